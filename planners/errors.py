@@ -1,0 +1,90 @@
+"""The one error tree.  Every error carries the exit code that the command line ends with.
+
+The codes follow Fast Downward's grouping: 1x proved impossible, 2x out of resources, 3x bad input.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A place in a file, for messages: ``file:line:column`` (both counted from 1)."""
+
+    file: str
+    line: int = 0
+    column: int = 0
+
+    def __str__(self) -> str:
+        if not self.line:
+            return self.file
+        return f"{self.file}:{self.line}:{self.column}"
+
+
+class CoordlangError(Exception):
+    """Base of all errors that a user may cause: what was wrong, where, and what to do about it.
+
+    Parameters
+    ----------
+    what
+        One sentence: what is wrong.
+    place
+        The file position it was found at, where there is one.
+    remedy
+        One sentence: what the user can do.
+    """
+
+    exit_code = 1
+
+    def __init__(self, what: str, *, place: Place | None = None, remedy: str | None = None) -> None:
+        super().__init__(what)
+        self.what = what
+        self.place = place
+        self.remedy = remedy
+
+    def __str__(self) -> str:
+        text = f"{self.place}: {self.what}" if self.place else self.what
+        return f"{text}\n  {self.remedy}" if self.remedy else text
+
+
+class Refuted(CoordlangError):
+    """A check ended with "no": the thing that was checked is not what it claims to be."""
+
+    exit_code = 1
+
+
+class UsageError(CoordlangError):
+    """The command line contradicts itself or the files it names."""
+
+    exit_code = 2
+
+
+class ProvedImpossible(CoordlangError):
+    """There is no answer, and this is proved (an unsolvable task, inseparable plans)."""
+
+    exit_code = 11
+
+
+class OutOfMemory(CoordlangError):
+    """The memory budget is used up, or an estimate says that it would be."""
+
+    exit_code = 22
+
+
+class OutOfTime(CoordlangError):
+    """The time limit is over."""
+
+    exit_code = 23
+
+
+class BadInput(CoordlangError):
+    """A file does not say what it must say."""
+
+    exit_code = 31
+
+
+class Unsupported(CoordlangError):
+    """A PDDL feature that coordlang does not read."""
+
+    exit_code = 34

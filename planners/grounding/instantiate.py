@@ -1,0 +1,274 @@
+"""Ground actions: arguments put in, static atoms, equalities and types evaluated, the rest in negation normal form."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import product
+
+from planners.errors import BadInput, Place
+from planners.grounding.reachability import reachable_arguments
+from planners.pddl.lifted import (
+    FALSE,
+    TRUE,
+    And,
+    Atom,
+    Domain,
+    Effect,
+    Equal,
+    Exists,
+    Forall,
+    Formula,
+    Not,
+    Or,
+    Problem,
+    Schema,
+    StepAtom,
+    Truth,
+    Variable,
+)
+from planners.robots import Team, fluent_predicates, objects_of, static_atoms
+
+Binding = dict[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class GroundEffect:
+    """``atom`` becomes true (``adds``) or false if ``condition`` holds before the step."""
+
+    atom: Atom
+    adds: bool
+    condition: Formula
+
+
+@dataclass(frozen=True, slots=True)
+class GroundAction:
+    """A ground action in negation normal form over fluent atoms and step atoms.
+
+    ``owners`` are the indices of the robots that choose it together; for joint-action PDDL they are all robots and
+    ``parts`` holds each robot's own label (None: idle).  ``cost`` is the PDDL action cost.  ``does_nothing`` says that
+    the action is as good as idling: it has no effect and no formula of the domain names it.
+    """
+
+    schema: str
+    args: tuple[str, ...]
+    owners: tuple[int, ...]
+    precondition: Formula
+    effects: tuple[GroundEffect, ...]
+    parts: tuple[str | None, ...] = ()
+    cost: int = 1
+    does_nothing: bool = False
+
+    @property
+    def label(self) -> str:
+        return label(self.schema, self.args)
+
+
+def label(name: str, args: Iterable[str]) -> str:
+    """PDDL syntax of a ground atom or action: ``(move r1 a b)``."""
+    return "(" + " ".join((name, *args)) + ")"
+
+
+def ground_actions(
+    domain: Domain, problem: Problem, team: Team, *, also: Iterable[Atom] = (), costs: bool = False
+) -> tuple[GroundAction, ...]:
+    """All ground actions that may ever be applied, sorted by schema (in domain order) and arguments.
+
+    Parameters
+    ----------
+    also
+        Fluent atoms of further initial states (other problems, task files).
+    costs
+        Whether PDDL action costs are wanted; else every cost is 1.
+
+    Raises
+    ------
+    BadInput
+        An action that no robot owns (``--unowned error``), or a missing cost value.
+    """
+    grounder = _Grounder(domain, problem, team)
+    reachable = reachable_arguments(domain, problem.objects, sorted({*problem.init, *also}, key=str))
+    actions = [
+        action
+        for schema in domain.schemas
+        for args in reachable[schema.name]
+        if (action := grounder.action(schema, args, costs)) is not None
+    ]
+    return tuple(actions)
+
+
+def ground_goal(domain: Domain, problem: Problem, goal: Formula) -> Formula:
+    """A goal formula over fluent atoms, in negation normal form."""
+    return _Grounder(domain, problem, Team((), "")).formula(goal, {}, True)
+
+
+class _Grounder:
+    def __init__(self, domain: Domain, problem: Problem, team: Team) -> None:
+        self._domain = domain
+        self._problem = problem
+        self._team = team
+        self._fluents = fluent_predicates(domain)
+        self._statics = static_atoms(domain, problem)
+        self._schemas = {schema.name: schema for schema in domain.schemas}
+        self._named = {atom.action for schema in domain.schemas for atom in _step_atoms(schema)}
+        self._members: dict[tuple[str, ...], tuple[str, ...]] = {}
+        self._atoms: dict[tuple[str, tuple[str, ...]], Atom] = {}
+
+    def action(self, schema: Schema, args: tuple[str, ...], costs: bool) -> GroundAction | None:
+        """The instance, or None if its precondition is false in every state."""
+        binding = {p.name: a for p, a in zip(schema.parameters, args, strict=True)}
+        if schema.parts:
+            owners = tuple(range(len(self._team.robots)))
+        else:
+            owners = self._team.owners(schema, args)
+        precondition = self.formula(schema.precondition, binding, True, acting=owners)
+        if precondition == FALSE:
+            return None
+        if not owners:
+            raise BadInput(
+                f"action {label(schema.name, args)} names no robot (robots: {', '.join(self._team.robots)})",
+                place=self._domain.source.place(schema.offset),
+                remedy="Say --unowned environment (one extra chooser owns such actions) "
+                "or --unowned shared (all robots choose them together).",
+            )
+        effects = tuple(e for effect in schema.effects for e in self._effect(effect, binding))
+        cost = self._cost(schema, binding) if costs else 1
+        return GroundAction(
+            schema=schema.name,
+            args=args,
+            owners=owners,
+            precondition=precondition,
+            effects=effects,
+            parts=self._parts(schema, binding),
+            cost=cost,
+            does_nothing=not effects and schema.name not in self._named,
+        )
+
+    def formula(
+        self, f: Formula, binding: Binding, positive: bool, acting: tuple[int, ...] = ()
+    ) -> Formula:
+        """``f`` (negated unless ``positive``) with arguments put in.
+
+        ``acting`` are the robots whose precondition this is: a negative step atom never speaks of them.
+        """
+        match f:
+            case Truth(value):
+                return TRUE if value == positive else FALSE
+            case Atom(predicate, args):
+                atom = self._atom(predicate, args, binding)
+                if predicate in self._fluents:
+                    return atom if positive else Not(atom)
+                return TRUE if (atom in self._statics) == positive else FALSE
+            case Equal(left, right):
+                same = binding.get(left, left) == binding.get(right, right)
+                return TRUE if same == positive else FALSE
+            case StepAtom(action, args):
+                return self._step_atom(action, tuple(binding.get(a, a) for a in args), positive, acting)
+            case Not(part):
+                return self.formula(part, binding, not positive, acting)
+            case And(parts) | Or(parts):
+                ground = (self.formula(part, binding, positive, acting) for part in parts)
+                return _join(ground, conjunction=isinstance(f, And) == positive)
+            case Forall(variables, part) | Exists(variables, part):
+                ground = (
+                    self.formula(part, inner, positive, acting)
+                    for inner in self._bindings(variables, binding)
+                )
+                return _join(ground, conjunction=isinstance(f, Forall) == positive)
+        raise AssertionError(f)
+
+    def _step_atom(
+        self, action: str, args: tuple[str, ...], positive: bool, acting: tuple[int, ...]
+    ) -> Formula:
+        schema = self._schemas[action]
+        if self._domain.is_joint_action:
+            raise BadInput(
+                f"action {action!r} is used as a formula in a joint-action domain",
+                place=self._domain.source.place(schema.offset),
+                remedy="A joint action already says what every robot does: use predicates only.",
+            )
+        for parameter, arg in zip(schema.parameters, args, strict=True):
+            if arg not in self._objects(parameter.types):
+                return FALSE if positive else TRUE
+        if not positive and set(self._team.owners(schema, args)) & set(acting):
+            return TRUE
+        atom = StepAtom(action, args)
+        return atom if positive else Not(atom)
+
+    def _effect(self, effect: Effect, binding: Binding) -> Iterator[GroundEffect]:
+        for inner in self._bindings(effect.variables, binding):
+            condition = self.formula(effect.condition, inner, True)
+            if condition != FALSE:
+                atom = self._atom(effect.atom.predicate, effect.atom.args, inner)
+                yield GroundEffect(atom, effect.adds, condition)
+
+    def _atom(self, predicate: str, args: tuple[str, ...], binding: Binding) -> Atom:
+        key = (predicate, tuple([binding.get(a, a) for a in args]))
+        atom = self._atoms.get(key)
+        if atom is None:
+            atom = self._atoms[key] = Atom(*key)
+        return atom
+
+    def _bindings(self, variables: tuple[Variable, ...], binding: Binding) -> Iterator[Binding]:
+        if not variables:
+            yield binding
+            return
+        names = [v.name for v in variables]
+        for values in product(*(self._objects(v.types) for v in variables)):
+            yield {**binding, **dict(zip(names, values, strict=True))}
+
+    def _objects(self, types: tuple[str, ...]) -> tuple[str, ...]:
+        if types not in self._members:
+            self._members[types] = objects_of(self._domain, self._problem, types)
+        return self._members[types]
+
+    def _parts(self, schema: Schema, binding: Binding) -> tuple[str | None, ...]:
+        if not schema.parts:
+            return ()
+        templates = {part.robot: part.template for part in schema.parts}
+        return tuple(
+            label(t[0], (binding.get(a, a) for a in t[1:])) if (t := templates.get(robot)) else None
+            for robot in self._team.robots
+        )
+
+    def _cost(self, schema: Schema, binding: Binding) -> int:
+        if schema.cost is None or isinstance(schema.cost, int):
+            return schema.cost or 0
+        atom = self._atom(schema.cost.predicate, schema.cost.args, binding)
+        value = self._problem.values.get(atom)
+        if value is None or value < 0 or value != int(value):
+            raise BadInput(
+                f"the cost {label(atom.predicate, atom.args)} has no whole value from 0 in the initial state",
+                place=Place(self._problem.source.name),
+            )
+        return int(value)
+
+
+def _join(parts: Iterable[Formula], *, conjunction: bool) -> Formula:
+    """A flat conjunction or disjunction with truth values simplified away."""
+    neutral, absorbing = (TRUE, FALSE) if conjunction else (FALSE, TRUE)
+    kind = And if conjunction else Or
+    kept: dict[Formula, None] = {}
+    for part in parts:
+        if part == absorbing:
+            return absorbing
+        if part == neutral:
+            continue
+        for inner in part.parts if isinstance(part, kind) else (part,):
+            kept[inner] = None
+    if not kept:
+        return neutral
+    return next(iter(kept)) if len(kept) == 1 else kind(tuple(kept))
+
+
+def _step_atoms(schema: Schema) -> Iterator[StepAtom]:
+    todo: list[Formula] = [schema.precondition, *(e.condition for e in schema.effects)]
+    while todo:
+        formula = todo.pop()
+        match formula:
+            case StepAtom():
+                yield formula
+            case Not(part) | Forall(_, part) | Exists(_, part):
+                todo.append(part)
+            case And(parts) | Or(parts):
+                todo += parts

@@ -1,0 +1,172 @@
+"""Which subactions of different robots may share a joint step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planners.grounding import GroundAction
+from planners.pddl.lifted import And, Atom, Formula, Not, Or, StepAtom
+
+
+@dataclass(frozen=True, slots=True)
+class Footprint:
+    """What an action touches, as the interference rule reads it.
+
+    Every literal left after grounding counts as required, also inside disjunctions and effect conditions;
+    conditional effects count as if they fired; an atom both deleted and added counts as added.  ``partners`` are the
+    actions that a positive literal of a precondition or effect condition names, ``excluded`` those that its
+    precondition as a whole forbids.
+    """
+
+    requires_true: frozenset[Atom]
+    requires_false: frozenset[Atom]
+    adds: frozenset[Atom]
+    deletes: frozenset[Atom]
+    partners: frozenset[StepAtom]
+    excluded: frozenset[StepAtom]
+
+
+def footprint(action: GroundAction) -> Footprint:
+    """The `Footprint` of a ground action."""
+    literals = [*_literals(action.precondition)]
+    for effect in action.effects:
+        literals += _literals(effect.condition)
+    adds = frozenset(e.atom for e in action.effects if e.adds)
+    return Footprint(
+        requires_true=frozenset(a for a, positive in literals if positive and isinstance(a, Atom)),
+        requires_false=frozenset(a for a, positive in literals if not positive and isinstance(a, Atom)),
+        adds=adds,
+        deletes=frozenset(e.atom for e in action.effects if not e.adds) - adds,
+        partners=frozenset(a for a, positive in literals if positive and isinstance(a, StepAtom)),
+        excluded=frozenset(
+            part.part
+            for part in conjuncts(action.precondition)
+            if isinstance(part, Not) and isinstance(part.part, StepAtom)
+        ),
+    )
+
+
+def conjuncts(formula: Formula) -> tuple[Formula, ...]:
+    """The parts that must all hold."""
+    return formula.parts if isinstance(formula, And) else (formula,)
+
+
+def _literals(formula: Formula) -> Iterable[tuple[Atom | StepAtom, bool]]:
+    match formula:
+        case Atom() | StepAtom():
+            yield formula, True
+        case Not(part):
+            assert isinstance(part, Atom | StepAtom)
+            yield part, False
+        case And(parts) | Or(parts):
+            for part in parts:
+                yield from _literals(part)
+
+
+def conflict(a: GroundAction, b: GroundAction) -> str | None:
+    """Why two subactions of different robots cannot share a step, in words; None if they can.
+
+    The rule of docs/pddl.md, read literally; `compatible` is the same for whole tables.
+    """
+    first, second = footprint(a), footprint(b)
+    for one, other, x, y in ((a, b, first, second), (b, a, second, first)):
+        if StepAtom(other.schema, other.args) in x.excluded:
+            return f"{one.label} forbids {other.label} in the same step"
+        if x.deletes & y.adds:
+            return f"{one.label} deletes {_show(x.deletes & y.adds)}, which {other.label} adds"
+    if _linked(a, b, first, second):
+        return None
+    for one, other, x, y in ((a, b, first, second), (b, a, second, first)):
+        if x.deletes & y.requires_true:
+            return f"{one.label} deletes {_show(x.deletes & y.requires_true)}, which {other.label} needs"
+        if x.adds & y.requires_false:
+            return f"{one.label} adds {_show(x.adds & y.requires_false)}, which {other.label} needs to be false"
+    return None
+
+
+def _linked(a: GroundAction, b: GroundAction, first: Footprint, second: Footprint) -> bool:
+    """Two actions meant to be done together: one names the other in a positive literal."""
+    return (
+        StepAtom(b.schema, b.args) in first.partners or StepAtom(a.schema, a.args) in second.partners
+    )
+
+
+def _show(atoms: frozenset[Atom]) -> str:
+    atom = min(atoms, key=str)
+    return "(" + " ".join((atom.predicate, *atom.args)) + ")"
+
+
+def compatible(
+    left: Sequence[GroundAction | None], right: Sequence[GroundAction | None], i: int, j: int
+) -> NDArray[np.bool_]:
+    """Table: may robot ``i`` do ``left[a]`` while robot ``j`` does ``right[b]``?  None is idling.
+
+    A shared subaction of both goes only with itself; one that only names other robots goes with idling too.
+    Bit rows make it O(|left| |right| facts / 64).
+    """
+    universe: dict[Atom, int] = {}
+    prints = [[footprint(a) if a else None for a in side] for side in (left, right)]
+    for side in prints:
+        for one in side:
+            for atoms in (one.requires_true, one.requires_false, one.adds, one.deletes) if one else ():
+                for atom in atoms:
+                    universe.setdefault(atom, len(universe))
+    fields = ("requires_true", "requires_false", "adds", "deletes")
+    (t1, f1, a1, d1), (t2, f2, a2, d2) = (
+        [_bit_table(universe, [getattr(p, f) if p else () for p in side]) for f in fields]
+        for side in prints
+    )
+    table = np.ones((len(left), len(right)), np.bool_)
+    numbers = {StepAtom(b.schema, b.args): n for n, b in enumerate(right) if b}
+    backwards: list[set[int]] = [set() for _ in left]  # columns whose action names this row
+    forbidden: list[set[int]] = [set() for _ in left]
+    rows = {StepAtom(a.schema, a.args): n for n, a in enumerate(left) if a}
+    for column, other in enumerate(prints[1]):
+        for partner in other.partners if other else ():
+            if partner in rows:
+                backwards[rows[partner]].add(column)
+        for excluded in other.excluded if other else ():
+            if excluded in rows:
+                forbidden[rows[excluded]].add(column)
+    for number, (action, one) in enumerate(zip(left, prints[0], strict=True)):
+        if action is None or one is None:
+            continue
+        hard = ((d1[number] & a2) | (a1[number] & d2)).any(axis=1)
+        soft = (d1[number] & t2 | t1[number] & d2 | a1[number] & f2 | f1[number] & a2).any(axis=1)
+        linked = backwards[number] | {numbers[p] for p in one.partners if p in numbers}
+        soft[sorted(linked)] = False
+        table[number] = ~(hard | soft)
+        out = forbidden[number] | {numbers[p] for p in one.excluded if p in numbers}
+        table[number, sorted(out)] = False
+    _share(table, left, right, i, j)
+    return table
+
+
+def _share(
+    table: NDArray[np.bool_],
+    left: Sequence[GroundAction | None],
+    right: Sequence[GroundAction | None],
+    i: int,
+    j: int,
+) -> None:
+    """A subaction owned by both robots is chosen by both or by neither."""
+    columns = {(b.schema, b.args): n for n, b in enumerate(right) if b and i in b.owners}
+    for column in columns.values():
+        table[:, column] = False
+    for row, action in enumerate(left):
+        if action and j in action.owners:
+            table[row, :] = False
+            table[row, columns[action.schema, action.args]] = True
+
+
+def _bit_table(universe: dict[Atom, int], sets: Sequence[Iterable[Atom]]) -> NDArray[np.uint64]:
+    table = np.zeros((len(sets), max(1, -(-len(universe) // 64))), np.uint64)
+    for row, atoms in enumerate(sets):
+        for atom in atoms:
+            number = universe[atom]
+            table[row, number // 64] |= np.uint64(1 << number % 64)
+    return table

@@ -1,0 +1,162 @@
+"""The nouns of lifted PDDL: formulas, effects, action schemas, domains, problems.
+
+All names are in lower case.  Formulas keep the user's structure; nothing is normalised here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from planners.pddl.sexpr import Source
+
+#: A term is a variable (``?x``) or the name of an object.
+Term = str
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A typed variable; ``types`` are alternatives, as in ``(either a b)``."""
+
+    name: str
+    types: tuple[str, ...] = ("object",)
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    value: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Atom:
+    """An atom over states: ``(predicate args)``."""
+
+    predicate: str
+    args: tuple[Term, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class StepAtom:
+    """An action used as a literal: "this subaction is part of the same joint step" (Kovacs 2012)."""
+
+    action: str
+    args: tuple[Term, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Equal:
+    left: Term
+    right: Term
+
+
+@dataclass(frozen=True, slots=True)
+class Not:
+    part: Formula
+
+
+@dataclass(frozen=True, slots=True)
+class And:
+    parts: tuple[Formula, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Or:
+    parts: tuple[Formula, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Forall:
+    variables: tuple[Variable, ...]
+    part: Formula
+
+
+@dataclass(frozen=True, slots=True)
+class Exists:
+    variables: tuple[Variable, ...]
+    part: Formula
+
+
+Formula = Truth | Atom | StepAtom | Equal | Not | And | Or | Forall | Exists
+TRUE = Truth(True)
+FALSE = Truth(False)
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """One literal effect with the variables it ranges over and its condition.
+
+    Nested ``forall`` and ``when`` are flattened: ``variables`` lists every enclosing universal variable,
+    outermost first, and ``condition`` is the conjunction of every enclosing condition.
+    """
+
+    atom: Atom
+    adds: bool
+    condition: Formula = TRUE
+    variables: tuple[Variable, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """``; subaction r1 (move ?f ?t)``: one robot's part of a joint-action schema (None: it idles)."""
+
+    robot: str
+    template: tuple[Term, ...] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Schema:
+    """An action schema.
+
+    ``agent`` is the index of the acting robot's parameter (MA-PDDL), None in plain PDDL; ``parts`` is
+    not empty exactly for joint-action PDDL; ``cost`` is the ``(increase (total-cost) ..)`` term: a number,
+    a function term, or None.  ``offset`` points into the domain's source.
+    """
+
+    name: str
+    parameters: tuple[Variable, ...]
+    agent: int | None
+    precondition: Formula
+    effects: tuple[Effect, ...]
+    parts: tuple[Part, ...] = ()
+    cost: int | Atom | None = None
+    offset: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Domain:
+    """A domain; ``types`` maps each type to its direct supertypes, ``predicates`` a name to its arities."""
+
+    name: str
+    source: Source
+    types: dict[str, tuple[str, ...]]
+    constants: dict[str, tuple[str, ...]]
+    predicates: dict[str, frozenset[int]]
+    functions: dict[str, frozenset[int]]
+    schemas: tuple[Schema, ...]
+
+    @property
+    def is_joint_action(self) -> bool:
+        """Whether the schemas are whole joint actions (``; subaction`` comments)."""
+        return any(schema.parts for schema in self.schemas)
+
+    def supertypes(self, name: str) -> frozenset[str]:
+        """The type itself, every type above it, and ``object``."""
+        seen = {name, "object"}
+        todo = [name]
+        while todo:
+            for parent in self.types.get(todo.pop(), ()):
+                if parent not in seen:
+                    seen.add(parent)
+                    todo.append(parent)
+        return frozenset(seen)
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """A problem; ``init`` holds the ground atoms that are true, ``values`` the numeric constants."""
+
+    name: str
+    source: Source
+    objects: dict[str, tuple[str, ...]]
+    init: frozenset[Atom]
+    goal: Formula
+    values: dict[Atom, float] = field(default_factory=dict)

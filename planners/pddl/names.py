@@ -1,0 +1,168 @@
+"""Typed lists and the names that a text may use, with helpful errors for the ones it may not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+
+from planners.errors import BadInput, Unsupported
+from planners.pddl.lifted import Variable
+from planners.pddl.sexpr import Document, Expression, Group, Word
+
+
+def known(names: Iterable[str], wrong: str, what: str) -> str:
+    """A remedy: the close match among ``names`` if there is one, else all of them (the first ten)."""
+    names = sorted(names)
+    close = get_close_matches(wrong, names, n=1)
+    if close:
+        return f"Did you mean {close[0]!r}?"
+    if not names:
+        return f"No {what} is declared."
+    listed = ", ".join(names[:10]) + (", .." if len(names) > 10 else "")
+    return f"Declared {what}s: {listed}."
+
+
+def word(document: Document, item: Expression, what: str) -> Word:
+    """``item`` as a single word, or an error that says what was expected there."""
+    if isinstance(item, Word):
+        return item
+    raise document.fail(f"expected {what}, found a list", item)
+
+
+def group(document: Document, item: Expression, what: str) -> Group:
+    """``item`` as a list, or an error that says what was expected there."""
+    if isinstance(item, Group):
+        return item
+    raise document.fail(f"expected {what}, found {item.text!r}", item)
+
+
+@dataclass(frozen=True, slots=True)
+class Typed:
+    """One entry of a typed list."""
+
+    word: Word
+    types: tuple[str, ...]
+
+
+def typed_list(document: Document, items: Sequence[Expression], what: str) -> list[Typed]:
+    """Read ``a b - t c - (either u v) d``; entries without a type get ``object``.
+
+    Raises `BadInput` where a dash has no names before or no type behind it.
+    """
+    entries: list[Typed] = []
+    waiting: list[Word] = []
+    position = 0
+    while position < len(items):
+        item = word(document, items[position], what)
+        if item.text != "-":
+            waiting.append(item)
+            position += 1
+            continue
+        if position + 1 == len(items):
+            raise document.fail("expected a type after '-'", item)
+        if not waiting:
+            raise document.fail(f"expected {what} before '-'", item)
+        types = _types(document, items[position + 1])
+        entries += [Typed(name, types) for name in waiting]
+        waiting = []
+        position += 2
+    return entries + [Typed(name, ("object",)) for name in waiting]
+
+
+def _types(document: Document, item: Expression) -> tuple[str, ...]:
+    if isinstance(item, Word):
+        return (item.text,)
+    if item.head != "either" or len(item) < 2:
+        raise document.fail("expected a type or '(either type ..)'", item)
+    return tuple(word(document, part, "a type").text for part in item.items[1:])
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """What a formula may speak of: types, predicates, actions, objects and the variables in scope.
+
+    ``actions`` maps each action to its number of arguments (the agent counted, first).
+    """
+
+    document: Document
+    types: frozenset[str]
+    predicates: dict[str, frozenset[int]]
+    functions: dict[str, frozenset[int]] = field(default_factory=dict)
+    actions: dict[str, int] = field(default_factory=dict)
+    objects: frozenset[str] = frozenset()
+    variables: frozenset[str] = frozenset()
+
+    def with_variables(self, variables: Iterable[Variable]) -> Names:
+        """The same names with more variables in scope; a variable of the same name is shadowed."""
+        return Names(
+            self.document,
+            self.types,
+            self.predicates,
+            self.functions,
+            self.actions,
+            self.objects,
+            self.variables | {v.name for v in variables},
+        )
+
+    def read_variables(self, items: Sequence[Expression]) -> tuple[Variable, ...]:
+        """A typed list of variables; their types must be declared."""
+        variables = []
+        for entry in typed_list(self.document, items, "a variable"):
+            if not entry.word.text.startswith("?"):
+                raise self.document.fail(
+                    f"expected a variable, found {entry.word.text!r}",
+                    entry.word,
+                    f"Variables start with '?': ?{entry.word.text}.",
+                )
+            self.check_types(entry)
+            if any(v.name == entry.word.text for v in variables):
+                raise self.document.fail(
+                    f"variable {entry.word.text} is declared twice", entry.word
+                )
+            variables.append(Variable(entry.word.text, entry.types))
+        return tuple(variables)
+
+    def check_types(self, entry: Typed) -> None:
+        for name in entry.types:
+            if name not in self.types and name != "object":
+                raise self.document.fail(
+                    f"type {name!r} of {entry.word.text!r} is not declared",
+                    entry.word,
+                    known(self.types, name, "type"),
+                )
+
+    def term(self, item: Expression) -> str:
+        """A variable in scope or a declared object."""
+        if isinstance(item, Group):
+            if item.head in self.functions:
+                raise Unsupported(
+                    f"numeric or object fluent ({item.head} ..) inside a formula",
+                    place=self.document.source.place(item.offset),
+                    remedy="coordlang reads functions only in '(increase (total-cost) ..)'.",
+                )
+            raise self.document.fail("expected a variable or an object, found a list", item)
+        if item.text.startswith("?"):
+            if item.text not in self.variables:
+                raise self.document.fail(
+                    f"variable {item.text} is not declared here",
+                    item,
+                    known(self.variables, item.text, "variable"),
+                )
+        elif item.text not in self.objects:
+            raise self.document.fail(
+                f"object {item.text!r} is not declared",
+                item,
+                known(self.objects, item.text, "object"),
+            )
+        return item.text
+
+    def arity(self, item: Group, name: str, arities: Iterable[int], what: str) -> BadInput | None:
+        """The error for a wrong number of arguments, or None."""
+        found = len(item) - 1
+        if found in arities:
+            return None
+        wanted = " or ".join(str(n) for n in sorted(arities))
+        return self.document.fail(
+            f"{what} {name!r} takes {wanted} arguments, found {found}", item
+        )

@@ -1,0 +1,110 @@
+"""A problem file -> `Problem`."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from planners.errors import Unsupported
+from planners.pddl.domain import read_header, read_objects
+from planners.pddl.formulas import read_formula
+from planners.pddl.lifted import Atom, Domain, Formula, Problem
+from planners.pddl.names import Names, group, word
+from planners.pddl.sexpr import Document, Group, Source, Word, parse, read_source
+
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)$")
+
+
+def read_problem(path: str | Path, domain: Domain) -> Problem:
+    """Read a problem file of ``domain``; see `parse_problem`."""
+    return parse_problem(read_source(path), domain)
+
+
+def parse_problem(source: Source, domain: Domain) -> Problem:
+    """Read a problem.
+
+    Raises `BadInput` (with place and remedy) for anything that ``domain`` does not declare, a problem of another
+    domain, or a missing goal; `Unsupported` for timed literals and the like.
+    """
+    document = parse(source)
+    name, sections = read_header(document, "problem")
+    for section in sections.get(":domain", ()):
+        other = word(document, section.items[1], "the name of the domain").text if len(section) > 1 else ""
+        if other != domain.name:
+            raise document.fail(
+                f"this is a problem for domain {other!r}, not for {domain.name!r}",
+                section,
+                f"The domain was read from {domain.source.name}.",
+            )
+    names = Names(document, frozenset(domain.types), domain.predicates, domain.functions)
+    objects = dict(domain.constants)
+    for section in sections.get(":objects", ()):
+        read_objects(names, section.items[1:], objects)
+    names = Names(
+        document, names.types, names.predicates, names.functions, {}, frozenset(objects)
+    )
+    init: set[Atom] = set()
+    values: dict[Atom, float] = {}
+    for section in sections.get(":init", ()):
+        for item in section.items[1:]:
+            _read_init(names, group(document, item, "an atom in parentheses"), init, values)
+    return Problem(name, source, objects, frozenset(init), _read_goal(names, document, sections), values)
+
+
+def _read_goal(
+    names: Names, document: Document, sections: dict[str, list[Group]]
+) -> Formula:
+    goals = sections.get(":goal", [])
+    if len(goals) != 1 or len(goals[0]) != 2:
+        raise document.fail(
+            "expected one '(:goal FORMULA)'", goals[0] if goals else document.root
+        )
+    return read_formula(names, goals[0].items[1])
+
+
+def _read_init(
+    names: Names, item: Group, init: set[Atom], values: dict[Atom, float]
+) -> None:
+    document = names.document
+    head = item.head
+    if head == "and":
+        for part in item.items[1:]:
+            _read_init(names, group(document, part, "an atom in parentheses"), init, values)
+        return
+    if head == "not" and len(item) == 2:
+        read_formula(names, item.items[1])  # closed world: checked, and nothing to add
+        return
+    if head == "=" and len(item) == 3 and isinstance(item.items[1], Group):
+        _read_value(names, item, values)
+        return
+    second = item.items[1] if len(item) > 1 else None
+    if head == "at" and len(item) == 3 and isinstance(item.items[2], Group):
+        raise Unsupported(
+            "timed initial literals are not supported",
+            place=document.source.place(item.offset),
+            remedy="coordlang reads classical PDDL: list what is true at the start.",
+        )
+    if head in ("oneof", "unknown", "or") and isinstance(second, Group):
+        raise Unsupported(
+            f"an uncertain initial state '({head} ..)' is not supported",
+            place=document.source.place(item.offset),
+        )
+    atom = read_formula(names, item)
+    if not isinstance(atom, Atom):
+        raise document.fail("expected an atom in the initial state", item)
+    init.add(atom)
+
+
+def _read_value(names: Names, item: Group, values: dict[Atom, float]) -> None:
+    document = names.document
+    function = group(document, item.items[1], "a function in parentheses")
+    number = item.items[2]
+    if function.head not in names.functions and function.head != "total-cost":
+        raise document.fail(f"unknown function {function.head!r}", function)
+    if not isinstance(number, Word) or not _NUMBER.match(number.text):
+        raise Unsupported(
+            "a function value that is no number is not supported",
+            place=document.source.place(item.offset),
+        )
+    args = tuple(names.term(term) for term in function.items[1:])
+    values[Atom(function.head, args)] = float(number.text)

@@ -1,0 +1,166 @@
+"""Text -> s-expressions that know where they stand, and the comments between them.
+
+The reader is iterative, so deep nesting costs an error message and not the stack.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Iterator
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+from planners.errors import BadInput, Place
+
+#: Deeper nesting than this is refused: no domain needs it, and the passes behind recurse.
+MAX_DEPTH = 200
+
+_TOKEN = re.compile(r";[^\n\r]*|[()]|[^\s();]+")
+
+
+class Source:
+    """A text with a name: turns offsets into places for messages."""
+
+    __slots__ = ("_line_starts", "name", "text")
+
+    def __init__(self, name: str, text: str) -> None:
+        self.name = name
+        self.text = text
+        self._line_starts: list[int] | None = None
+
+    def place(self, offset: int) -> Place:
+        """The line and column (from 1) of a character offset."""
+        if self._line_starts is None:
+            self._line_starts = [0, *(m.end() for m in re.finditer(r"\n", self.text))]
+        line = bisect_right(self._line_starts, offset)
+        return Place(self.name, line, offset - self._line_starts[line - 1] + 1)
+
+    @property
+    def sha256(self) -> str:
+        return sha256(self.text.encode()).hexdigest()
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """An atom of the text, in lower case (PDDL does not distinguish case)."""
+
+    text: str
+    offset: int
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """A parenthesised list; ``end`` is the offset of its closing parenthesis."""
+
+    items: tuple[Word | Group, ...]
+    offset: int
+    end: int
+
+    @property
+    def head(self) -> str:
+        """The first word, or the empty string."""
+        first = self.items[0] if self.items else None
+        return first.text if isinstance(first, Word) else ""
+
+    def __iter__(self) -> Iterator[Word | Group]:
+        return iter(self.items)
+
+    def __len__(self) -> int:
+        return len(self.items)
+
+
+Expression = Word | Group
+
+
+@dataclass(frozen=True, slots=True)
+class Comment:
+    """A comment without its semicolons."""
+
+    text: str
+    offset: int
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """The one top-level expression of a PDDL file, with its comments."""
+
+    source: Source
+    root: Group
+    comments: tuple[Comment, ...]
+
+    def fail(self, what: str, at: Expression | Comment, remedy: str | None = None) -> BadInput:
+        """An error that points at an expression (the caller raises it)."""
+        return BadInput(what, place=self.source.place(at.offset), remedy=remedy)
+
+
+def read_source(path: str | Path) -> Source:
+    """The text of a file.
+
+    Raises `BadInput` for a file that is missing, unreadable or no text.
+    """
+    name = str(path)
+    try:
+        data = Path(path).read_bytes()
+    except FileNotFoundError:
+        raise BadInput("there is no such file", place=Place(name)) from None
+    except OSError as error:
+        raise BadInput(f"cannot be read: {error.strerror}", place=Place(name)) from None
+    try:
+        return Source(name, data.decode("utf-8-sig"))
+    except UnicodeDecodeError:
+        # Old benchmark files hold Latin-1 in their comments; a zero byte is no text in any encoding.
+        if b"\0" in data:
+            raise BadInput("this is a binary file, not PDDL text", place=Place(name)) from None
+        return Source(name, data.decode("latin-1"))
+
+
+def parse(source: Source) -> Document:
+    """Read the one top-level expression of ``source``.
+
+    Raises `BadInput` for unbalanced parentheses, text outside of them, or nesting beyond `MAX_DEPTH`.
+    """
+    comments: list[Comment] = []
+    open_groups: list[tuple[int, list[Expression]]] = []
+    root: Group | None = None
+    for match in _TOKEN.finditer(source.text):
+        token, offset = match.group(), match.start()
+        if token[0] == ";":
+            comments.append(Comment(token.lstrip(";").strip().lower(), offset))
+        elif root is not None:
+            raise BadInput(
+                f"unexpected {token[:40]!r} after the end of the definition",
+                place=source.place(offset),
+                remedy="Expected the end of the file: a parenthesis too many before this place?",
+            )
+        elif token == "(":
+            if len(open_groups) >= MAX_DEPTH:
+                raise BadInput(f"nested more than {MAX_DEPTH} deep", place=source.place(offset))
+            open_groups.append((offset, []))
+        elif token == ")":
+            if not open_groups:
+                raise BadInput("')' without a '('", place=source.place(offset))
+            start, items = open_groups.pop()
+            group = Group(tuple(items), start, offset)
+            if open_groups:
+                open_groups[-1][1].append(group)
+            else:
+                root = group
+        elif not open_groups:
+            raise BadInput(
+                f"expected '(define ...', found {token[:40]!r}", place=source.place(offset)
+            )
+        else:
+            open_groups[-1][1].append(Word(token.lower(), offset))
+    if open_groups:
+        start, items = open_groups[-1]
+        first = items[0].text if items and isinstance(items[0], Word) else ""
+        raise BadInput(
+            f"the '({first}' that opens here is never closed",
+            place=source.place(start),
+            remedy=f"Expected {len(open_groups)} more ')' before the end of the file.",
+        )
+    if root is None:
+        raise BadInput("expected '(define ...', found an empty file", place=Place(source.name))
+    return Document(source, root, tuple(comments))

@@ -1,0 +1,181 @@
+"""Who acts: the robots of a problem and the owners of an action."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from planners.errors import BadInput, Place, UsageError
+from planners.pddl.lifted import Atom, Domain, Problem, Schema
+
+Unowned = Literal["error", "environment", "shared"]
+
+#: The name of the extra chooser that owns the actions of nobody under ``--unowned environment``.
+ENVIRONMENT = "environment"
+
+
+def natural(name: str) -> tuple[tuple[int, int, str], ...]:
+    """A sort key in which ``r2`` comes before ``r10``."""
+    parts = re.split(r"(\d+)", name)
+    return tuple((1, int(p), p) if p.isdigit() else (0, 0, p) for p in parts)
+
+
+@dataclass(frozen=True, slots=True)
+class RobotChoice:
+    """What the user said about robots (``--robots``, ``--robot-type``, ``--unowned``)."""
+
+    names: tuple[str, ...] = ()
+    type: str | None = None
+    unowned: Unowned = "error"
+
+
+@dataclass(frozen=True, slots=True)
+class Team:
+    """The choosers of a joint step, in natural order of their names.
+
+    ``by`` says how they were found, for `coordlang inspect`.  With ``--unowned environment`` the last one is
+    the environment.
+    """
+
+    robots: tuple[str, ...]
+    by: str
+    unowned: Unowned = "error"
+
+    def owners(self, schema: Schema, args: tuple[str, ...]) -> tuple[int, ...]:
+        """The indices of the robots that must choose this subaction together (usually one).
+
+        The ``:agent`` if the schema has one, else the robots among its arguments, else whoever
+        ``unowned`` names; empty if nobody.
+        """
+        if schema.agent is not None:
+            return (self.robots.index(args[schema.agent]),)
+        found = tuple(sorted({self.robots.index(arg) for arg in args if arg in self.robots}))
+        if found or self.unowned == "error":
+            return found
+        if self.unowned == "environment":
+            return (len(self.robots) - 1,)
+        return tuple(range(len(self.robots)))
+
+
+def objects_of(domain: Domain, problem: Problem, types: Sequence[str]) -> tuple[str, ...]:
+    """The objects that belong to one of ``types``, in natural order."""
+    wanted = set(types)
+    found = [
+        name
+        for name, own in problem.objects.items()
+        if "object" in wanted or any(domain.supertypes(t) & wanted for t in own)
+    ]
+    return tuple(sorted(found, key=natural))
+
+
+def find_team(domain: Domain, problem: Problem, choice: RobotChoice) -> Team:
+    """The robots: from subaction comments, ``:agent``, the user's choice, or by detection.
+
+    Raises
+    ------
+    BadInput
+        No robot, or more than one way to tell who the robots are (the candidates are listed).
+    UsageError
+        The user's choice contradicts the files or names an unknown object or type.
+    """
+    declared = _declared(domain, problem)
+    if declared is not None:
+        robots, by = declared
+        if choice.names and set(choice.names) != set(robots):
+            raise UsageError(
+                f"--robots {','.join(choice.names)} contradicts the domain",
+                remedy=f"The robots are {', '.join(robots)} (by {by}).",
+            )
+    elif choice.names:
+        for name in choice.names:
+            if name not in problem.objects:
+                raise UsageError(f"--robots: there is no object {name!r}",
+                                 remedy=f"Objects: {', '.join(sorted(problem.objects, key=natural))}.")  # fmt: skip
+        robots, by = tuple(sorted(set(choice.names), key=natural)), "--robots"
+    elif choice.type:
+        robots, by = _of_kind(domain, problem, choice.type), f"--robot-type {choice.type}"
+        if not robots:
+            raise UsageError(f"--robot-type: nothing has type or predicate {choice.type!r}",
+                             remedy=f"Candidates: {', '.join(_candidates(domain, problem)) or 'none'}.")  # fmt: skip
+    else:
+        robots, by = _detect(domain, problem)
+    if not robots:
+        raise BadInput(
+            "there is no robot in this problem",
+            place=Place(problem.source.name),
+            remedy=f"Robots are found by {by}; declare at least one such object.",
+        )
+    if choice.unowned == "environment" and _has_unowned(domain, robots):
+        robots = (*robots, ENVIRONMENT)
+    return Team(robots, by, choice.unowned)
+
+
+def _declared(domain: Domain, problem: Problem) -> tuple[tuple[str, ...], str] | None:
+    if domain.is_joint_action:
+        names = {part.robot for schema in domain.schemas for part in schema.parts}
+        return tuple(sorted(names, key=natural)), "subaction comments"
+    agents = [schema.parameters[schema.agent] for schema in domain.schemas if schema.agent is not None]
+    if not agents:
+        return None
+    types = tuple(sorted({t for agent in agents for t in agent.types}))
+    return objects_of(domain, problem, types), f":agent of type {', '.join(types)}"
+
+
+def _of_kind(domain: Domain, problem: Problem, kind: str) -> tuple[str, ...]:
+    """Objects of a type, or objects of which a unary predicate of that name is true at the start."""
+    if kind in domain.types:
+        return objects_of(domain, problem, (kind,))
+    names = [a.args[0] for a in problem.init if a.predicate == kind and len(a.args) == 1]
+    return tuple(sorted(names, key=natural))
+
+
+def _detect(domain: Domain, problem: Problem) -> tuple[tuple[str, ...], str]:
+    for kind in ("robot", "agent"):
+        robots = _of_kind(domain, problem, kind)
+        if robots:
+            return robots, f"type {kind}"
+    candidates = _candidates(domain, problem)
+    if len(candidates) == 1:
+        return _of_kind(domain, problem, candidates[0]), f"type {candidates[0]}"
+    raise BadInput(
+        "which objects are the robots? " + ("Several types could be" if candidates else "No type could be"),
+        place=Place(domain.source.name),
+        remedy="Say --robot-type TYPE or --robots NAME,NAME."
+        + (f" Every action takes one of: {', '.join(candidates)}." if candidates else ""),
+    )
+
+
+def _candidates(domain: Domain, problem: Problem) -> list[str]:
+    """The most specific types (or unary type predicates) of which every action takes an object."""
+    found = [
+        kind
+        for kind in sorted(domain.types)
+        if objects_of(domain, problem, (kind,))
+        and all(
+            any(all(kind in domain.supertypes(t) for t in p.types) for p in schema.parameters)
+            for schema in domain.schemas
+        )
+    ]
+    return [
+        kind
+        for kind in found
+        if not any(other != kind and kind in domain.supertypes(other) for other in found)
+    ]
+
+
+def _has_unowned(domain: Domain, robots: tuple[str, ...]) -> bool:
+    """Whether some schema might be grounded without a robot (decided finally at grounding)."""
+    return any(schema.agent is None and not schema.parts for schema in domain.schemas)
+
+
+def static_atoms(domain: Domain, problem: Problem) -> frozenset[Atom]:
+    """The initial atoms that no action can change."""
+    changed = fluent_predicates(domain)
+    return frozenset(atom for atom in problem.init if atom.predicate not in changed)
+
+
+def fluent_predicates(domain: Domain) -> frozenset[str]:
+    """Predicates that occur in some action's effect."""
+    return frozenset(e.atom.predicate for schema in domain.schemas for e in schema.effects)

@@ -1,0 +1,77 @@
+"""The reachable joint states as numpy arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from planners.conditions import Labels
+from planners.joint import JointModel, Steps
+from planners.matching import Ints
+from planners.states import Rows, find_rows, unique_rows
+
+#: States expanded at a time; bounds the memory of one expansion.
+BLOCK = 20_000
+
+
+@dataclass(frozen=True, slots=True)
+class Space:
+    """All states reachable from some initial states, with every joint step between them.
+
+    ``rows`` (states, words) are sorted; a state's *number* is its position there.  ``first`` (states + 1) delimits
+    the steps out of a state in ``target``, ``labels`` (steps, robots) and ``cost``, sorted by labels (CSR).
+    """
+
+    model: JointModel
+    rows: Rows
+    first: Ints
+    target: Ints
+    labels: Labels
+    cost: Ints
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def numbers(self, rows: Rows) -> Ints:
+        """The numbers of states given as rows, -1 for those that are not reachable."""
+        return find_rows(self.rows, rows)
+
+
+def blocks(model: JointModel, rows: Rows) -> Iterator[tuple[int, Steps]]:
+    """`JointModel.successors` of a long table in pieces: (number of the piece's first row, its steps)."""
+    for start in range(0, len(rows), BLOCK):
+        yield start, model.successors(rows[start : start + BLOCK])
+
+
+def explore(model: JointModel, inits: Rows) -> Space:
+    """Breadth-first search from all ``inits`` (a table of rows) to the end.
+
+    Time and memory are linear in the number of joint steps.
+    """
+    layer, _ = unique_rows(inits)
+    seen = layer
+    sources: list[Rows] = []
+    found: list[Steps] = []
+    while len(layer):
+        fresh: list[Rows] = []
+        for start, steps in blocks(model, layer):
+            sources.append(layer[start : start + BLOCK])
+            found.append(steps)
+            fresh.append(unique_rows(steps.result)[0])
+        new, _ = unique_rows(np.concatenate(fresh))
+        layer = new[find_rows(seen, new) < 0]
+        seen, _ = unique_rows(np.concatenate((seen, layer)))
+    source = np.concatenate(
+        [find_rows(seen, rows)[steps.source] for rows, steps in zip(sources, found, strict=True)]
+    )
+    order = np.argsort(source, kind="stable")
+    return Space(
+        model=model,
+        rows=seen,
+        first=np.searchsorted(source[order], np.arange(len(seen) + 1)),
+        target=np.concatenate([find_rows(seen, s.result) for s in found])[order],
+        labels=np.concatenate([s.labels for s in found])[order],
+        cost=np.concatenate([s.cost for s in found])[order],
+    )
