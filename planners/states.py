@@ -29,10 +29,10 @@ class StateCodec:
     facts: tuple[str, ...]
     robots: tuple[str, ...] = ()
     memory: tuple[tuple[str, ...], ...] | None = None
-    index: dict[str, int] = field(default_factory=dict, compare=False, repr=False)
+    index: dict[str, int] = field(init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        self.index.update({fact: number for number, fact in enumerate(self.facts)})
+        object.__setattr__(self, "index", {fact: number for number, fact in enumerate(self.facts)})
 
     @property
     def fact_words(self) -> int:

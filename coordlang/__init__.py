@@ -1,0 +1,1 @@
+"""Coordination languages: the fewest words that let robots plan on their own and still act together."""

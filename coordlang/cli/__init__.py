@@ -1,0 +1,51 @@
+"""The command line: arguments and rendering only.
+
+Data goes to stdout, logs and progress to stderr.  Exit codes are an interface (docs/cli.md).
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import NoReturn
+
+import click
+
+from coordlang.cli.app import EXIT_INTERRUPTED, cli
+from planners.errors import CoordlangError, OutOfMemory
+
+
+def main() -> NoReturn:
+    """Run the command line and end the process with its exit code."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command; the exit code.  No traceback reaches a user without ``--debug``."""
+    debug = "--debug" in arguments
+    try:
+        result = cli.main(args=arguments, prog_name="coordlang", standalone_mode=False)
+        sys.stdout.flush()
+        return result if isinstance(result, int) else 0
+    except click.exceptions.Exit as done:
+        return int(done.exit_code)
+    except (KeyboardInterrupt, click.Abort):
+        return _fail("interrupted", EXIT_INTERRUPTED)
+    except click.ClickException as error:
+        error.show(file=sys.stderr)
+        return 2
+    except BrokenPipeError:
+        # The reader has gone (`| head`): no more output, and no complaint at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except MemoryError:
+        return _fail("out of memory\n  Use a smaller task, or a larger --memory-limit.", OutOfMemory.exit_code)
+    except CoordlangError as error:
+        if debug:
+            raise
+        return _fail(str(error), error.exit_code)
+
+
+def _fail(message: str, code: int) -> int:
+    print(f"coordlang: {message}", file=sys.stderr)
+    return code

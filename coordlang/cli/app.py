@@ -1,0 +1,171 @@
+"""The command group and the options that several commands share."""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from planners.model import ModelOptions
+
+EXIT_INTERRUPTED = 130
+
+#: Command -> its module below `coordlang.cli`; imported when it is called.
+COMMANDS = {
+    "plans": "plans",
+    "check": "check",
+    "coordination": "coordination",
+    "build": "build",
+    "verify": "verify",
+    "explain": "explain",
+    "schema": "schema",
+}
+
+
+class _LazyGroup(click.Group):
+    """Imports a command's module only when the command is called or its help is asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        module = importlib.import_module(f"coordlang.cli.{COMMANDS[cmd_name]}")
+        command: click.Command = module.command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(SUMMARIES.items()))
+
+
+#: One line a command, so that ``--help`` need not import them all.
+SUMMARIES = {
+    "plans": "Count, list or sample all optimal plans of a task.",
+    "check": "Compare our optimal cost with Fast Downward's.",
+    "coordination": "Say which tasks require coordination, with a miscoordination shown.",
+    "build": "Build a coordination language and verify it.",
+    "verify": "Check by definition that a file holds a coordination language.",
+    "explain": "Show a language so that a person understands it.",
+    "schema": "Print the JSON Schema of language files.",
+}
+
+
+@click.group(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(package_name="coordlang")
+def cli() -> None:
+    """Coordination languages for robots that plan on their own and act together.
+
+    DOMAIN and PROBLEM are PDDL files, in that order.
+    """
+
+
+def _size(_context: click.Context, _parameter: click.Parameter, value: str | None) -> int | None:
+    if value is None:
+        return None
+    match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([kmgt]?)i?b?", value.strip().lower())
+    if not match:
+        raise click.BadParameter("expected a size such as 500M or 4G")
+    return int(float(match[1]) * 1024 ** " kmgt".index(match[2] or " "))
+
+
+def limits(function: Callable[..., Any]) -> Callable[..., Any]:
+    """``--time-limit``, ``--memory-limit`` and ``--debug``; the command runs under them."""
+
+    @click.option("--time-limit", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS",
+                  help="Stop after this long (exit 23).")
+    @click.option("--memory-limit", callback=_size, metavar="SIZE", help="Stop before using more, e.g. 4G (exit 22).")
+    @click.option("--debug", is_flag=True, help="Show tracebacks.")
+    @functools.wraps(function)
+    def wrapped(time_limit: float | None, memory_limit: int | None, debug: bool, **arguments: Any) -> Any:
+        from planners.limits import limit_memory, time_limit as limit_time
+
+        limit_memory(memory_limit)
+        with limit_time(time_limit):
+            return function(**arguments)
+
+    return wrapped
+
+
+def model_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """How the PDDL files are understood; the command gets one `ModelOptions` as ``options``."""
+
+    @click.option("--robots", metavar="R1,R2", help="The robots, where the domain does not say.")
+    @click.option("--robot-type", metavar="TYPE", help="The type (or unary predicate) of the robots.")
+    @click.option("--unowned", type=click.Choice(["error", "environment", "shared"]), default=None,
+                  help="Who owns actions that name no robot.")
+    @click.option("--cost", type=click.Choice(["makespan", "makespan+actions", "makespan+cost"]), default=None,
+                  help="What optimal means (default: makespan).")
+    @click.option("--remember-actions", is_flag=True, help="Add each robot's last subaction to the state.")
+    @functools.wraps(function)
+    def wrapped(
+        robots: str | None,
+        robot_type: str | None,
+        unowned: str | None,
+        cost: str | None,
+        remember_actions: bool,
+        **arguments: Any,
+    ) -> Any:
+        given = GivenOptions(robots, robot_type, unowned, cost, remember_actions)
+        return function(given=given, **arguments)
+
+    return wrapped
+
+
+class GivenOptions:
+    """The model options as the user gave them; None where he said nothing."""
+
+    def __init__(
+        self,
+        robots: str | None,
+        robot_type: str | None,
+        unowned: str | None,
+        cost: str | None,
+        remember_actions: bool,
+    ) -> None:
+        self.robots = tuple(r.strip().lower() for r in robots.split(",") if r.strip()) if robots else ()
+        self.robot_type = robot_type.lower() if robot_type else None
+        self.unowned: Any = unowned
+        self.cost: Any = cost
+        self.remember_actions = remember_actions
+
+    def options(self) -> ModelOptions:
+        from planners.model import ModelOptions
+        from planners.robots import RobotChoice
+
+        choice = RobotChoice(self.robots, self.robot_type, self.unowned or "error")
+        return ModelOptions(choice, self.cost or "makespan", self.remember_actions)
+
+    def for_language(self, language: Any) -> ModelOptions:
+        """The language's own options; `UsageError` where the user's contradict them."""
+        from coordlang.file import options_of
+        from planners.robots import RobotChoice
+
+        choice = RobotChoice(self.robots, self.robot_type, self.unowned or "error")
+        return options_of(language, robots=choice, cost=self.cost, remember_actions=self.remember_actions)
+
+
+def read_files(domain: str, problems: tuple[str, ...]) -> tuple[Any, list[Any]]:
+    """Read a domain and its problems."""
+    from planners.pddl import read_domain, read_problem
+
+    lifted = read_domain(domain)
+    return lifted, [read_problem(path, lifted) for path in problems]
+
+
+def note_single_robot(robots: tuple[str, ...]) -> None:
+    """One robot is no mistake in itself, but surely not what this program is for."""
+    if len(robots) == 1:
+        click.echo(f"coordlang: note: {robots[0]} is the only robot: there is nothing to coordinate", err=True)
+
+
+domain_argument = click.argument("domain", type=click.Path())
+problem_argument = click.argument("problem", type=click.Path())
+problems_argument = click.argument("problems", type=click.Path(), nargs=-1, required=True)
+language_argument = click.argument("language", type=click.Path())

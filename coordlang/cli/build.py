@@ -1,0 +1,146 @@
+"""``coordlang build``: a verified language for candidate tasks."""
+
+from __future__ import annotations
+
+import json
+import sys
+from importlib.metadata import version
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from coordlang.cli.app import (
+    GivenOptions,
+    domain_argument,
+    limits,
+    model_options,
+    note_single_robot,
+    problems_argument,
+    read_files,
+)
+
+if TYPE_CHECKING:
+    from coordlang.build import Built
+    from coordlang.tasks import Candidates
+    from coordlang.verify import Verdict
+
+
+@click.command(name="build")
+@domain_argument
+@problems_argument
+@click.option("--tasks", metavar="all|FILE", help="Candidate tasks: every pair of reachable states, or a task file "
+              "(default: the problems' own).")  # fmt: skip
+@click.option("--method", type=click.Choice(["greedy"]), default="greedy", show_default=True)
+@click.option("-o", "--output", required=True, metavar="LANGUAGE", help="The language file; .json or .json.gz, - for stdout.")
+@click.option("--seed", type=int, default=0, show_default=True)
+@click.option("--json", "as_json", is_flag=True, help="Print the figures as one JSON object.")
+@model_options
+@limits
+def command(
+    domain: str,
+    problems: tuple[str, ...],
+    tasks: str | None,
+    method: str,
+    output: str,
+    seed: int,
+    as_json: bool,
+    given: GivenOptions,
+) -> None:
+    """Build a coordination language and verify it before it is written."""
+    from dataclasses import replace
+
+    from coordlang.build import Inseparable, build_language
+    from coordlang.cli.coordination import show
+    from coordlang.file import describe_source, record_tasks, to_bytes, write_language
+    from coordlang.language import WordTable
+    from coordlang.verify import verify
+
+    start = perf_counter()
+    lifted, read = read_files(domain, problems)
+    candidates = make_candidates(lifted, read, tasks, given)
+    note_single_robot(candidates.model.robots)
+    seconds = {"space": perf_counter() - start}
+    try:
+        built = build_language(candidates, method, progress)
+    except Inseparable as error:
+        click.echo(show(error.witness), err=True)
+        raise
+    begin = perf_counter()
+    progress("verifying by definition")
+    verdict = verify(WordTable.of(built.language, candidates.model), candidates.spaces)
+    seconds |= built.seconds | {"verify": perf_counter() - begin}
+    assert verdict.holds, f"the built language is refuted: {verdict.witness}"
+    domain_entry, model_entry = describe_source(lifted, read[0], given.options())
+    language = replace(
+        built.language,
+        domain=domain_entry,
+        model=model_entry,
+        tasks=record_tasks(candidates),
+        producer={
+            "program": "coordlang",
+            "version": version("coordlang"),
+            "arguments": sys.argv[1:],
+            "seed": seed,
+            "seconds": {name: round(value, 3) for name, value in seconds.items()},
+        },
+    )
+    if output == "-":
+        click.echo(to_bytes(language).decode(), nl=False)
+    else:
+        write_language(language, output)
+    figures = _figures(candidates, built, verdict, seconds)
+    if as_json and output != "-":
+        click.echo(json.dumps(figures))
+    else:
+        click.echo(_summary(figures, output), err=output == "-")
+
+
+def make_candidates(lifted: Any, read: list[Any], tasks: str | None, given: GivenOptions) -> Candidates:
+    """The candidate tasks that ``--tasks`` asks for."""
+    from coordlang.tasks import all_pairs, from_listed, from_problems, read_task_file
+    from planners.errors import Place
+
+    options = given.options()
+    if tasks is None:
+        return from_problems(lifted, read, options)
+    if tasks == "all":
+        return all_pairs(lifted, read, options)
+    return from_listed(lifted, read, read_task_file(tasks), options, Place(tasks))
+
+
+def progress(message: str) -> None:
+    """A line about what is being done, on a terminal only."""
+    if sys.stderr.isatty():
+        click.echo(f"\r\033[K{message} ..", nl=False, err=True)
+
+
+def _figures(candidates: Candidates, built: Built, verdict: Verdict, seconds: dict[str, float]) -> dict[str, Any]:
+    return {
+        "tasks": candidates.count,
+        "states": candidates.states,
+        "states_on_plans": built.states,
+        "tasks_requiring_coordination": built.alphas.requiring,
+        "divergences": len(built.alphas.divergences),
+        "words": built.language.guarantee.size,
+        "lower_bound": built.language.guarantee.lower_bound,
+        "method": built.language.guarantee.method,
+        "walk_nodes": built.alphas.nodes,
+        "walk_edges": built.alphas.edges,
+        "verify_nodes": verdict.nodes,
+        "verified": verdict.holds,
+        "seconds": {name: round(value, 3) for name, value in seconds.items()},
+    }
+
+
+def _summary(figures: dict[str, Any], output: str) -> str:
+    if sys.stderr.isatty():
+        click.echo("\r\033[K", nl=False, err=True)
+    words, total = figures["words"], sum(figures["seconds"].values())
+    return (
+        f"{words} word{'s' * (words != 1)} ({figures['method']}, verified) for {figures['tasks']:,} tasks, "
+        f"{figures['tasks_requiring_coordination']:,} of which require coordination\n"
+        f"{figures['states_on_plans']:,} states on optimal plans, {figures['divergences']:,} divergences, "
+        f"{figures['walk_nodes']:,} walk nodes, {total:.2f} s\n"
+        f"written to {'stdout' if output == '-' else output}"
+    )

@@ -1,0 +1,53 @@
+"""``coordlang check``: our optimal cost against Fast Downward's."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+from coordlang.cli.app import GivenOptions, domain_argument, limits, model_options, problem_argument
+
+
+@click.command(name="check")
+@domain_argument
+@problem_argument
+@click.option("--json", "as_json", is_flag=True, help="One JSON object.")
+@click.pass_context
+@model_options
+@limits
+def command(context: click.Context, domain: str, problem: str, as_json: bool, given: GivenOptions) -> int:
+    """Compare our optimal cost with Fast Downward's (through unified-planning).
+
+    Exit 0: equal.  1: they differ.  11: both prove that there is no plan.
+    """
+    from planners.errors import ProvedImpossible
+    from planners.fast_downward import optimal_cost
+    from planners.model import load
+    from planners.optimal import search
+
+    loaded = load(domain, [problem], given.options())
+    model, task = loaded.model, loaded.tasks[0]
+    try:
+        ours: tuple[int, int] | None = search(model, task).cost_of(0)
+    except ProvedImpossible:
+        ours = None
+    answer = optimal_cost(model, task)
+    theirs = answer.cost
+    if as_json:
+        click.echo(json.dumps({"coordlang": ours, "fast_downward": theirs, "agree": ours == theirs,
+                               "form": answer.form, "actions": answer.actions}))  # fmt: skip
+    else:
+        click.echo(f"coordlang      {_cost(ours, model.cost)}")
+        click.echo(f"Fast Downward  {_cost(theirs, model.cost)}   ({answer.form} form, {answer.actions} plain actions)")
+    if ours != theirs:
+        click.echo("coordlang: the optimal costs differ", err=True)
+        return 1
+    return 11 if ours is None else 0
+
+
+def _cost(cost: tuple[int, int] | None, kind: str) -> str:
+    if cost is None:
+        return "no plan exists"
+    second = kind.partition("+")[2]
+    return f"makespan {cost[0]}" + (f", {second} {cost[1]}" if second else "")

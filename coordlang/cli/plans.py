@@ -1,0 +1,66 @@
+"""``coordlang plans``: all optimal plans of a task."""
+
+from __future__ import annotations
+
+import json
+from itertools import islice
+
+import click
+
+from coordlang.cli.app import GivenOptions, domain_argument, limits, model_options, note_single_robot, problem_argument
+
+_DEFAULT_MAX = 10
+
+
+@click.command(name="plans")
+@domain_argument
+@problem_argument
+@click.option("--count", "only_count", is_flag=True, help="Print the exact number of optimal plans only.")
+@click.option("--max", "most", type=click.IntRange(min=0), help=f"List at most this many plans (default: {_DEFAULT_MAX}).")
+@click.option("--sample", type=click.IntRange(min=1), metavar="N", help="Draw N plans uniformly instead of the first ones.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of --sample.")
+@click.option("--format", "form", type=click.Choice(["ipc", "json"]), default="ipc", show_default=True)
+@click.option("--json", "as_json", is_flag=True, help="Short for --format json.")
+@model_options
+@limits
+def command(
+    domain: str,
+    problem: str,
+    only_count: bool,
+    most: int | None,
+    sample: int | None,
+    seed: int,
+    form: str,
+    as_json: bool,
+    given: GivenOptions,
+) -> None:
+    """Count, list or sample all optimal plans of a task.
+
+    A plan is a sequence of joint actions; plans are listed in a stable order.
+    """
+    from planners.model import load
+    from planners.optimal import search
+    from planners.planfile import to_ipc, to_json
+    from planners.plans import Plans
+
+    if only_count and (most is not None or sample is not None):
+        raise click.UsageError("--count prints a number only: leave out --max and --sample")
+    loaded = load(domain, [problem], given.options())
+    note_single_robot(loaded.model.robots)
+    plans = Plans.of(search(loaded.model, loaded.tasks[0]))
+    if only_count and not (as_json or form == "json"):
+        click.echo(plans.count)
+        return
+    limit = 0 if only_count else most if most is not None else _DEFAULT_MAX
+    listed = list(plans.sample(sample, seed) if sample else islice(plans, limit))
+    if as_json or form == "json":
+        data = to_json(plans, listed)
+        if sample:
+            data["complete"] = False
+        click.echo(json.dumps(data))
+        return
+    for number, plan in enumerate(listed, 1):
+        click.echo(f"; plan {number} of {plans.count}" if not sample else f"; sampled plan {number}")
+        click.echo(to_ipc(plans, plan))
+    if not sample and len(listed) < plans.count:
+        click.echo(f"{len(listed)} of {plans.count} optimal plans listed; --max N lists more", err=True)

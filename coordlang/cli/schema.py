@@ -1,0 +1,15 @@
+"""``coordlang schema``: the JSON Schema of language files."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+
+@click.command(name="schema")
+def command() -> None:
+    """Print the JSON Schema of language files."""
+    from coordlang.file import json_schema
+
+    click.echo(json.dumps(json_schema(), indent=2))

@@ -1,0 +1,80 @@
+"""Where plans that introduce RC part: ``alpha*`` over all candidate tasks, and what must be told apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from coordlang.coordination import Divergences, Walk, unique_divergences, walk
+from planners.matching import Ints
+from planners.optimal import PlanSpace
+
+
+@dataclass(frozen=True, slots=True)
+class Alphas:
+    """The first differences of all candidate tasks (the paper's ``alpha*``, each once).
+
+    ``requiring`` counts the tasks that require coordination; ``nodes`` and ``edges`` are the composition walks' work.
+    """
+
+    divergences: Divergences
+    requiring: int
+    nodes: int
+    edges: int
+
+
+def alphas(spaces: Sequence[PlanSpace]) -> Alphas:
+    """Walk every plan space; see `coordlang.coordination.walk` for cost and errors."""
+    walks: list[Walk] = []
+    requiring = 0
+    for space in spaces:
+        result = walk(space)
+        requiring += int(result.requires[space.starts].sum())
+        walks.append(result)
+    joined = Divergences(
+        np.concatenate([w.divergences.last for w in walks]),
+        np.concatenate([w.divergences.following for w in walks]),
+    )
+    return Alphas(
+        unique_divergences(joined),
+        requiring,
+        sum(w.nodes for w in walks),
+        sum(w.edges for w in walks),
+    )
+
+
+def states_on_plans(spaces: Sequence[PlanSpace]) -> Ints:
+    """The numbers of the states that lie on some optimal plan of some candidate task, sorted."""
+    return np.unique(np.concatenate([space.state for space in spaces]))
+
+
+@dataclass(frozen=True, slots=True)
+class Separation:
+    """One way to satisfy a divergence: the pairs of states that must lie in different words."""
+
+    pairs: frozenset[tuple[int, int]]
+
+
+def separations(divergences: Divergences) -> list[tuple[Separation, ...]]:
+    """For each divergence its alternatives (Theorem 3, alpha part).
+
+    With two robots there is one: all three pairs of ``alpha*``.  With n robots any two of the different next states will
+    do, together with the last shared state.
+    """
+    result = []
+    for last, row in zip(divergences.last.tolist(), divergences.following.tolist(), strict=True):
+        states = [s for s in row if s >= 0]
+        result.append(
+            tuple(
+                Separation(frozenset({_pair(last, a), _pair(last, b), _pair(a, b)}))
+                for n, b in enumerate(states)
+                for a in states[:n]
+            )
+        )
+    return result
+
+
+def _pair(a: int, b: int) -> tuple[int, int]:
+    return (a, b) if a < b else (b, a)

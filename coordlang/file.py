@@ -1,0 +1,309 @@
+"""Language files: JSON in and out (docs/formats.md)."""
+
+from __future__ import annotations
+
+import gzip
+import os
+import tempfile
+from collections.abc import Mapping
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from coordlang.language import Guarantee, Language
+from coordlang.tasks import Candidates, Kind, ListedTask, all_pairs, from_listed, from_recorded, task_data
+from planners.errors import BadInput, Place, UsageError
+from planners.joint import Cost, show
+from planners.model import ModelOptions
+from planners.pddl.lifted import Domain, Problem
+from planners.robots import ENVIRONMENT, RobotChoice, Unowned, static_atoms
+
+FORMAT = "coordlang/language"
+VERSION = 1
+
+
+class DomainRecord(msgspec.Struct, omit_defaults=True):
+    """The domain that a language belongs to; a file without ``sha256`` is not held to one text."""
+
+    name: str
+    sha256: str | None = None
+
+
+class ModelRecord(msgspec.Struct, omit_defaults=True):
+    """How the PDDL files are understood.  ``world_sha256`` is over objects, static facts and function values."""
+
+    cost: Cost = "makespan"
+    unowned: Unowned = "error"
+    remember_actions: bool = False
+    problem_sha256: str | None = None
+    world_sha256: str | None = None
+
+
+class TaskRecord(msgspec.Struct):
+    """One candidate task: true fluents at the start, PDDL literals or formulas at the end."""
+
+    init: list[str]
+    goal: list[str]
+
+
+class TasksRecord(msgspec.Struct, omit_defaults=True):
+    """The candidate tasks that the language is guaranteed for."""
+
+    kind: Kind
+    count: int
+    tasks: list[TaskRecord] = []
+
+
+class GuaranteeRecord(msgspec.Struct):
+    """What is known of the language's size."""
+
+    method: str
+    size: int
+    lower_bound: int
+    proved_minimal: bool
+
+
+class LanguageRecord(msgspec.Struct):
+    """A language file, version 1.  Keys that are not listed here are ignored by readers."""
+
+    format: str
+    version: int
+    domain: DomainRecord
+    robots: list[str]
+    model: ModelRecord
+    tasks: TasksRecord
+    words: list[str]
+    states: dict[str, str]
+    default: str
+    guarantee: GuaranteeRecord
+    producer: dict[str, Any] = {}
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema of language files."""
+    schema: dict[str, Any] = msgspec.json.schema(LanguageRecord)
+    definitions = schema["$defs"]["LanguageRecord"]["properties"]
+    definitions["format"] = {"const": FORMAT}
+    definitions["version"] = {"const": VERSION}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "coordlang language", **schema}
+
+
+def describe_source(
+    domain: Domain, problem: Problem, options: ModelOptions
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The ``domain`` and ``model`` entries of a language file."""
+    return (
+        {"name": domain.name, "sha256": domain.source.sha256},
+        {
+            "cost": options.cost,
+            "unowned": options.robots.unowned,
+            "remember_actions": options.remember_actions,
+            "problem_sha256": problem.source.sha256,
+            "world_sha256": world_sha256(domain, problem),
+        },
+    )
+
+
+def world_sha256(domain: Domain, problem: Problem) -> str:
+    """A hash of what the problems of one language share: objects, static facts, function values."""
+    lines = [f"{name} - {' '.join(sorted(types))}" for name, types in sorted(problem.objects.items())]
+    lines += sorted(show(atom) for atom in static_atoms(domain, problem))
+    lines += sorted(f"{show(atom)} = {value:g}" for atom, value in problem.values.items())
+    return sha256("\n".join(lines).encode()).hexdigest()
+
+
+def record_tasks(candidates: Candidates) -> dict[str, Any]:
+    """The ``tasks`` entry of a language file."""
+    record: dict[str, Any] = {"kind": candidates.kind, "count": candidates.count}
+    if candidates.kind != "all":
+        record["tasks"] = task_data(candidates.listed)["tasks"]
+    return record
+
+
+def to_bytes(language: Language) -> bytes:
+    """The text of a language file: the same language gives the same bytes."""
+    data = {
+        "format": FORMAT,
+        "version": VERSION,
+        "domain": dict(language.domain),
+        "robots": list(language.robots),
+        "model": dict(language.model),
+        "tasks": dict(language.tasks),
+        "words": list(language.words),
+        "states": dict(language.states),
+        "default": language.default,
+        "guarantee": {
+            "method": language.guarantee.method,
+            "size": language.guarantee.size,
+            "lower_bound": language.guarantee.lower_bound,
+            "proved_minimal": language.guarantee.proved_minimal,
+        },
+        "producer": dict(language.producer),
+    }
+    return msgspec.json.format(msgspec.json.encode(data), indent=1) + b"\n"
+
+
+def write_language(language: Language, path: str | Path) -> None:
+    """Write a language file (gzip for ``.gz``).  The file is complete or not there at all."""
+    data = to_bytes(language)
+    if str(path).endswith(".gz"):
+        data = gzip.compress(data, mtime=0)
+    write_atomically(path, data)
+
+
+def write_atomically(path: str | Path, data: bytes) -> None:
+    """Write beside, then rename.  Raises `UsageError` when the place cannot be written."""
+    target = Path(path)
+    try:
+        handle, beside = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(data)
+            os.chmod(beside, 0o666 & ~_umask())
+            os.replace(beside, target)
+        except BaseException:
+            os.unlink(beside)
+            raise
+    except OSError as error:
+        raise UsageError(f"{path} cannot be written: {error.strerror}") from None
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def read_language(path: str | Path) -> Language:
+    """Read a language file.
+
+    Raises `BadInput` for a file that is missing, cut off, no language, of another version, or that contradicts itself.
+    """
+    place = Place(str(path))
+    try:
+        data = Path(path).read_bytes()
+        if data[:2] == b"\x1f\x8b":
+            data = gzip.decompress(data)
+    except FileNotFoundError:
+        raise BadInput("there is no such file", place=place) from None
+    except (OSError, EOFError) as error:
+        raise BadInput(f"cannot be read: {error}", place=place) from None
+    return language_from_bytes(data, place)
+
+
+def language_from_bytes(data: bytes, place: Place) -> Language:
+    """The language in the text of a language file; see `read_language`."""
+    _check_head(data, place)
+    try:
+        record = msgspec.json.decode(data, type=LanguageRecord)
+    except msgspec.ValidationError as error:
+        raise BadInput(f"this is no language file: {error}", place=place,
+                       remedy="`coordlang schema` prints what a language file holds.") from None  # fmt: skip
+    words = set(record.words)
+    if len(words) < len(record.words) or not words:
+        raise BadInput("the words must be different, and at least one", place=place)
+    for key, word in [*record.states.items(), ("default", record.default)]:
+        if word not in words:
+            raise BadInput(f"{word!r} (of {key!r}) is not among the words", place=place)
+    return Language(
+        words=tuple(record.words),
+        states=record.states,
+        default=record.default,
+        robots=tuple(record.robots),
+        guarantee=Guarantee(
+            record.guarantee.method,
+            record.guarantee.size,
+            record.guarantee.lower_bound,
+            record.guarantee.proved_minimal,
+        ),
+        domain=msgspec.to_builtins(record.domain),
+        model=msgspec.to_builtins(record.model),
+        tasks=msgspec.to_builtins(record.tasks),
+        producer=record.producer,
+    )
+
+
+class _Head(msgspec.Struct):
+    format: Any = None
+    version: Any = None
+
+
+def _check_head(data: bytes, place: Place) -> None:
+    """Format and version first: a file of another version need not look like ours."""
+    try:
+        head = msgspec.json.decode(data, type=_Head)
+    except msgspec.ValidationError as error:
+        raise BadInput(f"this is no language file: {error}", place=place) from None
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise BadInput(f"this is no JSON, or it is cut off: {error}", place=place) from None
+    if head.format != FORMAT:
+        raise BadInput(f"format {head.format!r}, expected {FORMAT!r}", place=place)
+    if head.version != VERSION:
+        raise BadInput(
+            f"language file version {head.version!r}; this program reads version {VERSION}", place=place
+        )
+
+
+def options_of(
+    language: Language,
+    *,
+    robots: RobotChoice | None = None,
+    cost: str | None = None,
+    remember_actions: bool | None = None,
+) -> ModelOptions:
+    """How the language's model is built.  Raises `UsageError` for a flag that contradicts the file."""
+    model: Mapping[str, Any] = language.model
+    own = {
+        "--cost": (model.get("cost", "makespan"), cost),
+        "--remember-actions": (model.get("remember_actions", False), remember_actions or None),
+        "--unowned": (model.get("unowned", "error"), robots.unowned if robots and robots.unowned != "error" else None),
+    }
+    for flag, (recorded, given) in own.items():
+        if given is not None and given != recorded:
+            raise UsageError(f"{flag} {given} contradicts the language file, which was built with {recorded}")
+    if robots and robots.names and set(robots.names) != set(language.robots) - {ENVIRONMENT}:
+        raise UsageError(f"--robots contradicts the language file: {', '.join(language.robots)}")
+    names = tuple(r for r in language.robots if r != ENVIRONMENT or own["--unowned"][0] != "environment")
+    return ModelOptions(
+        RobotChoice(names, None, own["--unowned"][0]), own["--cost"][0], own["--remember-actions"][0]
+    )
+
+
+def check_source(language: Language, domain: Domain, problems: list[Problem], place: Place) -> None:
+    """Raise `BadInput` when domain or problem are not those that the language was built for."""
+    wanted = language.domain.get("sha256")
+    if wanted is not None and wanted != domain.source.sha256:
+        raise BadInput(
+            f"this language belongs to another domain ({language.domain.get('name')!r}): the text of "
+            f"{domain.source.name} has another hash",
+            place=place,
+            remedy="Give the domain file that the language was built from.",
+        )
+    world = language.model.get("world_sha256")
+    for problem in problems:
+        if world is not None and world != world_sha256(domain, problem):
+            raise BadInput(
+                f"{problem.source.name} has other objects or static facts than the language's problem",
+                place=place,
+                remedy="A language serves the problems of one world: same objects, same static facts.",
+            )
+
+
+def recorded_candidates(
+    language: Language, domain: Domain, problems: list[Problem], options: ModelOptions, place: Place
+) -> Candidates:
+    """The candidate tasks that a language file records."""
+    kind = language.tasks["kind"]
+    try:
+        if kind == "all":
+            return all_pairs(domain, problems, options)
+        listed = [ListedTask(tuple(t["init"]), tuple(t["goal"])) for t in language.tasks.get("tasks", [])]
+        make = from_listed if kind == "file" else from_recorded
+        return make(domain, problems, listed, options, place)
+    except BadInput as error:
+        if error.place is not None:
+            raise
+        raise BadInput(error.what, place=place, remedy=error.remedy) from None
+

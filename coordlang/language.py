@@ -1,0 +1,117 @@
+"""A coordination language: states -> words, plans -> sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from planners.errors import BadInput
+from planners.joint import JointModel
+from planners.matching import Ints
+from planners.states import Rows, find_rows, unique_rows
+
+
+@dataclass(frozen=True, slots=True)
+class Guarantee:
+    """What is known of a language: how it was made, its size, and the proved lower bound on the size of any."""
+
+    method: str
+    size: int
+    lower_bound: int
+    proved_minimal: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Language:
+    """A partition ``f: states -> words`` (the paper, section 4), with what is needed to use it.
+
+    ``states`` maps state keys (see `planners.states.StateCodec`) to words; all other states have the word ``default``.
+    ``domain``, ``model``, ``tasks`` and ``producer`` are recorded as in a language file (docs/formats.md).
+    """
+
+    words: tuple[str, ...]
+    states: Mapping[str, str]
+    default: str
+    robots: tuple[str, ...]
+    guarantee: Guarantee
+    domain: Mapping[str, Any]
+    model: Mapping[str, Any]
+    tasks: Mapping[str, Any]
+    producer: Mapping[str, Any]
+
+    def sizes(self) -> dict[str, int]:
+        """How many of the mapped states each word holds."""
+        sizes = dict.fromkeys(self.words, 0)
+        for word in self.states.values():
+            sizes[word] += 1
+        return sizes
+
+
+@dataclass(frozen=True, slots=True)
+class WordTable:
+    """A language over one joint model: word numbers for whole tables of states."""
+
+    words: tuple[str, ...]
+    rows: Rows
+    word: Ints
+    default: int
+
+    @classmethod
+    def of(cls, language: Language, model: JointModel) -> WordTable:
+        """Raises `BadInput` for a state that the model cannot have."""
+        if not language.states:
+            none = np.zeros((0, model.codec.width), np.uint64)
+            return cls(language.words, none, np.zeros(0, np.int64), language.words.index(language.default))
+        number = {word: n for n, word in enumerate(language.words)}
+        rows = np.stack([_row(model, key) for key in language.states])
+        table, place = unique_rows(rows)
+        word = np.zeros(len(table), np.int64)
+        word[place] = [number[w] for w in language.states.values()]
+        return cls(language.words, table, word, number[language.default])
+
+    def of_rows(self, rows: Rows) -> Ints:
+        """The word number of each state of a table."""
+        if not len(self.rows):
+            return np.full(len(rows), self.default, np.int64)
+        found = find_rows(self.rows, rows)
+        return np.where(found >= 0, self.word[np.maximum(found, 0)], self.default)
+
+
+def _row(model: JointModel, key: str) -> Rows:
+    try:
+        return model.codec.parse_key(key)
+    except BadInput as error:
+        raise BadInput(
+            f"the language maps a state that this problem cannot have: {error.what}",
+            remedy="Give the problem that the language was built for.",
+        ) from None
+
+
+def sentence(words: Iterable[int]) -> tuple[int, ...]:
+    """The words of a state sequence, repeated neighbours collapsed (the paper's task state compression, TSC)."""
+    result: list[int] = []
+    for word in words:
+        if not result or result[-1] != word:
+            result.append(word)
+    return tuple(result)
+
+
+def name_words(
+    model: JointModel, rows: Rows, partition: Mapping[int, int]
+) -> tuple[tuple[str, ...], dict[str, str], str]:
+    """Words ``w0, w1, ..`` for a partition of state numbers: (words, state key -> word, default word).
+
+    Words are named in the order of their first state; the default is the word with most states.
+    """
+    order: dict[int, int] = {}
+    for state in sorted(partition):
+        order.setdefault(partition[state], len(order))
+    words = tuple(f"w{n}" for n in range(max(1, len(order))))
+    states = {
+        model.codec.key(rows[state]): words[order[partition[state]]] for state in sorted(partition)
+    }
+    counts: Sequence[int] = np.bincount([order[w] for w in partition.values()], minlength=len(words)).tolist()
+    return words, dict(sorted(states.items())), words[counts.index(max(counts))]

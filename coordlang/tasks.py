@@ -1,0 +1,301 @@
+"""Candidate tasks: the tasks that a language must serve, and their plan spaces."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from planners.errors import BadInput, Place, ProvedImpossible
+from planners.grounding import ground_goal
+from planners.joint import FullState, Goal, JointModel, show
+from planners.model import Loaded, ModelOptions, PlanningTask, build
+from planners.optimal import PlanSpace, TaskGroup, plan_spaces, search_each
+from planners.pddl.formulas import read_formula
+from planners.pddl.lifted import And, Atom, Domain, Formula, Not, Or, Problem, Truth
+from planners.pddl.names import Names
+from planners.pddl.sexpr import Source, parse
+from planners.robots import fluent_predicates
+from planners.space import explore
+from planners.states import Rows, find_rows, split_atoms, unique_rows
+
+FORMAT = "coordlang/tasks"
+VERSION = 1
+
+Kind = Literal["problems", "all", "file"]
+
+
+@dataclass(frozen=True, slots=True)
+class ListedTask:
+    """A task as a task file lists it: true fluents at the start, literals (or formulas) at the end, as PDDL text."""
+
+    init: tuple[str, ...]
+    goal: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Candidates:
+    """The candidate tasks ``T`` over one joint model.
+
+    ``kind`` "problems": the problems' own tasks; "all": every ordered pair of different reachable states;
+    "file": ``listed``.  ``spaces`` are their optimal plans, in batches over one common table of states; ``count`` is
+    the number of tasks.  ``states`` is the number of reachable states where the whole space was explored, else None.
+    """
+
+    kind: Kind
+    loaded: Loaded
+    listed: tuple[ListedTask, ...]
+    spaces: tuple[PlanSpace, ...]
+    states: int | None
+
+    @property
+    def model(self) -> JointModel:
+        return self.loaded.model
+
+    @property
+    def count(self) -> int:
+        return sum(len(space.starts) for space in self.spaces)
+
+    @property
+    def rows(self) -> Rows:
+        """The table of states that every plan space's state numbers refer to."""
+        return self.spaces[0].rows
+
+
+def from_problems(
+    domain: Domain, problems: Sequence[Problem], options: ModelOptions | None = None
+) -> Candidates:
+    """The tasks of the given problems.  Raises `ProvedImpossible` for an unsolvable one, naming it."""
+    loaded = build(domain, problems, options)
+    space = search_each(loaded.model, loaded.tasks)
+    listed = tuple(_as_listed(domain, problem, task) for problem, task in zip(problems, loaded.tasks, strict=True))
+    return Candidates("problems", loaded, listed, (space,), None)
+
+
+def all_pairs(
+    domain: Domain, problems: Sequence[Problem], options: ModelOptions | None = None
+) -> Candidates:
+    """Every ordered pair of different states reachable in the problem, the second from the first.
+
+    Goals are full states.
+    """
+    loaded = build(domain, problems, options)
+    inits = np.stack([task.init for task in loaded.tasks])
+    if loaded.model.remembers:
+        return _all_pairs_remembering(loaded, inits)
+    space = explore(loaded.model, inits)
+    spaces = tuple(plan_spaces(space, [TaskGroup(goal) for goal in _full_states(loaded.model, space.rows)]))
+    return Candidates("all", loaded, (), spaces, len(space))
+
+
+def _all_pairs_remembering(loaded: Loaded, inits: Rows) -> Candidates:
+    """The same pairs of states as without ``--remember-actions``; every task starts with no action to remember."""
+    model = loaded.model
+    forgetting = replace(model, codec=replace(model.codec, memory=None))
+    base = explore(forgetting, inits[:, : model.codec.fact_words])
+    zeros = np.zeros((len(base), len(model.robots)), np.uint64)
+    starts = np.hstack((base.rows, zeros))
+    groups = []
+    for space in plan_spaces(base, [TaskGroup(goal) for goal in _full_states(forgetting, base.rows)]):
+        goal_of_task, state = space.goal[space.starts], space.state[space.starts]
+        for number, goal in enumerate(space.goals):
+            mine = state[goal_of_task == number]
+            if len(mine):
+                groups.append(TaskGroup(goal, starts[mine]))
+    extended = explore(model, starts)
+    return Candidates("all", loaded, (), tuple(plan_spaces(extended, groups)), len(base))
+
+
+def _full_states(model: JointModel, rows: Rows) -> list[Goal]:
+    return [FullState(tuple(int(w) for w in row[: model.codec.fact_words])) for row in rows]
+
+
+def from_listed(
+    domain: Domain,
+    problems: Sequence[Problem],
+    listed: Sequence[ListedTask],
+    options: ModelOptions | None = None,
+    place: Place | None = None,
+) -> Candidates:
+    """The tasks of a task file; everything static comes from the problem.
+
+    Raises
+    ------
+    BadInput
+        An empty list, an atom that the problem does not have, or an initial state that the problem's initial
+        state does not reach (such a state is taken for a mistake).
+    """
+    if not listed:
+        raise BadInput("the list of tasks is empty", place=place, remedy="Give at least one task.")
+    inits = [_read_init(domain, problems[0], task, place) for task in listed]
+    loaded = build(domain, problems, options, also={a for init in inits for a in init})
+    model = loaded.model
+    space = explore(model, np.stack([task.init for task in loaded.tasks]))
+    reached, _ = unique_rows(space.rows[:, : model.codec.fact_words])
+    groups: dict[Goal, list[Rows]] = {}
+    for number, (task, init) in enumerate(zip(listed, inits, strict=True), 1):
+        row = model.state(init)
+        if find_rows(reached, row[None, : model.codec.fact_words])[0] < 0:
+            raise BadInput(
+                f"task {number}: the state {model.codec.key(row)} cannot be reached from the initial "
+                f"state of {problems[0].source.name}",
+                place=place,
+                remedy="Is a fluent missing or one too many?  List all fluents that are true.",
+            )
+        goal = ground_goal(domain, problems[0], _read_goal(domain, problems[0], task, place))
+        groups.setdefault(goal, []).append(row)
+    if model.remembers:  # a task starts with no action to remember: those are states of their own
+        space = explore(model, np.stack([row for rows in groups.values() for row in rows]))
+        states = len(reached)
+    else:
+        states = len(space)
+    spaces = plan_spaces(space, [TaskGroup(goal, np.stack(rows)) for goal, rows in groups.items()])
+    return Candidates("file", loaded, tuple(listed), tuple(spaces), states)
+
+
+def from_recorded(
+    domain: Domain,
+    problems: Sequence[Problem],
+    listed: Sequence[ListedTask],
+    options: ModelOptions | None = None,
+    place: Place | None = None,
+) -> Candidates:
+    """Problems' tasks as a language file records them: searched one by one, without the rest of the space."""
+    inits = [_read_init(domain, problems[0], task, place) for task in listed]
+    loaded = build(domain, problems, options, also={a for init in inits for a in init})
+    tasks = [
+        PlanningTask(
+            f"{number}",
+            loaded.model.state(init),
+            ground_goal(domain, problems[0], _read_goal(domain, problems[0], task, place)),
+        )
+        for number, (task, init) in enumerate(zip(listed, inits, strict=True), 1)
+    ]
+    return Candidates("problems", loaded, tuple(listed), (search_each(loaded.model, tasks),), None)
+
+
+def read_task_file(path: str | Path) -> tuple[ListedTask, ...]:
+    """Read a task file (docs/formats.md).  Raises `BadInput` for anything else."""
+    place = Place(str(path))
+    try:
+        data = json.loads(Path(path).read_text())
+    except OSError as error:
+        raise BadInput(f"cannot be read: {error.strerror}", place=place) from None
+    except ValueError as error:
+        raise BadInput(f"this is no JSON: {error}", place=place) from None
+    return tasks_from_data(data, place)
+
+
+def tasks_from_data(data: Any, place: Place) -> tuple[ListedTask, ...]:
+    """The tasks in the data of a task file."""
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise BadInput(f'expected a task file: {{"format": "{FORMAT}", ..}}', place=place)
+    if data.get("version") != VERSION:
+        raise BadInput(f"task file version {data.get('version')!r}, expected {VERSION}", place=place)
+    tasks = data.get("tasks")
+    if not isinstance(tasks, list):
+        raise BadInput("expected a list 'tasks'", place=place)
+    return tuple(_listed(entry, number, place) for number, entry in enumerate(tasks, 1))
+
+
+def task_data(tasks: Sequence[ListedTask]) -> dict[str, Any]:
+    """The data of a task file."""
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "tasks": [{"init": list(t.init), "goal": list(t.goal)} for t in tasks],
+    }
+
+
+def describe(space: PlanSpace, task: int) -> str:
+    """``INIT -> GOAL`` in words of the model."""
+    node = space.starts[task]
+    init = space.model.codec.key(space.rows[space.state[node]])
+    return f"{init} -> {goal_text(space.model, space.goals[space.goal[node]])}"
+
+
+def goal_text(model: JointModel, goal: Goal) -> str:
+    """A goal as PDDL text."""
+    if isinstance(goal, FullState):
+        row = np.zeros(model.codec.width, np.uint64)
+        row[: model.codec.fact_words] = goal.words
+        return " ".join(a for a in model.codec.decode(row) if not a.startswith("(last "))
+    return " ".join(formula_text(part) for part in (goal.parts if isinstance(goal, And) else (goal,)))
+
+
+def formula_text(formula: Formula) -> str:
+    """A ground formula as PDDL text."""
+    match formula:
+        case Atom():
+            return show(formula)
+        case Not(part):
+            return f"(not {formula_text(part)})"
+        case And(parts) | Or(parts):
+            name = "and" if isinstance(formula, And) else "or"
+            return "(" + " ".join((name, *map(formula_text, parts))) + ")"
+        case Truth(value):
+            return "(and)" if value else "(or)"
+    raise AssertionError(formula)
+
+
+def _as_listed(domain: Domain, problem: Problem, task: PlanningTask) -> ListedTask:
+    fluents = fluent_predicates(domain)
+    init = sorted(show(a) for a in problem.init if a.predicate in fluents)
+    assert not isinstance(task.goal, FullState)
+    parts = task.goal.parts if isinstance(task.goal, And) else (task.goal,)
+    return ListedTask(tuple(init), tuple(formula_text(p) for p in parts if p != Truth(True)))
+
+
+def _listed(entry: Any, number: int, place: Place) -> ListedTask:
+    fields = []
+    for key in ("init", "goal"):
+        value = entry.get(key) if isinstance(entry, dict) else None
+        if not isinstance(value, list) or not all(isinstance(v, str) for v in value):
+            raise BadInput(f"task {number}: expected a list of texts {key!r}", place=place)
+        fields.append(tuple(" ".join(v.lower().split()) for v in value))
+    return ListedTask(*fields)
+
+
+def _names(domain: Domain, problem: Problem, text: str, place: Place | None) -> Names:
+    document = parse(Source(place.file if place else "task", text))
+    return Names(document, frozenset(domain.types), domain.predicates, {}, {}, frozenset(problem.objects))
+
+
+def _read_init(
+    domain: Domain, problem: Problem, task: ListedTask, place: Place | None
+) -> frozenset[Atom]:
+    fluents = fluent_predicates(domain)
+    atoms = set()
+    for text in task.init:
+        formula = _read_text(domain, problem, text, place)
+        if not isinstance(formula, Atom):
+            raise BadInput(f"{text} is no atom: 'init' lists what is true", place=place)
+        if formula.predicate not in fluents and formula not in problem.init:
+            raise BadInput(f"{text} is static and false in {problem.source.name}", place=place)
+        atoms.add(formula)
+    return frozenset(atom for atom in atoms if atom.predicate in fluents)
+
+
+def _read_goal(domain: Domain, problem: Problem, task: ListedTask, place: Place | None) -> Formula:
+    return And(tuple(_read_text(domain, problem, text, place) for text in task.goal))
+
+
+def _read_text(domain: Domain, problem: Problem, text: str, place: Place | None) -> Formula:
+    parts = split_atoms(text)
+    if len(parts) != 1:
+        raise BadInput(f"expected one PDDL literal, found {text!r}", place=place)
+    names = _names(domain, problem, parts[0], place)
+    try:
+        return read_formula(names, names.document.root)
+    except BadInput as error:
+        raise BadInput(f"{text}: {error.what}", place=place, remedy=error.remedy) from None
+
+
+def require_solvable(candidates: Candidates) -> None:
+    """Raise `ProvedImpossible` when there is no task at all to build a language for."""
+    if candidates.count == 0:
+        raise ProvedImpossible("there is no candidate task: no reachable state leads to another one")

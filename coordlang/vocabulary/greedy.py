@@ -1,0 +1,78 @@
+"""The paper's approximation: fill a word with every state that still fits, then the next word."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from coordlang.divergence import Separation
+
+
+def greedy(
+    states: Sequence[int], constraints: Sequence[tuple[Separation, ...]]
+) -> dict[int, int]:
+    """A partition of ``states`` that satisfies every constraint: state -> word number, from 0.
+
+    A constraint is a tuple of alternatives, at least one of which must hold; each is a set of pairs to separate.  States
+    are tried in the given order, which decides the number of words: the result is a language, not a smallest one
+    (the paper, Algorithm 1).
+
+    O(words * (states + constraints)).
+    """
+    clashes: dict[int, set[int]] = {state: set() for state in states}
+    open_choices = _Choices()
+    for alternatives in constraints:
+        if len(alternatives) == 1:
+            for a, b in alternatives[0].pairs:
+                clashes[a].add(b)
+                clashes[b].add(a)
+        else:
+            open_choices.add(alternatives)
+    words: dict[int, int] = {}
+    waiting = list(states)
+    number = 0
+    while waiting:
+        members: list[int] = []
+        blocked: set[int] = set()
+        left = []
+        for state in waiting:
+            if state in blocked or not open_choices.merge(state, members):
+                left.append(state)
+                continue
+            words[state] = number
+            members.append(state)
+            blocked |= clashes[state]
+        waiting = left
+        number += 1
+    return words
+
+
+class _Choices:
+    """Constraints with several alternatives: merging two states rules out those that keep them apart."""
+
+    def __init__(self) -> None:
+        self._alive: list[set[Separation]] = []
+        self._asking: dict[tuple[int, int], list[tuple[int, Separation]]] = {}
+        self._touched: set[int] = set()
+
+    def add(self, alternatives: tuple[Separation, ...]) -> None:
+        number = len(self._alive)
+        self._alive.append(set(alternatives))
+        for separation in alternatives:
+            for pair in separation.pairs:
+                self._asking.setdefault(pair, []).append((number, separation))
+                self._touched.update(pair)
+
+    def merge(self, state: int, members: Sequence[int]) -> bool:
+        """Put ``state`` into a word with ``members`` if every constraint keeps an alternative."""
+        if state not in self._touched:
+            return True
+        gone: dict[int, set[Separation]] = {}
+        for other in members:
+            pair = (state, other) if state < other else (other, state)
+            for number, separation in self._asking.get(pair, ()):
+                gone.setdefault(number, set()).add(separation)
+        if any(self._alive[number] <= separations for number, separations in gone.items()):
+            return False
+        for number, separations in gone.items():
+            self._alive[number] -= separations
+        return True

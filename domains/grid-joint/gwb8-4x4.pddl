@@ -1,0 +1,26 @@
+; Written by domains/generate.py.
+(define (problem gwb8-4x4)
+  (:domain grid-joint)
+  (:objects
+    c0-0 c0-1 c0-2 c0-3
+    c1-0 c1-3
+    c2-0 c2-3
+    c3-0 c3-1 c3-2 c3-3 - cell
+  )
+  (:init
+    (at r1 c0-0) (at r2 c3-3)
+    (adjacent c0-0 c0-1) (adjacent c0-0 c1-0)
+    (adjacent c0-1 c0-0) (adjacent c0-1 c0-2)
+    (adjacent c0-2 c0-1) (adjacent c0-2 c0-3)
+    (adjacent c0-3 c0-2) (adjacent c0-3 c1-3)
+    (adjacent c1-0 c0-0) (adjacent c1-0 c2-0)
+    (adjacent c1-3 c0-3) (adjacent c1-3 c2-3)
+    (adjacent c2-0 c1-0) (adjacent c2-0 c3-0)
+    (adjacent c2-3 c1-3) (adjacent c2-3 c3-3)
+    (adjacent c3-0 c2-0) (adjacent c3-0 c3-1)
+    (adjacent c3-1 c3-0) (adjacent c3-1 c3-2)
+    (adjacent c3-2 c3-1) (adjacent c3-2 c3-3)
+    (adjacent c3-3 c2-3) (adjacent c3-3 c3-2)
+  )
+  (:goal (and (at r1 c3-3) (at r2 c0-0)))
+)

@@ -1,0 +1,53 @@
+; Written by domains/generate.py.
+(define (problem corners-6x6)
+  (:domain grid)
+  (:objects
+    r1 r2 - robot
+    c0-0 c0-1 c0-2 c0-3 c0-4 c0-5
+    c1-0 c1-1 c1-2 c1-3 c1-4 c1-5
+    c2-0 c2-1 c2-2 c2-3 c2-4 c2-5
+    c3-0 c3-1 c3-2 c3-3 c3-4 c3-5
+    c4-0 c4-1 c4-2 c4-3 c4-4 c4-5
+    c5-0 c5-1 c5-2 c5-3 c5-4 c5-5 - cell
+  )
+  (:init
+    (at r1 c0-0) (at r2 c5-5)
+    (adjacent c0-0 c0-1) (adjacent c0-0 c1-0)
+    (adjacent c0-1 c0-0) (adjacent c0-1 c0-2) (adjacent c0-1 c1-1)
+    (adjacent c0-2 c0-1) (adjacent c0-2 c0-3) (adjacent c0-2 c1-2)
+    (adjacent c0-3 c0-2) (adjacent c0-3 c0-4) (adjacent c0-3 c1-3)
+    (adjacent c0-4 c0-3) (adjacent c0-4 c0-5) (adjacent c0-4 c1-4)
+    (adjacent c0-5 c0-4) (adjacent c0-5 c1-5)
+    (adjacent c1-0 c0-0) (adjacent c1-0 c1-1) (adjacent c1-0 c2-0)
+    (adjacent c1-1 c0-1) (adjacent c1-1 c1-0) (adjacent c1-1 c1-2) (adjacent c1-1 c2-1)
+    (adjacent c1-2 c0-2) (adjacent c1-2 c1-1) (adjacent c1-2 c1-3) (adjacent c1-2 c2-2)
+    (adjacent c1-3 c0-3) (adjacent c1-3 c1-2) (adjacent c1-3 c1-4) (adjacent c1-3 c2-3)
+    (adjacent c1-4 c0-4) (adjacent c1-4 c1-3) (adjacent c1-4 c1-5) (adjacent c1-4 c2-4)
+    (adjacent c1-5 c0-5) (adjacent c1-5 c1-4) (adjacent c1-5 c2-5)
+    (adjacent c2-0 c1-0) (adjacent c2-0 c2-1) (adjacent c2-0 c3-0)
+    (adjacent c2-1 c1-1) (adjacent c2-1 c2-0) (adjacent c2-1 c2-2) (adjacent c2-1 c3-1)
+    (adjacent c2-2 c1-2) (adjacent c2-2 c2-1) (adjacent c2-2 c2-3) (adjacent c2-2 c3-2)
+    (adjacent c2-3 c1-3) (adjacent c2-3 c2-2) (adjacent c2-3 c2-4) (adjacent c2-3 c3-3)
+    (adjacent c2-4 c1-4) (adjacent c2-4 c2-3) (adjacent c2-4 c2-5) (adjacent c2-4 c3-4)
+    (adjacent c2-5 c1-5) (adjacent c2-5 c2-4) (adjacent c2-5 c3-5)
+    (adjacent c3-0 c2-0) (adjacent c3-0 c3-1) (adjacent c3-0 c4-0)
+    (adjacent c3-1 c2-1) (adjacent c3-1 c3-0) (adjacent c3-1 c3-2) (adjacent c3-1 c4-1)
+    (adjacent c3-2 c2-2) (adjacent c3-2 c3-1) (adjacent c3-2 c3-3) (adjacent c3-2 c4-2)
+    (adjacent c3-3 c2-3) (adjacent c3-3 c3-2) (adjacent c3-3 c3-4) (adjacent c3-3 c4-3)
+    (adjacent c3-4 c2-4) (adjacent c3-4 c3-3) (adjacent c3-4 c3-5) (adjacent c3-4 c4-4)
+    (adjacent c3-5 c2-5) (adjacent c3-5 c3-4) (adjacent c3-5 c4-5)
+    (adjacent c4-0 c3-0) (adjacent c4-0 c4-1) (adjacent c4-0 c5-0)
+    (adjacent c4-1 c3-1) (adjacent c4-1 c4-0) (adjacent c4-1 c4-2) (adjacent c4-1 c5-1)
+    (adjacent c4-2 c3-2) (adjacent c4-2 c4-1) (adjacent c4-2 c4-3) (adjacent c4-2 c5-2)
+    (adjacent c4-3 c3-3) (adjacent c4-3 c4-2) (adjacent c4-3 c4-4) (adjacent c4-3 c5-3)
+    (adjacent c4-4 c3-4) (adjacent c4-4 c4-3) (adjacent c4-4 c4-5) (adjacent c4-4 c5-4)
+    (adjacent c4-5 c3-5) (adjacent c4-5 c4-4) (adjacent c4-5 c5-5)
+    (adjacent c5-0 c4-0) (adjacent c5-0 c5-1)
+    (adjacent c5-1 c4-1) (adjacent c5-1 c5-0) (adjacent c5-1 c5-2)
+    (adjacent c5-2 c4-2) (adjacent c5-2 c5-1) (adjacent c5-2 c5-3)
+    (adjacent c5-3 c4-3) (adjacent c5-3 c5-2) (adjacent c5-3 c5-4)
+    (adjacent c5-4 c4-4) (adjacent c5-4 c5-3) (adjacent c5-4 c5-5)
+    (adjacent c5-5 c4-5) (adjacent c5-5 c5-4)
+  )
+  (:goal (and (at r1 c5-5) (at r2 c0-0)))
+)

@@ -1,0 +1,72 @@
+"""Time and memory limits of a process: over the limit, work in progress ends with an error that the caller can catch.
+
+An alarm raises `OutOfTime` wherever the program is, so that algorithms need no clock of their own; anytime methods catch
+it and return what they have.  The memory limit is the operating system's (address space), met as `MemoryError`.
+"""
+
+from __future__ import annotations
+
+import resource
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+from planners.errors import OutOfTime
+
+#: The alarm rings again until somebody has caught it: an exception inside a finalizer is lost.
+_AGAIN = 0.5
+
+
+@contextmanager
+def time_limit(seconds: float | None) -> Iterator[None]:
+    """Raise `OutOfTime` in the block when ``seconds`` of wall time are over (main thread only)."""
+    if seconds is None:
+        yield
+        return
+
+    def ring(_signal: int, _frame: FrameType | None) -> None:
+        raise OutOfTime(f"the time limit of {seconds:g} s is over", remedy="Use a larger --time-limit.")
+
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, seconds, _AGAIN)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def limit_memory(size: int | None) -> None:
+    """Let this process and its children have at most ``size`` bytes of address space."""
+    if size is not None:
+        _, hard = resource.getrlimit(resource.RLIMIT_AS)
+        resource.setrlimit(resource.RLIMIT_AS, (size, hard))
+
+
+def memory_left() -> int:
+    """Bytes that this process may still take: under its limit and as the machine has them free."""
+    free = _available()
+    soft, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if soft == resource.RLIM_INFINITY:
+        return free
+    return max(0, min(free, soft - _used()))
+
+
+def _available() -> int:
+    try:
+        with open("/proc/meminfo") as lines:
+            for line in lines:
+                if line.startswith("MemAvailable:"):
+                    return int(line.split()[1]) * 1024
+    except OSError:
+        pass  # no /proc on this system: the limit alone counts
+    return 2**62
+
+
+def _used() -> int:
+    try:
+        with open("/proc/self/statm") as text:
+            return int(text.read().split()[0]) * resource.getpagesize()
+    except OSError:
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024

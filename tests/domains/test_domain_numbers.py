@@ -1,0 +1,230 @@
+"""What the shipped domains contain: the paper's numbers, the numbers in the README files, and both styles equal."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import Counter
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+from generate import Scenario, problem_text
+from gridmap import GridMap, open_grid, ring, three_cells
+
+from planners.joint import FullState
+from planners.model import build
+from planners.optimal import PlanSpace, TaskGroup, plan_spaces
+from planners.pddl import parse_problem, read_domain
+from planners.pddl.sexpr import Source
+from planners.plans import Plans, counts
+from planners.space import Space, explore
+
+DOMAINS = Path(__file__).resolve().parents[2] / "domains"
+
+#: Table 1 of the paper: problem, tasks, states.
+ALL_TASKS = [
+    ("gw1-2x2", 132, 12),
+    ("gw2-2x3", 870, 30),
+    ("gw3-2x4", 3080, 56),
+    ("gw4-3x3", 5112, 72),
+    ("gwb1-2x4", 3080, 56),
+    ("gwb2-3x3", 3080, 56),
+    ("gwb3-3x4", 8010, 90),
+    ("gwb4-2x5", 8010, 90),
+]
+FILTERED = [
+    ("gwb5-3x3", 380, 56, 4),
+    ("gwb6-3x4", 636, 90, 5),
+    ("gwb7-3x5", 956, 132, 6),
+    ("gwb8-4x4", 956, 132, 6),
+]
+STYLES = ("grid", "grid-joint")
+
+
+def to_every_state(space: Space) -> PlanSpace:
+    """The optimal plans between all pairs of different states."""
+    groups = [TaskGroup(FullState(tuple(int(word) for word in row))) for row in space.rows]
+    (plans,) = plan_spaces(space, groups)
+    return plans
+
+
+@pytest.mark.parametrize("style", STYLES)
+@pytest.mark.parametrize(("problem", "tasks", "states"), ALL_TASKS)
+def test_table_1_all_tasks(world, style, problem, tasks, states):
+    space = world(style, problem).space
+    assert len(space) == states
+    assert len(to_every_state(space).starts) == tasks
+
+
+@pytest.mark.parametrize("style", STYLES)
+@pytest.mark.parametrize(("problem", "tasks", "states", "at_least"), FILTERED)
+def test_table_1_filtered_tasks(world, style, problem, tasks, states, at_least):
+    here = world(style, problem)
+    assert len(here.space) == states
+    data = json.loads((DOMAINS / "grid" / f"{problem}.tasks.json").read_text())
+    assert (data["format"], data["version"]) == ("coordlang/tasks", 1)
+    pairs = [(tuple(task["init"]), tuple(task["goal"])) for task in data["tasks"]]
+    assert len(set(pairs)) == len(pairs) == tasks
+    codec = here.loaded.model.codec
+    rows = np.array([codec.encode(atoms) for pair in pairs for atoms in pair])
+    assert (here.space.numbers(rows) >= 0).all(), "the states of the task file are reachable states"
+    assert all(farthest(init, goal) >= at_least for init, goal in pairs)
+
+
+def farthest(init: tuple[str, ...], goal: tuple[str, ...]) -> int:
+    """The greatest Manhattan distance of a robot, from the atoms' text."""
+    numbers = [[[int(n) for n in re.findall(r"\d+", atom)] for atom in state] for state in (init, goal)]
+    return max(abs(a[1] - b[1]) + abs(a[2] - b[2]) for a, b in zip(*numbers, strict=True) if a[0] == b[0])
+
+
+@pytest.mark.parametrize("style", STYLES)
+@pytest.mark.parametrize(("size", "plans"), [(3, 18), (4, 236), (5, 3090)])
+def test_trading_opposite_corners(world, style, size, plans):
+    assert Plans.of(world(style, f"corners-{size}x{size}").plans).count == plans
+
+
+@pytest.mark.parametrize("problem", [row[0] for row in ALL_TASKS] + ["gwb5-3x3", "gwb7-3x5", "gwb8-4x4", "corners-4x4"])
+def test_both_styles_are_the_same_model(world, problem):
+    one, other = (world(style, problem).space for style in STYLES)
+    assert one.model.codec.facts == other.model.codec.facts
+    assert (one.rows == other.rows).all()
+    # Only MA-PDDL has the step in which nobody moves.
+    still = {(number, (None, None), number) for number in range(len(one))}
+    assert steps(one) == steps(other) | still
+    first, second = to_every_state(one), to_every_state(other)
+    assert counts_at_starts(first) == counts_at_starts(second)
+
+
+def steps(space: Space) -> set[tuple[int, tuple[str | None, ...], int]]:
+    """(state, where each robot moves, next state); a step that is there twice is an error."""
+    found = [
+        (source, tuple(text and text.split()[-1] for text in space.model.texts(labels)), int(target))
+        for source in range(len(space))
+        for labels, target in zip(
+            space.labels[space.first[source] : space.first[source + 1]],
+            space.target[space.first[source] : space.first[source + 1]],
+            strict=True,
+        )
+    ]
+    assert len(set(found)) == len(found)
+    return set(found)
+
+
+def counts_at_starts(plans: PlanSpace) -> list[tuple[int, int, int]]:
+    """(goal, initial state, number of optimal plans) of every task."""
+    all_counts = counts(plans)
+    return [(int(plans.goal[node]), int(plans.state[node]), all_counts[node]) for node in plans.starts]
+
+
+def naive_steps(grid: GridMap, state: tuple[str, ...]) -> set[tuple[str, ...]]:
+    """The rules of a step, literally: who moves where, nobody shares a cell, nobody swaps."""
+    options = [[cell, *grid.neighbours(cell)] for cell in state]
+    return {
+        after
+        for after in product(*options)
+        if len(set(after)) == len(after)
+        and not any(a != b and (b, a) in zip(state, after, strict=True) for a, b in zip(state, after, strict=True))
+    }
+
+
+@pytest.mark.parametrize(
+    ("grid", "starts"),
+    [
+        (three_cells(), ("a", "b")),
+        (three_cells(), ("a", "b", "c")),
+        (open_grid(2, 2), ("c0-0", "c0-1", "c1-1", "c1-0")),
+        (open_grid(2, 3), ("c0-0", "c1-1")),
+        (open_grid(2, 3), ("c0-0", "c1-1", "c0-2")),
+        (ring(2, 4), ("c0-0", "c1-1", "c0-2")),
+    ],
+    ids=["triangle-2", "triangle-3", "square-4", "grid-2", "grid-3", "ring-3"],
+)
+def test_the_grid_domain_against_its_rules(grid, starts):
+    robots = len(starts)
+    domain = read_domain(DOMAINS / "grid" / "domain.pddl")
+    text = problem_text(Scenario("naive", grid, starts, starts), "grid")
+    loaded = build(domain, [parse_problem(Source("naive", text), domain)])
+    space = explore(loaded.model, loaded.tasks[0].init[None, :])
+    cells = [tuple(re.findall(r"\(at r\d+ (\S+)\)", loaded.model.codec.key(row))) for row in space.rows]
+
+    seen, todo = {starts}, [starts]
+    while todo:
+        new = naive_steps(grid, todo.pop()) - seen
+        seen |= new
+        todo += new
+    assert set(cells) == seen
+    for number, state in enumerate(cells):
+        after = [cells[target] for target in space.target[space.first[number] : space.first[number + 1]]]
+        assert len(state) == robots
+        assert Counter(after) == Counter(naive_steps(grid, state))
+
+
+def test_a_full_ring_can_only_turn():
+    """Following in a cycle: with no free cell all robots move at once, or none does."""
+    assert naive_steps(three_cells(), ("a", "b", "c")) == {("a", "b", "c"), ("b", "c", "a"), ("c", "a", "b")}
+
+
+def test_three_cells(world):
+    space = world("three-cells", "problem").space
+    assert len(space) == 6
+    assert to_every_state(space).layer.max() == 2
+
+
+def test_t_map(world):
+    assert len(world("t-map", "problem").space) == 12
+
+
+def test_who_uses_the_passing_place_of_the_corridor(world):
+    here = world("corridor", "problem")
+    aside = Counter(
+        tuple(any(text and text.endswith(" c0-4)") for text in column) for column in zip(*texts, strict=True))
+        for plan in Plans.of(here.plans)
+        for texts in [[here.loaded.model.texts(labels) for labels in plan]]
+    )
+    assert aside == {(True, False): 16, (False, True): 16}
+
+
+def readme_rows() -> list[tuple[str, str, dict[str, int]]]:
+    """(folder, problem, numbers by column) for every row of a README table about problems."""
+    found = []
+    for readme in sorted(DOMAINS.glob("*/README.md")):
+        columns: list[str] = []
+        for line in readme.read_text().splitlines():
+            entries = [entry.strip() for entry in line.strip("|").split("|")] if line.startswith("|") else []
+            if not entries or entries[0] == "problem":
+                columns = entries
+            elif columns and not entries[0].startswith("-"):
+                values = dict(zip(columns, entries, strict=True))
+                numbers = {key: int(values[key]) for key in ("states", "makespan", "optimal plans")}
+                found.append((readme.parent.name, entries[0], numbers))
+    return found
+
+
+def test_every_problem_is_in_a_readme():
+    told = {(folder, problem) for folder, problem, _ in readme_rows()}
+    there = {(p.parent.name, p.stem) for p in DOMAINS.glob("*/*.pddl") if p.stem != "domain"}
+    assert told == there
+
+
+@pytest.mark.parametrize(("folder", "problem", "told"), readme_rows(), ids=lambda value: str(value)[:20])
+def test_the_numbers_in_the_readme_files(world, folder, problem, told):
+    here = world(folder, problem)
+    seen = {
+        "states": len(here.space),
+        "makespan": here.plans.cost_of(0)[0],
+        "optimal plans": Plans.of(here.plans).count,
+    }
+    assert seen == told
+
+
+@pytest.mark.parametrize(("problem", "tasks"), [*((r[0], r[1]) for r in ALL_TASKS), *((r[0], r[1]) for r in FILTERED)])
+def test_the_numbers_of_tasks_in_the_readme(problem, tasks):
+    text = (DOMAINS / "grid" / "README.md").read_text()
+    assert re.search(rf"^\| {problem} \| \d+ \| {tasks} \|", text, re.MULTILINE)
+
+
+def test_problems_of_one_folder_name_their_domain():
+    for path in sorted(DOMAINS.glob("*/domain.pddl")):
+        assert read_domain(path).name == path.parent.name

@@ -1,0 +1,124 @@
+"""The generator: what is shipped is what it writes, and the command."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from generate import main, scenario
+from gridmap import open_grid
+
+from planners.errors import UsageError
+from planners.model import load
+
+DOMAINS = Path(__file__).resolve().parents[2] / "domains"
+
+#: What people write; everything else in domains/ comes from the generator.
+BY_HAND = {
+    "README.md",
+    "generate.py",
+    "gridmap.py",
+    "picture.py",
+    "grid/domain.pddl",
+    "grid-joint/domain.pddl",
+    "t-map/t-map.map",
+    "corridor/corridor.map",
+    *(f"{folder}/README.md" for folder in ("grid", "grid-joint", "three-cells", "t-map", "corridor")),
+}
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and not any(part.startswith((".", "__")) for part in path.relative_to(folder).parts)
+    }
+
+
+def test_the_shipped_files_are_what_the_generator_writes(tmp_path):
+    # In a process of its own with another hash seed: the order of sets must not show.
+    command = [sys.executable, str(DOMAINS / "generate.py"), "all", "--into", str(tmp_path)]
+    subprocess.run(command, check=True, env={"PYTHONHASHSEED": "77"})
+    shipped = {name: data for name, data in files(DOMAINS).items() if name not in BY_HAND}
+    written = files(tmp_path)
+    assert sorted(written) == sorted(shipped)
+    assert [name for name in written if written[name] != shipped[name]] == []
+
+
+def test_pictures_are_self_contained_and_say_what_they_show():
+    pictures = sorted(DOMAINS.glob("*/*.svg"))
+    assert {p.stem for p in pictures} >= {p.stem for p in DOMAINS.glob("grid/*.pddl")} - {"domain"}
+    for picture in pictures:
+        root = ElementTree.parse(picture).getroot()
+        tags = {element.tag.rpartition("}")[2] for element in root.iter()}
+        assert tags <= {"svg", "title", "desc", "rect", "line", "circle", "text"}
+        assert "starts in" in (root.findtext("{http://www.w3.org/2000/svg}desc") or "")
+        assert not [key for element in root.iter() for key in element.keys() if "href" in key]  # noqa: SIM118
+
+
+def test_a_ring_of_two_rows_is_drawn_with_its_wall():
+    lines = {
+        name: len(ElementTree.parse(DOMAINS / "grid" / f"{name}.svg").findall("{http://www.w3.org/2000/svg}line"))
+        for name in ("gw3-2x4", "gwb1-2x4", "gwb4-2x5")
+    }
+    assert lines == {"gw3-2x4": 0, "gwb1-2x4": 2, "gwb4-2x5": 3}
+
+
+@pytest.mark.parametrize(("style", "domain"), [("agents", "grid"), ("joint", "grid-joint")])
+def test_one_problem_with_everything(tmp_path, style, domain):
+    problem, picture, tasks = (tmp_path / name for name in ("p.pddl", "p.svg", "t.json"))
+    arguments = ["ring", "2x3", "--style", style, "-o", problem, "--picture", picture, "--tasks", tasks, "--at-least", "3"]
+    assert main([str(argument) for argument in arguments]) == 0
+    loaded = load(DOMAINS / domain / "domain.pddl", [problem])
+    assert loaded.model.codec.decode(loaded.tasks[0].init) == ["(at r1 c0-0)", "(at r2 c1-2)"]
+    assert ElementTree.parse(picture).getroot().tag.endswith("svg")
+    # Only corners are 3 apart: 4 pairs for one robot, 5 * 5 places for the other; both far: 4 * 3.  2 * 100 - 12.
+    assert len(json.loads(tasks.read_text())["tasks"]) == 188
+
+
+def test_a_problem_from_a_map_on_stdout(capsys, tmp_path):
+    path = DOMAINS / "t-map" / "t-map.map"
+    assert main(["map", str(path), "--starts", "c0-1", "c1-0", "--goals", "c1-0", "c0-1", "--domain", "t-map"]) == 0
+    assert capsys.readouterr().out == (DOMAINS / "t-map" / "problem.pddl").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (["open", "2x2", "--robots", "5"], 2, "cannot place 5 robots on 4 cells"),
+        (["open", "2x2", "--robots", "0"], 2, "cannot place 0 robots"),
+        (["open", "2x2", "--starts", "c0-0"], 2, "2 robots need 2 start cells, not 1"),
+        (["open", "2x2", "--starts", "c0-0", "c9-9"], 2, "no start cell 'c9-9'"),
+        (["open", "2x2", "--goals", "c0-0", "c0-0"], 2, "the same goal cell"),
+        (["open", "2x2", "--robots", "3", "--style", "joint"], 2, "for two robots"),
+        (["map", "no/such.map"], 31, "cannot read this map"),
+        (["open", "2x2", "-o", "no/such/folder/p.pddl"], 31, "cannot write no/such/folder/p.pddl"),
+    ],
+)
+def test_errors_of_the_command(capsys, arguments, code, message):
+    assert main(arguments) == code
+    captured = capsys.readouterr()
+    assert message in captured.err
+    assert captured.out == ""
+
+
+@pytest.mark.parametrize("arguments", [["ring", "1x4"], ["open", "0x3"], ["open", "3"], ["circle", "3x3"], []])
+def test_usage(arguments):
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    assert caught.value.code == 2
+
+
+def test_where_robots_go_when_nothing_is_said():
+    assert scenario("s", open_grid(3, 3)).starts == ("c0-0", "c2-2")
+    assert scenario("s", open_grid(3, 3)).goals == ("c2-2", "c0-0")
+    three = scenario("s", open_grid(3, 3), robots=3)
+    assert (three.starts, three.goals) == (("c0-0", "c1-1", "c2-2"), ("c1-1", "c2-2", "c0-0"))
+    one = scenario("s", open_grid(3, 3), robots=1)
+    assert (one.starts, one.goals) == (("c0-0",), ("c2-2",))
+    with pytest.raises(UsageError):
+        scenario("s", open_grid(3, 3), starts=["c0-0"])

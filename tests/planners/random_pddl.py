@@ -1,0 +1,306 @@
+"""Small random domains and problems as PDDL text, for comparing the fast model with its naive twin.
+
+Every seed gives one model with two or three robots and at most `_FLUENTS` ground fluents, hence at most
+``2 ** _FLUENTS`` states.  Three kinds: MA-PDDL with ``:agent``, plain typed PDDL with actions shared by two robots
+(and now and then actions of nobody), and joint-action PDDL.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import product
+from random import Random
+from typing import Literal
+
+from planners.robots import Unowned
+
+Kind = Literal["agent", "plain", "joint"]
+KINDS: tuple[Kind, ...] = ("agent", "plain", "joint")
+_FLUENTS = 7
+_SIGNATURES = ((), ("robot",), ("place",), ("robot", "place"), ("place", "place"), ("robot", "robot"))
+#: Types that a variable may have, and how often.
+_TYPES = ("robot", "robot", "place", "place", "place", "hub", "object", "(either robot hub)")
+
+
+@dataclass(frozen=True)
+class RandomModel:
+    """Text of a domain and a problem, and who does what belongs to nobody."""
+
+    domain: str
+    problem: str
+    unowned: Unowned = "error"
+
+
+def random_model(seed: int, kind: Kind) -> RandomModel:
+    """The model of a seed; the same seed writes the same text."""
+    return _Writer(Random(f"{kind} {seed}"), kind).model()
+
+
+Scope = dict[str, str]
+
+
+@dataclass
+class _Writer:
+    random: Random
+    kind: Kind
+    robots: list[str] = field(default_factory=list)
+    places: list[str] = field(default_factory=list)
+    fluents: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    statics: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    actions: dict[str, Scope] = field(default_factory=dict)
+    unowned: Unowned = "error"
+
+    def model(self) -> RandomModel:
+        self._choose_names()
+        # What no effect mentions would be static.
+        bodies = [self._schema(name, scope) for name, scope in self.actions.items()]
+        missing = [p for p in self.fluents if not any(f"({p}" in effect for _, effect in bodies)]
+        first = self.actions["a0"]
+        bodies[0][1] += "".join(f" ({name}{self._terms(self.fluents[name], first)})" for name in missing)
+        texts = [
+            self._action(name, scope, precondition, f"(and{effect})" if effect else "()")
+            for (name, scope), (precondition, effect) in zip(self.actions.items(), bodies, strict=True)
+        ]
+        predicates = " ".join(
+            f"({name}{''.join(f' ?{i} - {t}' for i, t in enumerate(types))})"
+            for name, types in (*self.fluents.items(), *self.statics.items())
+        )
+        domain = (
+            "(define (domain random) (:requirements :adl :multi-agent)\n"
+            "  (:types robot place - object hub - place)\n"
+            f"  (:constants {' '.join(self.robots)} - robot {self.places[0]} - hub)\n"
+            f"  (:predicates {predicates})\n" + "\n".join(texts) + ")\n"
+        )
+        return RandomModel(domain, self._problem(), self.unowned)
+
+    # -- what there is ---------------------------------------------------------------------------------------
+
+    def _choose_names(self) -> None:
+        pick = self.random
+        self.robots = [f"r{i + 1}" for i in range(pick.choice((2, 2, 3)))]
+        self.places = [f"p{i + 1}" for i in range(pick.choice((1, 2, 2, 3, 3)))]
+        left = _FLUENTS
+        for number in range(pick.randint(1, 3)):
+            fitting = [s for s in _SIGNATURES if self._ground_atoms(s) <= left and (s or number)]
+            if fitting:
+                self.fluents[f"f{number}"] = signature = pick.choice(fitting)
+                left -= self._ground_atoms(signature)
+        if not self.fluents:
+            self.fluents["f0"] = ("robot",)
+        for number in range(pick.randint(0, 2)):
+            self.statics[f"s{number}"] = pick.choice(_SIGNATURES)
+        if self.kind == "plain" and pick.random() < 0.2:
+            self.unowned = pick.choice(("environment", "shared"))
+        for number in range(pick.choice((1, 2, 2, 3, 3, 4))):
+            self.actions[f"a{number}"] = self._parameters()
+
+    def _ground_atoms(self, signature: tuple[str, ...]) -> int:
+        sizes = {"robot": len(self.robots), "place": len(self.places)}
+        count = 1
+        for kind in signature:
+            count *= sizes[kind]
+        return count
+
+    def _parameters(self) -> Scope:
+        pick = self.random
+        if self.kind == "joint":
+            return {f"?x{i}": pick.choice(("place", "place", "hub", "robot")) for i in range(pick.choice((0, 1, 2, 2, 3, 4)))}
+        scope = {"?r": "robot"}
+        if self.kind == "plain":
+            if self.unowned != "error" and pick.random() < 0.4:
+                del scope["?r"]
+            elif pick.random() < 0.4:
+                scope["?q"] = "robot"
+        extra = pick.choice((0, 1, 2, 2)) if len(scope) < 2 else pick.choice((0, 0, 1))
+        for number in range(extra):
+            # Another robot as argument would make a plain action a shared one.
+            types = ("place", "hub") if self.kind == "plain" else ("place", "place", "hub", "robot")
+            scope[f"?x{number}"] = pick.choice(types)
+        return scope
+
+    # -- schemas ---------------------------------------------------------------------------------------------
+
+    def _schema(self, name: str, scope: Scope) -> list[str]:
+        """Precondition and the effects (not yet joined) of an action; one in six has no effect at all."""
+        pick = self.random
+        if pick.random() < 0.4 and (moving := self._move(scope)):
+            return moving
+        parts = [self._literal(scope) for _ in range(pick.choice((0, 0, 1, 1, 2)))]
+        if pick.random() < 0.35:
+            parts.append(self._formula(scope, pick.randint(1, 3)))
+        if self.kind != "joint" and pick.random() < 0.3:
+            parts.append(self._about_the_step(scope))
+        precondition = f"(and {' '.join(parts)})" if len(parts) != 1 else parts[0]
+        if not parts and pick.random() < 0.5:
+            precondition = "()"
+        if pick.random() < 1 / 6:
+            return [precondition, ""]
+        return [precondition, "".join(f" {self._effect(scope, 2)}" for _ in range(pick.randint(1, 3)))]
+
+    def _move(self, scope: Scope) -> list[str] | None:
+        """``(f .. ?x)`` becomes ``(f .. ?y)``: chains of such steps make plans of some length."""
+        pick = self.random
+        changing = [(f, types) for f, types in self.fluents.items() if types]
+        if not changing:
+            return None
+        name, types = pick.choice(changing)
+        last = [v for v, t in scope.items() if t == types[-1] or (types[-1], t) == ("place", "hub")]
+        if len(last) < 2:
+            return None
+        before, after = pick.sample(last, 2)
+        first = self._terms(types[:-1], scope)
+        here, there = f"({name}{first} {before})", f"({name}{first} {after})"
+        more = [self._about_the_step(scope)] if self.kind != "joint" and pick.random() < 0.4 else []
+        more += [f"(not {there})"] if pick.random() < 0.4 else []
+        more += [self._literal(scope)] if pick.random() < 0.2 else []
+        effect = f" (not {here}) {there}" + (f" {self._effect(scope, 2)}" if pick.random() < 0.3 else "")
+        return [f"(and {' '.join((here, *more))})", effect]
+
+    def _action(self, name: str, scope: Scope, precondition: str, effect: str) -> str:
+        lines = [f"  (:action {name}"]
+        listed = [f"{v} - {t}" for v, t in scope.items()]
+        if self.kind == "agent" and self.random.random() < 0.7:
+            lines.append(f"    :agent {listed.pop(0)}")
+        elif self.kind == "agent":
+            lines.append("    :agent ?r")
+        lines.append(f"    :parameters ({' '.join(listed)})")
+        if self.kind == "joint":
+            lines += self._comments(scope)
+        lines += [f"    :precondition {precondition}", f"    :effect {effect})"]
+        return "\n".join(lines)
+
+    def _comments(self, scope: Scope) -> list[str]:
+        """The robots' parts.  Mostly all parameters are named, so that the parts determine the action."""
+        pick = self.random
+        lines = []
+        for robot in self.robots:
+            terms = [v for v in scope if pick.random() < 0.8]
+            if pick.random() < 0.1:
+                terms.append(self.places[0])
+            part = "idle" if pick.random() < 0.25 else f"({' '.join((pick.choice(('go', 'do')), *terms))})"
+            lines.append(f"    ; subaction {robot} {part}")
+        # A missing line means idle; the first robot is always named.
+        return [line for n, line in enumerate(lines) if n == 0 or not line.endswith("idle") or pick.random() < 0.5]
+
+    # -- formulas --------------------------------------------------------------------------------------------
+
+    def _term(self, kind: str, scope: Scope) -> str:
+        """Mostly a variable of the type, sometimes a constant or a variable of any type."""
+        pick = self.random
+        fitting = [v for v, t in scope.items() if t == kind or (kind == "place" and t == "hub")]
+        if fitting and pick.random() < 0.85:
+            return pick.choice(fitting)
+        if scope and pick.random() < 0.2:
+            return pick.choice(list(scope))
+        return pick.choice(self.robots) if kind == "robot" else self.places[0]
+
+    def _terms(self, types: tuple[str, ...], scope: Scope) -> str:
+        return "".join(f" {self._term(t, scope)}" for t in types)
+
+    def _literal(self, scope: Scope) -> str:
+        pick = self.random
+        known = {**self.fluents, **(self.statics if pick.random() < 0.4 else {})}
+        name = pick.choice(list(known))
+        atom = f"({name}{self._terms(known[name], scope)})"
+        return atom if pick.random() < 0.65 else f"(not {atom})"
+
+    def _variables(self) -> Scope:
+        """Names that may hide the parameters."""
+        names = self.random.sample(("?o", "?x0", "?r", "?y"), self.random.choice((1, 1, 2)))
+        return {name: self.random.choice(_TYPES) for name in names}
+
+    def _formula(self, scope: Scope, depth: int, *, step: bool = True) -> str:
+        pick = self.random
+        kind = pick.choice(("literal", "equal", "step", "and", "or", "not", "imply", "forall", "exists"))
+        if depth == 0:
+            kind = pick.choice(("literal", "literal", "literal", "equal", "step"))
+        if kind == "step" and (self.kind == "joint" or not step):
+            kind = "literal"
+        inner = depth - 1
+        match kind:
+            case "equal":
+                terms = [*scope, *self.robots, self.places[0]]
+                return f"(= {pick.choice(terms)} {pick.choice(terms)})"
+            case "step":
+                return self._step_atom(scope)
+            case "and" | "or":
+                parts = [self._formula(scope, inner, step=step) for _ in range(pick.choice((1, 2, 2, 3)))]
+                return f"({kind} {' '.join(parts)})"
+            case "not":
+                return f"(not {self._formula(scope, inner, step=step)})"
+            case "imply":
+                return f"(imply {self._formula(scope, inner, step=step)} {self._formula(scope, inner, step=step)})"
+            case "forall" | "exists":
+                return self._quantified(kind, self._variables(), scope, inner, step=step)
+        return self._literal(scope)
+
+    def _quantified(self, kind: str, variables: Scope, scope: Scope, depth: int, *, step: bool) -> str:
+        listed = " ".join(f"{v} - {t}" for v, t in variables.items())
+        return f"({kind} ({listed}) {self._formula({**scope, **variables}, depth, step=step)})"
+
+    def _step_atom(self, scope: Scope) -> str:
+        name = self.random.choice(list(self.actions))
+        return f"({name}{self._terms(tuple(self.actions[name].values()), scope)})"
+
+    def _about_the_step(self, scope: Scope) -> str:
+        """The two forms that domains use: nobody does .., somebody else does .."""
+        pick = self.random
+        inner = {**scope, "?o": "robot"}
+        name = pick.choice(list(self.actions))
+        args = [
+            "?o" if t == "robot" and pick.random() < 0.8 else self._term(t, inner)
+            for t in self.actions[name].values()
+        ]
+        atom = f"({' '.join((name, *args))})"
+        if pick.random() < 0.5:
+            return f"(forall (?o - robot) (not {atom}))"
+        other = pick.choice(("(not (= ?o ?r)) ", "")) if "?r" in scope else ""
+        return f"(exists (?o - robot) (and {other}{atom}))"
+
+    def _effect(self, scope: Scope, depth: int) -> str:
+        pick = self.random
+        kind = pick.choice(("literal", "literal", "literal", "when", "forall")) if depth else "literal"
+        if kind == "when":
+            condition = self._formula(scope, pick.choice((0, 0, 1, 2)))
+            return f"(when {condition} {self._effect(scope, depth - 1)})"
+        if kind == "forall":
+            variables = self._variables()
+            listed = " ".join(f"{v} - {t}" for v, t in variables.items())
+            return f"(forall ({listed}) {self._effect({**scope, **variables}, depth - 1)})"
+        name = pick.choice(list(self.fluents))
+        atom = f"({name}{self._terms(self.fluents[name], scope)})"
+        literal = atom if pick.random() < 0.55 else f"(not {atom})"
+        return literal if pick.random() < 0.85 else f"(and {literal} {self._effect(scope, 0)})"
+
+    # -- the problem -----------------------------------------------------------------------------------------
+
+    def _problem(self) -> str:
+        pick = self.random
+        things = {"robot": self.robots, "place": self.places}
+        true = [
+            f"({' '.join((name, *args))})"
+            for name, types in (*self.fluents.items(), *self.statics.items())
+            for args in product(*(things[t] for t in types))
+            if pick.random() < 0.5
+        ]
+        everything = {**{r: "robot" for r in self.robots}, **{p: "place" for p in self.places}}
+        names = list(self.fluents)
+        goals = []
+        for _ in range(pick.choice((1, 2, 2, 3))):
+            name = pick.choice(names)
+            args = [pick.choice(things[t]) for t in self.fluents[name]]
+            atom = f"({' '.join((name, *args))})"
+            # What already holds makes no goal: mostly ask for a change.
+            now = atom in true
+            wanted = not now if pick.random() < 0.8 else now
+            goals.append(atom if wanted else f"(not {atom})")
+        if pick.random() < 0.2:
+            goals.append(self._formula({v: t for v, t in everything.items() if v in self.robots}, 2, step=False))
+        rest = " ".join(self.places[1:])
+        objects = f"{rest} - {pick.choice(('place', 'place', 'hub'))}" if rest else ""
+        return (
+            "(define (problem random-1) (:domain random)\n"
+            f"  (:objects {objects})\n"
+            f"  (:init {' '.join(true)})\n"
+            f"  (:goal (and {' '.join(goals)})))\n"
+        )
