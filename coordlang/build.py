@@ -6,11 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 
-from coordlang.witness import Miscoordination, inseparable
 from coordlang.divergence import Alphas, alphas, separations, states_on_plans
 from coordlang.language import Guarantee, Language, name_words
 from coordlang.tasks import Candidates, require_solvable
 from coordlang.vocabulary import METHODS
+from coordlang.witness import Miscoordination, inseparable
 from planners.errors import ProvedImpossible
 
 

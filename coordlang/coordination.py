@@ -102,9 +102,7 @@ def walk(space: PlanSpace) -> Walk:
     return _backward(space, layers)
 
 
-def moves(
-    space: PlanSpace, index: EdgeIndex, nodes: Ints, *, together: bool = False
-) -> Iterator[Moves]:
+def moves(space: PlanSpace, index: EdgeIndex, nodes: Ints, *, together: bool = False) -> Iterator[Moves]:
     """All moves of n plans and their mixture out of walk nodes ``(x_1 .. x_n, y)``, in chunks.
 
     With ``together`` only those in which all plans reach the same node.
@@ -157,9 +155,7 @@ def _forward(space: PlanSpace, index: EdgeIndex) -> list[_Layer]:
     return layers
 
 
-def _expand(
-    space: PlanSpace, index: EdgeIndex, table: Ints, below: slice, held: int
-) -> tuple[_Layer, Ints]:
+def _expand(space: PlanSpace, index: EdgeIndex, table: Ints, below: slice, held: int) -> tuple[_Layer, Ints]:
     """One layer's moves.  A node that fails at once needs no children, unless it is diagonal."""
     columns = table.shape[1]
     bounds = [below.stop - below.start] * columns
@@ -174,9 +170,7 @@ def _expand(
         fails[move.source[broken]] = True
         follow = ~broken & (~fails[move.source] | diagonal[move.source])
         target = space.target[move.edges]
-        fresh, number = unique_tuples(
-            np.column_stack((target[follow], move.mixed[follow])) - below.start, bounds
-        )
+        fresh, number = unique_tuples(np.column_stack((target[follow], move.mixed[follow])) - below.start, bounds)
         child = np.full(len(move.source), FAILED, np.int64)
         child[follow] = number + count
         links.append(np.unique(np.column_stack((move.source[follow], child[follow])), axis=0))
@@ -242,9 +236,7 @@ def _implied(table: Ints) -> Bools:
     known: dict[int, set[frozenset[int]]] = {}
     for last, states in sets:
         known.setdefault(last, set()).add(states)
-    return np.array(
-        [any(other < states for other in known[last]) for last, states in sets], np.bool_
-    )
+    return np.array([any(other < states for other in known[last]) for last, states in sets], np.bool_)
 
 
 def _sorted_different(states: Ints) -> Ints:

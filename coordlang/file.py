@@ -90,9 +90,7 @@ def json_schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "coordlang language", **schema}
 
 
-def describe_source(
-    domain: Domain, problem: Problem, options: ModelOptions
-) -> tuple[dict[str, Any], dict[str, Any]]:
+def describe_source(domain: Domain, problem: Problem, options: ModelOptions) -> tuple[dict[str, Any], dict[str, Any]]:
     """The ``domain`` and ``model`` entries of a language file."""
     return (
         {"name": domain.name, "sha256": domain.source.sha256},
@@ -241,9 +239,7 @@ def _check_head(data: bytes, place: Place) -> None:
     if head.format != FORMAT:
         raise BadInput(f"format {head.format!r}, expected {FORMAT!r}", place=place)
     if head.version != VERSION:
-        raise BadInput(
-            f"language file version {head.version!r}; this program reads version {VERSION}", place=place
-        )
+        raise BadInput(f"language file version {head.version!r}; this program reads version {VERSION}", place=place)
 
 
 def options_of(
@@ -266,9 +262,7 @@ def options_of(
     if robots and robots.names and set(robots.names) != set(language.robots) - {ENVIRONMENT}:
         raise UsageError(f"--robots contradicts the language file: {', '.join(language.robots)}")
     names = tuple(r for r in language.robots if r != ENVIRONMENT or own["--unowned"][0] != "environment")
-    return ModelOptions(
-        RobotChoice(names, None, own["--unowned"][0]), own["--cost"][0], own["--remember-actions"][0]
-    )
+    return ModelOptions(RobotChoice(names, None, own["--unowned"][0]), own["--cost"][0], own["--remember-actions"][0])
 
 
 def check_source(language: Language, domain: Domain, problems: list[Problem], place: Place) -> None:
@@ -306,4 +300,3 @@ def recorded_candidates(
         if error.place is not None:
             raise
         raise BadInput(error.what, place=place, remedy=error.remedy) from None
-

@@ -110,8 +110,6 @@ def name_words(
     for state in sorted(partition):
         order.setdefault(partition[state], len(order))
     words = tuple(f"w{n}" for n in range(max(1, len(order))))
-    states = {
-        model.codec.key(rows[state]): words[order[partition[state]]] for state in sorted(partition)
-    }
+    states = {model.codec.key(rows[state]): words[order[partition[state]]] for state in sorted(partition)}
     counts: Sequence[int] = np.bincount([order[w] for w in partition.values()], minlength=len(words)).tolist()
     return words, dict(sorted(states.items())), words[counts.index(max(counts))]

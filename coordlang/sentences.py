@@ -35,17 +35,13 @@ def task_sentences(space: PlanSpace, task: int, table: WordTable) -> list[TaskSe
     start = int(space.starts[task])
     below = _counts_below(space, start, word)
     result = [
-        TaskSentence(
-            tuple(table.words[w] for w in words), plans, _choices(space, start, word, below, words)
-        )
+        TaskSentence(tuple(table.words[w] for w in words), plans, _choices(space, start, word, below, words))
         for words, plans in below[start].items()
     ]
     return sorted(result, key=lambda s: (-s.plans, s.words))
 
 
-def _counts_below(
-    space: PlanSpace, start: int, word: list[int]
-) -> dict[int, Counter[tuple[int, ...]]]:
+def _counts_below(space: PlanSpace, start: int, word: list[int]) -> dict[int, Counter[tuple[int, ...]]]:
     """For each node on the task's plans: sentence of the rest, from the node's own word on -> number of plans."""
     counts: dict[int, Counter[tuple[int, ...]]] = {}
     for node in sorted(_nodes_from(space, start)):

@@ -66,9 +66,7 @@ class Candidates:
         return self.spaces[0].rows
 
 
-def from_problems(
-    domain: Domain, problems: Sequence[Problem], options: ModelOptions | None = None
-) -> Candidates:
+def from_problems(domain: Domain, problems: Sequence[Problem], options: ModelOptions | None = None) -> Candidates:
     """The tasks of the given problems.  Raises `ProvedImpossible` for an unsolvable one, naming it."""
     loaded = build(domain, problems, options)
     space = search_each(loaded.model, loaded.tasks)
@@ -76,9 +74,7 @@ def from_problems(
     return Candidates("problems", loaded, listed, (space,), None)
 
 
-def all_pairs(
-    domain: Domain, problems: Sequence[Problem], options: ModelOptions | None = None
-) -> Candidates:
+def all_pairs(domain: Domain, problems: Sequence[Problem], options: ModelOptions | None = None) -> Candidates:
     """Every ordered pair of different states reachable in the problem, the second from the first.
 
     Goals are full states.
@@ -265,9 +261,7 @@ def _names(domain: Domain, problem: Problem, text: str, place: Place | None) -> 
     return Names(document, frozenset(domain.types), domain.predicates, {}, {}, frozenset(problem.objects))
 
 
-def _read_init(
-    domain: Domain, problem: Problem, task: ListedTask, place: Place | None
-) -> frozenset[Atom]:
+def _read_init(domain: Domain, problem: Problem, task: ListedTask, place: Place | None) -> frozenset[Atom]:
     fluents = fluent_predicates(domain)
     atoms = set()
     for text in task.init:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -177,8 +178,7 @@ class _Check:
         cuts = np.searchsorted(np.cumsum(sizes), np.arange(_CHUNK, sizes.sum() + _CHUNK, _CHUNK)) + 1
         bounds = np.unique(np.concatenate(([0], np.minimum(cuts, len(table)))))
         return [
-            self._some_moves(table, np.arange(low, high))
-            for low, high in zip(bounds[:-1], bounds[1:], strict=True)
+            self._some_moves(table, np.arange(low, high)) for low, high in pairwise(bounds)
         ]
 
     def _some_moves(self, table: Ints, rows: Ints) -> tuple[Ints, Ints, Ints]:
@@ -214,4 +214,3 @@ class _Check:
         found = np.minimum(np.searchsorted(self._edge_sorted, key), len(self._edge_sorted) - 1)
         hit = self._edge_sorted[found] == key
         return np.where(hit, self.space.target[self._edge_order[found]], self._failed)
-

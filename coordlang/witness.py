@@ -108,9 +108,7 @@ def _retrace(history: list[tuple[Ints, Ints, Ints]], row: int, last: tuple[int, 
     raise AssertionError("a walk starts somewhere")
 
 
-def describe_failure(
-    space: PlanSpace, trail: Trail, sentence: tuple[str, ...] | None = None
-) -> Miscoordination:
+def describe_failure(space: PlanSpace, trail: Trail, sentence: tuple[str, ...] | None = None) -> Miscoordination:
     """A trail in words: the plans completed to the goal, the mixture up to its breaking step, and why it breaks."""
     model = space.model
     robots = len(model.robots)

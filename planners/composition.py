@@ -43,13 +43,9 @@ class Composition:
         self._keeps_idle = tuple(keeps_idle)
         self._choices: list[list[GroundAction | None]] = [[None, *own] for own in subactions]
         self._tables = {
-            (i, j): compatible(self._choices[i], self._choices[j], i, j)
-            for j in range(len(robots))
-            for i in range(j)
+            (i, j): compatible(self._choices[i], self._choices[j], i, j) for j in range(len(robots)) for i in range(j)
         }
-        self._robot = [
-            _Subactions(own, codec, evaluator, number, cost) for number, own in enumerate(subactions)
-        ]
+        self._robot = [_Subactions(own, codec, evaluator, number, cost) for number, own in enumerate(subactions)]
 
     def steps(self, rows: Rows) -> Steps:
         """All joint steps applicable in the states of a table, sorted by source and labels."""
@@ -135,9 +131,7 @@ class Composition:
             for label, effects in robot.conditional.items():
                 there = np.flatnonzero(own == label)
                 for effect in effects if len(there) else ():
-                    fires = there[
-                        self._evaluator.holds(effect.condition, rows, source[there], labels[there])
-                    ]
+                    fires = there[self._evaluator.holds(effect.condition, rows, source[there], labels[there])]
                     number = self._evaluator.facts.get(effect.atom)
                     if number is not None:
                         into = adds if effect.adds else deletes
@@ -196,9 +190,7 @@ class _Subactions:
                 keep[there] &= self._evaluator.holds(formula, rows, row[there])
         return row[keep], operator[keep]
 
-    def drop_unmet(
-        self, fits: NDArray[np.bool_], robot: int, rows: Rows, source: Ints, labels: Labels
-    ) -> None:
+    def drop_unmet(self, fits: NDArray[np.bool_], robot: int, rows: Rows, source: Ints, labels: Labels) -> None:
         """Clear ``fits`` where this robot's subaction has a formula about the joint step that is not met."""
         asks = np.flatnonzero(self._has_step_formula[labels[:, robot]])
         if not len(asks):

@@ -40,7 +40,8 @@ class Evaluator:
                 if where is None:
                     return np.zeros(len(which), np.bool_)
                 robot, label = where
-                return labels[:, robot] == label
+                chosen: NDArray[np.bool_] = labels[:, robot] == label
+                return chosen
             case Not(part):
                 return ~self.holds(part, rows, which, labels)
             case And(parts):

@@ -90,9 +90,7 @@ def conflict(a: GroundAction, b: GroundAction) -> str | None:
 
 def _linked(a: GroundAction, b: GroundAction, first: Footprint, second: Footprint) -> bool:
     """Two actions meant to be done together: one names the other in a positive literal."""
-    return (
-        StepAtom(b.schema, b.args) in first.partners or StepAtom(a.schema, a.args) in second.partners
-    )
+    return StepAtom(b.schema, b.args) in first.partners or StepAtom(a.schema, a.args) in second.partners
 
 
 def _show(atoms: frozenset[Atom]) -> str:
@@ -117,8 +115,7 @@ def compatible(
                     universe.setdefault(atom, len(universe))
     fields = ("requires_true", "requires_false", "adds", "deletes")
     (t1, f1, a1, d1), (t2, f2, a2, d2) = (
-        [_bit_table(universe, [getattr(p, f) if p else () for p in side]) for f in fields]
-        for side in prints
+        [_bit_table(universe, [getattr(p, f) if p else () for p in side]) for f in fields] for side in prints
     )
     table = np.ones((len(left), len(right)), np.bool_)
     numbers = {StepAtom(b.schema, b.args): n for n, b in enumerate(right) if b}

@@ -101,7 +101,8 @@ class JointModel:
         """Which states of a table satisfy a goal.  Remembered actions never count."""
         if isinstance(goal, FullState):
             wanted = np.array(goal.words, np.uint64)
-            return (rows[:, : self.codec.fact_words] == wanted).all(axis=1)
+            same: NDArray[np.bool_] = (rows[:, : self.codec.fact_words] == wanted).all(axis=1)
+            return same
         return self.evaluator.holds(goal, rows, np.arange(len(rows)))
 
     def state(self, atoms: Iterable[Atom]) -> Rows:
@@ -115,9 +116,7 @@ class JointModel:
 
     def texts(self, labels: Sequence[int]) -> tuple[str | None, ...]:
         """Label numbers as text; None is idling."""
-        return tuple(
-            own[number] if number else None for own, number in zip(self.labels, labels, strict=True)
-        )
+        return tuple(own[number] if number else None for own, number in zip(self.labels, labels, strict=True))
 
     def numbers(self, texts: Sequence[str | None]) -> tuple[int, ...] | None:
         """Text as label numbers, or None if some robot has no such subaction."""

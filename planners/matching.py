@@ -19,7 +19,8 @@ def ranges(starts: Ints, counts: Ints) -> Ints:
     """``[s, s+1, .., s+c-1]`` for every pair, joined."""
     total = int(counts.sum())
     ends = np.cumsum(counts)
-    return np.arange(total) + np.repeat(starts - (ends - counts), counts)
+    within: Ints = np.arange(total) + np.repeat(starts - (ends - counts), counts)
+    return within
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,9 +46,7 @@ class Loaded:
     tasks: tuple[PlanningTask, ...]
 
 
-def load(
-    domain: str | Path, problems: Sequence[str | Path], options: ModelOptions | None = None
-) -> Loaded:
+def load(domain: str | Path, problems: Sequence[str | Path], options: ModelOptions | None = None) -> Loaded:
     """Read PDDL files and build their joint model.
 
     Raises `BadInput`, `Unsupported` or `UsageError` with place and remedy.
@@ -73,9 +71,7 @@ def build(
         _check_same_world(domain, first, other)
     team = find_team(domain, first, options.robots)
     extra = {atom for problem in problems for atom in problem.init} | set(also)
-    actions = ground_actions(
-        domain, first, team, also=extra, costs=options.cost == "makespan+cost"
-    )
+    actions = ground_actions(domain, first, team, also=extra, costs=options.cost == "makespan+cost")
     model = _joint_model(domain, problems, team, actions, extra, options)
     tasks = tuple(task_of(model, domain, problem) for problem in problems)
     return Loaded(domain, tuple(problems), model, tasks)
@@ -116,11 +112,10 @@ def _joint_model(
     texts = tuple(sorted(by_text))
     robots = team.robots
     subactions = [[a for a in actions if i in a.owners] for i in range(len(robots))]
+    labels: tuple[tuple[str, ...], ...]
     if domain.is_joint_action:
-        labels = tuple(
-            (IDLE, *sorted({a.parts[i] for a in actions if a.parts[i]}, key=_natural_label))  # type: ignore[type-var]
-            for i in range(len(robots))
-        )
+        parts = [{a.parts[i] for a in actions} for i in range(len(robots))]
+        labels = tuple((IDLE, *sorted((p for p in own if p), key=_natural_label)) for own in parts)
     else:
         labels = tuple((IDLE, *(a.label for a in own)) for own in subactions)
     memory = labels if options.remember_actions else None

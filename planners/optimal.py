@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +60,7 @@ class PlanSpace:
     def layers(self) -> list[slice]:
         """The nodes of each layer, the goals' layer (0) first."""
         bounds = np.searchsorted(self.layer, np.arange(int(self.layer[-1]) + 2)) if len(self) else [0]
-        return [slice(int(a), int(b)) for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
+        return [slice(int(a), int(b)) for a, b in pairwise(bounds)]
 
     def cost_of(self, task: int) -> tuple[int, int]:
         """The optimal cost of a task: (makespan, second component)."""
@@ -285,7 +286,7 @@ def _second_costs(space: Space, distance: Ints) -> tuple[Ints, PlanSpace]:
     value = np.where(layer == 0, 0, _FAR)
     if cost.any():
         bounds = np.searchsorted(layer[source], np.arange(int(layer.max(initial=0)) + 2))
-        for low, high in zip(bounds[1:-1], bounds[2:], strict=True):
+        for low, high in pairwise(bounds[1:]):
             span = slice(low, high)
             np.minimum.at(value, source[span], cost[span] + value[target[span]])
         keep = cost + value[target] == value[source]

@@ -69,9 +69,7 @@ class PlainTask:
         return (makespan, second) if self.step_cost > self.dearest * makespan else None
 
 
-def compile_plain(
-    model: JointModel, task: PlanningTask, limit: int = 2000, longest: int = LONGEST
-) -> PlainTask:
+def compile_plain(model: JointModel, task: PlanningTask, limit: int = 2000, longest: int = LONGEST) -> PlainTask:
     """The plain form of a task: explicit with at most ``limit`` plain actions, else select-then-apply.
 
     Parameters
@@ -405,9 +403,7 @@ def _name(team: _Team, step: Sequence[int]) -> str:
     return " ".join(chosen.get(robot, "idle") for robot in range(len(team.choosers)))
 
 
-def _cases_of(
-    team: _Team, model: JointModel, step: Sequence[int]
-) -> Iterator[tuple[Known, set[Atom], set[Atom]]]:
+def _cases_of(team: _Team, model: JointModel, step: Sequence[int]) -> Iterator[tuple[Known, set[Atom], set[Atom]]]:
     """The disjoint cases (what is known, adds, deletes) in which a joint action is applicable, however it turns out."""
     chosen = {StepAtom(team.actions[n].schema, team.actions[n].args) for n in step}
     on_state = _of_state(model)

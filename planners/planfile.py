@@ -52,9 +52,7 @@ def to_json(plans: Plans, listed: Sequence[Plan], task: int = 0) -> dict[str, An
     model = plans.space.model
     makespan, second = plans.space.cost_of(task)
     data: dict[str, Any] = {
-        "plans": [
-            {"cost": len(plan), "actions": [list(step) for step in texts(model, plan)]} for plan in listed
-        ],
+        "plans": [{"cost": len(plan), "actions": [list(step) for step in texts(model, plan)]} for plan in listed],
         "count": plans.count if plans.count <= _EXACT else str(plans.count),
         "complete": len(listed) == plans.count,
         "optimal_cost": makespan,
@@ -122,5 +120,7 @@ def _put(step: list[str | None], action: str, model: JointModel, place: Place) -
         raise BadInput(f"{action} is no action of this problem", place=place)
     for robot in owners:
         if step[robot] is not None:
-            raise BadInput(f"{model.robots[robot]} does two things in one step: {step[robot]} and {action}", place=place)
+            raise BadInput(
+                f"{model.robots[robot]} does two things in one step: {step[robot]} and {action}", place=place
+            )
         step[robot] = action

@@ -158,11 +158,7 @@ def _candidates(domain: Domain, problem: Problem) -> list[str]:
             for schema in domain.schemas
         )
     ]
-    return [
-        kind
-        for kind in found
-        if not any(other != kind and kind in domain.supertypes(other) for other in found)
-    ]
+    return [kind for kind in found if not any(other != kind and kind in domain.supertypes(other) for other in found)]
 
 
 def _has_unowned(domain: Domain, robots: tuple[str, ...]) -> bool:

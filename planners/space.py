@@ -63,9 +63,7 @@ def explore(model: JointModel, inits: Rows) -> Space:
         new, _ = unique_rows(np.concatenate(fresh))
         layer = new[find_rows(seen, new) < 0]
         seen, _ = unique_rows(np.concatenate((seen, layer)))
-    source = np.concatenate(
-        [find_rows(seen, rows)[steps.source] for rows, steps in zip(sources, found, strict=True)]
-    )
+    source = np.concatenate([find_rows(seen, rows)[steps.source] for rows, steps in zip(sources, found, strict=True)])
     order = np.argsort(source, kind="stable")
     return Space(
         model=model,

@@ -71,14 +71,10 @@ class StateCodec:
     def decode(self, row: Rows) -> list[str]:
         """The true atoms of a state, sorted."""
         atoms = [
-            self.facts[word * _WORD_BITS + bit]
-            for word in range(self.fact_words)
-            for bit in _bits(int(row[word]))
+            self.facts[word * _WORD_BITS + bit] for word in range(self.fact_words) for bit in _bits(int(row[word]))
         ]
         if self.memory is not None:
-            for robot, labels, last in zip(
-                self.robots, self.memory, row[self.fact_words :], strict=True
-            ):
+            for robot, labels, last in zip(self.robots, self.memory, row[self.fact_words :], strict=True):
                 name = "none" if last == 0 else labels[int(last) - 1]
                 atoms.append(f"(last {robot} {name})")
             atoms.sort()

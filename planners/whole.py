@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planners.conditions import Evaluator
 from planners.composition import cost_of, split
+from planners.conditions import Evaluator
 from planners.errors import BadInput
 from planners.grounding import GroundAction, GroundEffect
 from planners.joint import Cost, Steps

@@ -78,13 +78,18 @@ def _size(_context: click.Context, _parameter: click.Parameter, value: str | Non
 def limits(function: Callable[..., Any]) -> Callable[..., Any]:
     """``--time-limit``, ``--memory-limit`` and ``--debug``; the command runs under them."""
 
-    @click.option("--time-limit", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS",
-                  help="Stop after this long (exit 23).")
+    @click.option(
+        "--time-limit",
+        type=click.FloatRange(min=0, min_open=True),
+        metavar="SECONDS",
+        help="Stop after this long (exit 23).",
+    )
     @click.option("--memory-limit", callback=_size, metavar="SIZE", help="Stop before using more, e.g. 4G (exit 22).")
     @click.option("--debug", is_flag=True, help="Show tracebacks.")
     @functools.wraps(function)
     def wrapped(time_limit: float | None, memory_limit: int | None, debug: bool, **arguments: Any) -> Any:
-        from planners.limits import limit_memory, time_limit as limit_time
+        from planners.limits import limit_memory
+        from planners.limits import time_limit as limit_time
 
         limit_memory(memory_limit)
         with limit_time(time_limit):
@@ -98,10 +103,18 @@ def model_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
     @click.option("--robots", metavar="R1,R2", help="The robots, where the domain does not say.")
     @click.option("--robot-type", metavar="TYPE", help="The type (or unary predicate) of the robots.")
-    @click.option("--unowned", type=click.Choice(["error", "environment", "shared"]), default=None,
-                  help="Who owns actions that name no robot.")
-    @click.option("--cost", type=click.Choice(["makespan", "makespan+actions", "makespan+cost"]), default=None,
-                  help="What optimal means (default: makespan).")
+    @click.option(
+        "--unowned",
+        type=click.Choice(["error", "environment", "shared"]),
+        default=None,
+        help="Who owns actions that name no robot.",
+    )
+    @click.option(
+        "--cost",
+        type=click.Choice(["makespan", "makespan+actions", "makespan+cost"]),
+        default=None,
+        help="What optimal means (default: makespan).",
+    )
     @click.option("--remember-actions", is_flag=True, help="Add each robot's last subaction to the state.")
     @functools.wraps(function)
     def wrapped(

@@ -32,7 +32,9 @@ if TYPE_CHECKING:
 @click.option("--tasks", metavar="all|FILE", help="Candidate tasks: every pair of reachable states, or a task file "
               "(default: the problems' own).")  # fmt: skip
 @click.option("--method", type=click.Choice(["greedy"]), default="greedy", show_default=True)
-@click.option("-o", "--output", required=True, metavar="LANGUAGE", help="The language file; .json or .json.gz, - for stdout.")
+@click.option(
+    "-o", "--output", required=True, metavar="LANGUAGE", help="The language file; .json or .json.gz, - for stdout."
+)
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as one JSON object.")
 @model_options

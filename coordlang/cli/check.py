@@ -21,8 +21,9 @@ def command(context: click.Context, domain: str, problem: str, as_json: bool, gi
 
     Exit 0: equal.  1: they differ.  11: both prove that there is no plan.
     """
-    from planners.errors import ProvedImpossible
     from planners.fast_downward import optimal_cost
+
+    from planners.errors import ProvedImpossible
     from planners.model import load
     from planners.optimal import search
 

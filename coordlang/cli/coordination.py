@@ -47,8 +47,8 @@ def command(domain: str, problems: tuple[str, ...], as_json: bool, given: GivenO
         click.echo(json.dumps({"tasks": [_data(*entry) for entry in entries]}))
         return
     for name, makespan, plans, witness in entries:
-        click.echo(f"{name}: {plans:,} optimal plan{'s' * (plans != 1)} of {makespan} steps; " + (
-            "coordination is required" if witness else "no coordination required: any mixture of them is optimal"))  # fmt: skip
+        answer = "is required" if witness else "is not required: any mixture of them is optimal"
+        click.echo(f"{name}: {plans:,} optimal plan{'s' * (plans != 1)} of {makespan} steps; coordination {answer}")
         if witness:
             click.echo()
             click.echo(show(witness))

@@ -94,7 +94,9 @@ def _sentences(task: str, robots: tuple[str, ...], sentences: list[TaskSentence]
     lines = [f"The task {task}", f"has {total:,} optimal plan{'s' * (total != 1)} in {len(sentences)} "
              f"sentence{'s' * (len(sentences) != 1)}:"]  # fmt: skip
     for sentence in sentences[:_SENTENCES_SHOWN]:
-        lines.append(f'  "{" ".join(sentence.words)}" leaves {sentence.plans:,} plan{"s" * (sentence.plans != 1)} open:')
+        lines.append(
+            f'  "{" ".join(sentence.words)}" leaves {sentence.plans:,} plan{"s" * (sentence.plans != 1)} open:'
+        )
         for number, step in enumerate(sentence.choices, 1):
             parts = [f"{robot} {_either(own)}" for robot, own in zip(robots, step, strict=True)]
             lines.append(f"    step {number}: " + "; ".join(parts))

@@ -16,8 +16,12 @@ _DEFAULT_MAX = 10
 @domain_argument
 @problem_argument
 @click.option("--count", "only_count", is_flag=True, help="Print the exact number of optimal plans only.")
-@click.option("--max", "most", type=click.IntRange(min=0), help=f"List at most this many plans (default: {_DEFAULT_MAX}).")
-@click.option("--sample", type=click.IntRange(min=1), metavar="N", help="Draw N plans uniformly instead of the first ones.")
+@click.option(
+    "--max", "most", type=click.IntRange(min=0), help=f"List at most this many plans (default: {_DEFAULT_MAX})."
+)
+@click.option(
+    "--sample", type=click.IntRange(min=1), metavar="N", help="Draw N plans uniformly instead of the first ones."
+)
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of --sample.")
 @click.option("--format", "form", type=click.Choice(["ipc", "json"]), default="ipc", show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Short for --format json.")

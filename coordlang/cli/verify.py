@@ -65,7 +65,9 @@ def command(
                    f"sentence mix freely ({verdict.nodes:,} walk nodes)")  # fmt: skip
     if verdict.witness:
         if not as_json:
-            click.echo(f"refuted: plans with the sentence \"{' '.join(verdict.witness.sentence or ())} ..\" miscoordinate")
+            click.echo(
+                f'refuted: plans with the sentence "{" ".join(verdict.witness.sentence or ())} .." miscoordinate'
+            )
             click.echo(show(verdict.witness))
         return 1
     return 0

@@ -7,9 +7,7 @@ from collections.abc import Sequence
 from coordlang.divergence import Separation
 
 
-def greedy(
-    states: Sequence[int], constraints: Sequence[tuple[Separation, ...]]
-) -> dict[int, int]:
+def greedy(states: Sequence[int], constraints: Sequence[tuple[Separation, ...]]) -> dict[int, int]:
     """A partition of ``states`` that satisfies every constraint: state -> word number, from 0.
 
     A constraint is a tuple of alternatives, at least one of which must hold; each is a set of pairs to separate.  States

@@ -117,10 +117,8 @@ class _Grounder:
     def action(self, schema: Schema, args: tuple[str, ...], costs: bool) -> GroundAction | None:
         """The instance, or None if its precondition is false in every state."""
         binding = {p.name: a for p, a in zip(schema.parameters, args, strict=True)}
-        if schema.parts:
-            owners = tuple(range(len(self._team.robots)))
-        else:
-            owners = self._team.owners(schema, args)
+        everybody = tuple(range(len(self._team.robots)))
+        owners = everybody if schema.parts else self._team.owners(schema, args)
         precondition = self.formula(schema.precondition, binding, True, acting=owners)
         if precondition == FALSE:
             return None
@@ -144,9 +142,7 @@ class _Grounder:
             does_nothing=not effects and schema.name not in self._named,
         )
 
-    def formula(
-        self, f: Formula, binding: Binding, positive: bool, acting: tuple[int, ...] = ()
-    ) -> Formula:
+    def formula(self, f: Formula, binding: Binding, positive: bool, acting: tuple[int, ...] = ()) -> Formula:
         """``f`` (negated unless ``positive``) with arguments put in.
 
         ``acting`` are the robots whose precondition this is: a negative step atom never speaks of them.
@@ -170,16 +166,11 @@ class _Grounder:
                 ground = (self.formula(part, binding, positive, acting) for part in parts)
                 return _join(ground, conjunction=isinstance(f, And) == positive)
             case Forall(variables, part) | Exists(variables, part):
-                ground = (
-                    self.formula(part, inner, positive, acting)
-                    for inner in self._bindings(variables, binding)
-                )
+                ground = (self.formula(part, inner, positive, acting) for inner in self._bindings(variables, binding))
                 return _join(ground, conjunction=isinstance(f, Forall) == positive)
         raise AssertionError(f)
 
-    def _step_atom(
-        self, action: str, args: tuple[str, ...], positive: bool, acting: tuple[int, ...]
-    ) -> Formula:
+    def _step_atom(self, action: str, args: tuple[str, ...], positive: bool, acting: tuple[int, ...]) -> Formula:
         schema = self._schemas[action]
         if self._domain.is_joint_action:
             raise BadInput(

@@ -84,8 +84,7 @@ class _Core:
             self._constants[name] = self._lang.constant(symbol, self._sort)
             self.objects[symbol] = name
         self._object_types = {
-            name: frozenset(t for own in types for t in domain.supertypes(own))
-            for name, types in objects.items()
+            name: frozenset(t for own in types for t in domain.supertypes(own)) for name, types in objects.items()
         }
         self.actions: dict[str, str] = {}
 

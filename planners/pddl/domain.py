@@ -8,7 +8,7 @@ from pathlib import Path
 
 from planners.errors import Unsupported
 from planners.pddl.formulas import read_effects, read_formula
-from planners.pddl.lifted import TRUE, Domain, Part, Schema
+from planners.pddl.lifted import TRUE, Domain, Formula, Part, Schema
 from planners.pddl.names import Names, group, typed_list, word
 from planners.pddl.sexpr import Document, Expression, Group, Source, Word, parse, read_source
 
@@ -61,9 +61,7 @@ def parse_domain(source: Source) -> Domain:
     )
     schemas = tuple(_read_schema(names, item) for item in actions.values())
     _check_parts(document, schemas, actions)
-    return Domain(
-        name, source, types, constants, names.predicates, names.functions, schemas
-    )
+    return Domain(name, source, types, constants, names.predicates, names.functions, schemas)
 
 
 def read_header(document: Document, kind: str) -> tuple[str, dict[str, list[Group]]]:
@@ -81,9 +79,7 @@ def read_header(document: Document, kind: str) -> tuple[str, dict[str, list[Grou
         raise document.fail(
             f"expected '({kind} NAME)' after 'define'",
             title,
-            f"This is a {other} file: the order is DOMAIN PROBLEM."
-            if {kind, other} == {"domain", "problem"}
-            else None,
+            f"This is a {other} file: the order is DOMAIN PROBLEM." if {kind, other} == {"domain", "problem"} else None,
         )
     sections: dict[str, list[Group]] = {}
     for item in root.items[2:]:
@@ -113,9 +109,7 @@ _SECTIONS = {
 }  # fmt: skip
 
 
-def read_objects(
-    names: Names, items: Sequence[Expression], into: dict[str, tuple[str, ...]]
-) -> None:
+def read_objects(names: Names, items: Sequence[Expression], into: dict[str, tuple[str, ...]]) -> None:
     """Add a typed list of objects, with ``(:private ..)`` groups, to ``into`` (name -> types)."""
     document = names.document
     plain = [item for item in items if isinstance(item, Word)]
@@ -128,9 +122,7 @@ def read_objects(
         # Unfactored MA-PDDL writes the owner first: "(:private depot0 hoist0 - hoist)".
         first = inner[0].text if inner and isinstance(inner[0], Word) else ""
         repeated = sum(isinstance(i, Word) and i.text == first for i in inner) > 1
-        entries += typed_list(
-            document, inner[1:] if repeated or first in declared else inner, "an object"
-        )
+        entries += typed_list(document, inner[1:] if repeated or first in declared else inner, "an object")
     for entry in entries:
         names.check_types(entry)
         if entry.word.text.startswith("?"):
@@ -143,9 +135,7 @@ def _all(sections: dict[str, list[Group]], key: str) -> list[Group]:
     return sections.get(key, [])
 
 
-def _read_types(
-    document: Document, sections: dict[str, list[Group]]
-) -> dict[str, tuple[str, ...]]:
+def _read_types(document: Document, sections: dict[str, list[Group]]) -> dict[str, tuple[str, ...]]:
     """Type -> direct supertypes.  Supertypes need no declaration of their own."""
     types: dict[str, tuple[str, ...]] = {}
     offsets: dict[str, Word] = {}
@@ -161,9 +151,7 @@ def _read_types(
     for name in types:
         cycle = _cycle(types, name)
         if cycle:
-            raise document.fail(
-                "the types form a cycle: " + " - ".join(cycle), offsets.get(name, document.root)
-            )
+            raise document.fail("the types form a cycle: " + " - ".join(cycle), offsets.get(name, document.root))
     return types
 
 
@@ -185,9 +173,7 @@ def _cycle(types: dict[str, tuple[str, ...]], start: str) -> list[str] | None:
     return None
 
 
-def _read_predicates(
-    document: Document, sections: dict[str, list[Group]]
-) -> dict[str, frozenset[int]]:
+def _read_predicates(document: Document, sections: dict[str, list[Group]]) -> dict[str, frozenset[int]]:
     predicates: dict[str, frozenset[int]] = {}
 
     def declare(items: Sequence[Expression]) -> None:
@@ -208,9 +194,7 @@ def _read_predicates(
     return predicates
 
 
-def _read_functions(
-    document: Document, sections: dict[str, list[Group]]
-) -> dict[str, frozenset[int]]:
+def _read_functions(document: Document, sections: dict[str, list[Group]]) -> dict[str, frozenset[int]]:
     functions: dict[str, frozenset[int]] = {}
     for section in _all(sections, ":functions"):
         for item in section.items[1:]:
@@ -305,13 +289,11 @@ def _read_schema(names: Names, item: Group) -> Schema:
     if agent_name is not None and agent is None:
         raise document.fail(f"expected a variable after ':agent', found {agent_name!r}", item)
     inner = names.with_variables(parameters)
-    precondition = TRUE
+    precondition: Formula = TRUE
     if fields.get(":precondition"):
         precondition = read_formula(inner, fields[":precondition"][0])
     effects, cost = read_effects(inner, fields[":effect"][0]) if fields.get(":effect") else ((), None)
-    return Schema(
-        name.text, parameters, agent, precondition, effects, _read_parts(inner, item), cost, item.offset
-    )
+    return Schema(name.text, parameters, agent, precondition, effects, _read_parts(inner, item), cost, item.offset)
 
 
 def _read_parts(names: Names, item: Group) -> tuple[Part, ...]:
@@ -340,9 +322,7 @@ def _read_parts(names: Names, item: Group) -> tuple[Part, ...]:
     return tuple(parts.values())
 
 
-def _check_parts(
-    document: Document, schemas: tuple[Schema, ...], actions: dict[str, Group]
-) -> None:
+def _check_parts(document: Document, schemas: tuple[Schema, ...], actions: dict[str, Group]) -> None:
     if not any(schema.parts for schema in schemas):
         return
     for schema in schemas:

@@ -71,9 +71,7 @@ def read_formula(names: Names, item: Expression) -> Formula:
         raise _unsupported(names, "preferences", item)
     if head in _TEMPORAL or (head == "at" and rest and _is_word(rest[0], "end", "start")):
         raise _unsupported(names, f"trajectory constraint '({head} ..)'", item)
-    raise document.fail(
-        f"unknown predicate {head!r}", item, known(names.predicates, head, "predicate")
-    )
+    raise document.fail(f"unknown predicate {head!r}", item, known(names.predicates, head, "predicate"))
 
 
 def read_effects(names: Names, item: Expression) -> tuple[tuple[Effect, ...], int | Atom | None]:
@@ -182,7 +180,7 @@ def _equal(names: Names, item: Group) -> Formula:
     _expect(names, item, 2)
     left, right = item.items[1:]
     for side in (left, right):
-        if isinstance(side, Group) or _NUMBER.match(side.text) and side.text not in names.objects:
+        if isinstance(side, Group) or (_NUMBER.match(side.text) and side.text not in names.objects):
             raise _unsupported(names, "numeric condition '(= ..)'", item)
     return Equal(names.term(left), names.term(right))
 

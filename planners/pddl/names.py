@@ -107,7 +107,7 @@ class Names:
 
     def read_variables(self, items: Sequence[Expression]) -> tuple[Variable, ...]:
         """A typed list of variables; their types must be declared."""
-        variables = []
+        variables: list[Variable] = []
         for entry in typed_list(self.document, items, "a variable"):
             if not entry.word.text.startswith("?"):
                 raise self.document.fail(
@@ -117,9 +117,7 @@ class Names:
                 )
             self.check_types(entry)
             if any(v.name == entry.word.text for v in variables):
-                raise self.document.fail(
-                    f"variable {entry.word.text} is declared twice", entry.word
-                )
+                raise self.document.fail(f"variable {entry.word.text} is declared twice", entry.word)
             variables.append(Variable(entry.word.text, entry.types))
         return tuple(variables)
 
@@ -163,6 +161,4 @@ class Names:
         if found in arities:
             return None
         wanted = " or ".join(str(n) for n in sorted(arities))
-        return self.document.fail(
-            f"{what} {name!r} takes {wanted} arguments, found {found}", item
-        )
+        return self.document.fail(f"{what} {name!r} takes {wanted} arguments, found {found}", item)

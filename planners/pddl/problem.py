@@ -40,9 +40,7 @@ def parse_problem(source: Source, domain: Domain) -> Problem:
     objects = dict(domain.constants)
     for section in sections.get(":objects", ()):
         read_objects(names, section.items[1:], objects)
-    names = Names(
-        document, names.types, names.predicates, names.functions, {}, frozenset(objects)
-    )
+    names = Names(document, names.types, names.predicates, names.functions, {}, frozenset(objects))
     init: set[Atom] = set()
     values: dict[Atom, float] = {}
     for section in sections.get(":init", ()):
@@ -51,20 +49,14 @@ def parse_problem(source: Source, domain: Domain) -> Problem:
     return Problem(name, source, objects, frozenset(init), _read_goal(names, document, sections), values)
 
 
-def _read_goal(
-    names: Names, document: Document, sections: dict[str, list[Group]]
-) -> Formula:
+def _read_goal(names: Names, document: Document, sections: dict[str, list[Group]]) -> Formula:
     goals = sections.get(":goal", [])
     if len(goals) != 1 or len(goals[0]) != 2:
-        raise document.fail(
-            "expected one '(:goal FORMULA)'", goals[0] if goals else document.root
-        )
+        raise document.fail("expected one '(:goal FORMULA)'", goals[0] if goals else document.root)
     return read_formula(names, goals[0].items[1])
 
 
-def _read_init(
-    names: Names, item: Group, init: set[Atom], values: dict[Atom, float]
-) -> None:
+def _read_init(names: Names, item: Group, init: set[Atom], values: dict[Atom, float]) -> None:
     document = names.document
     head = item.head
     if head == "and":

@@ -148,9 +148,7 @@ def parse(source: Source) -> Document:
             else:
                 root = group
         elif not open_groups:
-            raise BadInput(
-                f"expected '(define ...', found {token[:40]!r}", place=source.place(offset)
-            )
+            raise BadInput(f"expected '(define ...', found {token[:40]!r}", place=source.place(offset))
         else:
             open_groups[-1][1].append(Word(token.lower(), offset))
     if open_groups:

@@ -190,15 +190,12 @@ def readme_rows() -> list[tuple[str, str, dict[str, int]]]:
     """(folder, problem, numbers by column) for every row of a README table about problems."""
     found = []
     for readme in sorted(DOMAINS.glob("*/README.md")):
-        columns: list[str] = []
-        for line in readme.read_text().splitlines():
-            entries = [entry.strip() for entry in line.strip("|").split("|")] if line.startswith("|") else []
-            if not entries or entries[0] == "problem":
-                columns = entries
-            elif columns and not entries[0].startswith("-"):
-                values = dict(zip(columns, entries, strict=True))
+        for table in re.findall(r"^\| problem \|.*\n(?:\|.*\n)+", readme.read_text(), re.MULTILINE):
+            columns, _, *rows = ([entry.strip() for entry in line.split("|")[1:-1]] for line in table.splitlines())
+            for row in rows:
+                values = dict(zip(columns, row, strict=True))
                 numbers = {key: int(values[key]) for key in ("states", "makespan", "optimal plans")}
-                found.append((readme.parent.name, entries[0], numbers))
+                found.append((readme.parent.name, row[0], numbers))
     return found
 
 
@@ -208,7 +205,13 @@ def test_every_problem_is_in_a_readme():
     assert told == there
 
 
-@pytest.mark.parametrize(("folder", "problem", "told"), readme_rows(), ids=lambda value: str(value)[:20])
+@pytest.mark.parametrize(
+    ("folder", "problem", "told"),
+    [
+        pytest.param(*row, id=f"{row[0]}-{row[1]}", marks=[pytest.mark.slow] if row[2]["states"] > 4000 else [])
+        for row in readme_rows()
+    ],
+)
 def test_the_numbers_in_the_readme_files(world, folder, problem, told):
     here = world(folder, problem)
     seen = {

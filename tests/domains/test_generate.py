@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -42,7 +43,7 @@ def files(folder: Path) -> dict[str, bytes]:
 def test_the_shipped_files_are_what_the_generator_writes(tmp_path):
     # In a process of its own with another hash seed: the order of sets must not show.
     command = [sys.executable, str(DOMAINS / "generate.py"), "all", "--into", str(tmp_path)]
-    subprocess.run(command, check=True, env={"PYTHONHASHSEED": "77"})
+    subprocess.run(command, check=True, env={**os.environ, "PYTHONHASHSEED": "77"})
     shipped = {name: data for name, data in files(DOMAINS).items() if name not in BY_HAND}
     written = files(tmp_path)
     assert sorted(written) == sorted(shipped)
@@ -71,8 +72,8 @@ def test_a_ring_of_two_rows_is_drawn_with_its_wall():
 @pytest.mark.parametrize(("style", "domain"), [("agents", "grid"), ("joint", "grid-joint")])
 def test_one_problem_with_everything(tmp_path, style, domain):
     problem, picture, tasks = (tmp_path / name for name in ("p.pddl", "p.svg", "t.json"))
-    arguments = ["ring", "2x3", "--style", style, "-o", problem, "--picture", picture, "--tasks", tasks, "--at-least", "3"]
-    assert main([str(argument) for argument in arguments]) == 0
+    outputs = ["-o", str(problem), "--picture", str(picture), "--tasks", str(tasks)]
+    assert main(["ring", "2x3", "--style", style, "--at-least", "3", *outputs]) == 0
     loaded = load(DOMAINS / domain / "domain.pddl", [problem])
     assert loaded.model.codec.decode(loaded.tasks[0].init) == ["(at r1 c0-0)", "(at r2 c1-2)"]
     assert ElementTree.parse(picture).getroot().tag.endswith("svg")

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
+from math import prod
 
 from planners.pddl.lifted import And, Domain, Exists, Forall, Formula, Not, Or, Problem, StepAtom
 from planners.robots import Team
@@ -20,13 +21,24 @@ Plan = tuple[Labels, ...]
 
 
 class TooLarge(Exception):
-    """More states or plans than a brute force should list."""
+    """More states or steps than brute force should list."""
 
 
 class Twin:
-    """Brute force over one problem, with a memory of the states already expanded."""
+    """Brute force over one problem, with a memory of the states already expanded.
 
-    def __init__(self, domain: Domain, problem: Problem, team: Team, idle_allowed: Sequence[bool] | None = None):
+    ``budget`` bounds the tuples of subactions tried, over all states; beyond it, `TooLarge`.
+    """
+
+    def __init__(
+        self,
+        domain: Domain,
+        problem: Problem,
+        team: Team,
+        idle_allowed: Sequence[bool] | None = None,
+        budget: int = 1_000_000,
+    ) -> None:
+        self._budget = budget
         self.rules = Rules.of(domain, problem, team, idle_allowed)
         self.init = self.rules.fluents_of(problem.init)
         self.labels = [self._labels(robot) for robot in range(len(team.robots))]
@@ -53,6 +65,9 @@ class Twin:
                 [label for label in own if label is None or self._worth_a_try(state, label, robot)]
                 for robot, own in enumerate(self.labels)
             ]
+            self._budget -= prod(map(len, options))
+            if self._budget < 0:
+                raise TooLarge
             self._steps[state] = frozenset(
                 (labels, self.rules.result(state, labels))
                 for labels in product(*options)

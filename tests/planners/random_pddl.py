@@ -77,7 +77,7 @@ class _Writer:
 
     def _choose_names(self) -> None:
         pick = self.random
-        self.robots = [f"r{i + 1}" for i in range(pick.choice((2, 2, 3)))]
+        self.robots = [f"r{i + 1}" for i in range(pick.choice((2, 2, 2, 3)))]
         self.places = [f"p{i + 1}" for i in range(pick.choice((1, 2, 2, 3, 3)))]
         left = _FLUENTS
         for number in range(pick.randint(1, 3)):

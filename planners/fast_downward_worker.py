@@ -1,0 +1,107 @@
+"""The child process of `planners.fast_downward`: one plain task solved by Fast Downward through unified-planning.
+
+``python -m planners.fast_downward_worker TASK RESULT`` reads the task (JSON, see `planners.fast_downward.as_json`) and
+writes one JSON object: ``{"status": .., "total": cost of the plan or null, "log": the end of what Fast Downward said}``.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from planners.limits import limit_memory
+
+
+class _SameGroup(subprocess.Popen[bytes]):
+    """A child that stays in our process group: unified-planning would give Fast Downward a session of its own.
+
+    Then nobody could end it together with us.
+    """
+
+    def __init__(self, *args: Any, **settings: Any) -> None:
+        settings.pop("start_new_session", None)
+        super().__init__(*args, **settings)
+
+
+def main(task_file: str, result_file: str) -> None:
+    """Solve the task of one file and write the outcome to another (never half of it)."""
+    task = json.loads(Path(task_file).read_text())
+    limit_memory(task["memory_limit"])
+    try:
+        result = solve(task)
+    except MemoryError:
+        result = {"status": "memory", "total": None, "log": ""}
+    beside = Path(result_file + ".part")
+    beside.write_text(json.dumps(result))
+    os.replace(beside, result_file)
+
+
+def solve(task: dict[str, Any]) -> dict[str, Any]:
+    """Build the task with unified-planning and ask ``fast-downward-opt`` for an optimal plan."""
+    from unified_planning.engines import PlanGenerationResultStatus as Status
+    from unified_planning.shortcuts import OneshotPlanner, get_environment
+
+    get_environment().credits_stream = None
+    subprocess.Popen = _SameGroup  # type: ignore[misc]
+    problem, costs = build(task)
+    with OneshotPlanner(name="fast-downward-opt") as planner:
+        answer = planner.solve(problem)
+    log = "".join(message.message for message in answer.log_messages or ())
+    outcome = {
+        Status.SOLVED_OPTIMALLY: "solved",
+        Status.UNSOLVABLE_PROVEN: "unsolvable",
+        Status.MEMOUT: "memory",
+    }.get(answer.status, f"failed: {answer.status.name}")
+    total = sum(costs[step.action.name] for step in answer.plan.actions) if outcome == "solved" else None
+    return {"status": outcome, "total": total, "log": log[-2000:]}
+
+
+def build(task: dict[str, Any]) -> tuple[Any, dict[str, int]]:
+    """The task as a unified-planning problem, and the cost of each action by name.
+
+    Facts have no arguments and are called ``f0``, ``f1``, ..; actions ``a0``, ``a1``, ..
+    """
+    from unified_planning.shortcuts import (
+        BoolType,
+        Fluent,
+        InstantaneousAction,
+        Int,
+        MinimizeActionCosts,
+        Not,
+        Problem,
+    )
+
+    problem = Problem("plain")
+    fluents = [Fluent(f"f{n}", BoolType()) for n in range(task["facts"])]
+    true = [fluent() for fluent in fluents]
+    false = [Not(fact) for fact in true]
+    for fluent in fluents:
+        problem.add_fluent(fluent, default_initial_value=False)
+    for n in task["init"]:
+        problem.set_initial_value(true[n], True)
+    prices, costs = {}, {}
+    for number, (conditions, adds, deletes, cost) in enumerate(task["actions"]):
+        if not adds and not deletes:
+            continue  # of no use in a plan, and unified-planning would write PDDL that Fast Downward cannot read
+        action = InstantaneousAction(f"a{number}")
+        for n, positive in conditions:
+            action.add_precondition(true[n] if positive else false[n])
+        for n in adds:
+            action.add_effect(true[n], True)
+        for n in deletes:
+            action.add_effect(true[n], False)
+        problem.add_action(action)
+        prices[action], costs[action.name] = Int(cost), cost
+    for n, positive in task["goal"]:
+        problem.add_goal(true[n] if positive else false[n])
+    # Without a metric the engine calls its answer "satisficing".
+    problem.add_quality_metric(MinimizeActionCosts(prices))
+    return problem, costs
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

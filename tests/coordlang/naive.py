@@ -1,0 +1,70 @@
+"""The paper's definitions, read literally: plans are listed and every mixture is made.  Tiny inputs only."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+
+from planners.optimal import PlanSpace
+from planners.plans import Plan, Plans, counts
+
+
+class TooLarge(Exception):
+    """More plans than a twin should list."""
+
+
+def listed(space: PlanSpace, task: int, most: int) -> list[Plan]:
+    plans = Plans(space, int(space.starts[task]), counts(space))
+    if plans.count > most:
+        raise TooLarge
+    return list(plans)
+
+
+def mixture(plans: tuple[Plan, ...]) -> Plan:
+    """Robot i does its part of plan i, step by step."""
+    return tuple(tuple(step[i] for i, step in enumerate(steps)) for steps in zip(*plans, strict=True))
+
+
+def failing(plans: list[Plan], robots: int) -> Iterator[tuple[Plan, ...]]:
+    """The tuples of plans, one for each robot, whose mixture is not among the plans."""
+    good = set(plans)
+    for chosen in product(plans, repeat=robots):
+        if mixture(chosen) not in good:
+            yield chosen
+
+
+def states(space: PlanSpace, task: int, plan: Plan) -> tuple[int, ...]:
+    return tuple(Plans(space, int(space.starts[task]), []).states(plan))
+
+
+def divergence(sequences: list[tuple[int, ...]]) -> tuple[int, frozenset[int]] | None:
+    """alpha*: the last state before the sequences first differ, and the different next ones; None if they never do."""
+    for step, here in enumerate(zip(*sequences, strict=True)):
+        if len(set(here)) > 1:
+            return sequences[0][step - 1], frozenset(here)
+    return None
+
+
+def minimal(found: set[tuple[int, frozenset[int]]]) -> set[tuple[int, frozenset[int]]]:
+    """Without those that another one with the same last state implies."""
+    return {(last, after) for last, after in found if not any(p == last and other < after for p, other in found)}
+
+
+def sentence(words: list[int]) -> tuple[int, ...]:
+    return tuple(word for n, word in enumerate(words) if n == 0 or word != words[n - 1])
+
+
+def is_language(space: PlanSpace, word_of_state: dict[int, int], most: int) -> bool:
+    """By definition: for every task and sentence, the optimal plans with that sentence are RC-free."""
+    robots = len(space.model.robots)
+    for task in range(len(space.starts)):
+        plans = listed(space, task, most)
+        good = set(plans)
+        groups: dict[tuple[int, ...], list[Plan]] = {}
+        for plan in plans:
+            key = sentence([word_of_state[s] for s in states(space, task, plan)])
+            groups.setdefault(key, []).append(plan)
+        for group in groups.values():
+            if any(mixture(chosen) not in good for chosen in product(group, repeat=robots)):
+                return False
+    return True
