@@ -279,11 +279,11 @@ def _read_goal(domain: Domain, problem: Problem, task: ListedTask, place: Place 
 
 
 def _read_text(domain: Domain, problem: Problem, text: str, place: Place | None) -> Formula:
-    parts = split_atoms(text)
-    if len(parts) != 1:
-        raise BadInput(f"expected one PDDL literal, found {text!r}", place=place)
-    names = _names(domain, problem, parts[0], place)
     try:
+        parts = split_atoms(text)
+        if len(parts) != 1:
+            raise BadInput("expected one PDDL literal")
+        names = _names(domain, problem, parts[0], place)
         return read_formula(names, names.document.root)
     except BadInput as error:
         raise BadInput(f"{text}: {error.what}", place=place, remedy=error.remedy) from None

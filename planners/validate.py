@@ -131,20 +131,16 @@ class Moment:
 
 @dataclass(frozen=True, slots=True)
 class Instance:
-    """A schema with arguments, and the robots that must choose it together."""
+    """A schema with arguments, and the robots that must choose it together; ``name`` is what formulas call it."""
 
     schema: Schema
-    args: tuple[str, ...]
+    name: StepAtom
     binding: Binding
     owners: tuple[int, ...]
 
     @property
-    def name(self) -> StepAtom:
-        return StepAtom(self.schema.name, self.args)
-
-    @property
     def text(self) -> str:
-        return _text(self.schema.name, self.args)
+        return _text_of(self.name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,6 +162,7 @@ class Rules:
     allow_idle: tuple[bool, ...]
     fluents: frozenset[str]
     schemas: dict[str, Schema]
+    is_joint_action: bool
     _members: dict[tuple[str, ...], tuple[str, ...]] = field(default_factory=dict)
     _instances: dict[str, Instance | str] = field(default_factory=dict)
     _touched: dict[StepAtom, Touched] = field(default_factory=dict)
@@ -176,7 +173,7 @@ class Rules:
     ) -> Rules:
         idle = tuple(allow_idle) if allow_idle is not None else (True,) * len(team.robots)
         schemas = {schema.name: schema for schema in domain.schemas}
-        return cls(domain, problem, team, idle, fluent_predicates(domain), schemas)
+        return cls(domain, problem, team, idle, fluent_predicates(domain), schemas, domain.is_joint_action)
 
     # -- joint steps -----------------------------------------------------------------------------------------
 
@@ -187,7 +184,7 @@ class Rules:
         """
         if len(labels) != len(self.team.robots):
             return f"the step has {len(labels)} entries for {len(self.team.robots)} robots"
-        if self.domain.is_joint_action:
+        if self.is_joint_action:
             return self._joint_action(state, labels)[0]
         chosen: list[Instance | None] = []
         for robot, label in enumerate(labels):
@@ -201,7 +198,7 @@ class Rules:
 
     def result(self, state: State, labels: Labels) -> State:
         """The state after a joint step without a `broken_rule`."""
-        if self.domain.is_joint_action:
+        if self.is_joint_action:
             return self._joint_action(state, labels)[1]
         chosen = _together([self._known(label) if label is not None else None for label in labels])
         return self._after(state, chosen)
@@ -239,7 +236,7 @@ class Rules:
         """A schema with (type-correct) arguments."""
         binding = {p.name: arg for p, arg in zip(schema.parameters, args, strict=True)}
         owners = () if schema.parts else self.team.owners(schema, args)
-        return Instance(schema, args, binding, owners)
+        return Instance(schema, StepAtom(schema.name, args), binding, owners)
 
     def _wrong_choice(self, chosen: Sequence[Instance | None]) -> str | None:
         """Idling where it is not allowed, somebody else's action, a shared action that not all its owners chose."""
@@ -452,7 +449,7 @@ class Rules:
         self, formula: StepAtom, binding: Binding, positive: bool, acting: tuple[int, ...]
     ) -> bool | None:
         schema = self.schemas[formula.action]
-        if self.domain.is_joint_action:
+        if self.is_joint_action:
             raise BadInput(
                 f"action {schema.name!r} is used as a formula in a joint-action domain",
                 place=self.domain.source.place(schema.offset),
@@ -465,7 +462,7 @@ class Rules:
             return True  # as if the domain had said "(or (= ?o ?r) (not ..))"
         return None
 
-    def _branches(self, formula: Formula, binding: Binding) -> Iterator[tuple[Formula, Binding]] | None:
+    def _branches(self, formula: Formula, binding: Binding) -> Iterable[tuple[Formula, Binding]] | None:
         """The parts of a connective or quantifier; None for a literal."""
         match formula:
             case And(parts) | Or(parts):
@@ -541,8 +538,5 @@ def _first(atoms: Iterable[Atom | StepAtom]) -> str:
 
 
 def _text_of(atom: Atom | StepAtom) -> str:
-    return _text(atom.predicate if isinstance(atom, Atom) else atom.action, atom.args)
-
-
-def _text(name: str, args: Iterable[str]) -> str:
-    return "(" + " ".join((name, *args)) + ")"
+    name = atom.predicate if isinstance(atom, Atom) else atom.action
+    return "(" + " ".join((name, *atom.args)) + ")"

@@ -77,7 +77,7 @@ class Twin:
 
     def _worth_a_try(self, state: State, label: str, robot: int) -> bool:
         """Drop what cannot be part of any step here: a product of everything would take hours."""
-        if self.rules.domain.is_joint_action:
+        if self.rules.is_joint_action:
             return True
         found = self.rules.instance(label)
         assert not isinstance(found, str), found
@@ -98,7 +98,7 @@ class Twin:
 
     def actions(self, labels: Labels) -> int:
         """The second component of ``makespan+actions``: chosen subactions, shared ones once, do-nothing ones free."""
-        if self.rules.domain.is_joint_action:
+        if self.rules.is_joint_action:
             return sum(label is not None for label in labels)
         return sum(not self.does_nothing(label) for label in {*labels} - {None})
 

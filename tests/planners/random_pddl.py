@@ -123,6 +123,8 @@ class _Writer:
     def _schema(self, name: str, scope: Scope) -> list[str]:
         """Precondition and the effects (not yet joined) of an action; one in six has no effect at all."""
         pick = self.random
+        if pick.random() < 0.12 and self.kind != "joint":
+            return self._wait(scope)
         if pick.random() < 0.4 and (moving := self._move(scope)):
             return moving
         parts = [self._literal(scope) for _ in range(pick.choice((0, 0, 1, 1, 2)))]
@@ -136,6 +138,12 @@ class _Writer:
         if pick.random() < 1 / 6:
             return [precondition, ""]
         return [precondition, "".join(f" {self._effect(scope, 2)}" for _ in range(pick.randint(1, 3)))]
+
+    def _wait(self, scope: Scope) -> list[str]:
+        """An action that does nothing: always possible, or wherever one fact holds."""
+        name, types = self.random.choice(list(self.fluents.items()))
+        where = self.random.choice(("()", f"({name}{self._terms(types, scope)})"))
+        return [where, ""]
 
     def _move(self, scope: Scope) -> list[str] | None:
         """``(f .. ?x)`` becomes ``(f .. ?y)``: chains of such steps make plans of some length."""
@@ -283,7 +291,6 @@ class _Writer:
             for args in product(*(things[t] for t in types))
             if pick.random() < 0.5
         ]
-        everything = {**{r: "robot" for r in self.robots}, **{p: "place" for p in self.places}}
         names = list(self.fluents)
         goals = []
         for _ in range(pick.choice((1, 2, 2, 3))):
@@ -295,7 +302,7 @@ class _Writer:
             wanted = not now if pick.random() < 0.8 else now
             goals.append(atom if wanted else f"(not {atom})")
         if pick.random() < 0.2:
-            goals.append(self._formula({v: t for v, t in everything.items() if v in self.robots}, 2, step=False))
+            goals.append(self._formula(dict.fromkeys(self.robots, "robot"), 2, step=False))
         rest = " ".join(self.places[1:])
         objects = f"{rest} - {pick.choice(('place', 'place', 'hub'))}" if rest else ""
         return (

@@ -438,11 +438,13 @@ def test_a_negative_formula_does_not_link() -> None:
 # -- effects ------------------------------------------------------------------------------------------------------
 
 EFFECTS = """(:types robot thing - object box - thing) (:predicates (on ?t - object) (big ?t - object) (p) (q))
-  (:action swap :agent ?r - robot :parameters () :effect (and (when (p) (and (q) (not (p)))) (when (q) (and (p) (not (q))))))
+  (:action swap :agent ?r - robot :parameters ()
+    :effect (and (when (p) (and (q) (not (p)))) (when (q) (and (p) (not (q))))))
   (:action keep :agent ?r - robot :parameters () :effect (and (p) (not (p))))
   (:action clear :agent ?r - robot :parameters (?t - thing)
     :effect (forall (?t - box) (when (big ?t) (forall (?u - (either robot box)) (when (on ?u) (not (on ?u)))))))
-  (:action put :agent ?r - robot :parameters (?t - thing) :effect (and (on ?t) (when (not (exists (?t - box) (on ?t))) (q))))"""
+  (:action put :agent ?r - robot :parameters (?t - thing)
+    :effect (and (on ?t) (when (not (exists (?t - box) (on ?t))) (q))))"""
 
 
 def things(init: str) -> World:
