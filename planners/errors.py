@@ -1,6 +1,6 @@
 """The one error tree.  Every error carries the exit code that the command line ends with.
 
-The codes follow Fast Downward's grouping: 1x proved impossible, 2x out of resources, 3x bad input.
+The codes follow Fast Downward's grouping: 1x proved impossible, 2x out of resources, 3x bad input or a failure.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ class CoordlangError(Exception):
         One sentence: what the user can do.
     """
 
-    exit_code = 1
+    #: A program that coordlang relies on failed (the other codes are set below).
+    exit_code = 32
 
     def __init__(self, what: str, *, place: Place | None = None, remedy: str | None = None) -> None:
         super().__init__(what)

@@ -168,9 +168,7 @@ class Rules:
     _touched: dict[StepAtom, Touched] = field(default_factory=dict)
 
     @classmethod
-    def of(
-        cls, domain: Domain, problem: Problem, team: Team, allow_idle: Sequence[bool] | None = None
-    ) -> Rules:
+    def of(cls, domain: Domain, problem: Problem, team: Team, allow_idle: Sequence[bool] | None = None) -> Rules:
         idle = tuple(allow_idle) if allow_idle is not None else (True,) * len(team.robots)
         schemas = {schema.name: schema for schema in domain.schemas}
         return cls(domain, problem, team, idle, fluent_predicates(domain), schemas, domain.is_joint_action)
@@ -192,9 +190,7 @@ class Rules:
             if isinstance(found, str):
                 return f"{self.team.robots[robot]}: {found}"
             chosen.append(found)
-        return (
-            self._wrong_choice(chosen) or self._unmet(state, chosen) or self._interference(_together(chosen))
-        )
+        return self._wrong_choice(chosen) or self._unmet(state, chosen) or self._interference(_together(chosen))
 
     def result(self, state: State, labels: Labels) -> State:
         """The state after a joint step without a `broken_rule`."""
@@ -337,9 +333,7 @@ class Rules:
             )
         for result in results:
             return None, result
-        parts = ", ".join(
-            f"{robot} {label or 'idle'}" for robot, label in zip(self.team.robots, labels, strict=True)
-        )
+        parts = ", ".join(f"{robot} {label or 'idle'}" for robot, label in zip(self.team.robots, labels, strict=True))
         return reason or f"no joint action of the domain has the parts {parts}", state
 
     def _whole_actions(self, labels: Labels) -> Iterator[Instance]:

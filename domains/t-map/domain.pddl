@@ -27,7 +27,7 @@
         (or (= ?o ?r)
             (not (at ?o ?to))
             (exists (?next - cell) (and (adjacent ?to ?next) (move ?o ?to ?next)))))
-      ; Nobody else moves into it.
+      ; Nobody else moves into it.  (So says the interference rule, too; this is for readers that have none.)
       (forall (?o - robot ?other - cell)
         (or (= ?o ?r)
             (not (adjacent ?other ?to))

@@ -11,6 +11,7 @@ import tempfile
 from collections.abc import Iterable
 from typing import Any
 
+from planners.errors import CoordlangError, OutOfMemory
 from planners.pddl.lifted import And, Atom, Domain, Formula, Schema, Variable
 from planners.robots import natural
 
@@ -29,10 +30,8 @@ def reachable_arguments(
     init
         All atoms (static and fluent) that hold in some initial state.
     """
-    from tarski.errors import ExternalCommandError, OutOfMemoryError
+    from tarski.errors import TarskiError
     from tarski.grounding.lp_grounding import LPGroundingStrategy
-
-    from planners.errors import OutOfMemory
 
     core = _Core(domain, objects)
     for atom in init:
@@ -45,11 +44,8 @@ def reachable_arguments(
         tempfile.tempdir = directory
         try:
             groundings = LPGroundingStrategy(core.problem).ground_actions()
-        except (OutOfMemoryError, ExternalCommandError) as error:
-            if isinstance(error, ExternalCommandError) and "exited with code -" not in str(error):
-                raise
-            raise OutOfMemory("grounding needs more memory than it may use",
-                              remedy="Use fewer objects, or a larger --memory-limit.") from error  # fmt: skip
+        except TarskiError as error:
+            raise _failure(error) from error
         finally:
             tempfile.tempdir = before
     return {
@@ -59,6 +55,17 @@ def reachable_arguments(
         )
         for name, symbol in core.actions.items()
     }
+
+
+def _failure(error: Exception) -> CoordlangError:
+    """Tarski's error as ours: clingo out of memory (it may also be killed for it), or anything else."""
+    text = str(error)
+    if any(sign in text for sign in ("ran out of memory", "MemoryError", "bad_alloc", "exited with code -")):
+        return OutOfMemory(
+            "grounding needs more memory than it may use",
+            remedy="Use fewer objects, or a larger --memory-limit.",
+        )
+    return CoordlangError(f"Tarski's grounder failed: {text or type(error).__name__}")
 
 
 class _Core:
@@ -102,7 +109,7 @@ class _Core:
                 continue
             # A variable that only the effect has is universal: the program's rule quantifies it.
             inner = dict(variables)
-            condition = self._declare(effect.variables, inner)
+            condition = self._declare(effect.variables, inner, always=True)
             condition += self._positive(effect.condition, inner)
             effects.append(self._fs.AddEffect(self._atom(effect.atom, inner), self._all(condition)))
         symbol = f"a{len(self.actions)}"
@@ -116,13 +123,16 @@ class _Core:
             self._symbols[key] = self._lang.predicate(f"p{len(self._symbols)}", *[self._sort] * arity)
         return self._symbols[key]
 
-    def _declare(self, variables: Iterable[Variable], into: dict[str, Any]) -> list[Any]:
-        """Tarski variables for ours, and the atoms that hold them to their types."""
+    def _declare(self, variables: Iterable[Variable], into: dict[str, Any], *, always: bool = False) -> list[Any]:
+        """Tarski variables for ours, and the atoms that hold them to their types.
+
+        Tarski itself restricts parameters to objects; other variables need an atom ``always``.
+        """
         atoms = []
         for variable in variables:
             term = self._lang.variable(f"v{len(into)}", self._sort)
             into[variable.name] = term
-            if "object" not in variable.types:
+            if always or "object" not in variable.types:
                 atoms.append(self._type(variable.types)(term))
         return atoms
 

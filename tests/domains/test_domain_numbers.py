@@ -13,6 +13,7 @@ import pytest
 from generate import Scenario, problem_text
 from gridmap import GridMap, open_grid, ring, three_cells
 
+from planners.interference import conjuncts
 from planners.joint import FullState
 from planners.model import build
 from planners.optimal import PlanSpace, TaskGroup, plan_spaces
@@ -95,6 +96,14 @@ def test_both_styles_are_the_same_model(world, problem):
     assert steps(one) == steps(other) | still
     first, second = to_every_state(one), to_every_state(other)
     assert counts_at_starts(first) == counts_at_starts(second)
+
+
+@pytest.mark.parametrize("problem", ["three-cells", "t-map", "gw2-2x3", "gwb1-2x4", "corners-4x4"])
+def test_joint_schemas_are_disjoint(world, problem):
+    """Planners that do not compare what actions do would count a plan twice."""
+    actions = world("grid-joint", problem).loaded.model.actions
+    meant = Counter((action.parts, frozenset(conjuncts(action.precondition))) for action in actions)
+    assert [key for key, times in meant.items() if times > 1] == []
 
 
 def steps(space: Space) -> set[tuple[int, tuple[str | None, ...], int]]:

@@ -104,7 +104,8 @@ class _Writer:
     def _parameters(self) -> Scope:
         pick = self.random
         if self.kind == "joint":
-            return {f"?x{i}": pick.choice(("place", "place", "hub", "robot")) for i in range(pick.choice((0, 1, 2, 2, 3, 4)))}
+            number = pick.choice((0, 1, 2, 2, 3, 4))
+            return {f"?x{i}": pick.choice(("place", "place", "hub", "robot")) for i in range(number)}
         scope = {"?r": "robot"}
         if self.kind == "plain":
             if self.unowned != "error" and pick.random() < 0.4:
@@ -256,8 +257,7 @@ class _Writer:
         inner = {**scope, "?o": "robot"}
         name = pick.choice(list(self.actions))
         args = [
-            "?o" if t == "robot" and pick.random() < 0.8 else self._term(t, inner)
-            for t in self.actions[name].values()
+            "?o" if t == "robot" and pick.random() < 0.8 else self._term(t, inner) for t in self.actions[name].values()
         ]
         atom = f"({' '.join((name, *args))})"
         if pick.random() < 0.5:

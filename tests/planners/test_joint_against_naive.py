@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from itertools import islice
 from typing import Any
@@ -77,32 +77,32 @@ def _fast_steps(loaded: Loaded, state: State) -> set[tuple[tuple[str | None, ...
     return set(found)
 
 
-def _check_model(text: RandomModel) -> None:
+def _check_model(text: RandomModel, note: Callable[[str], None]) -> None:
     loaded = _load(text)
     twin = _twin(loaded, text)
     try:
         states = twin.reachable(_MOST_STATES)
     except TooLarge:
-        event("too large")
+        note("too large")
         return
     except BadInput:
-        event("ambiguous parts")  # exit 31: two joint actions with the same parts do different things
+        note("ambiguous parts")  # exit 31: two joint actions with the same parts do different things
         with pytest.raises(BadInput, match="different results"):
             explore(loaded.model, loaded.tasks[0].init[None, :])
         return
     for state in states:
         slow = {(labels, tuple(_key(after))) for labels, after in twin.successors(state)}
         assert _fast_steps(loaded, state) == slow, _key(state)
-    event("one state" if len(states) == 1 else "several states")
+    note("one state" if len(states) == 1 else "several states")
     if not all(loaded.model.keeps_idle):
-        event("nobody has to idle")
+        note("nobody has to idle")
         _check_idling_adds_nothing(twin)
     if len(states) == 1:
-        _check_plans(loaded, twin, loaded.problems[0])
+        _check_plans(loaded, twin, loaded.problems[0], note)
         return
     for one in (loaded, _load(text, "makespan+actions")):
-        _check_plans(one, twin, one.problems[0])
-        _check_plans(one, twin, _far(twin, states[-1]))
+        _check_plans(one, twin, one.problems[0], note)
+        _check_plans(one, twin, _far(twin, states[-1]), note)
 
 
 def _check_idling_adds_nothing(twin: Twin) -> None:
@@ -120,17 +120,17 @@ def _far(twin: Twin, state: State) -> Problem:
     return replace(twin.rules.problem, goal=And(tuple(goals)))
 
 
-def _check_plans(loaded: Loaded, twin: Twin, problem: Problem) -> None:
+def _check_plans(loaded: Loaded, twin: Twin, problem: Problem, note: Callable[[str], None]) -> None:
     """The same optimal cost, the same number of plans, the same plans, and all of them valid."""
     model = loaded.model
     task = task_of(model, loaded.domain, problem)
     wanted = twin.optimal(problem.goal, actions=model.cost == "makespan+actions")
     if wanted is None:
-        event("unsolvable")
+        note("unsolvable")
         with pytest.raises(ProvedImpossible):
             search(model, task)
         return
-    event(f"makespan {wanted.makespan}")
+    note(f"makespan {wanted.makespan}")
     plans = Plans.of(search(model, task))
     assert plans.space.cost_of(0) == (wanted.makespan, wanted.second)
     assert plans.count == wanted.count()
@@ -161,4 +161,99 @@ def _check_verdicts(
 @given(seed=st.integers(0, 2**40))
 def test_same_joint_steps_and_optimal_plans(kind: Kind, seed: int) -> None:
     """Exactly the same joint steps in every reachable state, and exactly the same optimal plans."""
-    _check_model(random_model(seed, kind))
+    _check_model(random_model(seed, kind), event)
+
+
+# -- by hand: when a robot may not idle ---------------------------------------------------------------------------
+
+_ROOMS = """(define (domain rooms) (:types robot place) (:predicates (at ?r - robot ?p - place) (ok ?r - robot))
+  (:action move :agent ?r - robot :parameters (?from ?to - place) :precondition (at ?r ?from)
+    :effect (and (not (at ?r ?from)) (at ?r ?to)))
+  {more})"""
+_TASK = """(define (problem p) (:domain rooms) (:objects r1 r2 - robot a b - place)
+  (:init (at r1 a) (at r2 b) (ok r1)) (:goal (and (at r1 b) (at r2 b))))"""
+
+
+def _rooms(*more: str) -> Loaded:
+    return _load(RandomModel(_ROOMS.format(more=" ".join(more)), _TASK))
+
+
+_WAIT = "(:action wait :agent ?r - robot :parameters () {precondition} :effect ())"
+
+
+@pytest.mark.parametrize(
+    ("more", "keeps_idle"),
+    [
+        ("", (True, True)),
+        (_WAIT.format(precondition=""), (False, False)),
+        # One of a group of facts always holds: every action that ends one makes another one true.
+        ("(:action stay :agent ?r - robot :parameters (?p - place) :precondition (at ?r ?p))", (False, False)),
+        # Only r1 is ok at the start, and nobody ever stops being ok.
+        (_WAIT.format(precondition=":precondition (ok ?r)")
+         + "(:action heal :agent ?r - robot :parameters () :effect (ok ?r))", (False, True)),
+        (_WAIT.format(precondition=":precondition (ok ?r)")
+         + "(:action fall :agent ?r - robot :parameters () :effect (not (ok ?r)))", (True, True)),
+        (_WAIT.format(precondition=":precondition (not (ok ?r))")
+         + "(:action heal :agent ?r - robot :parameters () :effect (ok ?r))", (True, True)),
+        # A formula needs it.
+        (_WAIT.format(precondition="")
+         + "(:action watch :agent ?r - robot :parameters (?o - robot) :precondition (wait ?o) :effect (ok ?r))",
+         (True, True)),
+        # It does something.
+        (_WAIT.format(precondition="").replace(":effect ()", ":effect (ok ?r)"), (True, True)),
+    ],
+)  # fmt: skip
+def test_when_idling_is_dropped(more: str, keeps_idle: tuple[bool, bool]) -> None:
+    loaded = _rooms(more)
+    assert loaded.model.keeps_idle == keeps_idle
+    # r1 walks over, r2 stays where it is: one plan, and not one more for every way to do nothing.
+    if not any(keeps_idle):
+        plans = [
+            [loaded.model.texts(step) for step in plan] for plan in Plans.of(search(loaded.model, loaded.tasks[0]))
+        ]
+        assert all(label is not None for plan in plans for step in plan for label in step)
+
+
+def test_a_shared_do_nothing_action_is_nobodys_own() -> None:
+    text = RandomModel(
+        """(define (domain d) (:types robot) (:predicates (p ?r - robot))
+        (:action meet :parameters (?r ?q - robot))
+        (:action go :parameters (?r - robot) :effect (p ?r)))""",
+        "(define (problem p) (:domain d) (:objects r1 r2 - robot) (:init) (:goal (p r1)))",
+    )
+    # (meet r1 r1) belongs to r1 alone; without it there is only meeting the other one.
+    assert _load(text).model.keeps_idle == (False, False)
+    apart = text.domain.replace("(?r ?q - robot))", "(?r ?q - robot) :precondition (not (= ?r ?q)))")
+    assert _load(RandomModel(apart, text.problem)).model.keeps_idle == (True, True)
+
+
+def test_a_wait_that_others_disturb_does_not_replace_idling() -> None:
+    """r1 pushes r2 away, which deletes what r2's ``stay`` requires: r2 must be able to idle."""
+    text = RandomModel(
+        """(define (domain push) (:types robot place) (:predicates (at ?r - robot ?p - place) (next ?p ?q - place))
+        (:action stay :agent ?r - robot :parameters (?p - place) :precondition (at ?r ?p))
+        (:action push :agent ?r - robot :parameters (?o - robot ?from ?to - place)
+          :precondition (and (at ?o ?from) (next ?from ?to) (not (= ?r ?o)))
+          :effect (and (not (at ?o ?from)) (at ?o ?to))))""",
+        """(define (problem p) (:domain push) (:objects r1 r2 - robot a b - place)
+        (:init (at r1 a) (at r2 a) (next a b)) (:goal (and (at r1 a) (at r2 b))))""",
+    )
+    loaded = _load(text)
+    twin = _twin(loaded, text)
+    _check_idling_adds_nothing(twin)
+    plans = Plans.of(search(loaded.model, loaded.tasks[0]))
+    assert [[loaded.model.texts(step) for step in plan] for plan in plans] == [[("(push r1 r2 a b)", None)]]
+
+
+def test_an_effect_on_every_object() -> None:
+    """A universal effect whose variable has no type but ``object``."""
+    _check_model(
+        RandomModel(
+            """(define (domain d) (:types robot) (:predicates (p ?x) (q ?x))
+            (:action all :agent ?r - robot :parameters () :effect (forall (?x) (p ?x)))
+            (:action none :agent ?r - robot :parameters () :precondition (p ?r)
+              :effect (forall (?x - object) (when (not (q ?x)) (and (q ?x) (not (p ?x)))))))""",
+            "(define (problem p) (:domain d) (:objects r1 r2 - robot o) (:init) (:goal (and (q o) (not (p r1)))))",
+        ),
+        note=lambda _: None,
+    )

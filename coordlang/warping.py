@@ -1,0 +1,71 @@
+"""When do two state sequences have one sentence?  Warping paths, and the shortest of them.
+
+Key fact (proved in docs/concepts.md): ``u`` and ``v`` have the same sentence under ``f`` iff there is a *warping path*:
+cells ``(i, j)`` from ``(0, 0)`` to the last indices, steps ``(1, 0)``, ``(0, 1)``, ``(1, 1)``, with ``f(u_i) = f(v_j)`` on
+every cell.  So whoever wants the sentences to differ must separate ``u_i`` from ``v_j`` on some cell of *every* warping path.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+Pair = tuple[int, int]
+
+#: A clause: at least one of these pairs of states must lie in different words.
+Clause = frozenset[Pair]
+
+_NO_PATH = 10**9
+
+
+def pair(a: int, b: int) -> Pair:
+    """Two states as an unordered pair."""
+    return (a, b) if a < b else (b, a)
+
+
+def warping_clause(u: Sequence[int], v: Sequence[int], word: Mapping[int, int] | Sequence[int]) -> Clause | None:
+    """The non-identical pairs on a warping path of ``u`` and ``v`` under ``word`` with the fewest non-identical cells.
+
+    None if the two sentences differ.  O(|u| |v|).
+    """
+    best = [[_NO_PATH] * len(v) for _ in u]
+    for i, a in enumerate(u):
+        for j, b in enumerate(v):
+            if word[a] != word[b]:
+                continue
+            before = min(_before(best, i, j)) if i or j else 0
+            if before < _NO_PATH:
+                best[i][j] = before + (a != b)
+    if best[-1][-1] >= _NO_PATH:
+        return None
+    pairs: set[Pair] = set()
+    i, j = len(u) - 1, len(v) - 1
+    while True:
+        if u[i] != v[j]:
+            pairs.add(pair(u[i], v[j]))
+        if i == 0 and j == 0:
+            return frozenset(pairs)
+        options = _before(best, i, j)
+        i, j = ((i - 1, j - 1), (i - 1, j), (i, j - 1))[options.index(min(options))]
+
+
+def _before(best: list[list[int]], i: int, j: int) -> tuple[int, int, int]:
+    """The values of the three cells before ``(i, j)``: diagonal, above, left."""
+    return (
+        best[i - 1][j - 1] if i and j else _NO_PATH,
+        best[i - 1][j] if i else _NO_PATH,
+        best[i][j - 1] if j else _NO_PATH,
+    )
+
+
+def separation_clause(sequences: Sequence[Sequence[int]], word: Mapping[int, int] | Sequence[int]) -> Clause | None:
+    """The clause of a failing tuple of plans: the union of warping paths from the first to each other one.
+
+    None if not all of them have one sentence.
+    """
+    clause: set[Pair] = set()
+    for other in sequences[1:]:
+        pairs = warping_clause(sequences[0], other, word)
+        if pairs is None:
+            return None
+        clause |= pairs
+    return frozenset(clause)
