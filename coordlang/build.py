@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from time import perf_counter
 
-from coordlang.divergence import Alphas, alphas, separations, states_on_plans
-from coordlang.language import Guarantee, Language, name_words
+from coordlang.divergence import Alphas, alphas, states_on_plans
+from coordlang.file import signed
+from coordlang.language import Guarantee, Language, WordTable, name_words
 from coordlang.tasks import Candidates, require_solvable
-from coordlang.vocabulary import METHODS
+from coordlang.verify import Verdict, verify
+from coordlang.vocabulary import METHODS, Job, Outcome, greedy
+from coordlang.vocabulary.job import Partition
 from coordlang.witness import Miscoordination, inseparable
 from planners.errors import ProvedImpossible
 
@@ -28,24 +31,34 @@ class Inseparable(ProvedImpossible):
 
 @dataclass(frozen=True, slots=True)
 class Built:
-    """A language and the figures of its making (seconds by phase)."""
+    """A verified language and the figures of its making.
+
+    ``figures`` are the method's own (rounds, clauses, ..), ``seconds`` are by phase.  ``stopped`` is the error that ended
+    the method before its proof was complete, or None.
+    """
 
     language: Language
     alphas: Alphas
     states: int
+    verdict: Verdict
+    figures: Mapping[str, float]
     seconds: dict[str, float]
+    stopped: BaseException | None
 
 
 def build_language(
-    candidates: Candidates, method: str = "greedy", progress: Callable[[str], None] = lambda _: None
+    candidates: Candidates,
+    method: str = "greedy",
+    *,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Built:
-    """Build a coordination language for candidate tasks.
+    """Build a coordination language for candidate tasks and verify it by definition.
 
     Raises `Inseparable` (with the two plans) when there is none, `OutOfMemory` before the memory budget is used up.
     """
     require_solvable(candidates)
-    seconds: dict[str, float] = {}
-    start = perf_counter()
+    clock = _Clock()
     progress("looking for inseparable plans")
     for space in candidates.spaces:
         witness = inseparable(space)
@@ -53,23 +66,50 @@ def build_language(
             raise Inseparable(witness)
     progress("walking pairs of plans")
     found = alphas(candidates.spaces)
-    seconds["coordination"] = perf_counter() - start
-    start = perf_counter()
-    progress(f"separating {len(found.divergences):,} divergences")
-    states = states_on_plans(candidates.spaces)
-    partition = METHODS[method](states.tolist(), separations(found.divergences))
-    seconds["vocabulary"] = perf_counter() - start
+    clock.note("coordination")
+    job = Job(candidates, tuple(states_on_plans(candidates.spaces).tolist()), found, None, seed, progress)
+    if method != "greedy":
+        # What is left when an anytime method is stopped; verified before, because there is no time then.
+        first = greedy(job).partition
+        _verify(candidates, first)
+        job = replace(job, incumbent=first)
+        clock.note("incumbent")
+    progress(f"building words ({method})")
+    outcome = METHODS[method](job)
+    clock.note("vocabulary")
+    progress("verifying by definition")
+    verdict = _verify(candidates, outcome.partition)
+    clock.note("verify")
+    language = _language(candidates, method, outcome)
+    return Built(language, found, len(job.states), verdict, outcome.figures, clock.seconds, outcome.stopped)
+
+
+def _verify(candidates: Candidates, partition: Partition) -> Verdict:
     words, mapping, default = name_words(candidates.model, candidates.rows, partition)
-    lower = 2 if found.requiring else 1
     language = Language(
-        words=words,
-        states=mapping,
-        default=default,
-        robots=candidates.model.robots,
-        guarantee=Guarantee(method, len(words), lower, len(words) == lower),
-        domain={},
-        model={},
-        tasks={},
-        producer={},
+        words, mapping, default, candidates.model.robots, Guarantee("", 0, 0, False), {}, {}, {}, {}
     )
-    return Built(language, found, len(states), seconds)
+    verdict = verify(WordTable.of(language, candidates.model), candidates.spaces)
+    if not verdict.holds:
+        raise AssertionError(f"a method returned what is no coordination language: {verdict.witness}")
+    return verdict
+
+
+def _language(candidates: Candidates, method: str, outcome: Outcome) -> Language:
+    words, mapping, default = name_words(candidates.model, candidates.rows, outcome.partition)
+    guarantee = Guarantee(method, len(words), outcome.lower_bound, len(words) == outcome.lower_bound)
+    language = Language(words, mapping, default, candidates.model.robots, guarantee, {}, {}, {}, {})
+    return signed(language, candidates, {"program": "coordlang"})
+
+
+class _Clock:
+    """Seconds by phase."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._since = perf_counter()
+
+    def note(self, phase: str) -> None:
+        now = perf_counter()
+        self.seconds[phase] = now - self._since
+        self._since = now

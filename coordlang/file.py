@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import gzip
 import os
+import sys
 import tempfile
-from collections.abc import Mapping
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -90,17 +93,25 @@ def json_schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "coordlang language", **schema}
 
 
-def describe_source(domain: Domain, problem: Problem, options: ModelOptions) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The ``domain`` and ``model`` entries of a language file."""
-    return (
-        {"name": domain.name, "sha256": domain.source.sha256},
-        {
-            "cost": options.cost,
-            "unowned": options.robots.unowned,
-            "remember_actions": options.remember_actions,
+def signed(language: Language, candidates: Candidates, producer: Mapping[str, Any]) -> Language:
+    """The language with what its file records of domain, model, tasks and making."""
+    loaded = candidates.loaded
+    problem = loaded.problems[0]
+    tasks: dict[str, Any] = {"kind": candidates.kind, "count": candidates.count}
+    if candidates.kind != "all":
+        tasks["tasks"] = task_data(candidates.listed)["tasks"]
+    return replace(
+        language,
+        domain={"name": loaded.domain.name, "sha256": loaded.domain.source.sha256},
+        model={
+            "cost": loaded.options.cost,
+            "unowned": loaded.options.robots.unowned,
+            "remember_actions": loaded.options.remember_actions,
             "problem_sha256": problem.source.sha256,
-            "world_sha256": world_sha256(domain, problem),
+            "world_sha256": world_sha256(loaded.domain, problem),
         },
+        tasks=tasks,
+        producer=producer,
     )
 
 
@@ -110,14 +121,6 @@ def world_sha256(domain: Domain, problem: Problem) -> str:
     lines += sorted(show(atom) for atom in static_atoms(domain, problem))
     lines += sorted(f"{show(atom)} = {value:g}" for atom, value in problem.values.items())
     return sha256("\n".join(lines).encode()).hexdigest()
-
-
-def record_tasks(candidates: Candidates) -> dict[str, Any]:
-    """The ``tasks`` entry of a language file."""
-    record: dict[str, Any] = {"kind": candidates.kind, "count": candidates.count}
-    if candidates.kind != "all":
-        record["tasks"] = task_data(candidates.listed)["tasks"]
-    return record
 
 
 def to_bytes(language: Language) -> bytes:
@@ -181,12 +184,12 @@ def read_language(path: str | Path) -> Language:
     """
     place = Place(str(path))
     try:
-        data = Path(path).read_bytes()
+        data = sys.stdin.buffer.read() if str(path) == "-" else Path(path).read_bytes()
         if data[:2] == b"\x1f\x8b":
             data = gzip.decompress(data)
     except FileNotFoundError:
         raise BadInput("there is no such file", place=place) from None
-    except (OSError, EOFError) as error:
+    except (OSError, EOFError, zlib.error) as error:
         raise BadInput(f"cannot be read: {error}", place=place) from None
     return language_from_bytes(data, place)
 
@@ -245,24 +248,28 @@ def _check_head(data: bytes, place: Place) -> None:
 def options_of(
     language: Language,
     *,
-    robots: RobotChoice | None = None,
+    robots: Sequence[str] = (),
+    unowned: str | None = None,
     cost: str | None = None,
     remember_actions: bool | None = None,
 ) -> ModelOptions:
     """How the language's model is built.  Raises `UsageError` for a flag that contradicts the file."""
     model: Mapping[str, Any] = language.model
-    own = {
-        "--cost": (model.get("cost", "makespan"), cost),
-        "--remember-actions": (model.get("remember_actions", False), remember_actions or None),
-        "--unowned": (model.get("unowned", "error"), robots.unowned if robots and robots.unowned != "error" else None),
+    recorded = {
+        "--cost": model.get("cost", "makespan"),
+        "--unowned": model.get("unowned", "error"),
+        "--remember-actions": model.get("remember_actions", False),
     }
-    for flag, (recorded, given) in own.items():
-        if given is not None and given != recorded:
-            raise UsageError(f"{flag} {given} contradicts the language file, which was built with {recorded}")
-    if robots and robots.names and set(robots.names) != set(language.robots) - {ENVIRONMENT}:
-        raise UsageError(f"--robots contradicts the language file: {', '.join(language.robots)}")
-    names = tuple(r for r in language.robots if r != ENVIRONMENT or own["--unowned"][0] != "environment")
-    return ModelOptions(RobotChoice(names, None, own["--unowned"][0]), own["--cost"][0], own["--remember-actions"][0])
+    given = {"--cost": cost, "--unowned": unowned, "--remember-actions": remember_actions or None}
+    for flag, value in given.items():
+        if value is not None and value != recorded[flag]:
+            raise UsageError(f"{flag} contradicts the language file, which was built with {recorded[flag]}")
+    own = tuple(r for r in language.robots if r != ENVIRONMENT or recorded["--unowned"] != "environment")
+    if robots and set(robots) != set(own):
+        raise UsageError(f"--robots contradicts the language file: its robots are {', '.join(own)}")
+    return ModelOptions(
+        RobotChoice(own, None, recorded["--unowned"]), recorded["--cost"], recorded["--remember-actions"]
+    )
 
 
 def check_source(language: Language, domain: Domain, problems: list[Problem], place: Place) -> None:
@@ -292,7 +299,14 @@ def recorded_candidates(
     kind = language.tasks["kind"]
     try:
         if kind == "all":
-            return all_pairs(domain, problems, options)
+            candidates = all_pairs(domain, problems, options)
+            if candidates.count != language.tasks["count"]:
+                raise BadInput(
+                    f"the language records {language.tasks['count']:,} tasks, but {problems[0].source.name} has "
+                    f"{candidates.count:,} pairs of states",
+                    remedy="Give the problem that the language was built for, or say --tasks all to check these.",
+                )
+            return candidates
         listed = [ListedTask(tuple(t["init"]), tuple(t["goal"])) for t in language.tasks.get("tasks", [])]
         make = from_listed if kind == "file" else from_recorded
         return make(domain, problems, listed, options, place)

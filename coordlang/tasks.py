@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -178,7 +179,7 @@ def read_task_file(path: str | Path) -> tuple[ListedTask, ...]:
     """Read a task file (docs/formats.md).  Raises `BadInput` for anything else."""
     place = Place(str(path))
     try:
-        data = json.loads(Path(path).read_text())
+        data = json.loads(sys.stdin.read() if str(path) == "-" else Path(path).read_text())
     except OSError as error:
         raise BadInput(f"cannot be read: {error.strerror}", place=place) from None
     except ValueError as error:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -27,9 +28,13 @@ from planners.plain import LONGEST, Form, PlainTask, compile_plain
 _GREATEST = 2**31 - 1
 #: The end of a message that is worth showing.
 _TAIL = 1500
+#: numpy, which unified-planning imports, would reserve memory for a thread per processor.
+_ENVIRONMENT = {"PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+#: How Python, the loader and numpy say that a limit of the calling process leaves them too little memory.
+_NO_MEMORY = re.compile("memory|failed to map segment|start new thread", re.IGNORECASE)
 
 
-class FastDownwardFailed(CoordlangError):  # noqa: N818 - named like the rest of the tree
+class FastDownwardFailed(CoordlangError):
     """Fast Downward gave no answer: the cost that was to be checked is neither confirmed nor refuted."""
 
     exit_code = 3
@@ -61,7 +66,7 @@ def optimal_cost(
     Parameters
     ----------
     time_limit, memory_limit
-        Seconds of wall time for all of it; bytes of address space for the child and each of its children.
+        Seconds of wall time for all of it; bytes of address space for Fast Downward's translator and its search.
     limit
         See `planners.plain.compile_plain`.
 
@@ -138,7 +143,7 @@ def _run(directory: Path, left: float | None) -> int:
                 [sys.executable, "-m", "planners.fast_downward_worker", "task.json", "result.json"],
                 cwd=directory,
                 # What the worker's libraries put into a temporary directory goes away with this one.
-                env={**os.environ, "PYTHONPATH": path, "TMPDIR": str(directory), "PYTHONHASHSEED": "0"},
+                env={**os.environ, **_ENVIRONMENT, "PYTHONPATH": path, "TMPDIR": str(directory)},
                 stdin=subprocess.PIPE,  # ends when we do, even by a signal: then the worker ends its group
                 stdout=subprocess.DEVNULL,
                 stderr=errors,
@@ -161,7 +166,7 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 def _explain_crash(code: int, errors: str) -> None:
     """Raise the error for a worker that left no result."""
-    if code == -signal.SIGKILL or "MemoryError" in errors or "Cannot allocate memory" in errors:
+    if code == -signal.SIGKILL or _NO_MEMORY.search(errors):
         raise _out_of_memory()
     raise FastDownwardFailed(
         f"the process that runs Fast Downward ended with exit code {code}", remedy=errors[-_TAIL:].strip() or None

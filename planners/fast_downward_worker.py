@@ -6,7 +6,6 @@ writes one JSON object: ``{"status": .., "total": cost of the plan or null, "log
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 import signal
@@ -19,28 +18,24 @@ from typing import Any
 from planners.limits import limit_memory
 
 
-class _SameGroup(subprocess.Popen[bytes]):
-    """A child that stays in our process group: unified-planning would give Fast Downward a session of its own.
+class _FastDownward(subprocess.Popen[bytes]):
+    """Fast Downward with a memory limit, and in our process group.
 
-    Then nobody could end it together with us.
+    unified-planning would give it a session of its own, and then nobody could end it together with us.
     """
+
+    memory_limit: int | None = None
 
     def __init__(self, *args: Any, **settings: Any) -> None:
         settings.pop("start_new_session", None)
-        super().__init__(*args, **settings)
+        super().__init__(*args, **settings, preexec_fn=lambda: limit_memory(self.memory_limit))
 
 
 def main(task_file: str, result_file: str) -> None:
     """Solve the task of one file and write the outcome to another (never half of it)."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
     task = json.loads(Path(task_file).read_text())
-    limit_memory(task["memory_limit"])
-    try:
-        result = solve(task)
-    except (MemoryError, OSError) as error:
-        if isinstance(error, OSError) and error.errno != errno.ENOMEM:
-            raise
-        result = {"status": "memory", "total": None, "log": ""}
+    result = solve(task)
     beside = Path(result_file + ".part")
     beside.write_text(json.dumps(result))
     os.replace(beside, result_file)
@@ -58,7 +53,8 @@ def solve(task: dict[str, Any]) -> dict[str, Any]:
     from unified_planning.shortcuts import OneshotPlanner, get_environment
 
     get_environment().credits_stream = None
-    subprocess.Popen = _SameGroup  # type: ignore[misc]
+    _FastDownward.memory_limit = task["memory_limit"]
+    subprocess.Popen = _FastDownward  # type: ignore[assignment, misc]
     problem, costs = build(task)
     with OneshotPlanner(name="fast-downward-opt") as planner:
         # A search for invariants among facts without arguments takes seconds and gains nothing: 0.05 s without it

@@ -37,6 +37,11 @@ def time_limit(seconds: float | None) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
+def stop_clock() -> None:
+    """Ring no more: for work that has met its time limit and still has to save what it has."""
+    signal.setitimer(signal.ITIMER_REAL, 0)
+
+
 def limit_memory(size: int | None) -> None:
     """Let this process and its children have at most ``size`` bytes of address space."""
     if size is not None:

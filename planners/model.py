@@ -38,12 +38,13 @@ class PlanningTask:
 
 @dataclass(frozen=True, slots=True)
 class Loaded:
-    """A joint model with the files it was made from and one task per problem."""
+    """A joint model with the files and options it was made from and one task per problem."""
 
     domain: Domain
     problems: tuple[Problem, ...]
     model: JointModel
     tasks: tuple[PlanningTask, ...]
+    options: ModelOptions
 
 
 def load(domain: str | Path, problems: Sequence[str | Path], options: ModelOptions | None = None) -> Loaded:
@@ -74,7 +75,7 @@ def build(
     actions = ground_actions(domain, first, team, also=extra, costs=options.cost == "makespan+cost")
     model = _joint_model(domain, problems, team, actions, extra, options)
     tasks = tuple(task_of(model, domain, problem) for problem in problems)
-    return Loaded(domain, tuple(problems), model, tasks)
+    return Loaded(domain, tuple(problems), model, tasks, options)
 
 
 def task_of(model: JointModel, domain: Domain, problem: Problem) -> PlanningTask:
@@ -159,19 +160,21 @@ def _always_has_nothing_to_do(
     actions: Sequence[GroundAction],
     inits: Sequence[frozenset[Atom]],
 ) -> bool:
-    """Whether a do-nothing schema of the robot's own is applicable in every state and no formula names it.
+    """Whether a do-nothing schema of the robot's own is as good as idling: always possible, and named in no formula.
 
     Proved for a precondition that is true, or for instances with one positive literal each of which at least one is
-    true at the start and which no action makes false without making another one true.
+    true at the start, which no action makes false without making another one true, and which no other robot's action
+    makes false at all (it would interfere with the schema, and not with idling).
     """
     by_schema: dict[str, list[GroundAction]] = {}
     for action in subactions:
         if action.does_nothing and action.owners == (robot,):
             by_schema.setdefault(action.schema, []).append(action)
-    return any(_one_always_holds(own, actions, inits) for own in by_schema.values())
+    return any(_one_always_holds(robot, own, actions, inits) for own in by_schema.values())
 
 
 def _one_always_holds(
+    robot: int,
     candidates: Sequence[GroundAction],
     actions: Sequence[GroundAction],
     inits: Sequence[frozenset[Atom]],
@@ -184,7 +187,7 @@ def _one_always_holds(
     for action in actions:
         added = {e.atom for e in action.effects if e.adds and e.condition == TRUE}
         deleted = {e.atom for e in action.effects if not e.adds} - added
-        if deleted & group and not added & group:
+        if deleted & group and (not added & group or robot not in action.owners):
             return False
     return True
 

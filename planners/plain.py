@@ -13,6 +13,7 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
 from typing import Literal
@@ -75,20 +76,13 @@ def compile_plain(model: JointModel, task: PlanningTask, limit: int = 2000, long
     Parameters
     ----------
     limit
-        Joint-action PDDL may have as many plain actions as ground actions beyond it.  0 asks for select-then-apply.
+        0 asks for select-then-apply.  Joint-action PDDL, whose ground actions are plain actions already, may exceed it.
     longest
         The makespan, in joint steps, up to which `PlainTask.cost` has to be sure.
     """
     team = _team(model)
     step_cost = team.dearest * longest + 1
-    if model.is_joint_action and limit:
-        limit = max(limit, 4 * len(model.actions))
-    try:
-        out = _explicit(team, model, task.goal, step_cost, limit)
-        form: Form = "explicit"
-    except _TooManyError:
-        out = _select_then_apply(team, model, task.goal, step_cost)
-        form = "select-then-apply"
+    out, form = _written(team, model, task.goal, step_cost, limit)
     true = {out.fact(atom) for atom, holds in _state(model, task.init.tolist()).items() if holds}
     return PlainTask(
         name=task.name,
@@ -100,6 +94,15 @@ def compile_plain(model: JointModel, task: PlanningTask, limit: int = 2000, long
         step_cost=step_cost,
         dearest=team.dearest,
     )
+
+
+def _written(team: _Team, model: JointModel, goal: Goal, step_cost: int, limit: int) -> tuple[_Writer, Form]:
+    if model.is_joint_action and limit:
+        limit = max(limit, 4 * len(model.actions))
+    if limit:
+        with suppress(_TooManyError):
+            return _explicit(team, model, goal, step_cost, limit), "explicit"
+    return _select_then_apply(team, model, goal, step_cost), "select-then-apply"
 
 
 class _TooManyError(Exception):
@@ -267,14 +270,14 @@ def _literals(formula: Formula) -> tuple[dict[Atom, bool], list[Formula]] | None
 
 
 class _Writer:
-    """Collects facts and actions; actions that differ in name only are written once."""
+    """Collects facts and actions; equal actions are written once."""
 
     def __init__(self, facts: Iterable[Atom]) -> None:
         self.facts: dict[Atom, int] = {atom: n for n, atom in enumerate(facts)}
         self.actions: list[PlainAction] = []
         self.init: set[int] = set()
         self.goal: tuple[Condition, ...] = ()
-        self._seen: set[tuple[object, ...]] = set()
+        self._seen: set[PlainAction] = set()
         self._places = 0
 
     def fact(self, atom: Atom) -> int:
@@ -288,9 +291,8 @@ class _Writer:
         plus = {self.fact(atom) for atom in adds}
         minus = {self.fact(atom) for atom in deletes} - plus
         new = PlainAction(name, self.conditions(known), tuple(sorted(plus)), tuple(sorted(minus)), cost)
-        key = (new.preconditions, new.adds, new.deletes, cost)
-        if key not in self._seen:
-            self._seen.add(key)
+        if new not in self._seen:
+            self._seen.add(new)
             self.actions.append(new)
 
     def place(self) -> Atom:
@@ -399,8 +401,10 @@ def _joint_steps(team: _Team, limit: int) -> Iterator[tuple[int, ...]]:
 
 
 def _name(team: _Team, step: Sequence[int]) -> str:
+    """The label tuple: ground actions of joint-action PDDL that do the same with the same labels are one."""
     chosen = {robot: team.actions[n].label for n in step for robot in team.owners[n]}
-    return " ".join(chosen.get(robot, "idle") for robot in range(len(team.choosers)))
+    parts = next((team.actions[n].parts for n in step), ()) or [chosen.get(r) for r in range(len(team.choosers))]
+    return " ".join(part or "idle" for part in parts)
 
 
 def _cases_of(team: _Team, model: JointModel, step: Sequence[int]) -> Iterator[tuple[Known, set[Atom], set[Atom]]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -67,7 +68,7 @@ def read_plans(path: str | Path, model: JointModel) -> list[tuple[Texts, ...]]:
     """The plans of a plan file, JSON or IPC text.  Raises `BadInput` with the line."""
     place = Place(str(path))
     try:
-        text = Path(path).read_text()
+        text = sys.stdin.read() if str(path) == "-" else Path(path).read_text()
     except OSError as error:
         raise BadInput(f"cannot be read: {error.strerror}", place=place) from None
     if text.lstrip().startswith("{"):
@@ -113,6 +114,8 @@ def _put(step: list[str | None], action: str, model: JointModel, place: Place) -
         parts = next((a.parts for a in model.actions if a.label == action), None)
         if parts is None:
             raise BadInput(f"{action} is no action of this problem", place=place)
+        if any(step):
+            raise BadInput(f"two joint actions in one step: {action} is the second", place=place)
         step[:] = parts
         return
     owners = next((a.owners for a in model.actions if a.label == action), None)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import sys
+import traceback
 from typing import NoReturn
 
 import click
@@ -42,7 +43,7 @@ def run(arguments: list[str]) -> int:
         return _fail("out of memory\n  Use a smaller task, or a larger --memory-limit.", OutOfMemory.exit_code)
     except CoordlangError as error:
         if debug:
-            raise
+            traceback.print_exc()
         return _fail(str(error), error.exit_code)
 
 

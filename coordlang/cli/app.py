@@ -13,6 +13,7 @@ import click
 if TYPE_CHECKING:
     from planners.model import ModelOptions
 
+EXIT_UNPROVED = 3
 EXIT_INTERRUPTED = 130
 
 #: Command -> its module below `coordlang.cli`; imported when it is called.
@@ -158,10 +159,16 @@ class GivenOptions:
     def for_language(self, language: Any) -> ModelOptions:
         """The language's own options; `UsageError` where the user's contradict them."""
         from coordlang.file import options_of
-        from planners.robots import RobotChoice
 
-        choice = RobotChoice(self.robots, self.robot_type, self.unowned or "error")
-        return options_of(language, robots=choice, cost=self.cost, remember_actions=self.remember_actions)
+        if self.robot_type:
+            raise click.UsageError("--robot-type: a language file names its robots already")
+        return options_of(
+            language,
+            robots=self.robots,
+            unowned=self.unowned,
+            cost=self.cost,
+            remember_actions=self.remember_actions,
+        )
 
 
 def read_files(domain: str, problems: tuple[str, ...]) -> tuple[Any, list[Any]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from importlib.metadata import version
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -11,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from coordlang.cli.app import (
+    EXIT_INTERRUPTED,
+    EXIT_UNPROVED,
     GivenOptions,
     domain_argument,
     limits,
@@ -23,7 +26,6 @@ from coordlang.cli.app import (
 if TYPE_CHECKING:
     from coordlang.build import Built
     from coordlang.tasks import Candidates
-    from coordlang.verify import Verdict
 
 
 @click.command(name="build")
@@ -31,7 +33,8 @@ if TYPE_CHECKING:
 @problems_argument
 @click.option("--tasks", metavar="all|FILE", help="Candidate tasks: every pair of reachable states, or a task file "
               "(default: the problems' own).")  # fmt: skip
-@click.option("--method", type=click.Choice(["greedy"]), default="greedy", show_default=True)
+@click.option("--method", type=click.Choice(["greedy", "minimal", "exhaustive"]), default="greedy",
+              show_default=True, help="greedy: fast.  minimal: fewest words, with proof.  exhaustive: brute force.")
 @click.option(
     "-o", "--output", required=True, metavar="LANGUAGE", help="The language file; .json or .json.gz, - for stdout."
 )
@@ -48,15 +51,14 @@ def command(
     seed: int,
     as_json: bool,
     given: GivenOptions,
-) -> None:
-    """Build a coordination language and verify it before it is written."""
-    from dataclasses import replace
+) -> int:
+    """Build a coordination language and verify it before it is written.
 
+    Exit 0: written, with the proof that the method promises.  3: written without it (a limit was hit).
+    """
     from coordlang.build import Inseparable, build_language
     from coordlang.cli.coordination import show
-    from coordlang.file import describe_source, record_tasks, to_bytes, write_language
-    from coordlang.language import WordTable
-    from coordlang.verify import verify
+    from coordlang.file import to_bytes, write_language
 
     start = perf_counter()
     lifted, read = read_files(domain, problems)
@@ -64,38 +66,37 @@ def command(
     note_single_robot(candidates.model.robots)
     seconds = {"space": perf_counter() - start}
     try:
-        built = build_language(candidates, method, progress)
+        built = build_language(candidates, method, seed=seed, progress=progress)
     except Inseparable as error:
         click.echo(show(error.witness), err=True)
         raise
-    begin = perf_counter()
-    progress("verifying by definition")
-    verdict = verify(WordTable.of(built.language, candidates.model), candidates.spaces)
-    seconds |= built.seconds | {"verify": perf_counter() - begin}
-    assert verdict.holds, f"the built language is refuted: {verdict.witness}"
-    domain_entry, model_entry = describe_source(lifted, read[0], given.options())
-    language = replace(
-        built.language,
-        domain=domain_entry,
-        model=model_entry,
-        tasks=record_tasks(candidates),
-        producer={
-            "program": "coordlang",
-            "version": version("coordlang"),
-            "arguments": sys.argv[1:],
-            "seed": seed,
-            "seconds": {name: round(value, 3) for name, value in seconds.items()},
-        },
-    )
+    seconds |= built.seconds
+    producer = {
+        "program": "coordlang",
+        "version": version("coordlang"),
+        "arguments": sys.argv[1:],
+        "seed": seed,
+        "solver": f"python-sat {version('python-sat')}",
+        "seconds": {name: round(value, 3) for name, value in seconds.items()},
+    }
+    language = replace(built.language, producer=producer)
     if output == "-":
         click.echo(to_bytes(language).decode(), nl=False)
     else:
         write_language(language, output)
-    figures = _figures(candidates, built, verdict, seconds)
+    figures = _figures(candidates, built, seconds)
     if as_json and output != "-":
         click.echo(json.dumps(figures))
     else:
         click.echo(_summary(figures, output), err=output == "-")
+    if isinstance(built.stopped, KeyboardInterrupt):
+        click.echo("coordlang: interrupted; the best language so far is written", err=True)
+        return EXIT_INTERRUPTED
+    if built.stopped is not None:
+        reason = str(built.stopped).splitlines()[0] if str(built.stopped) else "out of memory"
+        click.echo(f"coordlang: {reason}; the best language so far is written, without proof", err=True)
+    unproved = method in ("minimal", "exhaustive") and not language.guarantee.proved_minimal
+    return EXIT_UNPROVED if unproved else 0
 
 
 def make_candidates(lifted: Any, read: list[Any], tasks: str | None, given: GivenOptions) -> Candidates:
@@ -117,7 +118,7 @@ def progress(message: str) -> None:
         click.echo(f"\r\033[K{message} ..", nl=False, err=True)
 
 
-def _figures(candidates: Candidates, built: Built, verdict: Verdict, seconds: dict[str, float]) -> dict[str, Any]:
+def _figures(candidates: Candidates, built: Built, seconds: dict[str, float]) -> dict[str, Any]:
     return {
         "tasks": candidates.count,
         "states": candidates.states,
@@ -129,8 +130,10 @@ def _figures(candidates: Candidates, built: Built, verdict: Verdict, seconds: di
         "method": built.language.guarantee.method,
         "walk_nodes": built.alphas.nodes,
         "walk_edges": built.alphas.edges,
-        "verify_nodes": verdict.nodes,
-        "verified": verdict.holds,
+        "verify_nodes": built.verdict.nodes,
+        "verified": built.verdict.holds,
+        "proved_minimal": built.language.guarantee.proved_minimal,
+        **built.figures,
         "seconds": {name: round(value, 3) for name, value in seconds.items()},
     }
 
@@ -139,8 +142,9 @@ def _summary(figures: dict[str, Any], output: str) -> str:
     if sys.stderr.isatty():
         click.echo("\r\033[K", nl=False, err=True)
     words, total = figures["words"], sum(figures["seconds"].values())
+    proof = "proved minimal, " if figures["proved_minimal"] else f"at least {figures['lower_bound']} needed, "
     return (
-        f"{words} word{'s' * (words != 1)} ({figures['method']}, verified) for {figures['tasks']:,} tasks, "
+        f"{words} word{'s' * (words != 1)} ({figures['method']}, {proof}verified) for {figures['tasks']:,} tasks, "
         f"{figures['tasks_requiring_coordination']:,} of which require coordination\n"
         f"{figures['states_on_plans']:,} states on optimal plans, {figures['divergences']:,} divergences, "
         f"{figures['walk_nodes']:,} walk nodes, {total:.2f} s\n"

@@ -13,17 +13,15 @@ from coordlang.cli.app import GivenOptions, domain_argument, limits, model_optio
 @domain_argument
 @problem_argument
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
-@click.pass_context
 @model_options
 @limits
-def command(context: click.Context, domain: str, problem: str, as_json: bool, given: GivenOptions) -> int:
+def command(domain: str, problem: str, as_json: bool, given: GivenOptions) -> int:
     """Compare our optimal cost with Fast Downward's (through unified-planning).
 
     Exit 0: equal.  1: they differ.  11: both prove that there is no plan.
     """
-    from planners.fast_downward import optimal_cost
-
     from planners.errors import ProvedImpossible
+    from planners.fast_downward import optimal_cost
     from planners.model import load
     from planners.optimal import search
 

@@ -1,8 +1,17 @@
-"""Constraints -> a partition of states into words."""
+"""Constraints -> a partition of states into words.  One interface: a `Job` in, an `Outcome` out."""
 
+from collections.abc import Callable
+
+from coordlang.vocabulary.exhaustive import exhaustive
 from coordlang.vocabulary.greedy import greedy
+from coordlang.vocabulary.job import Job, Outcome
+from coordlang.vocabulary.minimal import minimal
 
 #: The ways to a partition, by the name that ``--method`` takes.
-METHODS = {"greedy": greedy}
+METHODS: dict[str, Callable[[Job], Outcome]] = {
+    "greedy": greedy,
+    "minimal": minimal,
+    "exhaustive": exhaustive,
+}
 
-__all__ = ["METHODS", "greedy"]
+__all__ = ["METHODS", "Job", "Outcome", "exhaustive", "greedy", "minimal"]

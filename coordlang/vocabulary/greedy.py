@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from coordlang.divergence import Separation
+from coordlang.divergence import Separation, separations
+from coordlang.vocabulary.job import Job, Outcome
 
 
-def greedy(states: Sequence[int], constraints: Sequence[tuple[Separation, ...]]) -> dict[int, int]:
+def greedy(job: Job) -> Outcome:
+    """The greedy partition of a job's states in their own order."""
+    return Outcome(fill(job.states, separations(job.alphas.divergences)), job.lower_bound)
+
+
+def fill(states: Sequence[int], constraints: Sequence[tuple[Separation, ...]]) -> dict[int, int]:
     """A partition of ``states`` that satisfies every constraint: state -> word number, from 0.
 
     A constraint is a tuple of alternatives, at least one of which must hold; each is a set of pairs to separate.  States
@@ -69,8 +75,8 @@ class _Choices:
             pair = (state, other) if state < other else (other, state)
             for number, separation in self._asking.get(pair, ()):
                 gone.setdefault(number, set()).add(separation)
-        if any(self._alive[number] <= separations for number, separations in gone.items()):
+        if any(self._alive[number] <= dead for number, dead in gone.items()):
             return False
-        for number, separations in gone.items():
-            self._alive[number] -= separations
+        for number, dead in gone.items():
+            self._alive[number] -= dead
         return True

@@ -6,6 +6,7 @@ The reader is iterative, so deep nesting costs an error message and not the stac
 from __future__ import annotations
 
 import re
+import sys
 from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -96,13 +97,13 @@ class Document:
 
 
 def read_source(path: str | Path) -> Source:
-    """The text of a file.
+    """The text of a file; ``-`` is standard input.
 
     Raises `BadInput` for a file that is missing, unreadable or no text.
     """
     name = str(path)
     try:
-        data = Path(path).read_bytes()
+        data = sys.stdin.buffer.read() if name == "-" else Path(path).read_bytes()
     except FileNotFoundError:
         raise BadInput("there is no such file", place=Place(name)) from None
     except OSError as error:

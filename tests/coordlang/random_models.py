@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from random import Random
 
+from planners.joint import Cost
 from planners.model import ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain, Problem
@@ -65,9 +66,48 @@ def ma_text(random: Random, robots: int) -> tuple[str, list[str]]:
     return domain, shared + [f"own r{n + 1}" for n in range(robots)]
 
 
+def graph_text(random: Random, robots: int) -> tuple[str, str]:
+    """Robots on a small random directed graph, each with edges of its own; random rules of the road.  Much RC."""
+    places = [f"c{n}" for n in range(random.choice([3, 3, 4]))]
+    names = [f"r{n + 1}" for n in range(robots)]
+    rules = ["(forall (?o - robot ?z - place) (not (go ?o ?z ?y)))"]
+    if random.random() < 0.7:
+        rules.append("(forall (?o - robot) (not (go ?o ?y ?x)))")
+    if random.random() < 0.3:
+        rules.append("(forall (?o - robot) (not (at ?o ?y)))")
+    else:
+        rules.append(
+            "(forall (?o - robot) (or (= ?o ?r) (not (at ?o ?y)) (exists (?z - place) (and (way ?o ?y ?z) (go ?o ?y ?z)))))"
+        )
+    domain = (
+        "(define (domain random) (:types robot place)\n"
+        "(:predicates (at ?r - robot ?x - place) (way ?r - robot ?x ?y - place))\n"
+        "(:action go :agent ?r - robot :parameters (?x ?y - place)\n"
+        f" :precondition (and (at ?r ?x) (way ?r ?x ?y) {' '.join(rules)})\n"
+        " :effect (and (at ?r ?y) (not (at ?r ?x)))))"
+    )
+    ways = [
+        f"(way {r} {x} {y})" for r in names for x in places for y in places if x != y and random.random() < 0.75
+    ]
+    start, end = (random.sample(places, robots) for _ in range(2))
+    at = [f"(at {r} {p})" for r, p in zip(names, start, strict=True)]
+    goal = [f"(at {r} {p})" for r, p in zip(names, end, strict=True)]
+    random.shuffle(goal)
+    problem = (
+        f"(define (problem p) (:domain random) (:objects {' '.join(names)} - robot {' '.join(places)} - place)\n"
+        f"(:init {' '.join(at + ways)}) (:goal (and {' '.join(goal[: random.randint(1, robots)])})))"
+    )
+    return domain, problem
+
+
 def random_model(seed: int, robots: int) -> tuple[Domain, Problem, ModelOptions]:
     """A random model with a random start and goal."""
     random = Random(seed)
+    cost: Cost = random.choice(["makespan", "makespan", "makespan+actions"])
+    if random.random() < 0.4:
+        text, problem = graph_text(random, robots)
+        domain = parse_domain(Source("random-domain.pddl", text))
+        return domain, parse_problem(Source("random-problem.pddl", problem), domain), ModelOptions(cost=cost)
     style = random.choice([joint_text, ma_text])
     text, facts = style(random, robots)
     domain = parse_domain(Source("random-domain.pddl", text))
@@ -76,5 +116,4 @@ def random_model(seed: int, robots: int) -> tuple[Domain, Problem, ModelOptions]
     init = " ".join(f"({f})" for f in facts if random.random() < 0.5)
     goal = " ".join(literals(random, facts, 2))
     problem = f"(define (problem p) (:domain random) {objects} (:init {init}) (:goal (and {goal})))"
-    cost = random.choice(["makespan", "makespan", "makespan+actions"])
     return domain, parse_problem(Source("random-problem.pddl", problem), domain), ModelOptions(cost=cost)

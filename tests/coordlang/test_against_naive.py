@@ -13,7 +13,7 @@ from coordlang.divergence import alphas, separations
 from coordlang.language import WordTable
 from coordlang.tasks import Candidates, all_pairs, from_problems
 from coordlang.verify import verify
-from coordlang.vocabulary import greedy
+from coordlang.vocabulary.greedy import fill
 from coordlang.witness import inseparable, miscoordination
 from planners.errors import ProvedImpossible
 from planners.joint import FullState
@@ -155,7 +155,7 @@ def test_greedy_is_a_language_and_merging_is_judged_right(robots: int, most: int
         listable(candidates, most)
         assume(all(inseparable(space) is None for space in candidates.spaces))
         found = alphas(candidates.spaces)
-        partition = greedy(range(len(candidates.rows)), separations(found.divergences))
+        partition = fill(range(len(candidates.rows)), separations(found.divergences))
         word = np.array([partition[s] for s in range(len(candidates.rows))])
         names = tuple(f"w{n}" for n in range(int(word.max()) + 1))
         assert verify(WordTable(names, candidates.rows, word, 0), candidates.spaces).holds

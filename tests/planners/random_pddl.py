@@ -252,7 +252,7 @@ class _Writer:
         return f"({name}{self._terms(tuple(self.actions[name].values()), scope)})"
 
     def _about_the_step(self, scope: Scope) -> str:
-        """The two forms that domains use: nobody does .., somebody else does .."""
+        """The forms that domains use: nobody does .., somebody else does .., nobody does .. unless .."""
         pick = self.random
         inner = {**scope, "?o": "robot"}
         name = pick.choice(list(self.actions))
@@ -260,8 +260,11 @@ class _Writer:
             "?o" if t == "robot" and pick.random() < 0.8 else self._term(t, inner) for t in self.actions[name].values()
         ]
         atom = f"({' '.join((name, *args))})"
-        if pick.random() < 0.5:
+        form = pick.random()
+        if form < 0.4:
             return f"(forall (?o - robot) (not {atom}))"
+        if form < 0.6:
+            return f"(forall (?o - robot) (or (not {atom}) {self._literal(inner)}))"
         other = pick.choice(("(not (= ?o ?r)) ", "")) if "?r" in scope else ""
         return f"(exists (?o - robot) (and {other}{atom}))"
 
@@ -269,7 +272,8 @@ class _Writer:
         pick = self.random
         kind = pick.choice(("literal", "literal", "literal", "when", "forall")) if depth else "literal"
         if kind == "when":
-            condition = self._formula(scope, pick.choice((0, 0, 1, 2)))
+            about_step = self.kind != "joint" and pick.random() < 0.3
+            condition = self._about_the_step(scope) if about_step else self._formula(scope, pick.choice((0, 0, 1, 2)))
             return f"(when {condition} {self._effect(scope, depth - 1)})"
         if kind == "forall":
             variables = self._variables()

@@ -164,6 +164,35 @@ def test_same_joint_steps_and_optimal_plans(kind: Kind, seed: int) -> None:
     _check_model(random_model(seed, kind), event)
 
 
+# -- by hand: rules that random models meet rarely ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        # A negative formula does not link, wherever it stands: one deletes what two requires.
+        ":precondition (and (p) (or (q) (not (one r1)) (not (one r2)))) :effect (n)",
+        ":precondition (p) :effect (when (not (one r1)) (n))",
+        ":precondition (p) :effect (when (not (not (one r1))) (n))",
+        # In the condition of an effect it may speak of the acting robot, in a precondition not.
+        ":precondition () :effect (and (q) (when (forall (?o - robot) (not (two ?o))) (n)))",
+        ":precondition (forall (?o - robot) (or (not (two ?o)) (q))) :effect (n)",
+        ":precondition () :effect (when (or (not (two ?r)) (p)) (n))",
+        # Links by a positive formula lift all but delete against add.
+        ":precondition (and (p) (exists (?o - robot) (one ?o))) :effect (n)",
+        ":precondition (exists (?o - robot) (one ?o)) :effect (p)",
+        ":precondition (one ?r) :effect (n)",
+    ],
+)
+def test_formulas_about_the_joint_step(effect: str) -> None:
+    domain = f"""(define (domain d) (:types robot) (:constants r1 r2 - robot) (:predicates (p) (q) (n))
+      (:action one :agent ?r - robot :parameters () :effect (not (p)))
+      (:action two :agent ?r - robot :parameters () {effect})
+      (:action back :agent ?r - robot :parameters () :precondition (q) :effect (and (p) (not (q)) (not (n)))))"""
+    problem = "(define (problem p) (:domain d) (:init (p) (q)) (:goal (and (n) (not (p)))))"
+    _check_model(RandomModel(domain, problem), note=lambda _: None)
+
+
 # -- by hand: when a robot may not idle ---------------------------------------------------------------------------
 
 _ROOMS = """(define (domain rooms) (:types robot place) (:predicates (at ?r - robot ?p - place) (ok ?r - robot))

@@ -358,6 +358,12 @@ def test_the_condition_of_an_effect_counts_as_required() -> None:
     assert "requires to be false" in str(clash(ADDS_Q, ":effect (when (not (q)) (n))"))
 
 
+def test_a_negative_formula_of_the_acting_robot_is_left_in_the_condition_of_an_effect() -> None:
+    """There it may be false, so that the other literals of the disjunction count; in a precondition it is true."""
+    assert "requires" in str(clash(DELETES_P, ":effect (when (or (not (two ?r)) (p)) (n))"))
+    assert clash(DELETES_P, ":precondition (or (not (two ?r)) (p)) :effect (n)") is None
+
+
 def test_an_effect_that_can_never_fire_touches_nothing() -> None:
     assert clash(DELETES_P, ":effect (and (n) (when (and (p) (z)) (n)) (when (z) (p)))") is None
 
@@ -444,7 +450,9 @@ EFFECTS = """(:types robot thing - object box - thing) (:predicates (on ?t - obj
   (:action clear :agent ?r - robot :parameters (?t - thing)
     :effect (forall (?t - box) (when (big ?t) (forall (?u - (either robot box)) (when (on ?u) (not (on ?u)))))))
   (:action put :agent ?r - robot :parameters (?t - thing)
-    :effect (and (on ?t) (when (not (exists (?t - box) (on ?t))) (q))))"""
+    :effect (and (on ?t) (when (not (exists (?t - box) (on ?t))) (q))))
+  (:action wipe :agent ?r - robot :parameters ()
+    :effect (forall (?t - thing) (when (big ?t) (forall (?t - box) (not (on ?t))))))"""
 
 
 def things(init: str) -> World:
@@ -467,6 +475,12 @@ def test_nested_effects_and_hidden_variables() -> None:
     # big is static here, and only the boxes are asked.
     assert after(things(start + " (big t)"), "(clear r1 t)", None) >= {"on r2", "on b", "big t"}
     assert after(things(start + " (big c)"), "(clear r1 t)", None) == {"on t", "big c"}
+
+
+def test_a_condition_speaks_of_the_variables_around_it() -> None:
+    """wipe: if anything at all is big, every box is cleared."""
+    assert after(things("(on t) (on b) (big t)"), "(wipe r1)", None) == {"on t", "big t"}
+    assert after(things("(on t) (on b)"), "(wipe r1)", None) == {"on t", "on b"}
 
 
 def test_a_hidden_variable_in_a_condition() -> None:

@@ -1,0 +1,60 @@
+"""The paper's brute force: all partitions by increasing size, judged by the definition.  For tiny inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import product
+
+from coordlang.language import sentence
+from coordlang.vocabulary.job import Job, Outcome
+from planners.plans import Plans, counts
+
+#: A failing tuple of plans as state sequences.
+_Failing = tuple[tuple[int, ...], ...]
+
+
+def exhaustive(job: Job) -> Outcome:
+    """The least language, by listing plans, mixing all of them and trying all partitions.
+
+    Exponential in everything; the other methods are checked against it.
+    """
+    failing = sorted({tuple(sequences) for sequences in _failing(job)})
+    tried = 0
+    for size in range(1, len(job.states) + 1):
+        for words in _partitions(len(job.states), size):
+            tried += 1
+            word = dict(zip(job.states, words, strict=True))
+            if not any(len({sentence(word[s] for s in states) for states in plans}) == 1 for plans in failing):
+                return Outcome(word, size, {"partitions": tried, "failing_mixtures": len(failing)})
+    raise AssertionError("states all apart are a language where no plans are inseparable")
+
+
+def _failing(job: Job) -> Iterator[_Failing]:
+    for space in job.candidates.spaces:
+        counted = counts(space)
+        robots = space.labels.shape[1]
+        for start in space.starts.tolist():
+            plans = Plans(space, start, counted)
+            listed = list(plans)
+            optimal = set(listed)
+            states = [tuple(plans.states(plan)) for plan in listed]
+            for chosen in product(range(len(listed)), repeat=robots):
+                steps = zip(*(listed[k] for k in chosen), strict=True)
+                if tuple(tuple(own[i] for i, own in enumerate(step)) for step in steps) not in optimal:
+                    yield tuple(states[k] for k in chosen)
+
+
+def _partitions(states: int, size: int) -> Iterator[Sequence[int]]:
+    """All partitions into exactly ``size`` blocks, as restricted growth strings."""
+
+    def extend(prefix: list[int], used: int) -> Iterator[Sequence[int]]:
+        left = states - len(prefix)
+        if used + left < size:
+            return
+        if not left:
+            yield prefix
+            return
+        for block in range(min(used + 1, size)):
+            yield from extend([*prefix, block], max(used, block + 1))
+
+    return extend([], 0)

@@ -1,0 +1,50 @@
+"""What every method gets and gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from coordlang.divergence import Alphas
+from coordlang.tasks import Candidates
+
+#: State number -> word number.
+Partition = Mapping[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A partition to find: of ``states`` (numbers in ``candidates.rows``; those on optimal plans), for ``candidates``.
+
+    ``incumbent`` is a partition that is known to be a language, what an anytime method returns in the worst case.
+    """
+
+    candidates: Candidates
+    states: tuple[int, ...]
+    alphas: Alphas
+    incumbent: Partition | None = None
+    seed: int = 0
+    progress: Callable[[str], None] = lambda _: None
+
+    @property
+    def lower_bound(self) -> int:
+        """A bound that needs no search: plans that introduce RC need two words at least."""
+        return 2 if self.alphas.requiring else 1
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """A partition with what is proved of it.
+
+    ``lower_bound``: no coordination language has fewer words.  ``figures`` are the work done.  ``stopped`` is the error
+    that ended the search early, None if it came to its end.
+    """
+
+    partition: Partition
+    lower_bound: int
+    figures: Mapping[str, float] = field(default_factory=dict)
+    stopped: BaseException | None = None
+
+    @property
+    def size(self) -> int:
+        return len(set(self.partition.values()))

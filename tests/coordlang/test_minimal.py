@@ -1,0 +1,138 @@
+"""The exact method: known minima, agreement with brute force, and what it rests on."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from coordlang.build import build_language
+from coordlang.language import sentence
+from coordlang.tasks import Candidates, all_pairs, from_problems
+from coordlang.vocabulary.sat import Colouring, reduce
+from coordlang.warping import pair, separation_clause, warping_clause
+from coordlang.witness import inseparable
+from planners.errors import ProvedImpossible
+from planners.optimal import PlanSpace
+from planners.pddl import read_domain, read_problem
+from tests.cli.conftest import DOMAINS
+from tests.coordlang import naive
+from tests.coordlang.random_models import random_model
+
+
+def shipped(folder: str, stem: str = "problem") -> Candidates:
+    domain = read_domain(DOMAINS / folder / "domain.pddl")
+    return all_pairs(domain, [read_problem(DOMAINS / folder / f"{stem}.pddl", domain)])
+
+
+@pytest.mark.parametrize(
+    ("folder", "stem", "words"),
+    [("three-cells", "problem", 3), ("t-map", "problem", 3), ("grid", "gw1-2x2", 3), ("grid-joint", "gw1-2x2", 3),
+     ("grid", "gw2-2x3", 5), ("grid", "gwb2-3x3", 3)],
+)  # fmt: skip
+def test_known_minima(folder: str, stem: str, words: int) -> None:
+    built = build_language(shipped(folder, stem), "minimal")
+    guarantee = built.language.guarantee
+    assert (guarantee.size, guarantee.lower_bound, guarantee.proved_minimal) == (words, words, True)
+    assert built.verdict.holds
+
+
+def test_t_map_has_two_single_words() -> None:
+    """Two words of a single state each, and two sentences of three words that say who moves first."""
+    sizes = build_language(shipped("t-map"), "minimal").language.sizes()
+    assert sorted(sizes.values()) == [1, 1, 10]
+
+
+SEQUENCES = st.lists(st.integers(0, 4), min_size=1, max_size=6)
+
+
+@settings(max_examples=500, deadline=None)
+@given(SEQUENCES, SEQUENCES, st.lists(st.integers(0, 2), min_size=5, max_size=5))
+def test_same_sentence_iff_a_warping_path_exists(u: list[int], v: list[int], word: list[int]) -> None:
+    clause = warping_clause(u, v, word)
+    assert (clause is not None) == (sentence(word[s] for s in u) == sentence(word[s] for s in v))
+    if clause is not None:
+        assert all(word[a] == word[b] and a != b for a, b in clause)
+        assert len(clause) <= fewest_cells(tuple(u), tuple(v), word)
+
+
+def fewest_cells(u: tuple[int, ...], v: tuple[int, ...], word: list[int]) -> int:
+    """Non-identical cells of the best warping path, by trying all of them."""
+
+    def best(i: int, j: int) -> int:
+        if word[u[i]] != word[v[j]]:
+            return 10**9
+        here = int(u[i] != v[j])
+        steps = [(i - a, j - b) for a, b in ((1, 0), (0, 1), (1, 1)) if i >= a and j >= b]
+        return here + (min(best(*step) for step in steps) if steps else 0)
+
+    return best(len(u) - 1, len(v) - 1)
+
+
+def test_separation_clause_of_three_plans() -> None:
+    assert separation_clause([[0, 1, 3], [0, 2, 3], [0, 4, 3]], [0] * 5) == {(1, 2), (1, 4)}
+    assert separation_clause([[0, 1, 3], [0, 2, 3], [0, 4, 3]], [0, 1, 0, 0, 1]) is None
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.integers(1, 3), st.lists(st.sets(st.tuples(st.integers(0, 4), st.integers(0, 4)), min_size=1), max_size=6))
+def test_colouring_against_trying_all(size: int, drawn: list[set[tuple[int, int]]]) -> None:
+    clauses = [frozenset(pair(a, b) for a, b in clause if a != b) for clause in drawn]
+    colouring = Colouring([2, 0, 1, 4, 3], size)
+    for clause in clauses:
+        colouring.add(clause)
+    found = colouring.solve()
+    colouring.delete()
+
+    def holds(word: tuple[int, ...] | dict[int, int]) -> bool:
+        return all(any(word[a] != word[b] for a, b in clause) for clause in clauses)
+
+    assert (found is not None) == any(holds(word) for word in product(range(size), repeat=5))
+    assert found is None or holds(found)
+
+
+def test_reduce_drops_what_is_implied() -> None:
+    short, long, other = frozenset({(0, 1)}), frozenset({(0, 1), (1, 2)}), frozenset({(1, 2), (2, 3)})
+    assert reduce([long, short, other, short]) == [short, other]
+
+
+def states_of(spaces: tuple[PlanSpace, ...]) -> int:
+    return len({int(s) for space in spaces for s in space.state})
+
+
+@pytest.mark.parametrize(("robots", "most", "examples"), [(2, 40, 150), (3, 10, 60)])
+def test_minimal_equals_exhaustive(robots: int, most: int, examples: int) -> None:
+    """On random models with two and three robots, all pairs of states or one partial goal."""
+    seen: dict[int, int] = {}
+
+    @settings(max_examples=examples, deadline=None, derandomize=True)
+    @given(st.integers(0, 10**9))
+    def compare(seed: int) -> None:
+        domain, problem, options = random_model(seed, robots)
+        try:
+            make = all_pairs if seed % 3 else from_problems
+            candidates = make(domain, [problem], options)
+        except ProvedImpossible:
+            assume(False)
+            raise
+        assume(0 < candidates.count <= 100)
+        assume(states_of(candidates.spaces) <= 8)
+        for space in candidates.spaces:
+            for task in range(len(space.starts)):
+                try:
+                    naive.listed(space, task, most)
+                except naive.TooLarge:
+                    assume(False)
+        assume(all(inseparable(space) is None for space in candidates.spaces))
+        brute = build_language(candidates, "exhaustive").language.guarantee
+        exact = build_language(candidates, "minimal").language.guarantee
+        greedy = build_language(candidates, "greedy").language.guarantee
+        assert exact.size == exact.lower_bound == brute.size
+        assert brute.size <= greedy.size
+        seen[brute.size] = seen.get(brute.size, 0) + 1
+
+    compare()
+    # Worth something only if more than one word is needed now and then.
+    assert sum(n for size, n in seen.items() if size > 1) >= examples // 10, seen

@@ -1,0 +1,101 @@
+"""The examples of docs/concepts.md that are told in words, as models."""
+
+from __future__ import annotations
+
+from itertools import product
+
+from coordlang.witness import inseparable, miscoordination
+from planners.model import build
+from planners.optimal import PlanSpace, search
+from planners.pddl import parse_domain, parse_problem
+from planners.pddl.sexpr import Source
+from planners.plans import Plan, Plans
+
+
+def joint_space(actions: list[tuple[str, str, str]], robots: int, goal: str, init: str = "") -> PlanSpace:
+    """Joint-action PDDL from (subactions, precondition, effect); ``-`` is idling, facts are p0 .. p9."""
+    text = []
+    for number, (parts, before, after) in enumerate(actions):
+        comments = "\n".join(
+            f"; subaction r{n} {'idle' if p == '-' else f'({p})'}" for n, p in enumerate(parts.split(), 1)
+        )
+        text.append(f"(:action j{number} :parameters ()\n{comments}\n :precondition (and {before}) :effect (and {after}))")
+    predicates = " ".join(f"(p{n})" for n in range(10))
+    domain = parse_domain(Source("d", f"(define (domain d) (:predicates {predicates})\n" + "\n".join(text) + ")"))
+    problem = parse_problem(Source("p", f"(define (problem p) (:domain d) (:init {init}) (:goal (and {goal})))"), domain)
+    loaded = build(domain, [problem])
+    assert len(loaded.model.robots) == robots
+    return search(loaded.model, loaded.tasks[0])
+
+
+def mixture(plans: tuple[Plan, ...]) -> Plan:
+    return tuple(tuple(step[i] for i, step in enumerate(steps)) for steps in zip(*plans, strict=True))
+
+
+def test_two_actions_of_one_effect() -> None:
+    """Subtlety (a): the lamp that either robot may switch on, but not both."""
+    space = joint_space([("press -", "", "(p0)"), ("- press", "", "(p0)")], 2, "(p0)")
+    assert Plans.of(space).count == 2
+    assert inseparable(space) is not None
+
+
+def test_failing_after_the_plans_have_met() -> None:
+    """Subtlety (c): p0 is the lamp, p1 to p3 count the steps."""
+    flip = [
+        (parts, f"{before} {lamp}", f"{after} {new}")
+        for before, after in [("(not (p1))", "(p1)"), ("(p1) (not (p2))", "(p2)")]
+        for lamp, choices in [
+            ("(not (p0))", [("- -", ""), ("flip -", "(p0)"), ("- flip", "(p0)")]),
+            ("(p0)", [("- -", ""), ("flip -", "(not (p0))"), ("- flip", "(not (p0))")]),
+        ]
+        for parts, new in choices
+    ]
+    finish = [("finish -", "(p2) (p0)", "(p3)"), ("- finish", "(p2) (not (p0))", "(p3)")]
+    space = joint_space(flip + finish, 2, "(p3)")
+    plans = Plans.of(space)
+    model = space.model
+    idle = "idle"
+    by_text = {tuple(tuple(t or idle for t in model.texts(step)) for step in plan): plan for plan in plans}
+    first = by_text[(("(flip)", idle), (idle, idle), ("(finish)", idle))]
+    second = by_text[((idle, idle), (idle, "(flip)"), ("(finish)", idle))]
+    mixed = mixture((second, first))
+    assert tuple(tuple(t or idle for t in model.texts(s)) for s in mixed) == ((idle, idle), (idle, idle), ("(finish)", idle))
+    assert plans.states(first)[1] != plans.states(second)[1]
+    assert plans.states(first)[2] == plans.states(second)[2]
+    assert plans.rank(mixed) is None
+    # Two steps of the mixture begin an optimal plan: only the third one breaks.
+    assert any(plan[:2] == mixed[:2] for plan in plans)
+
+
+def test_three_robots_need_three_plans() -> None:
+    """Every two of the plans aaa, bbb, ccc mix well, and all three do not."""
+    good = [parts for parts in product("abc", repeat=3) if len(set(parts)) < 3]
+    space = joint_space([(" ".join(parts), "", "(p0)") for parts in good], 3, "(p0)")
+    plans = Plans.of(space)
+    everything = set(plans)
+    assert len(everything) == 21
+    same = [plan for plan in plans if len(set(plan[0])) == 1]
+    assert len(same) == 3
+    for two in product(same, repeat=2):
+        assert all(mixture(chosen) in everything for chosen in product(two, repeat=3))
+    assert mixture((same[0], same[1], same[2])) not in everything
+    assert miscoordination(space, 0) is not None
+
+
+def first_fit(states: list[int], apart: set[frozenset[int]]) -> list[set[int]]:
+    words: list[set[int]] = []
+    waiting = list(states)
+    while waiting:
+        word: set[int] = set()
+        for state in waiting:
+            if not any(frozenset({state, other}) in apart for other in word):
+                word.add(state)
+        words.append(word)
+        waiting = [s for s in waiting if s not in word]
+    return words
+
+
+def test_greedy_depends_on_the_order() -> None:
+    apart = {frozenset({1, 2}), frozenset({2, 3}), frozenset({3, 4})}
+    assert first_fit([1, 2, 3, 4], apart) == [{1, 3}, {2, 4}]
+    assert first_fit([1, 4, 2, 3], apart) == [{1, 4}, {2}, {3}]

@@ -1,0 +1,82 @@
+"""The reader of docs/formats.md, without coordlang, says the same sentences as the package."""
+
+from __future__ import annotations
+
+import ast
+import gzip
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from coordlang.cli import run
+from coordlang.file import options_of, read_language
+from coordlang.language import WordTable, sentence
+from coordlang.tasks import all_pairs, read_task_file
+from planners.pddl import read_domain, read_problem
+from planners.plans import Plans, counts
+from tests.docs.pages import DOCS, ROOT, blocks
+
+DOMAIN, PROBLEM = (ROOT / "domains" / "t-map" / name for name in ("domain.pddl", "problem.pddl"))
+
+
+@pytest.fixture(scope="module")
+def reader() -> dict[str, Any]:
+    text = next(b.text for b in blocks(DOCS / "formats.md") if b.kind == "python")
+    namespace: dict[str, Any] = {}
+    exec(text, namespace)
+    return namespace
+
+
+def test_reader_needs_the_standard_library_only() -> None:
+    text = next(b.text for b in blocks(DOCS / "formats.md") if b.kind == "python")
+    assert len(text.splitlines()) < 40
+    for node in ast.walk(ast.parse(text)):
+        names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+        names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+        assert all(name.split(".")[0] in sys.stdlib_module_names for name in names)
+
+
+@pytest.mark.parametrize("flags", [[], ["--remember-actions"]], ids=["states", "actions"])
+@pytest.mark.parametrize("ending", [".json", ".json.gz"])
+def test_reader_says_the_same(flags: list[str], ending: str, reader: dict[str, Any], tmp_path: Path) -> None:
+    path = tmp_path / f"language{ending}"
+    assert run(["build", str(DOMAIN), str(PROBLEM), "--tasks", "all", "-o", str(path), *flags]) == 0
+    plain = reader["read_language"](path)
+    language = read_language(path)
+    domain = read_domain(DOMAIN)
+    candidates = all_pairs(domain, [read_problem(PROBLEM, domain)], options_of(language))
+    table = WordTable.of(language, candidates.model)
+    codec = candidates.model.codec
+    compared, words = 0, set()
+    for space in candidates.spaces:
+        counted, word = counts(space), table.of_rows(space.rows)
+        for start in space.starts.tolist():
+            for plan in Plans(space, start, counted):
+                states = Plans(space, start, counted).states(plan)
+                expected = [language.words[w] for w in sentence(int(word[s]) for s in states)]
+                # The reader gets atoms in no particular order.
+                assert reader["sentence"](plain, [set(codec.decode(space.rows[s])) for s in states]) == expected
+                compared += 1
+                words.update(expected)
+    assert compared >= 132
+    assert len(words) > 2
+
+
+def test_reader_uses_the_default_and_refuses(reader: dict[str, Any], tmp_path: Path) -> None:
+    language = {"states": {"(p)": "w1"}, "default": "w0"}
+    assert reader["sentence"](language, [["(p)"], [], ["(q)", "(p)"], ["(p)"]]) == ["w1", "w0", "w1"]
+    path = tmp_path / "x.json.gz"
+    path.write_bytes(gzip.compress(b'{"format": "coordlang/language", "version": 2}'))
+    with pytest.raises(ValueError, match="version 1"):
+        reader["read_language"](path)
+
+
+def test_task_file_of_the_page(tmp_path: Path) -> None:
+    """The task file shown in docs/formats.md is one, and its tasks can be built for."""
+    path = tmp_path / "tasks.json"
+    path.write_text(next(b.text for b in blocks(DOCS / "formats.md") if b.kind == "json"))
+    assert len(read_task_file(path)) == 2
+    files = [str(ROOT / "domains" / "three-cells" / name) for name in ("domain.pddl", "problem.pddl")]
+    assert run(["build", *files, "--tasks", str(path), "-o", str(tmp_path / "l.json")]) == 0

@@ -1,0 +1,147 @@
+"""docs/cli.md against click's own lists, links against files, the list of files against the packages."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from functools import cache
+from pathlib import Path
+
+import click
+import pytest
+
+from coordlang.cli.app import COMMANDS, EXIT_INTERRUPTED, cli
+from planners.errors import CoordlangError
+from tests.docs.pages import DOCS, PAGES, ROOT, anchor, blocks, code, links, prose, rows, sections
+
+CLI = DOCS / "cli.md"
+SHARED = {"model options": "Model options", "limits": "Limits"}
+#: Options whose choices need not all be described yet.
+OPEN = {("build", "--method")}
+
+
+@cache
+def command(name: str) -> click.Command:
+    found = cli.get_command(click.Context(cli), name)
+    assert found is not None
+    return found
+
+
+def options(name: str) -> dict[str, click.Option]:
+    """Spelling -> option, for all spellings."""
+    return {
+        spelling: option
+        for option in command(name).params
+        if isinstance(option, click.Option)
+        for spelling in option.opts + option.secondary_opts
+    }
+
+
+def described(name: str) -> dict[str, tuple[str, ...]]:
+    """The options of a command by docs/cli.md: spelling -> the cells of its row."""
+    section = sections(CLI)[name]
+    shared = [text for link, text in SHARED.items() if f"[{link}]" in section]
+    found = {}
+    for text in (section, *(sections(CLI)[s] for s in shared)):
+        for cells in rows(text):
+            for inline in code(cells[0]):
+                if inline.startswith("-"):
+                    found[inline.split()[0]] = tuple(cells)
+    return found
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_options(name: str) -> None:
+    assert set(described(name)) == set(options(name))
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_choices_and_defaults(name: str) -> None:
+    for spelling, option in options(name).items():
+        cells = described(name)[spelling]
+        if isinstance(option.type, click.Choice):
+            listed = {word for inline in code(cells[0]) for word in inline.split() if not word.startswith("-")}
+            real = set(option.type.choices)
+            assert listed <= real, f"{name} {spelling}"
+            assert listed == real or (name, spelling) in OPEN, f"{name} {spelling}"
+        if option.show_default:
+            default = f"default: {option.default}"
+            assert default in cells[1].replace("`", ""), f"{name} {spelling}: {default}"
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_usage(name: str) -> None:
+    usage = " ".join(command(name).collect_usage_pieces(click.Context(command(name))))
+    assert f"    coordlang {name} {usage}\n" in sections(CLI)[name]
+
+
+def test_every_command_has_its_row() -> None:
+    listed = [code(cells[0]) or re.findall(r"\[(\w+)\]", cells[0]) for cells in rows(sections(CLI)["Command line"])]
+    assert [names[0] for names in listed] == list(COMMANDS)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.stem)
+def test_nothing_is_mentioned_that_does_not_exist(page: Path) -> None:
+    known = {"--help", "--version", "-h"}.union(*(options(name) for name in COMMANDS))
+    for inline in code(prose(page)):
+        words = inline.split()
+        if inline.startswith("-") or words[0] == "coordlang":
+            assert {w for w in words if re.match(r"--?[a-z]", w)} <= known, inline
+        if words[0] == "coordlang" and len(words) > 1 and re.fullmatch(r"[a-z]+", words[1]):
+            assert words[1] in COMMANDS, inline
+
+
+def test_exit_codes() -> None:
+    importlib.import_module("planners.fast_downward")
+    importlib.import_module("coordlang.build")
+    listed = [int(cells[0]) for cells in rows(sections(CLI)["Exit codes"])]
+    assert listed == sorted(listed)
+    assert set(listed) == {0, EXIT_INTERRUPTED, *(kind.exit_code for kind in error_tree(CoordlangError))}
+
+
+def error_tree(kind: type[CoordlangError]) -> list[type[CoordlangError]]:
+    ours = [k for k in kind.__subclasses__() if k.__module__.split(".")[0] in ("planners", "coordlang")]
+    return [kind, *(below for k in ours for below in error_tree(k))]
+
+
+LINKING = [*PAGES, *sorted((ROOT / "domains").glob("**/README.md"))]
+
+
+@pytest.mark.parametrize("page", LINKING, ids=lambda p: str(p.relative_to(ROOT)))
+def test_links(page: Path) -> None:
+    for target in links(page):
+        path, _, fragment = target.partition("#")
+        file = (page.parent / path).resolve() if path else page
+        assert file.exists(), target
+        if fragment:
+            assert fragment in {anchor(heading) for heading in sections(file)}, target
+
+
+def test_links_are_found() -> None:
+    assert sum(len(links(page)) for page in LINKING) > 50
+
+
+def test_index_links_every_page() -> None:
+    assert {p.name for p in DOCS.glob("*.md")} - {"index.md"} <= set(links(DOCS / "index.md"))
+
+
+@pytest.mark.parametrize("package", ["planners", "coordlang"])
+def test_file_list(package: str) -> None:
+    """docs/extending.md has one line for each file."""
+    listed = re.findall(rf"`({package}/[\w/]+\.py)`", prose(DOCS / "extending.md"))
+    real = [p.relative_to(ROOT).as_posix() for p in (ROOT / package).rglob("*.py") if p.name != "__init__.py"]
+    rows_of = [cells for cells in rows(prose(DOCS / "extending.md")) if cells[0].startswith(f"`{package}/")]
+    assert sorted(code(cells[0])[0] for cells in rows_of) == sorted(real)
+    assert all((ROOT / path).exists() for path in listed if "NAME" not in path)
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if p.parent == DOCS], ids=lambda p: p.stem)
+def test_no_path_of_a_machine(page: Path) -> None:
+    assert not re.search(r"(?<![\w.~])/(?:work|home|root|tmp|Users)/", page.read_text())
+
+
+def test_blocks_are_of_known_kinds() -> None:
+    """A misspelt kind would not be run."""
+    for page in PAGES:
+        for block in blocks(page):
+            assert block.kind in {"python", "output", "console", "json", "sh", "lisp", ""}, f"{page.name}:{block.line}"
