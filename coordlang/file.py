@@ -263,7 +263,8 @@ def options_of(
     given = {"--cost": cost, "--unowned": unowned, "--remember-actions": remember_actions or None}
     for flag, value in given.items():
         if value is not None and value != recorded[flag]:
-            raise UsageError(f"{flag} contradicts the language file, which was built with {recorded[flag]}")
+            said = flag if value is True else f"{flag} {value}"
+            raise UsageError(f"{said} contradicts the language file, which was built with {recorded[flag]}")
     own = tuple(r for r in language.robots if r != ENVIRONMENT or recorded["--unowned"] != "environment")
     if robots and set(robots) != set(own):
         raise UsageError(f"--robots contradicts the language file: its robots are {', '.join(own)}")

@@ -28,6 +28,8 @@ class Composition:
         For each robot its ground actions, shared ones in the lists of all their owners.
     keeps_idle
         For each robot whether it may do nothing at all.
+
+    ``tables[i, j]`` (i < j) says which labels of two robots may share a step (`planners.interference`).
     """
 
     def __init__(
@@ -42,7 +44,7 @@ class Composition:
         self._codec, self._evaluator, self._robots = codec, evaluator, tuple(robots)
         self._keeps_idle = tuple(keeps_idle)
         self._choices: list[list[GroundAction | None]] = [[None, *own] for own in subactions]
-        self._tables = {
+        self.tables = {
             (i, j): compatible(self._choices[i], self._choices[j], i, j) for j in range(len(robots)) for i in range(j)
         }
         self._robot = [_Subactions(own, codec, evaluator, number, cost) for number, own in enumerate(subactions)]
@@ -81,7 +83,7 @@ class Composition:
                     return f"{action.label} needs {self._robots[j]} to choose it too"
         for j, second in enumerate(chosen):
             for i, first in enumerate(chosen[:j]):
-                if first and second and not self._tables[i, j][labels[i], labels[j]]:
+                if first and second and not self.tables[i, j][labels[i], labels[j]]:
                     return conflict(first, second) or f"{first.label} and {second.label} interfere"
         both = np.array([labels], np.int32)
         for action in chosen:
@@ -110,7 +112,7 @@ class Composition:
             chosen = [np.repeat(old, counts) for old in chosen]
             fits = np.ones(len(source), np.bool_)
             for i, old in enumerate(chosen):
-                fits &= self._tables[i, j][old, new]
+                fits &= self.tables[i, j][old, new]
             source, chosen = source[fits], [old[fits] for old in chosen] + [new[fits]]
         labels = np.stack(chosen, axis=1).astype(np.int32)
         fits = np.ones(len(source), np.bool_)

@@ -26,9 +26,9 @@ class _FastDownward(subprocess.Popen[bytes]):
 
     memory_limit: int | None = None
 
-    def __init__(self, *args: Any, **settings: Any) -> None:
+    def __init__(self, arguments: Any, **settings: Any) -> None:
         settings.pop("start_new_session", None)
-        super().__init__(*args, **settings, preexec_fn=lambda: limit_memory(self.memory_limit))
+        super().__init__(arguments, preexec_fn=lambda: limit_memory(self.memory_limit), **settings)
 
 
 def main(task_file: str, result_file: str) -> None:

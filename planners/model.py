@@ -10,6 +10,7 @@ from planners.composition import Composition
 from planners.conditions import Evaluator
 from planners.errors import BadInput, Place
 from planners.grounding import GroundAction, ground_actions, ground_goal
+from planners.grounding.networks import apply_network
 from planners.joint import IDLE, Cost, Goal, JointModel, show
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import TRUE, Atom, Domain, Problem, StepAtom
@@ -45,6 +46,7 @@ class Loaded:
     model: JointModel
     tasks: tuple[PlanningTask, ...]
     options: ModelOptions
+    team: Team
 
 
 def load(domain: str | Path, problems: Sequence[str | Path], options: ModelOptions | None = None) -> Loaded:
@@ -73,9 +75,10 @@ def build(
     team = find_team(domain, first, options.robots)
     extra = {atom for problem in problems for atom in problem.init} | set(also)
     actions = ground_actions(domain, first, team, also=extra, costs=options.cost == "makespan+cost")
+    actions = apply_network(domain, first, actions)
     model = _joint_model(domain, problems, team, actions, extra, options)
     tasks = tuple(task_of(model, domain, problem) for problem in problems)
-    return Loaded(domain, tuple(problems), model, tasks, options)
+    return Loaded(domain, tuple(problems), model, tasks, options, team)
 
 
 def task_of(model: JointModel, domain: Domain, problem: Problem) -> PlanningTask:

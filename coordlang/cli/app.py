@@ -18,6 +18,7 @@ EXIT_INTERRUPTED = 130
 
 #: Command -> its module below `coordlang.cli`; imported when it is called.
 COMMANDS = {
+    "inspect": "inspect",
     "plans": "plans",
     "check": "check",
     "coordination": "coordination",
@@ -48,6 +49,7 @@ class _LazyGroup(click.Group):
 
 #: One line a command, so that ``--help`` need not import them all.
 SUMMARIES = {
+    "inspect": "Show what was understood of a domain: robots, subactions, constraints.",
     "plans": "Count, list or sample all optimal plans of a task.",
     "check": "Compare our optimal cost with Fast Downward's.",
     "coordination": "Say which tasks require coordination, with a miscoordination shown.",

@@ -111,6 +111,7 @@ class _Grounder:
         self._statics = static_atoms(domain, problem)
         self._schemas = {schema.name: schema for schema in domain.schemas}
         self._named = {atom.action for schema in domain.schemas for atom in _step_atoms(schema)}
+        self._named |= {name for constraint in domain.constraints for name, _ in constraint.actions}
         self._members: dict[tuple[str, ...], tuple[str, ...]] = {}
         self._atoms: dict[tuple[str, tuple[str, ...]], Atom] = {}
 

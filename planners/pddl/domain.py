@@ -10,6 +10,7 @@ from planners.errors import Unsupported
 from planners.pddl.formulas import read_effects, read_formula
 from planners.pddl.lifted import TRUE, Domain, Formula, Part, Schema
 from planners.pddl.names import Names, group, typed_list, word
+from planners.pddl.network import read_network
 from planners.pddl.sexpr import Document, Expression, Group, Source, Word, parse, read_source
 
 _PART = re.compile(r"subaction\b\s*(?P<robot>[^\s()]*)\s*(?P<what>.*)$")
@@ -19,8 +20,6 @@ _UNSUPPORTED = {
     ":constraints": "trajectory constraints",
     ":process": "processes (PDDL+)",
     ":event": "events (PDDL+)",
-    ":concurrency-constraint": "concurrency networks",
-    ":positive-dependence": "concurrency networks",
 }
 
 
@@ -61,7 +60,10 @@ def parse_domain(source: Source) -> Domain:
     )
     schemas = tuple(_read_schema(names, item) for item in actions.values())
     _check_parts(document, schemas, actions)
-    return Domain(name, source, types, constants, names.predicates, names.functions, schemas)
+    constraints, dependences = read_network(names, schemas, sections)
+    return Domain(
+        name, source, types, constants, names.predicates, names.functions, schemas, constraints, dependences
+    )
 
 
 def read_header(document: Document, kind: str) -> tuple[str, dict[str, list[Group]]]:
@@ -102,7 +104,10 @@ def read_header(document: Document, kind: str) -> tuple[str, dict[str, list[Grou
 
 
 _SECTIONS = {
-    "domain": {":requirements", ":types", ":constants", ":predicates", ":functions", ":action"},
+    "domain": {
+        ":requirements", ":types", ":constants", ":predicates", ":functions", ":action",
+        ":concurrency-constraint", ":positive-dependence",
+    },
     "problem": {
         ":domain", ":requirements", ":objects", ":init", ":goal", ":metric", ":length",
     },

@@ -122,8 +122,28 @@ class Schema:
 
 
 @dataclass(frozen=True, slots=True)
+class Constraint:
+    """A node of a concurrency network (Crosby, Jonsson, Rovatsos 2014).
+
+    For each binding of ``parameters``, the subactions of a joint step that match it are none, or at least ``low`` and at
+    most ``high`` (None: no bound).  ``actions`` lists each action with the positions of its arguments (the agent is
+    argument 0) that the parameters bind.
+    """
+
+    name: str
+    parameters: tuple[Variable, ...]
+    low: int
+    high: int | None
+    actions: tuple[tuple[str, tuple[int, ...]], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Domain:
-    """A domain; ``types`` maps each type to its direct supertypes, ``predicates`` a name to its arities."""
+    """A domain; ``types`` maps each type to its direct supertypes, ``predicates`` a name to its arities.
+
+    ``constraints`` and ``dependences`` are the concurrency network: a pair (v, w) says that whoever matches w needs
+    somebody who matches v with the same binding, in the same step.
+    """
 
     name: str
     source: Source
@@ -132,6 +152,8 @@ class Domain:
     predicates: dict[str, frozenset[int]]
     functions: dict[str, frozenset[int]]
     schemas: tuple[Schema, ...]
+    constraints: tuple[Constraint, ...] = ()
+    dependences: tuple[tuple[str, str], ...] = ()
 
     @property
     def is_joint_action(self) -> bool:

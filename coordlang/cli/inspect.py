@@ -1,0 +1,71 @@
+"""``coordlang inspect``: what was understood of a domain and problem."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from coordlang.cli.app import GivenOptions, domain_argument, limits, model_options, note_single_robot, problem_argument
+
+if TYPE_CHECKING:
+    from planners.inspection import Inspection
+
+
+@click.command(name="inspect")
+@domain_argument
+@problem_argument
+@click.option("--states", "count_states", is_flag=True, help="Also count the reachable joint states and steps.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object.")
+@model_options
+@limits
+def command(domain: str, problem: str, count_states: bool, as_json: bool, given: GivenOptions) -> None:
+    """Show what was understood of DOMAIN and PROBLEM: a domain that was misread shows it here."""
+    from planners.inspection import inspect
+    from planners.model import load
+
+    loaded = load(domain, [problem], given.options())
+    note_single_robot(loaded.model.robots)
+    found = inspect(loaded)
+    space = None
+    if count_states:
+        from planners.space import explore
+
+        explored = explore(loaded.model, loaded.tasks[0].init[None, :])
+        space = {"states": len(explored), "joint_steps": len(explored.target)}
+    if as_json:
+        data: dict[str, Any] = asdict(found)
+        click.echo(json.dumps(data | (space or {})))
+        return
+    click.echo(_text(found))
+    if space:
+        click.echo(f"reachable       {space['states']:,} joint states, {space['joint_steps']:,} joint steps")
+
+
+def _text(found: Inspection) -> str:
+    lines = [
+        ("domain", f"{found.domain}, problem {found.problem}"),
+        ("read as", found.style),
+        ("robots", f"{', '.join(found.robots)} (by {found.robots_by})"),
+    ]
+    for robot, schemas in found.subactions.items():
+        total = sum(schemas.values())
+        lines.append((f"  {robot}", f"{total} subaction{'s' * (total != 1)}: {_counts(schemas)}; {found.idle[robot]}"))
+    lines += [
+        ("shared", _counts(found.shared) or "none"),
+        ("no robot named", {"error": "not allowed (--unowned)"}.get(found.unowned, f"--unowned {found.unowned}")),
+        ("step formulas", _counts(found.step_formulas) or "none"),
+        ("no effects", ", ".join(found.without_effects) or "none"),
+        ("action costs", found.costs),
+        ("interference", f"{found.interfering:,} pairs" + (f", e.g. {found.example}" if found.example else "")),
+        ("fluents", f"{found.facts} facts: {_counts(found.fluents)}"),
+        ("statics", _counts(found.statics) or "none"),
+        ("goal", found.goal),
+    ]
+    return "\n".join(f"{name:<14}  {text}" for name, text in lines)
+
+
+def _counts(counts: dict[str, int]) -> str:
+    return ", ".join(f"{name} {number:,}" for name, number in counts.items())

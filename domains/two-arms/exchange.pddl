@@ -1,0 +1,15 @@
+; Two blocks that change trays.
+(define (problem exchange)
+  (:domain two-arms)
+  (:objects arm1 arm2 left front back right red blue)
+  (:init
+    (robot arm1) (robot arm2)
+    (place left) (place front) (place back) (place right)
+    (reaches arm1 left) (reaches arm1 front) (reaches arm1 back)
+    (reaches arm2 right) (reaches arm2 front) (reaches arm2 back)
+    (block red) (block blue)
+    (over arm1 left) (over arm2 right) (nobody-over front) (nobody-over back)
+    (empty arm1) (empty arm2)
+    (on red left) (on blue right) (clear front) (clear back))
+  (:goal (and (on red right) (on blue left)))
+)

@@ -1,0 +1,15 @@
+; Each arm brings home a block of its own.  Nothing to agree on.
+(define (problem own-sides)
+  (:domain two-arms)
+  (:objects arm1 arm2 left front back right red blue)
+  (:init
+    (robot arm1) (robot arm2)
+    (place left) (place front) (place back) (place right)
+    (reaches arm1 left) (reaches arm1 front) (reaches arm1 back)
+    (reaches arm2 right) (reaches arm2 front) (reaches arm2 back)
+    (block red) (block blue)
+    (over arm1 left) (over arm2 right) (nobody-over front) (nobody-over back)
+    (empty arm1) (empty arm2)
+    (on red front) (on blue back) (clear left) (clear right))
+  (:goal (and (on red left) (on blue right)))
+)

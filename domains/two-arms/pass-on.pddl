@@ -1,0 +1,15 @@
+; One block from the left tray to the right one: put down in front or at the back, and taken from there.
+(define (problem pass-on)
+  (:domain two-arms)
+  (:objects arm1 arm2 left front back right red)
+  (:init
+    (robot arm1) (robot arm2)
+    (place left) (place front) (place back) (place right)
+    (reaches arm1 left) (reaches arm1 front) (reaches arm1 back)
+    (reaches arm2 right) (reaches arm2 front) (reaches arm2 back)
+    (block red)
+    (over arm1 left) (over arm2 right) (nobody-over front) (nobody-over back)
+    (empty arm1) (empty arm2)
+    (on red left) (clear front) (clear back) (clear right))
+  (:goal (on red right))
+)

@@ -1,0 +1,99 @@
+"""Concurrency networks -> formulas about the joint step, in the preconditions of the ground actions they bind."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations, product
+
+from planners.grounding.instantiate import GroundAction
+from planners.pddl.lifted import TRUE, And, Constraint, Domain, Formula, Not, Or, Problem, StepAtom
+from planners.robots import objects_of
+
+#: (constraint, binding of its parameters) -> the ground actions that match.
+_Groups = dict[tuple[str, tuple[str, ...]], list[GroundAction]]
+
+
+def apply_network(domain: Domain, problem: Problem, actions: Sequence[GroundAction]) -> tuple[GroundAction, ...]:
+    """The same actions with the network's constraints as conjuncts of their preconditions.
+
+    At least ``low``: some ``low - 1`` others of the group, of different robots.  At most ``high``: not any ``high`` others.
+    (v, w) dependent: whoever is in w needs somebody in v with the same binding.
+    """
+    if not domain.constraints:
+        return tuple(actions)
+    by_name = {c.name: c for c in domain.constraints}
+    groups: _Groups = {}
+    keys: dict[GroundAction, list[tuple[str, tuple[str, ...]]]] = {}
+    for action in actions:
+        for constraint in domain.constraints:
+            for binding in _bindings(domain, problem, constraint, action):
+                groups.setdefault((constraint.name, binding), []).append(action)
+                keys.setdefault(action, []).append((constraint.name, binding))
+    return tuple(
+        _bound(domain, by_name, groups, action, keys[action]) if action in keys else action for action in actions
+    )
+
+
+def _bindings(
+    domain: Domain, problem: Problem, constraint: Constraint, action: GroundAction
+) -> list[tuple[str, ...]]:
+    found = []
+    for name, positions in constraint.actions:
+        if name == action.schema:
+            binding = tuple(action.args[p] for p in positions)
+            typed = all(
+                value in objects_of(domain, problem, variable.types)
+                for value, variable in zip(binding, constraint.parameters, strict=True)
+            )
+            if typed and binding not in found:
+                found.append(binding)
+    return found
+
+
+def _bound(
+    domain: Domain,
+    by_name: dict[str, Constraint],
+    groups: _Groups,
+    action: GroundAction,
+    keys: Sequence[tuple[str, tuple[str, ...]]],
+) -> GroundAction:
+    parts: list[Formula] = []
+    for name, binding in keys:
+        constraint = by_name[name]
+        others = _by_robot(groups[name, binding], action)
+        if constraint.low > 1:
+            parts.append(_some(others, constraint.low - 1))
+        if constraint.high is not None:
+            parts += _not_more(others, constraint.high)
+        for needed, by in domain.dependences:
+            if by == name:
+                parts.append(_some(_by_robot(groups.get((needed, binding), []), action), 1))
+    if not parts:
+        return action
+    own = action.precondition
+    before = own.parts if isinstance(own, And) else () if own == TRUE else (own,)
+    return replace(action, precondition=And((*before, *parts)))
+
+
+def _by_robot(group: Sequence[GroundAction], action: GroundAction) -> list[list[StepAtom]]:
+    """The group's actions of other robots, robot by robot."""
+    robots: dict[int, list[StepAtom]] = {}
+    for other in group:
+        if not set(other.owners) & set(action.owners):
+            robots.setdefault(other.owners[0], []).append(StepAtom(other.schema, other.args))
+    return [robots[robot] for robot in sorted(robots)]
+
+
+def _some(others: Sequence[list[StepAtom]], number: int) -> Formula:
+    """At least ``number`` robots among the others do one of these."""
+    ways = [chosen for robots in combinations(others, number) for chosen in product(*robots)]
+    return Or(tuple(chosen[0] if number == 1 else And(chosen) for chosen in ways))
+
+
+def _not_more(others: Sequence[list[StepAtom]], high: int) -> list[Formula]:
+    """No ``high`` robots among the others do one of these (the action itself is one more)."""
+    ways = [chosen for robots in combinations(others, high) for chosen in product(*robots)]
+    if high == 1:
+        return [Not(chosen[0]) for chosen in ways]
+    return [Or(tuple(Not(atom) for atom in chosen)) for chosen in ways]

@@ -1,0 +1,89 @@
+"""Concurrency networks (Crosby, Jonsson, Rovatsos 2014): constraints on how many do an action together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from planners.pddl.lifted import Constraint, Schema
+from planners.pddl.names import Names, group, known, word
+from planners.pddl.sexpr import Expression, Group, Word
+
+
+def read_network(
+    names: Names, schemas: Sequence[Schema], sections: dict[str, list[Group]]
+) -> tuple[tuple[Constraint, ...], tuple[tuple[str, str], ...]]:
+    """The ``:concurrency-constraint`` and ``:positive-dependence`` sections of a domain.
+
+    Raises `BadInput` for unknown actions, positions outside the arguments, impossible bounds, unknown constraints.
+    """
+    arities = {schema.name: len(schema.parameters) for schema in schemas}
+    constraints = [_constraint(names, arities, s) for s in sections.get(":concurrency-constraint", ())]
+    by_name = {c.name: c for c in constraints}
+    dependences = []
+    for section in sections.get(":positive-dependence", ()):
+        pair = [word(names.document, item, "the name of a constraint") for item in section.items[1:]]
+        if len(pair) != 2:
+            raise names.document.fail("expected '(:positive-dependence V W)'", section)
+        for item in pair:
+            if item.text not in by_name:
+                raise names.document.fail(
+                    f"unknown constraint {item.text!r}", item, known(by_name, item.text, "constraint")
+                )
+        first, second = (by_name[item.text] for item in pair)
+        if len(first.parameters) != len(second.parameters):
+            raise names.document.fail("the two constraints have different numbers of parameters", section)
+        dependences.append((first.name, second.name))
+    return tuple(constraints), tuple(dependences)
+
+
+def _constraint(names: Names, arities: dict[str, int], section: Group) -> Constraint:
+    document = names.document
+    if len(section) < 2:
+        raise document.fail("expected the name of the constraint", section)
+    name = word(document, section.items[1], "the name of the constraint").text
+    fields: dict[str, Expression] = {}
+    items = section.items[2:]
+    for key, value in zip(items[::2], items[1::2], strict=False):
+        fields[word(document, key, "a keyword").text] = value
+    missing = {":parameters", ":bounds", ":actions"} - set(fields)
+    if missing or len(items) % 2:
+        raise document.fail(
+            "a constraint has :parameters, :bounds and :actions"
+            + (f"; missing: {', '.join(sorted(missing))}" if missing else ""),
+            section,
+        )
+    parameters = names.read_variables(group(document, fields[":parameters"], "a list of variables").items)
+    low, high = _bounds(names, group(document, fields[":bounds"], "'(LOW HIGH)'"))
+    actions = []
+    for item in group(document, fields[":actions"], "a list of actions").items:
+        entry = group(document, item, "'(action POSITION ..)'")
+        if entry.head not in arities:
+            raise document.fail(f"unknown action {entry.head!r}", entry, known(arities, entry.head, "action"))
+        positions = tuple(_number(names, part) for part in entry.items[1:])
+        if len(positions) != len(parameters) or any(p >= arities[entry.head] for p in positions):
+            raise document.fail(
+                f"expected {len(parameters)} argument positions below {arities[entry.head]} (the agent is argument 0)",
+                entry,
+            )
+        actions.append((entry.head, positions))
+    return Constraint(name, parameters, low, high, tuple(actions))
+
+
+def _bounds(names: Names, item: Group) -> tuple[int, int | None]:
+    if len(item) != 2:
+        raise names.document.fail("expected '(LOW HIGH)'", item)
+    low = _number(names, item.items[0])
+    high = item.items[1]
+    if isinstance(high, Word) and high.text in ("inf", "infinity"):
+        return low, None
+    most = _number(names, high)
+    if most < low or most == 0:
+        raise names.document.fail(f"nobody can meet the bounds ({low} {most})", item)
+    return low, most
+
+
+def _number(names: Names, item: Expression) -> int:
+    text = word(names.document, item, "a number").text
+    if not text.isdigit():
+        raise names.document.fail(f"expected a number from 0, found {text!r}", item)
+    return int(text)
