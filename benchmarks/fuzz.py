@@ -209,6 +209,43 @@ def wrap_group(text: str, random: Random) -> str:
     return text[:start] + before + text[start:end] + after + text[end:]
 
 
+def _literals(text: str) -> list[tuple[int, int]]:
+    """The spans of groups without groups inside that stand in another one: atoms, mostly."""
+    groups = _groups(text)
+    return [(a, b) for a, b in groups if "(" not in text[a + 1 : b] and (a, b) != groups[-1]]
+
+
+def edit_literal(text: str, random: Random) -> str:
+    """One to three atoms are left out, negated, said twice, or get their words in another order."""
+    for _ in range(random.choice((1, 1, 2, 3))):
+        spans = _literals(text)
+        if not spans:
+            return text
+        start, end = random.choice(spans)
+        atom = text[start:end]
+        words = atom[1:-1].split()
+        if len(words) > 2:
+            first, *rest = words
+            random.shuffle(rest)
+            words = [first, *rest]
+        other = text[slice(*random.choice(spans))]
+        new = random.choice(("", f"(not {atom})", f"{atom} {atom}", f"({' '.join(words)})", other, f"{atom} {other}",
+                             f"(or {atom} {other})", f"(imply {atom} {other})", f"(when {atom} {other})"))  # fmt: skip
+        text = text[:start] + new + text[end:]
+    return text
+
+
+def other_variable(text: str, random: Random) -> str:
+    """A variable gives its place to another one, once or twice."""
+
+    def edit(tokens: list[str], numbers: list[int]) -> None:
+        found = [n for n in numbers if tokens[n][0] == "?"]
+        if found:
+            tokens[random.choice(found)] = tokens[random.choice(found)]
+
+    return _edit_tokens(text, random, edit)
+
+
 def truncate(text: str, random: Random) -> str:
     return text[: random.randrange(len(text) + 1)]
 
@@ -398,10 +435,10 @@ def nothing(text: str, random: Random) -> str:
 MUTATIONS: tuple[Mutation, ...] = (
     drop, double, swap, replace_token, drop_group, swap_groups, wrap_group, truncate, random_bytes, unbalance, nest,
     many_objects, many_sections, odd_name, one_name, upper_case, shadow, long_line, line_ends, marked, empty_section,
-    double_section, foreign_section, numbers, comments, nothing,
+    double_section, foreign_section, numbers, comments, nothing, edit_literal, other_variable,
 )  # fmt: skip
 #: How often each is used: the quiet ones get past the reader and are worth more.
-_WEIGHT = {drop: 4, replace_token: 6, drop_group: 6, swap_groups: 5, wrap_group: 8, one_name: 5, odd_name: 5, shadow: 4,
+_WEIGHT = {edit_literal: 16, other_variable: 8, drop: 3, replace_token: 5, drop_group: 6, swap_groups: 4, wrap_group: 8, one_name: 5, odd_name: 5, shadow: 4,
            numbers: 2, nothing: 0.5, many_objects: 0.7, many_sections: 0.7, nest: 2}  # fmt: skip
 
 
@@ -642,7 +679,7 @@ def complaint(m: Mutant, outcome: Outcome, written: bool) -> str | None:
         return None if outcome.out.strip() else "no output"
     if code == 2 and m.pair.options:
         return None  # --robot-type of a type that the mutation took away
-    if not err.startswith("coordlang: ") or not err[len("coordlang: ") :].strip():
+    if not re.search(r"^coordlang: (?!note: )\S", err, re.MULTILINE):
         return f"exit code {code} without a message"
     if code in (31, 34):
         if "domain.pddl" not in err and "problem.pddl" not in err:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import resource
 import signal
 import subprocess
 import sys
@@ -31,7 +32,7 @@ _TAIL = 1500
 #: numpy, which unified-planning imports, would reserve memory for a thread per processor.
 _ENVIRONMENT = {"PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 #: How Python, the loader and numpy say that a limit of the calling process leaves them too little memory.
-_NO_MEMORY = re.compile("memory|failed to map segment|start new thread", re.IGNORECASE)
+_NO_MEMORY = re.compile("MemoryError|out of memory|allocat|failed to map|start new thread", re.IGNORECASE)
 
 
 class FastDownwardFailed(CoordlangError):
@@ -116,7 +117,10 @@ def _solve(plain: PlainTask, left: float | None, time_limit: float | None, memor
             ) from None
         result = directory / "result.json"
         if not result.exists():
-            _explain_crash(code, (directory / "stderr").read_text(errors="replace"))
+            errors = (directory / "stderr").read_text(errors="replace")
+            if code == -signal.SIGKILL:  # not by us: by the system, which is out of memory
+                raise _out_of_memory()
+            raise _crash(f"the process that runs Fast Downward ended with exit code {code}", errors)
         answer: dict[str, Any] = json.loads(result.read_text())
     match answer["status"]:
         case "solved":
@@ -129,7 +133,7 @@ def _solve(plain: PlainTask, left: float | None, time_limit: float | None, memor
             return None
         case "memory":
             raise _out_of_memory()
-    raise FastDownwardFailed(f"Fast Downward {answer['status']}", remedy=answer["log"][-_TAIL:].strip() or None)
+    raise _crash(f"Fast Downward {answer['status']}", answer["log"])
 
 
 def _run(directory: Path, left: float | None) -> int:
@@ -164,13 +168,13 @@ def _end(process: subprocess.Popen[bytes]) -> None:
     process.wait()
 
 
-def _explain_crash(code: int, errors: str) -> None:
-    """Raise the error for a worker that left no result."""
-    if code == -signal.SIGKILL or _NO_MEMORY.search(errors):
-        raise _out_of_memory()
-    raise FastDownwardFailed(
-        f"the process that runs Fast Downward ended with exit code {code}", remedy=errors[-_TAIL:].strip() or None
-    )
+def _crash(what: str, said: str) -> CoordlangError:
+    """The error for a process that gave no answer, with the end of what it said."""
+    # A limit of this process holds for all below it, and libraries crash in many ways when they meet it.
+    limited = resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
+    if limited or _NO_MEMORY.search(said):
+        return _out_of_memory()
+    return FastDownwardFailed(what, remedy=said[-_TAIL:].strip() or None)
 
 
 def _out_of_memory() -> OutOfMemory:

@@ -17,6 +17,10 @@ from typing import Any
 
 from planners.limits import limit_memory
 
+#: The exit codes with which Fast Downward's translator and search say that they proved it.  unified-planning takes
+#: other codes for a proof too, 1 among them, with which the driver ends when Python cannot even start.
+_UNSOLVABLE = (10, 11)
+
 
 class _FastDownward(subprocess.Popen[bytes]):
     """Fast Downward with a memory limit, and in our process group.
@@ -25,10 +29,12 @@ class _FastDownward(subprocess.Popen[bytes]):
     """
 
     memory_limit: int | None = None
+    started: list[_FastDownward] = []  # noqa: RUF012 - of the one process that this module is
 
     def __init__(self, arguments: Any, **settings: Any) -> None:
         settings.pop("start_new_session", None)
         super().__init__(arguments, preexec_fn=lambda: limit_memory(self.memory_limit), **settings)
+        self.started.append(self)
 
 
 def main(task_file: str, result_file: str) -> None:
@@ -62,11 +68,13 @@ def solve(task: dict[str, Any]) -> dict[str, Any]:
         planner._fd_translate_options = ["--invariant-generation-max-time", "0"]
         answer = planner.solve(problem)
     log = "".join(message.message for message in answer.log_messages or ())
-    outcome = {
-        Status.SOLVED_OPTIMALLY: "solved",
-        Status.UNSOLVABLE_PROVEN: "unsolvable",
-        Status.MEMOUT: "memory",
-    }.get(answer.status, f"failed: {answer.status.name}")
+    code = _FastDownward.started[-1].returncode
+    if answer.status == Status.SOLVED_OPTIMALLY and code == 0:
+        outcome = "solved"
+    elif answer.status == Status.UNSOLVABLE_PROVEN and code in _UNSOLVABLE:
+        outcome = "unsolvable"
+    else:
+        outcome = "memory" if answer.status == Status.MEMOUT else f"ended with exit code {code}"
     total = sum(costs[step.action.name] for step in answer.plan.actions) if outcome == "solved" else None
     return {"status": outcome, "total": total, "log": log[-2000:]}
 

@@ -18,7 +18,7 @@ def apply_network(domain: Domain, problem: Problem, actions: Sequence[GroundActi
     """The same actions with the network's constraints as conjuncts of their preconditions.
 
     At least ``low``: some ``low - 1`` others of the group, of different robots.  At most ``high``: not any ``high`` others.
-    (v, w) dependent: whoever is in w needs somebody in v with the same binding.
+    (v, w) dependent: whoever is in w needs somebody in v with the same binding, who may be itself.
     """
     if not domain.constraints:
         return tuple(actions)
@@ -67,7 +67,7 @@ def _bound(
         if constraint.high is not None:
             parts += _not_more(others, constraint.high)
         for needed, by in domain.dependences:
-            if by == name:
+            if by == name and (needed, binding) not in keys:
                 parts.append(_some(_by_robot(groups.get((needed, binding), []), action), 1))
     if not parts:
         return action

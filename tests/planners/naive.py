@@ -110,8 +110,9 @@ class Twin:
         if touched.adds or touched.deletes:
             return False
         schemas = self.rules.domain.schemas
+        bound = {name for c in self.rules.domain.constraints for name, _ in c.actions}
         formulas = [f for s in schemas for f in (s.precondition, *(e.condition for e in s.effects))]
-        return found.schema.name not in {name for f in formulas for name in _actions_named(f)}
+        return found.schema.name not in {name for f in formulas for name in _actions_named(f)} | bound
 
     def optimal(self, goal: Formula | None = None, *, actions: bool = False) -> Optimal | None:
         """The optimal plans under ``makespan`` or ``makespan+actions``; None if the goal cannot be reached."""

@@ -246,9 +246,9 @@ def wait_until(condition: object) -> None:
         time.sleep(0.05)
 
 
-@pytest.mark.parametrize("limit", [30_000_000, 130_000_000])
+@pytest.mark.parametrize("limit", [20_000_000, 35_000_000])
 def test_the_memory_limit_is_an_error_of_its_own(limit: int) -> None:
-    """Once too little for Fast Downward to start, once for its search."""
+    """Once too little for its translator, once for its search."""
     loaded = big()
     with pytest.raises(OutOfMemory):
         optimal_cost(loaded.model, loaded.tasks[0], memory_limit=limit, time_limit=60)

@@ -1,13 +1,13 @@
-; One robot is charged and in its room.  Only the other one needs the charger.
-(define (problem one-charged)
+; Both batteries are empty, but one robot is still on its way to the charger when the other one is done.
+(define (problem in-turn)
   (:domain charger)
   (:objects
     r1 r2 - robot
     hall bath kitchen - room
     socket - charger)
   (:init
-    (at r1 bath) (charged r1) (at r2 hall) (clean hall)
+    (at r1 hall) (at r2 bath) (clean hall)
     (installed socket hall)
     (door hall bath) (door bath hall) (door hall kitchen) (door kitchen hall))
-  (:goal (and (clean bath) (clean kitchen)))
+  (:goal (and (charged r1) (charged r2)))
 )
