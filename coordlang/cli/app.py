@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from planners.model import ModelOptions
+    from planners.model import Loaded, ModelOptions
 
 EXIT_UNPROVED = 3
 EXIT_INTERRUPTED = 130
@@ -185,6 +185,31 @@ def note_single_robot(robots: tuple[str, ...]) -> None:
     """One robot is no mistake in itself, but surely not what this program is for."""
     if len(robots) == 1:
         click.echo(f"coordlang: note: {robots[0]} is the only robot: there is nothing to coordinate", err=True)
+
+
+def task_files(function: Callable[..., Any]) -> Callable[..., Any]:
+    """DOMAIN PROBLEM, or ``--factored DIR`` in their place; the command gets a `Loaded` maker as ``load``."""
+
+    @click.argument("files", nargs=-1, metavar="DOMAIN PROBLEM")
+    @click.option("--factored", metavar="DIR", help="Read domain-ROBOT.pddl and problem-ROBOT.pddl of every robot here.")
+    @functools.wraps(function)
+    def wrapped(files: tuple[str, ...], factored: str | None, given: GivenOptions, **arguments: Any) -> Any:
+        if len(files) != (0 if factored else 2):
+            raise click.UsageError("expected DOMAIN PROBLEM, or --factored DIR without them")
+
+        def load() -> Loaded:
+            from planners.model import build
+            from planners.pddl.factored import read_factored
+
+            if factored:
+                domain, problem = read_factored(factored)
+            else:
+                domain, (problem,) = read_files(files[0], files[1:])
+            return build(domain, [problem], given.options())
+
+        return function(load=load, **arguments)
+
+    return wrapped
 
 
 domain_argument = click.argument("domain", type=click.Path())

@@ -3,29 +3,32 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import click
 
-from coordlang.cli.app import GivenOptions, domain_argument, limits, model_options, problem_argument
+from coordlang.cli.app import limits, model_options, task_files
+
+if TYPE_CHECKING:
+    from planners.model import Loaded
 
 
 @click.command(name="check")
-@domain_argument
-@problem_argument
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
 @model_options
+@task_files
 @limits
-def command(domain: str, problem: str, as_json: bool, given: GivenOptions) -> int:
+def command(as_json: bool, load: Callable[[], Loaded]) -> int:
     """Compare our optimal cost with Fast Downward's (through unified-planning).
 
     Exit 0: equal.  1: they differ.  11: both prove that there is no plan.
     """
     from planners.errors import ProvedImpossible
     from planners.fast_downward import optimal_cost
-    from planners.model import load
     from planners.optimal import search
 
-    loaded = load(domain, [problem], given.options())
+    loaded = load()
     model, task = loaded.model, loaded.tasks[0]
     try:
         ours: tuple[int, int] | None = search(model, task).cost_of(0)

@@ -3,30 +3,30 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from coordlang.cli.app import GivenOptions, domain_argument, limits, model_options, note_single_robot, problem_argument
+from coordlang.cli.app import limits, model_options, note_single_robot, task_files
 
 if TYPE_CHECKING:
     from planners.inspection import Inspection
+    from planners.model import Loaded
 
 
 @click.command(name="inspect")
-@domain_argument
-@problem_argument
 @click.option("--states", "count_states", is_flag=True, help="Also count the reachable joint states and steps.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
 @model_options
+@task_files
 @limits
-def command(domain: str, problem: str, count_states: bool, as_json: bool, given: GivenOptions) -> None:
+def command(count_states: bool, as_json: bool, load: Callable[[], Loaded]) -> None:
     """Show what was understood of DOMAIN and PROBLEM: a domain that was misread shows it here."""
     from planners.inspection import inspect
-    from planners.model import load
 
-    loaded = load(domain, [problem], given.options())
+    loaded = load()
     note_single_robot(loaded.model.robots)
     found = inspect(loaded)
     space = None

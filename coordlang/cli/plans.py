@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from itertools import islice
+from typing import TYPE_CHECKING
 
 import click
 
-from coordlang.cli.app import GivenOptions, domain_argument, limits, model_options, note_single_robot, problem_argument
+from coordlang.cli.app import limits, model_options, note_single_robot, task_files
+
+if TYPE_CHECKING:
+    from planners.model import Loaded
 
 _DEFAULT_MAX = 10
 
 
 @click.command(name="plans")
-@domain_argument
-@problem_argument
 @click.option("--count", "only_count", is_flag=True, help="Print the exact number of optimal plans only.")
 @click.option(
     "--max", "most", type=click.IntRange(min=0), help=f"List at most this many plans (default: {_DEFAULT_MAX})."
@@ -26,30 +29,28 @@ _DEFAULT_MAX = 10
 @click.option("--format", "form", type=click.Choice(["ipc", "json"]), default="ipc", show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Short for --format json.")
 @model_options
+@task_files
 @limits
 def command(
-    domain: str,
-    problem: str,
     only_count: bool,
     most: int | None,
     sample: int | None,
     seed: int,
     form: str,
     as_json: bool,
-    given: GivenOptions,
+    load: Callable[[], Loaded],
 ) -> None:
     """Count, list or sample all optimal plans of a task.
 
     A plan is a sequence of joint actions; plans are listed in a stable order.
     """
-    from planners.model import load
     from planners.optimal import search
     from planners.planfile import to_ipc, to_json
     from planners.plans import Plans
 
     if only_count and (most is not None or sample is not None):
         raise click.UsageError("--count prints a number only: leave out --max and --sample")
-    loaded = load(domain, [problem], given.options())
+    loaded = load()
     note_single_robot(loaded.model.robots)
     plans = Plans.of(search(loaded.model, loaded.tasks[0]))
     if only_count and not (as_json or form == "json"):

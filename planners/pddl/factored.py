@@ -1,0 +1,111 @@
+"""Factored MA-PDDL: one domain and one problem file per robot -> one domain and one problem.
+
+A robot's files hold what it knows: public objects, its own private ones, and the actions that it can do.  The union is the
+unfactored form; the parameter that can only be the robot itself becomes the action's ``:agent``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from planners.errors import BadInput, Place
+from planners.pddl.domain import read_domain
+from planners.pddl.lifted import And, Atom, Domain, Formula, Problem, Schema
+from planners.pddl.problem import read_problem
+from planners.pddl.sexpr import Source
+
+
+def read_factored(directory: str | Path) -> tuple[Domain, Problem]:
+    """Read ``domain-ROBOT.pddl`` and ``problem-ROBOT.pddl`` for every robot of a directory.
+
+    Raises `BadInput` where a file has no partner, an action differs between files or has no parameter for its robot.
+    """
+    folder = Path(directory)
+    domains = {path.stem.partition("-")[2].lower(): path for path in sorted(folder.glob("domain-*.pddl"))}
+    problems = {path.stem.partition("-")[2].lower(): path for path in sorted(folder.glob("problem-*.pddl"))}
+    if not domains or set(domains) != set(problems):
+        odd = ", ".join(sorted(set(domains) ^ set(problems))) or "no such files"
+        raise BadInput(
+            f"expected domain-ROBOT.pddl and problem-ROBOT.pddl for every robot; without a partner: {odd}",
+            place=Place(str(directory)),
+        )
+    views: list[tuple[Domain, Problem]] = []
+    for robot, path in domains.items():
+        domain = read_domain(path)
+        views.append(_of_robot(robot, domain, read_problem(problems[robot], domain)))
+    text = "\n".join(domain.source.text for domain, _ in views)
+    domain = _join_domains([domain for domain, _ in views], Source(str(directory), text))
+    return domain, _join_problems([problem for _, problem in views], domain, str(directory))
+
+
+def _of_robot(robot: str, domain: Domain, problem: Problem) -> tuple[Domain, Problem]:
+    """The robot's view with its own parameter in every action marked as the agent."""
+    if robot not in problem.objects:
+        raise BadInput(
+            f"robot {robot!r} of the file name is no object of its problem", place=Place(problem.source.name)
+        )
+    schemas = tuple(replace(s, agent=_agent(robot, s, domain, problem)) for s in domain.schemas)
+    return replace(domain, schemas=schemas), problem
+
+
+def _agent(robot: str, schema: Schema, domain: Domain, problem: Problem) -> int:
+    for number, parameter in enumerate(schema.parameters):
+        wanted = set(parameter.types)
+        fitting = [
+            name
+            for name, types in problem.objects.items()
+            if "object" in wanted or any(domain.supertypes(t) & wanted for t in types)
+        ]
+        if fitting == [robot]:
+            return number
+    raise BadInput(
+        f"action {schema.name!r} has no parameter that can only be {robot!r}",
+        place=domain.source.place(schema.offset),
+        remedy="Give the robot a type of its own and a parameter of this type.",
+    )
+
+
+def _join_domains(domains: list[Domain], source: Source) -> Domain:
+    first = domains[0]
+    schemas: dict[str, Schema] = {}
+    for domain in domains:
+        if domain.name != first.name:
+            raise BadInput(f"domain {domain.name!r}, expected {first.name!r}", place=Place(domain.source.name))
+        for schema in domain.schemas:
+            known = schemas.setdefault(schema.name, schema)
+            if replace(known, offset=0) != replace(schema, offset=0):
+                raise BadInput(
+                    f"action {schema.name!r} differs between the robots' files",
+                    place=domain.source.place(schema.offset),
+                )
+    return replace(
+        first,
+        source=source,
+        types={k: v for domain in domains for k, v in domain.types.items()},
+        constants={k: v for domain in domains for k, v in domain.constants.items()},
+        predicates={
+            k: frozenset().union(*(d.predicates.get(k, frozenset()) for d in domains))
+            for domain in domains
+            for k in domain.predicates
+        },
+        schemas=tuple(schemas.values()),
+    )
+
+
+def _join_problems(problems: list[Problem], domain: Domain, name: str) -> Problem:
+    first = problems[0]
+    objects: dict[str, tuple[str, ...]] = {}
+    init: set[Atom] = set()
+    goals: dict[Formula, None] = {}
+    for problem in problems:
+        for obj, types in problem.objects.items():
+            if objects.setdefault(obj, types) != types:
+                raise BadInput(f"object {obj!r} has other types elsewhere", place=Place(problem.source.name))
+        init |= problem.init
+        goals[problem.goal] = None
+    goal = next(iter(goals)) if len(goals) == 1 else And(tuple(goals))
+    text = "\n".join(problem.source.text for problem in problems)
+    return replace(
+        first, source=Source(name, text), objects=dict(sorted(objects.items())), init=frozenset(init), goal=goal
+    )
