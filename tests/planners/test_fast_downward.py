@@ -42,7 +42,7 @@ WORKSHOP = """
     :effect (and (free) (open))))
 """
 WORKSHOP_TASK = """
-(define (problem {name}) (:domain workshop) (:objects r1 r2 - robot) (:init (free)) (:goal {goal}))
+(define (problem work) (:domain workshop) (:objects r1 r2 - robot) (:init (free)) (:goal {goal}))
 """
 GOAL = "(and (clean) (in r1) (in r2))"
 
@@ -81,7 +81,7 @@ JOINT_TASK = """
   (:goal (and (at1 c) (at2 d))))
 """
 
-#: Tokens on a long row of cells, for which no small bound on the cost is known: more states than a second allows.
+#: Lamps along a corridor that put out their neighbours: more states than anybody searches in the time of a test.
 BIG_CELLS = 24
 BIG = """
 (define (domain big)
@@ -102,7 +102,7 @@ def read(domain_text: str, problem_text: str, cost: Cost = "makespan") -> Loaded
 
 
 def workshop(goal: str, cost: Cost = "makespan") -> Loaded:
-    return read(WORKSHOP, WORKSHOP_TASK.format(name="w", goal=goal), cost)
+    return read(WORKSHOP, WORKSHOP_TASK.format(goal=goal), cost)
 
 
 def big() -> Loaded:
@@ -117,10 +117,10 @@ def big() -> Loaded:
 
 
 def processes(place: Path) -> set[str]:
-    """Command lines of the processes that work in a directory below ``place``."""
+    """Command lines of the other processes that work in a directory below ``place``."""
     found = set()
     for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
+        if entry.name.isdigit() and int(entry.name) != os.getpid():
             try:
                 text = (entry / "cmdline").read_bytes().replace(b"\0", b" ").decode()
                 directory = os.readlink(entry / "cwd")
@@ -134,8 +134,8 @@ def processes(place: Path) -> set[str]:
 @pytest.mark.parametrize(
     ("texts", "cost", "limit"),
     [
-        ((WORKSHOP, WORKSHOP_TASK.format(name="w", goal=GOAL)), "makespan", 2000),
-        ((WORKSHOP, WORKSHOP_TASK.format(name="w", goal=GOAL)), "makespan+actions", 0),
+        ((WORKSHOP, WORKSHOP_TASK.format(goal=GOAL)), "makespan", 2000),
+        ((WORKSHOP, WORKSHOP_TASK.format(goal=GOAL)), "makespan+actions", 0),
         ((RELAY, RELAY_TASK), "makespan", 0),
         ((RELAY, RELAY_TASK), "makespan+actions", 2000),
         ((JOINT, JOINT_TASK), "makespan+actions", 2000),
@@ -152,11 +152,12 @@ def test_fast_downward_agrees(texts: tuple[str, str], cost: Cost, limit: int) ->
 
 
 def test_a_wrong_model_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    loaded = workshop("(and (done r1) (done r2))")
+    text = WORKSHOP_TASK.format(goal="(and (done r1) (done r2))")
+    loaded = read(WORKSHOP, text.replace("(:init (free))", "(:init (free) (in r1) (in r2))"))
+    expected = search(loaded.model, loaded.tasks[0]).cost_of(0)
+    assert expected == (3, 0)
     monkeypatch.setattr(plain_module, "_clashes", lambda actions: (frozenset(),) * len(actions))
-    answer = optimal_cost(loaded.model, loaded.tasks[0], limit=0)
-    assert answer.cost is not None
-    assert answer.cost < search(loaded.model, loaded.tasks[0]).cost_of(0)
+    assert optimal_cost(loaded.model, loaded.tasks[0], limit=0).cost == (1, 0)
 
 
 @pytest.mark.parametrize("limit", [2000, 0])
@@ -193,7 +194,7 @@ def test_nothing_is_written_or_printed(
     assert processes(tmp_path) == set()
 
 
-@pytest.mark.parametrize("seconds", [0.5, 6.0])
+@pytest.mark.parametrize("seconds", [0.5, 5.0])
 def test_the_time_limit_ends_everything(seconds: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Once while unified-planning is being imported, once while Fast Downward searches."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
