@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from planners.errors import OutOfTime
+from planners.errors import OutOfMemory, OutOfTime
 
 #: The alarm rings again until somebody has caught it: an exception inside a finalizer is lost.
 _AGAIN = 0.5
@@ -47,6 +47,21 @@ def limit_memory(size: int | None) -> None:
     if size is not None:
         _, hard = resource.getrlimit(resource.RLIMIT_AS)
         resource.setrlimit(resource.RLIMIT_AS, (size, hard))
+
+
+def require_memory(size: int) -> None:
+    """Raise `OutOfMemory` if the program alone, its libraries loaded, has more than ``size`` bytes already.
+
+    To be asked before `limit_memory`: numpy aborts the process when it is loaded under a limit that is too small.
+    """
+    import numpy as np
+
+    np.zeros((8, 8)) @ np.zeros((8, 8))
+    if size < _used():
+        raise OutOfMemory(
+            f"the program alone needs {_used() / 2**20:.0f} MiB of address space",
+            remedy="Use a larger --memory-limit.",
+        )
 
 
 def memory_left() -> int:

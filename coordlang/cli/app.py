@@ -91,10 +91,12 @@ def limits(function: Callable[..., Any]) -> Callable[..., Any]:
     @click.option("--debug", is_flag=True, help="Show tracebacks.")
     @functools.wraps(function)
     def wrapped(time_limit: float | None, memory_limit: int | None, debug: bool, **arguments: Any) -> Any:
-        from planners.limits import limit_memory
+        from planners.limits import limit_memory, require_memory
         from planners.limits import time_limit as limit_time
 
-        limit_memory(memory_limit)
+        if memory_limit is not None:
+            require_memory(memory_limit)
+            limit_memory(memory_limit)
         with limit_time(time_limit):
             return function(**arguments)
 
