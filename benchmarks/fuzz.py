@@ -13,6 +13,7 @@ Mutant K of a seed is the same file whatever N is, so a long run can be cut in p
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import re
@@ -317,7 +318,7 @@ def one_name(text: str, random: Random) -> str:
     if len(plain) < 2:
         return text
     target = random.choice(plain)
-    return _renamed(text, {name: target for name in random.sample(plain, min(len(plain), random.choice((1, 2, 4))))})
+    return _renamed(text, dict.fromkeys(random.sample(plain, min(len(plain), random.choice((1, 2, 4)))), target))
 
 
 def upper_case(text: str, random: Random) -> str:
@@ -438,8 +439,23 @@ MUTATIONS: tuple[Mutation, ...] = (
     double_section, foreign_section, numbers, comments, nothing, edit_literal, other_variable,
 )  # fmt: skip
 #: How often each is used: the quiet ones get past the reader and are worth more.
-_WEIGHT = {edit_literal: 16, other_variable: 8, drop: 3, replace_token: 5, drop_group: 6, swap_groups: 4, wrap_group: 8, one_name: 5, odd_name: 5, shadow: 4,
-           numbers: 2, nothing: 0.5, many_objects: 0.7, many_sections: 0.7, nest: 2}  # fmt: skip
+_WEIGHT: dict[Mutation, float] = {
+    edit_literal: 16,
+    other_variable: 8,
+    wrap_group: 8,
+    drop_group: 6,
+    replace_token: 5,
+    one_name: 5,
+    odd_name: 5,
+    swap_groups: 4,
+    shadow: 4,
+    drop: 3,
+    numbers: 2,
+    nest: 2,
+    many_objects: 0.7,
+    many_sections: 0.7,
+    nothing: 0.5,
+}
 
 
 # ---- mutants ---------------------------------------------------------------------------------------------------------
@@ -696,12 +712,14 @@ def fuzz(
     *,
     keep: Path | None = None,
     only_light: bool = False,
-    known: Callable[[Failure], bool] = lambda _: False,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Report:
-    """Run mutants and judge them; files of failures go to ``keep``, those that are ``known`` do not count."""
+    """Run mutants and judge them; files of failures go to ``keep``.
+
+    An interrupt (Ctrl-C) ends it early, with the report so far.
+    """
     report = Report()
-    with tempfile.TemporaryDirectory(prefix="fuzz-") as name:
+    with tempfile.TemporaryDirectory(prefix="fuzz-") as name, contextlib.suppress(KeyboardInterrupt):
         folder = Path(name)
         runner = Runner(folder)
         try:
@@ -709,7 +727,7 @@ def fuzz(
                 m = mutant(number, seed, sources)
                 if only_light and not m.light:
                     continue
-                _judge(m, runner, folder / "work", report, keep, known)
+                _judge(m, runner, folder / "work", report, keep)
                 if done % 20 == 0:
                     progress(f"{done} of {len(numbers)}")
         finally:
@@ -717,9 +735,7 @@ def fuzz(
     return report
 
 
-def _judge(
-    m: Mutant, runner: Runner, work: Path, report: Report, keep: Path | None, known: Callable[[Failure], bool]
-) -> None:
+def _judge(m: Mutant, runner: Runner, work: Path, report: Report, keep: Path | None) -> None:
     (work / "domain.pddl").write_bytes(m.domain)
     (work / "problem.pddl").write_bytes(m.problem)
     language = work / "language.json"
@@ -728,9 +744,9 @@ def _judge(
     report.codes[m.command, "killed" if outcome.code is None else str(outcome.code)] += 1
     report.slowest = sorted([*report.slowest, (outcome.seconds, f"#{m.number} {m.pair.name}, {m.what}")])[-5:]
     why = complaint(m, outcome, language.exists())
-    if why is None or known(failure := Failure(m, outcome, why)):
+    if why is None:
         return
-    report.failures.append(failure)
+    report.failures.append(Failure(m, outcome, why))
     if keep is not None:
         target = keep / f"{m.number:06}"
         target.mkdir(parents=True, exist_ok=True)
@@ -761,7 +777,8 @@ def main() -> int:
     report = fuzz(chosen, given.seed, pairs(), keep=given.keep, progress=progress)
     progress("done")
     print(report.text())
-    print(f"\n{given.number} mutants, seed {given.seed}, from {given.start}: {time.perf_counter() - start:.0f} s")
+    done, seconds = sum(report.codes.values()), time.perf_counter() - start
+    print(f"\n{done} mutants, seed {given.seed}, from {given.start}: {seconds:.0f} s")
     if report.failures:
         print(f"files in {given.keep}")
     return 1 if report.failures else 0

@@ -67,18 +67,26 @@ def build_language(
     progress("walking pairs of plans")
     found = alphas(candidates.spaces)
     clock.note("coordination")
-    job = Job(candidates, tuple(states_on_plans(candidates.spaces).tolist()), found, None, seed, progress)
+    checked: list[tuple[Partition, Verdict]] = []
+
+    def check(partition: Partition) -> None:
+        checked.append((partition, _verify(candidates, partition)))
+
+    states = tuple(states_on_plans(candidates.spaces).tolist())
+    job = Job(candidates, states, found, None, seed, progress, check)
     if method != "greedy":
-        # What is left when an anytime method is stopped; verified before, because there is no time then.
+        # What is left when an anytime method is stopped; verified now, because there is no time then.
         first = greedy(job).partition
-        _verify(candidates, first)
+        check(first)
         job = replace(job, incumbent=first)
         clock.note("incumbent")
     progress(f"building words ({method})")
     outcome = METHODS[method](job)
     clock.note("vocabulary")
-    progress("verifying by definition")
-    verdict = _verify(candidates, outcome.partition)
+    if not any(partition is outcome.partition for partition, _ in checked):
+        progress("verifying by definition")
+        check(outcome.partition)
+    verdict = next(verdict for partition, verdict in checked if partition is outcome.partition)
     clock.note("verify")
     language = _language(candidates, method, outcome)
     return Built(language, found, len(job.states), verdict, outcome.figures, clock.seconds, outcome.stopped)

@@ -17,6 +17,8 @@ class Job:
     """A partition to find: of ``states`` (numbers in ``candidates.rows``; those on optimal plans), for ``candidates``.
 
     ``incumbent`` is a partition that is known to be a language, what an anytime method returns in the worst case.
+    ``check`` verifies a partition by definition and raises if it is none; an anytime method calls it for every better
+    one that it finds, because when it is stopped there is no time left.
     """
 
     candidates: Candidates
@@ -25,6 +27,7 @@ class Job:
     incumbent: Partition | None = None
     seed: int = 0
     progress: Callable[[str], None] = lambda _: None
+    check: Callable[[Partition], None] = lambda _: None
 
     @property
     def lower_bound(self) -> int:

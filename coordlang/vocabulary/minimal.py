@@ -23,58 +23,111 @@ from planners.limits import stop_clock
 from planners.matching import Ints
 from planners.optimal import PlanSpace
 
-#: Tasks are searched for counterexamples in this many parts, one after another.
-_PARTS = 8
+#: Tasks are searched for counterexamples in parts, one after another: at least so many, of at most so many tasks.
+_PARTS, _TASKS = 8, 1_500
 #: Counterexamples taken from one part.
 _MOST = 200
+#: Rounds with counterexamples before another number of words is tried; doubled when nothing else is left.
+_PATIENCE = 250
 
 
 def minimal(job: Job) -> Outcome:
     """A language with the fewest words among all partitions.
 
-    Anytime: out of time or memory, or interrupted, it returns the incumbent with the lower bound proved so far and
-    says so in ``stopped``.
+    Anytime: out of time or memory, or interrupted, it returns the best language found with the lower bound proved so
+    far and says so in ``stopped``.
     """
     search = _Search(job)
     try:
-        partition = search.run()
+        search.run()
     except (OutOfTime, OutOfMemory, MemoryError, KeyboardInterrupt) as error:
         stop_clock()
-        if job.incumbent is None:
+        if search.best is None:
             raise
-        return Outcome(job.incumbent, search.size, search.figures(), error)
-    return Outcome(partition, search.size, search.figures())
+        return Outcome(search.best, search.lower, search.figures(), error)
+    assert search.best is not None
+    return Outcome(search.best, search.lower, search.figures())
 
 
 class _Search:
+    """Closes in on the least number of words: ``lower`` is proved to be needed, ``best`` is a language."""
+
     def __init__(self, job: Job) -> None:
         self._job = job
-        self.size = job.lower_bound
+        self.lower = job.lower_bound
+        self.best: Partition | None = job.incumbent
         self._rounds = 0
         self._found = 0
         self._clauses: list[Clause] = []
         self._known: set[Clause] = set()
         self._symmetries: list[list[int]] = []
 
-    def run(self) -> Partition:
+    @property
+    def _upper(self) -> int:
+        return len(set(self.best.values())) if self.best is not None else len(self._job.states)
+
+    def run(self) -> None:
         job = self._job
         if not job.alphas.requiring:
-            return dict.fromkeys(job.states, 0)
+            self.best = dict.fromkeys(job.states, 0)
+            return
         self._symmetries = [p.tolist() for p in state_symmetries(job.candidates)]
         parts = _parts(job.candidates.spaces, Random(job.seed))
-        while True:
-            self._clauses = reduce(self._clauses)
-            colouring = Colouring(_by_demand(job.states, self._clauses), self.size)
-            try:
-                partition = self._with_size(colouring, parts)
-            finally:
-                colouring.delete()
-            if partition is not None:
-                return partition
-            if job.incumbent is not None and self.size + 1 == len(set(job.incumbent.values())):
-                self.size += 1
-                return job.incumbent
-            self.size += 1
+        patience = _PATIENCE
+        while self.best is None or self.lower < self._upper:
+            # From below as long as that is quick; what is slow is first closed in from above, to have a good language.
+            if self._decide(self.lower, parts, patience):
+                continue
+            middle = (self.lower + self._upper) // 2
+            if middle == self.lower or not self._decide(middle, parts, patience):
+                patience *= 2
+
+    def _decide(self, size: int, parts: Sequence[_Part], patience: int) -> bool:
+        """Find a language with ``size`` words or prove that there is none; False if patience ran out before."""
+        self._clauses = reduce(self._clauses)
+        colouring = Colouring(_by_demand(self._job.states, self._clauses), size)
+        try:
+            for clause in self._clauses:
+                colouring.add(clause)
+            partition = self._refine(colouring, parts, patience)
+        except _Impatient:
+            return False
+        finally:
+            colouring.delete()
+        if partition is None:
+            self.lower = size + 1
+        else:
+            self._job.check(partition)
+            self.best = partition
+        return True
+
+    def _refine(self, colouring: Colouring, parts: Sequence[_Part], patience: int) -> Partition | None:
+        """The loop for one number of words: a language, or None if there is none."""
+        partition = colouring.solve()
+        clean = position = 0
+        word = np.zeros(len(self._job.candidates.rows), np.int64)
+        while partition is not None and clean < len(parts):
+            if patience <= 0:
+                raise _Impatient
+            self._rounds += 1
+            word[list(partition)] = list(partition.values())
+            fresh = parts[position].clauses(word)
+            position = (position + 1) % len(parts)
+            self._job.progress(
+                f"trying {colouring.size} words, {self.lower} to {self._upper} needed: "
+                f"round {self._rounds}, {len(self._clauses):,} clauses"
+            )
+            if not fresh:
+                clean += 1
+                continue
+            clean = 0
+            patience -= 1
+            self._found += len(fresh)
+            for clause in self._images(reduce(fresh)):
+                self._clauses.append(clause)
+                colouring.add(clause)
+            partition = colouring.solve()
+        return partition
 
     def figures(self) -> dict[str, float]:
         return {
@@ -84,33 +137,6 @@ class _Search:
             "symmetries": len(self._symmetries),
         }
 
-    def _with_size(self, colouring: Colouring, parts: Sequence[_Part]) -> Partition | None:
-        """A language with this many words, or None if there is none."""
-        for clause in self._clauses:
-            colouring.add(clause)
-        partition = colouring.solve()
-        clean = position = 0
-        word = np.zeros(len(self._job.candidates.rows), np.int64)
-        while partition is not None and clean < len(parts):
-            self._rounds += 1
-            word[list(partition)] = list(partition.values())
-            fresh = parts[position].clauses(word)
-            position = (position + 1) % len(parts)
-            self._job.progress(
-                f"{self.size} words: round {self._rounds}, {len(self._clauses):,} clauses"
-                + (f", at most {len(set(self._job.incumbent.values()))} needed" if self._job.incumbent else "")
-            )
-            if not fresh:
-                clean += 1
-                continue
-            clean = 0
-            self._found += len(fresh)
-            for clause in self._images(reduce(fresh)):
-                self._clauses.append(clause)
-                colouring.add(clause)
-            partition = colouring.solve()
-        return partition
-
     def _images(self, clauses: Iterable[Clause]) -> Iterable[Clause]:
         """New clauses with their images under the symmetries."""
         for clause in clauses:
@@ -119,6 +145,10 @@ class _Search:
                 if image not in self._known:
                     self._known.add(image)
                     yield image
+
+
+class _Impatient(Exception):
+    """A number of words is not decided yet, and others may be easier."""
 
 
 class _Part:
@@ -145,8 +175,9 @@ def _parts(spaces: Sequence[PlanSpace], random: Random) -> list[_Part]:
         goals = list(range(len(space.goals)))
         random.shuffle(goals)
         goal_of_start = space.goal[space.starts]
-        for number in range(min(_PARTS, len(goals))):
-            mine = np.isin(goal_of_start, goals[number::_PARTS])
+        count = min(len(goals), max(_PARTS, len(space.starts) // _TASKS))
+        for number in range(count):
+            mine = np.isin(goal_of_start, goals[number::count])
             parts.append(_Part(space, index, np.unique(space.starts[mine])))
     return parts
 

@@ -47,13 +47,13 @@ CORRIDOR_TASK = """
   (:goal (and (at r1 c) (at r2 a))))
 """
 
-#: Partners (positive formulas), an effect that only a partner brings about, an action without effects, a disjunction.
+#: Partners (positive formulas) that would interfere if the formula did not link them, an effect that only a partner brings about, an action without effects, a disjunction.
 PARTNERS = """
 (define (domain partners)
   (:types robot table)
   (:predicates (high ?t - table) (open) (tired ?r - robot) (dirty ?t - table) (spare))
   (:action lift :agent ?r - robot :parameters (?t - table)
-    :precondition (and (not (tired ?r)) (exists (?o - robot) (and (not (= ?o ?r)) (lift ?o ?t))))
+    :precondition (and (not (tired ?r)) (not (high ?t)) (exists (?o - robot) (and (not (= ?o ?r)) (lift ?o ?t))))
     :effect (and (high ?t) (tired ?r)))
   (:action press :agent ?r - robot :parameters () :precondition () :effect ())
   (:action enter :agent ?r - robot :parameters ()
@@ -101,15 +101,15 @@ RELAY_TASK = """
 BLINK = """
 (define (domain blink)
   (:types robot)
-  (:predicates (lamp) (ready ?r - robot) (seen))
-  (:action flash :agent ?r - robot :parameters () :precondition (ready ?r)
+  (:predicates (lamp) (ready ?r - robot) (seen) (switcher ?r - robot))
+  (:action flash :agent ?r - robot :parameters () :precondition (and (ready ?r) (not (switcher ?r)))
     :effect (and (not (lamp)) (when (seen) (lamp)) (not (ready ?r))))
-  (:action switch :agent ?r - robot :parameters () :precondition (ready ?r)
+  (:action switch :agent ?r - robot :parameters () :precondition (and (ready ?r) (switcher ?r))
     :effect (and (lamp) (not (ready ?r)))))
 """
 BLINK_TASK = """
 (define (problem blink-1) (:domain blink) (:objects r1 r2 - robot)
-  (:init (ready r1) (ready r2) (lamp))
+  (:init (ready r1) (ready r2) (lamp) (switcher r1))
   (:goal (and (lamp) (not (ready r1)) (not (ready r2)))))
 """
 
@@ -149,8 +149,21 @@ TOOL_TASK = """
 (define (problem tool-1) (:domain tool) (:objects r1 r2 - robot) (:init (free)) (:goal (and (done r1) (done r2))))
 """
 
+#: Only a negative formula keeps the two from singing at once.
+SOLO = """
+(define (domain solo)
+  (:types robot)
+  (:predicates (done ?r - robot))
+  (:action sing :agent ?r - robot :parameters ()
+    :precondition (forall (?o - robot) (not (sing ?o))) :effect (done ?r)))
+"""
+SOLO_TASK = """
+(define (problem solo-1) (:domain solo) (:objects r1 r2 - robot) (:init) (:goal (and (done r1) (done r2))))
+"""
+
 MODELS = {
     "tool": (TOOL, TOOL_TASK),
+    "solo": (SOLO, SOLO_TASK),
     "corridor": (CORRIDOR, CORRIDOR_TASK),
     "partners": (PARTNERS, PARTNERS_TASK),
     "relay": (RELAY, RELAY_TASK),
@@ -224,6 +237,7 @@ def test_the_models_are_not_trivial() -> None:
     read_all = {name: read(*texts, "makespan+actions") for name, texts in MODELS.items()}
     assert {name: ours(loaded.model, loaded.tasks[0]) for name, loaded in read_all.items()} == {
         "tool": (3, 3),
+        "solo": (2, 2),
         "corridor": (6, 6),
         "partners": (6, 11),
         "relay": (2, 3),

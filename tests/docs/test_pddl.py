@@ -1,0 +1,98 @@
+"""docs/pddl.md: its table of what is not supported, and that each rule is shown by an example that is run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from coordlang.cli import run
+from planners.errors import Unsupported
+from planners.model import build
+from planners.pddl import parse_domain, parse_problem
+from planners.pddl.sexpr import Source
+from tests.docs.pages import DOCS, ROOT, blocks, code, links, rows, sections
+
+PAGE = DOCS / "pddl.md"
+REFUSED = rows(sections(PAGE)["What is not supported"])
+#: The sections that give rules of joint steps.
+RULES = [
+    "Before and after", "Interference", "Action formulas", "Linked actions", "Conditional effects", "Idling", "Following",
+    "Concurrency networks", "Joint-action PDDL",
+]  # fmt: skip
+
+
+def texts(where: str = "", example: str = "") -> tuple[str, str]:
+    """A domain and a problem with an example in one place."""
+    parts = {"section": "", "condition": "(p)", "effect": "(p)", "init": "(p)"}
+    assert not where or where in parts, where
+    parts |= {where: example} if where else {}
+    return (
+        f"""(define (domain d) (:types robot) (:predicates (p) (q ?x)) (:functions (f) (total-cost)) {parts["section"]}
+        (:action a :agent ?r - robot :precondition {parts["condition"]} :effect {parts["effect"]}))""",
+        f"(define (problem p) (:domain d) (:objects r1 - robot) (:init {parts['init']}) (:goal (p)))",
+    )
+
+
+def load(domain: str, problem: str) -> None:
+    lifted = parse_domain(Source("domain", domain))
+    build(lifted, [parse_problem(Source("problem", problem), lifted)])
+
+
+def test_without_an_example_nothing_is_refused() -> None:
+    load(*texts())
+    assert len(REFUSED) >= 19
+
+
+@pytest.mark.parametrize("cells", REFUSED, ids=lambda cells: cells[0])
+def test_what_is_not_supported(cells: list[str]) -> None:
+    with pytest.raises(Unsupported) as error:
+        load(*texts(cells[2], code(cells[1])[0]))
+    assert error.value.what == cells[3]
+    assert error.value.exit_code == 34
+    place = error.value.place
+    assert place is not None
+    assert place.file == ("problem" if cells[2] == "init" else "domain")
+    assert place.line > 0
+
+
+def test_an_unknown_section_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    domain, problem = texts("section", "(:observe (p))")
+    (tmp_path / "d.pddl").write_text(domain)
+    (tmp_path / "p.pddl").write_text(problem)
+    assert run(["inspect", str(tmp_path / "d.pddl"), str(tmp_path / "p.pddl")]) == 31
+    assert "unknown section ':observe'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_each_rule_is_shown(rule: str) -> None:
+    """Both that something is a joint step and that something is not, where the section shows steps."""
+    shown = [b.text for b in blocks(PAGE) if b.kind == "output" and b.text in sections(PAGE)[rule]]
+    assert any(line.startswith("yes: ") for text in shown for line in text.splitlines())
+    assert rule == "Conditional effects" or any(line.startswith("no: ") for text in shown for line in text.splitlines())
+
+
+def test_every_answer_is_compared() -> None:
+    """Each Python block that asks is followed by its output."""
+    kinds = [(b.kind, "ask(" in b.text and "def ask(" not in b.text) for b in blocks(PAGE)]
+    asking = [n for n, (kind, asks) in enumerate(kinds) if kind == "python" and asks]
+    assert len(asking) >= 14
+    assert all(kinds[n + 1][0] == "output" for n in asking)
+
+
+def test_each_example_domain_is_of_its_dialect() -> None:
+    """The files that the table of dialects points to are read as what it says."""
+    styles = {}
+    for cells in rows(sections(PAGE)["Dialects"]):
+        for target in [t for t in links(PAGE) if t in cells[2] and t.endswith(".pddl")]:
+            text = (PAGE.parent / target).resolve().relative_to(ROOT)
+            domain = parse_domain(Source(str(text), (ROOT / text).read_text()))
+            agents = any(schema.agent is not None for schema in domain.schemas)
+            styles[cells[0]] = (domain.is_joint_action, agents, bool(domain.types))
+    assert styles == {
+        "plain PDDL, typed": (False, False, True),
+        "plain PDDL, untyped": (False, False, False),
+        "joint-action PDDL": (True, False, True),
+        "MA-PDDL": (False, True, True),
+        "action formulas (Kovacs 2012)": (False, True, True),
+    }
