@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.conftest import Outcome, coordlang  # noqa: F401
+from tests.cli.conftest import Command, coordlang  # noqa: F401
 
 DOMAIN = """(define (domain hall)
   (:requirements :typing)
@@ -146,9 +146,6 @@ CASES = {
     "an empty action": Case(2, with_action("wait :agent ?r - robot")),
     "empty parentheses": Case(2, with_action("wait :agent ?r - robot :parameters () :precondition () :effect ()")),
     "keywords alone": Case(2, with_action("wait :agent ?r - robot :parameters () :precondition :effect")),
-    "an empty action that is not always possible": Case(3, with_action(
-        "wait :agent ?r - robot :precondition (exists (?x - room) (and (at ?r ?x) (door ?x ?x)))"),
-        problem(("(:init", "(:init (door b b)"), (GOAL, "(and (at r1 b))"))) if False else Case(2),
     # formulas
     "an empty goal": Case(1, problem=goal("()")),
     "a goal without conjuncts": Case(1, problem=goal("(and)")),
@@ -182,8 +179,7 @@ CASES = {
         ("a b c", "at go door"), ("r1 a)", "r1 at)"), ("r2 b)", "r2 go)"), ("(door a b) (door b a) (door b c) (door c b)",
         "(door at go) (door go at) (door go door) (door door go)"), ("(at r1 c) (at r2 a)", "(at r1 door) (at r2 at)"))),
     "a predicate named like a type": Case(2, DOMAIN.replace("(door", "(room"), PROBLEM.replace("(door", "(room")),
-    "names with all kinds of signs": Case(2, problem=PROBLEM.replace("r1", "1r.1_+@x,'") and problem(
-        ("r1", "1r.1_+@x,'"))),
+    "names with all kinds of signs": Case(2, problem=problem(("r1", "1r.1_+@x,'"))),
     "numbers as names": Case(2, problem=problem(
         ("r1 r2 - robot", "1 2 - robot"), ("(at r1", "(at 1"), ("(at r2", "(at 2"))),
     "upper case": Case(2, DOMAIN.upper(), PROBLEM.upper()),
@@ -206,9 +202,9 @@ CASES = {
 
 #: Cases that are wrong today.  Strict: whoever mends one moves it up to CASES.
 WRONG = {
-    "untyped agent before typed parameters": Case(2, domain((":agent ?r - robot", ":agent ?r")), options=()),
+    "untyped agent before typed parameters": Case(2, domain((":agent ?r - robot", ":agent ?r"))),
     "= among the predicates": Case(2, change(
-        where("(not (= ?x ?y))"), ("(door ?x ?y - room)", "(door ?x ?y - room) (= ?x ?y)")), problem()),
+        where("(= ?r ?r)"), ("(door ?x ?y - room)", "(door ?x ?y - room) (= ?x ?y)"))),
     "costs whose sum passes 2^63": Case((31, "cost"), COSTLY, change(
         COSTLY_PROBLEM, (" 3)", f" {9 * 10**18})"), ("b a) 1", f"b a) {9 * 10**18}")), ("--cost", "makespan+cost")),
     "a cost above 2^63": Case((31, "cost"), COSTLY, change(COSTLY_PROBLEM, (" 3)", f" {10**20})")), ("--cost", "makespan+cost")),
@@ -231,11 +227,11 @@ WRONG = {
 }  # fmt: skip
 
 
-def _run(case: Case, command: object, folder: Path) -> None:
+def _run(case: Case, command: Command, folder: Path) -> None:
     d, p = folder / "d.pddl", folder / "p.pddl"
     d.write_bytes(case.domain.encode())
     p.write_bytes(case.problem.encode())
-    outcome: Outcome = command("plans", d, p, "--count", *case.options)  # type: ignore[operator]
+    outcome = command("plans", d, p, "--count", *case.options)
     if isinstance(case.expected, int):
         assert (outcome.code, outcome.out) == (0, f"{case.expected}\n"), outcome.err
     else:
@@ -245,11 +241,11 @@ def _run(case: Case, command: object, folder: Path) -> None:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_odd(name: str, coordlang: object, tmp_path: Path) -> None:  # noqa: F811
+def test_odd(name: str, coordlang: Command, tmp_path: Path) -> None:  # noqa: F811
     _run(CASES[name], coordlang, tmp_path)
 
 
 @pytest.mark.xfail(strict=True, reason="known to be wrong")
 @pytest.mark.parametrize("name", WRONG)
-def test_wrong_today(name: str, coordlang: object, tmp_path: Path) -> None:  # noqa: F811
+def test_wrong_today(name: str, coordlang: Command, tmp_path: Path) -> None:  # noqa: F811
     _run(WRONG[name], coordlang, tmp_path)

@@ -47,7 +47,8 @@ CORRIDOR_TASK = """
   (:goal (and (at r1 c) (at r2 a))))
 """
 
-#: Partners (positive formulas) that would interfere if the formula did not link them, an effect that only a partner brings about, an action without effects, a disjunction.
+#: Partners (positive formulas) that would interfere if the formula did not link them, an effect that only a partner
+#: brings about, an action without effects, a disjunction.
 PARTNERS = """
 (define (domain partners)
   (:types robot table)
@@ -105,7 +106,8 @@ BLINK = """
   (:action flash :agent ?r - robot :parameters () :precondition (and (ready ?r) (not (switcher ?r)))
     :effect (and (not (lamp)) (when (seen) (lamp)) (not (ready ?r))))
   (:action switch :agent ?r - robot :parameters () :precondition (and (ready ?r) (switcher ?r))
-    :effect (and (lamp) (not (ready ?r)))))
+    :effect (and (lamp) (not (ready ?r))))
+  (:action look :agent ?r - robot :parameters () :precondition (not (ready ?r)) :effect (seen)))
 """
 BLINK_TASK = """
 (define (problem blink-1) (:domain blink) (:objects r1 r2 - robot)
