@@ -18,7 +18,7 @@ class Footprint:
 
     Every literal left after grounding counts as required, also inside disjunctions and effect conditions;
     conditional effects count as if they fired; an atom both deleted and added counts as added.  ``partners`` are the
-    actions that a positive literal of a precondition or effect condition names, ``excluded`` those that its
+    actions that a positive literal of a precondition or effect condition or a network names, ``excluded`` those that its
     precondition as a whole forbids.
     """
 
@@ -41,7 +41,7 @@ def footprint(action: GroundAction) -> Footprint:
         requires_false=frozenset(a for a, positive in literals if not positive and isinstance(a, Atom)),
         adds=adds,
         deletes=frozenset(e.atom for e in action.effects if not e.adds) - adds,
-        partners=frozenset(a for a, positive in literals if positive and isinstance(a, StepAtom)),
+        partners=action.links | {a for a, positive in literals if positive and isinstance(a, StepAtom)},
         excluded=frozenset(
             part.part
             for part in conjuncts(action.precondition)

@@ -14,7 +14,15 @@ from planners.grounding.networks import apply_network
 from planners.joint import IDLE, Cost, Goal, JointModel, show
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import TRUE, Atom, Domain, Problem, StepAtom
-from planners.robots import RobotChoice, Team, find_team, fluent_predicates, natural, static_atoms
+from planners.robots import (
+    RobotChoice,
+    Team,
+    find_team,
+    fluent_predicates,
+    natural,
+    static_atoms,
+    without_idle_environment,
+)
 from planners.states import Rows, StateCodec
 from planners.whole import WholeActions
 
@@ -76,6 +84,7 @@ def build(
     extra = {atom for problem in problems for atom in problem.init} | set(also)
     actions = ground_actions(domain, first, team, also=extra, costs=options.cost == "makespan+cost")
     actions = apply_network(domain, first, actions)
+    team = without_idle_environment(team, (i for action in actions for i in action.owners))
     model = _joint_model(domain, problems, team, actions, extra, options)
     tasks = tuple(task_of(model, domain, problem) for problem in problems)
     return Loaded(domain, tuple(problems), model, tasks, options, team)
@@ -139,7 +148,8 @@ def _joint_model(
     )
     stepper: Composition | WholeActions
     if domain.is_joint_action:
-        stepper = WholeActions(codec, evaluator, robots, labels, actions, options.cost)
+        place = Place(domain.source.name)
+        stepper = WholeActions(codec, evaluator, robots, labels, actions, options.cost, place)
     else:
         stepper = Composition(codec, evaluator, robots, subactions, keeps_idle, options.cost)
     return JointModel(

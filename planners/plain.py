@@ -173,6 +173,7 @@ def _clashes(actions: Sequence[GroundAction]) -> tuple[frozenset[int], ...]:
                 readers[leaf, positive].add(n)
             elif positive and leaf in number:
                 named.add(frozenset((n, number[leaf])))
+        named |= {frozenset((n, number[link])) for link in action.links if link in number}
         for part in _conjuncts(action.precondition):
             if isinstance(part, Not) and isinstance(part.part, StepAtom) and part.part in number:
                 forbidden.add(frozenset((n, number[part.part])))

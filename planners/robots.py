@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from planners.errors import BadInput, Place, UsageError
-from planners.pddl.lifted import Atom, Domain, Problem, Schema
+from planners.pddl.lifted import And, Atom, Domain, Problem, Schema
 
 Unowned = Literal["error", "environment", "shared"]
 
@@ -50,7 +50,8 @@ class Team:
         ``unowned`` names; empty if nobody.
         """
         if schema.agent is not None:
-            return (self.robots.index(args[schema.agent]),)
+            agent = args[schema.agent]
+            return (self.robots.index(agent),) if agent in self.robots else ()
         found = tuple(sorted({self.robots.index(arg) for arg in args if arg in self.robots}))
         if found or self.unowned == "error":
             return found
@@ -88,6 +89,11 @@ def find_team(domain: Domain, problem: Problem, choice: RobotChoice) -> Team:
                 f"--robots {','.join(choice.names)} contradicts the domain",
                 remedy=f"The robots are {', '.join(robots)} (by {by}).",
             )
+        if choice.type:
+            raise UsageError(
+                f"--robot-type {choice.type}: the domain says itself who the robots are",
+                remedy=f"The robots are {', '.join(robots)} (by {by}).",
+            )
     elif choice.names:
         for name in choice.names:
             if name not in problem.objects:
@@ -107,20 +113,49 @@ def find_team(domain: Domain, problem: Problem, choice: RobotChoice) -> Team:
             place=Place(problem.source.name),
             remedy=f"Robots are found by {by}; declare at least one such object.",
         )
-    if choice.unowned == "environment" and _has_unowned(domain, robots):
+    if choice.unowned == "environment" and any(s.agent is None and not s.parts for s in domain.schemas):
+        if ENVIRONMENT in problem.objects:
+            raise UsageError(
+                f"--unowned environment: an object of this problem is called {ENVIRONMENT!r} already",
+                remedy="Rename the object.",
+            )
         robots = (*robots, ENVIRONMENT)
     return Team(robots, by, choice.unowned)
+
+
+def without_idle_environment(team: Team, owners: Iterable[int]) -> Team:
+    """The team without the environment if it owns no ground action."""
+    if team.robots[-1] != ENVIRONMENT or len(team.robots) - 1 in set(owners):
+        return team
+    return replace(team, robots=team.robots[:-1])
 
 
 def _declared(domain: Domain, problem: Problem) -> tuple[tuple[str, ...], str] | None:
     if domain.is_joint_action:
         names = {part.robot for schema in domain.schemas for part in schema.parts}
         return tuple(sorted(names, key=natural)), "subaction comments"
-    agents = [schema.parameters[schema.agent] for schema in domain.schemas if schema.agent is not None]
-    if not agents:
+    acting = [schema for schema in domain.schemas if schema.agent is not None]
+    if not acting:
         return None
-    types = tuple(sorted({t for agent in agents for t in agent.types}))
-    return objects_of(domain, problem, types), f":agent of type {', '.join(types)}"
+    robots = {name for schema in acting for name in _possible_agents(domain, problem, schema)}
+    types = sorted({t for schema in acting for t in schema.parameters[schema.agent or 0].types})
+    return tuple(sorted(robots, key=natural)), f":agent of type {', '.join(types)}"
+
+
+def _possible_agents(domain: Domain, problem: Problem, schema: Schema) -> tuple[str, ...]:
+    """The objects of the agent's type; in untyped domains those that its static type predicates hold for."""
+    agent = schema.parameters[schema.agent or 0]
+    objects = objects_of(domain, problem, agent.types)
+    if agent.types != ("object",):
+        return objects
+    changed = fluent_predicates(domain)
+    parts = schema.precondition.parts if isinstance(schema.precondition, And) else (schema.precondition,)
+    kinds = {
+        part.predicate
+        for part in parts
+        if isinstance(part, Atom) and part.args == (agent.name,) and part.predicate not in changed
+    }
+    return tuple(o for o in objects if all(Atom(kind, (o,)) in problem.init for kind in kinds))
 
 
 def _of_kind(domain: Domain, problem: Problem, kind: str) -> tuple[str, ...]:
@@ -148,7 +183,7 @@ def _detect(domain: Domain, problem: Problem) -> tuple[tuple[str, ...], str]:
 
 
 def _candidates(domain: Domain, problem: Problem) -> list[str]:
-    """The most specific types (or unary type predicates) of which every action takes an object."""
+    """The most specific types of which every action takes an object."""
     found = [
         kind
         for kind in sorted(domain.types)
@@ -159,11 +194,6 @@ def _candidates(domain: Domain, problem: Problem) -> list[str]:
         )
     ]
     return [kind for kind in found if not any(other != kind and kind in domain.supertypes(other) for other in found)]
-
-
-def _has_unowned(domain: Domain, robots: tuple[str, ...]) -> bool:
-    """Whether some schema might be grounded without a robot (decided finally at grounding)."""
-    return any(schema.agent is None and not schema.parts for schema in domain.schemas)
 
 
 def static_atoms(domain: Domain, problem: Problem) -> frozenset[Atom]:

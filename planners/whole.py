@@ -8,7 +8,7 @@ import numpy as np
 
 from planners.composition import cost_of, split
 from planners.conditions import Evaluator
-from planners.errors import BadInput
+from planners.errors import BadInput, Place
 from planners.grounding import GroundAction, GroundEffect
 from planners.joint import Cost, Steps
 from planners.matching import Ints, Matcher
@@ -31,7 +31,9 @@ class WholeActions:
         labels: Sequence[Sequence[str]],
         actions: Sequence[GroundAction],
         cost: Cost,
+        place: Place | None = None,
     ) -> None:
+        self._place = place
         self._codec, self._evaluator, self._robots = codec, evaluator, tuple(robots)
         self._names, self._actions = [tuple(own) for own in labels], tuple(actions)
         numbers = [{text: n for n, text in enumerate(own)} for own in labels]
@@ -70,7 +72,8 @@ class WholeActions:
         for number, effects in self._conditional.items():
             result = self._fire(rows, row, operator, number, effects, result)
         labels = self._labels[operator]
-        order = np.lexsort((*labels.T[::-1], row))
+        # Of joint actions with the same parts the cheapest comes first, and is kept.
+        order = np.lexsort((self._cost[operator], *labels.T[::-1], row))
         row, labels, result = row[order], labels[order], result[order]
         cost, operator = self._cost[operator[order]], operator[order]
         same = np.zeros(len(row), np.bool_)
@@ -80,6 +83,7 @@ class WholeActions:
             first, second = (self._actions[operator[differs[0] + k]] for k in (0, 1))
             raise BadInput(
                 f"{first.label} and {second.label} have the same subactions but different results",
+                place=self._place,
                 remedy="The subactions of a joint action must determine what it does: rename one of them.",
             )
         keep = ~same

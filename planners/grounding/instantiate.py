@@ -47,7 +47,8 @@ class GroundAction:
 
     ``owners`` are the indices of the robots that choose it together; for joint-action PDDL they are all robots and
     ``parts`` holds each robot's own label (None: idle).  ``cost`` is the PDDL action cost.  ``does_nothing`` says that
-    the action is as good as idling: it has no effect and no formula of the domain names it.
+    the action is as good as idling: it has no effect, no cost that is counted, and no formula or network names it.
+    ``links`` are the actions that a concurrency network joins it with: they are meant to be done together.
     """
 
     schema: str
@@ -58,6 +59,7 @@ class GroundAction:
     parts: tuple[str | None, ...] = ()
     cost: int = 1
     does_nothing: bool = False
+    links: frozenset[StepAtom] = frozenset()
 
     @property
     def label(self) -> str:
@@ -140,7 +142,7 @@ class _Grounder:
             effects=effects,
             parts=self._parts(schema, binding),
             cost=cost,
-            does_nothing=not effects and schema.name not in self._named,
+            does_nothing=not effects and schema.name not in self._named and not (costs and cost),
         )
 
     def formula(self, f: Formula, binding: Binding, positive: bool, acting: tuple[int, ...] = ()) -> Formula:

@@ -59,21 +59,30 @@ def _bound(
     keys: Sequence[tuple[str, tuple[str, ...]]],
 ) -> GroundAction:
     parts: list[Formula] = []
+    links: set[StepAtom] = set()
     for name, binding in keys:
         constraint = by_name[name]
         others = _by_robot(groups[name, binding], action)
         if constraint.low > 1:
             parts.append(_some(others, constraint.low - 1))
+            links |= {atom for own in others for atom in own}
         if constraint.high is not None:
             parts += _not_more(others, constraint.high)
         for needed, by in domain.dependences:
-            if by == name and (needed, binding) not in keys:
-                parts.append(_some(_by_robot(groups.get((needed, binding), []), action), 1))
-    if not parts:
+            if by != name:
+                continue
+            helpers = _by_robot(groups.get((needed, binding), []), action)
+            links |= {atom for own in helpers for atom in own}
+            if (needed, binding) not in keys:
+                parts.append(_some(helpers, 1))
+    if not parts and not links:
         return action
     own = action.precondition
     before = own.parts if isinstance(own, And) else () if own == TRUE else (own,)
-    return replace(action, precondition=And((*before, *parts)))
+    after = (*before, *parts)
+    return replace(
+        action, precondition=And(after) if len(after) != 1 else after[0], links=frozenset(links)
+    )
 
 
 def _by_robot(group: Sequence[GroundAction], action: GroundAction) -> list[list[StepAtom]]:

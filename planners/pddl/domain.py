@@ -61,6 +61,12 @@ def parse_domain(source: Source) -> Domain:
     schemas = tuple(_read_schema(names, item) for item in actions.values())
     _check_parts(document, schemas, actions)
     constraints, dependences = read_network(names, schemas, sections)
+    if constraints and any(schema.parts for schema in schemas):
+        raise document.fail(
+            "a concurrency network in a joint-action domain",
+            sections[":concurrency-constraint"][0],
+            "A joint action already says what every robot does.",
+        )
     return Domain(
         name, source, types, constants, names.predicates, names.functions, schemas, constraints, dependences
     )

@@ -84,13 +84,21 @@ def _join_domains(domains: list[Domain], source: Source) -> Domain:
         source=source,
         types={k: v for domain in domains for k, v in domain.types.items()},
         constants={k: v for domain in domains for k, v in domain.constants.items()},
-        predicates={
-            k: frozenset().union(*(d.predicates.get(k, frozenset()) for d in domains))
-            for domain in domains
-            for k in domain.predicates
-        },
+        predicates=_union([domain.predicates for domain in domains]),
+        functions=_union([domain.functions for domain in domains]),
         schemas=tuple(schemas.values()),
+        constraints=tuple(dict.fromkeys(c for domain in domains for c in domain.constraints)),
+        dependences=tuple(dict.fromkeys(d for domain in domains for d in domain.dependences)),
     )
+
+
+def _union(tables: list[dict[str, frozenset[int]]]) -> dict[str, frozenset[int]]:
+    """Names with all the numbers of arguments that they have in some file."""
+    joined: dict[str, frozenset[int]] = {}
+    for table in tables:
+        for name, arities in table.items():
+            joined[name] = joined.get(name, frozenset()) | arities
+    return joined
 
 
 def _join_problems(problems: list[Problem], domain: Domain, name: str) -> Problem:
@@ -98,7 +106,14 @@ def _join_problems(problems: list[Problem], domain: Domain, name: str) -> Proble
     objects: dict[str, tuple[str, ...]] = {}
     init: set[Atom] = set()
     goals: dict[Formula, None] = {}
+    values: dict[Atom, float] = {}
     for problem in problems:
+        for function, value in problem.values.items():
+            if values.setdefault(function, value) != value:
+                raise BadInput(
+                    f"{function.predicate} {' '.join(function.args)} has another value elsewhere",
+                    place=Place(problem.source.name),
+                )
         for obj, types in problem.objects.items():
             if objects.setdefault(obj, types) != types:
                 raise BadInput(f"object {obj!r} has other types elsewhere", place=Place(problem.source.name))
@@ -107,5 +122,10 @@ def _join_problems(problems: list[Problem], domain: Domain, name: str) -> Proble
     goal = next(iter(goals)) if len(goals) == 1 else And(tuple(goals))
     text = "\n".join(problem.source.text for problem in problems)
     return replace(
-        first, source=Source(name, text), objects=dict(sorted(objects.items())), init=frozenset(init), goal=goal
+        first,
+        source=Source(name, text),
+        objects=dict(sorted(objects.items())),
+        init=frozenset(init),
+        goal=goal,
+        values=values,
     )

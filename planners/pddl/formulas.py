@@ -68,7 +68,7 @@ def read_formula(names: Names, item: Expression) -> Formula:
     if head in _NUMERIC_TESTS:
         raise _unsupported(names, f"numeric condition '({head} ..)'", item)
     if head == "preference":
-        raise _unsupported(names, "preferences", item)
+        raise _unsupported(names, "a preference", item)
     if head in _TEMPORAL or (head == "at" and rest and _is_word(rest[0], "end", "start")):
         raise _unsupported(names, f"trajectory constraint '({head} ..)'", item)
     raise document.fail(f"unknown predicate {head!r}", item, known(names.predicates, head, "predicate"))

@@ -107,7 +107,7 @@ def test_wrong_problem(case: str, coordlang: Command, files: Files) -> None:
         ("(:derived (at ?r ?x) (at ?r ?x))", "derived predicates (axioms) (:derived) are not supported"),
         ("(:action x :parameters () :effect (increase (fuel) 1))", "numeric effect '(increase ..)' is not supported"),
         ("(:action x :parameters () :precondition (< 1 2))", "numeric condition '(< ..)' is not supported"),
-        ("(:action x :parameters () :precondition (preference q (and)))", "preferences is not supported"),
+        ("(:action x :parameters () :precondition (preference q (and)))", "a preference is not supported"),
     ],
 )
 def test_unsupported(insert: str, message: str, coordlang: Command, files: Files) -> None:

@@ -207,7 +207,8 @@ WRONG = {
         where("(= ?r ?r)"), ("(door ?x ?y - room)", "(door ?x ?y - room) (= ?x ?y)"))),
     "costs whose sum passes 2^63": Case((31, "cost"), COSTLY, change(
         COSTLY_PROBLEM, (" 3)", f" {9 * 10**18})"), ("b a) 1", f"b a) {9 * 10**18}")), ("--cost", "makespan+cost")),
-    "a cost above 2^63": Case((31, "cost"), COSTLY, change(COSTLY_PROBLEM, (" 3)", f" {10**20})")), ("--cost", "makespan+cost")),
+    "a cost above 2^63": Case((31, "cost"), COSTLY, change(
+        COSTLY_PROBLEM, (" 3)", f" {10**20})")), ("--cost", "makespan+cost")),
     "a cost of 400 digits": Case((31, "cost"), COSTLY, change(
         COSTLY_PROBLEM, (" 3)", f" {'9' * 400})")), ("--cost", "makespan+cost")),
     "a constant cost of 400 digits": Case((34, "d.pddl"), change(COSTLY, ("(far ?x ?y)))", f"{'9' * 400}))"))),
@@ -220,7 +221,8 @@ WRONG = {
         goal("(rung)"), ("r1", "environment")), ENVIRONMENT),
     "two variables behind :agent": Case((31, "d.pddl:5"), domain((":agent ?r - robot", ":agent ?r ?q - robot"))),
     "a comment about subactions": Case(2, domain((":precondition", "; subactions of one robot\n :precondition"))),
-    "a predicate called last": Case(2, DOMAIN.replace("(at ", "(last "), PROBLEM.replace("(at ", "(last "), ("--remember-actions",)),
+    "a predicate called last": Case(2, DOMAIN.replace("(at ", "(last "), PROBLEM.replace("(at ", "(last "), options=(
+        "--remember-actions",)),
     "types robot and agent": Case((31, "Several types"), change(PLAIN, ("robot room)", "robot room agent)")), problem(
         ("a b c - room", "a b c - room x - agent"))),
     "a value with the wrong number of arguments": Case((31, "p.pddl:3"), COSTLY, problem(("(:init", "(:init (= (far a) 3)"))),

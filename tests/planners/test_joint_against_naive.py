@@ -23,7 +23,7 @@ from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import And, Atom, Domain, Formula, Not, Problem
 from planners.pddl.sexpr import Source
 from planners.plans import Plans
-from planners.robots import RobotChoice, find_team
+from planners.robots import RobotChoice
 from planners.space import explore
 from planners.validate import State, validate
 
@@ -58,8 +58,7 @@ def _load(text: RandomModel, cost: str = "makespan") -> Loaded:
 
 def _twin(loaded: Loaded, text: RandomModel) -> Twin:
     domain, (problem,) = loaded.domain, loaded.problems
-    team = find_team(domain, problem, RobotChoice(unowned=text.unowned))
-    return Twin(domain, problem, team, loaded.model.keeps_idle, _MOST_TRIES)
+    return Twin(domain, problem, loaded.team, loaded.model.keeps_idle, _MOST_TRIES)
 
 
 def _key(state: State) -> list[str]:

@@ -13,8 +13,9 @@ from test_joint_against_naive import _check_model
 from planners.errors import BadInput
 from planners.model import Loaded, build
 from planners.pddl import parse_domain, parse_problem
-from planners.pddl.lifted import Domain
+from planners.pddl.lifted import Atom, Domain
 from planners.pddl.sexpr import Source
+from planners.rules import Rules
 
 ROWING = """(define (domain rowing) (:types robot boat place)
   (:predicates (on ?r - robot ?b - boat) (moored ?b - boat ?p - place) (lit))
@@ -125,3 +126,31 @@ def test_random_networks() -> None:
 
     compare()
     assert seen.get("several states", 0) >= 30, seen
+
+
+def test_an_action_that_satisfies_both_itself_is_still_linked() -> None:
+    """(v, w) dependent and `a` in both: it needs nobody, but it is meant to be done together with the others in v."""
+    domain = parse_domain(Source("d", """(define (domain d) (:types robot) (:predicates (p) (q) (n))
+      (:action a :agent ?r - robot :parameters () :effect (and (not (p)) (q)))
+      (:action b :agent ?r - robot :parameters () :precondition (p) :effect (n))
+      (:concurrency-constraint v :parameters () :bounds (1 inf) :actions ((a) (b)))
+      (:concurrency-constraint w :parameters () :bounds (1 inf) :actions ((a)))
+      (:positive-dependence v w))"""))  # fmt: skip
+    text = "(define (problem p) (:domain d) (:objects r1 r2 - robot) (:init (p)) (:goal (q)))"
+    problem = parse_problem(Source("p", text), domain)
+    loaded = build(domain, [problem])
+    steps = loaded.model.successors(loaded.tasks[0].init[None, :])
+    found = {loaded.model.texts(row) for row in steps.labels}
+    rules = Rules.of(domain, problem, loaded.team)
+    assert ("(a r1)", "(b r2)") in found
+    assert rules.broken_rule(frozenset({Atom("p", ())}), ("(a r1)", "(b r2)")) is None
+
+
+def test_a_network_of_joint_actions_is_refused() -> None:
+    text = """(define (domain d) (:predicates (p))
+      (:action x :parameters ()
+        ; subaction r1 (do)
+        :effect (p))
+      (:concurrency-constraint v :parameters () :bounds (2 2) :actions ((x))))"""
+    with pytest.raises(BadInput, match="a concurrency network in a joint-action domain"):
+        parse_domain(Source("d", text))
