@@ -1,14 +1,13 @@
 """Symmetries of a joint model: permutations of its states that map plans to plans and tasks to tasks.
 
-Found from the PDDL objects (networkx matches the graph of static facts with itself), not from any geometry, and checked on
-the ground actions, the states and the tasks before use.  The image of a failing tuple of plans fails too, so the image of
+Found from the PDDL objects (permutations that keep the static facts), not from any geometry, and checked on the ground
+actions, the states and the tasks before use.  The image of a failing tuple of plans fails too, so the image of
 a necessary clause is necessary.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import islice
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -17,14 +16,15 @@ from planners.joint import FullState, Goal, JointModel, show
 from planners.matching import Ints
 from planners.optimal import PlanSpace
 from planners.pddl.lifted import And, Atom, Domain, Not, Or, Problem, Truth
+from planners.robots import fluent_predicates, natural
 from planners.states import find_rows
 
 Renaming = Mapping[str, str]
 
 #: More symmetries than this are not used: each multiplies the clauses.
 MOST = 64
-#: Matchings looked at before giving up on finding more.
-_TRIED = 2_000
+#: Assignments of one object to another that are tried before giving up on finding more.
+_TRIED = 200_000
 
 
 def state_symmetries(candidates: Candidates) -> list[Ints]:
@@ -53,32 +53,87 @@ def state_symmetries(candidates: Candidates) -> list[Ints]:
 
 
 def _renamings(domain: Domain, problem: Problem) -> Iterator[Renaming]:
-    """Permutations of the objects that keep types, static facts and the domain's constants."""
-    import networkx as nx
-    from networkx.algorithms.isomorphism import DiGraphMatcher
+    """Permutations of the objects that keep types, static facts and the domain's constants.
 
-    fluents = {e.atom.predicate for schema in domain.schemas for e in schema.effects}
-    statics = [a for a in problem.init if a.predicate not in fluents]
-    graph = nx.DiGraph()
-    for name, types in problem.objects.items():
-        fixed = name if name in domain.constants else ""
-        unary = sorted(a.predicate for a in statics if a.args == (name,))
-        graph.add_node(name, colour=(fixed, tuple(sorted(types)), tuple(unary)))
-    labels: dict[tuple[object, object], list[str]] = {}
-    for number, atom in enumerate(sorted(statics, key=str)):
-        if len(atom.args) == 2:
-            labels.setdefault((atom.args[0], atom.args[1]), []).append(atom.predicate)
-        elif len(atom.args) > 2:  # a node of its own, joined to its arguments by their positions
-            graph.add_node(number, colour=("", ("fact",), (atom.predicate,)))
-            for position, arg in enumerate(atom.args):
-                labels.setdefault((arg, number), []).append(str(position))
-    for (a, b), names in labels.items():
-        graph.add_edge(a, b, label=tuple(sorted(names)))
-    matcher = DiGraphMatcher(
-        graph, graph, lambda a, b: a["colour"] == b["colour"], lambda a, b: a["label"] == b["label"]
-    )
-    for mapping in islice(matcher.isomorphisms_iter(), _TRIED):
-        yield {a: b for a, b in mapping.items() if isinstance(a, str)}
+    Backtracking over objects in the order in which facts join them, each among those that look alike; it gives up after
+    `_TRIED` assignments.
+    """
+    fluents = fluent_predicates(domain)
+    statics = {(a.predicate, *a.args) for a in problem.init if a.predicate not in fluents}
+    looks = _looks(domain, problem, statics)
+    order = _joined_order(problem.objects, statics)
+    position = {name: n for n, name in enumerate(order)}
+    # The facts that are complete once the object at a position is assigned.
+    complete: list[list[tuple[str, ...]]] = [[] for _ in order]
+    for fact in sorted(statics):
+        if len(fact) > 1:
+            complete[max(position[arg] for arg in fact[1:])].append(fact)
+    tried = 0
+    image: dict[str, str] = {}
+    open_choices = [iter(_alike(order[0], looks, image))] if order else []
+    while open_choices:
+        name = order[len(open_choices) - 1]
+        image.pop(name, None)
+        candidate = next(open_choices[-1], None)
+        tried += 1
+        if tried > _TRIED:
+            return
+        if candidate is None:
+            open_choices.pop()
+            continue
+        image[name] = candidate
+        here = complete[len(open_choices) - 1]
+        if any((fact[0], *(image[arg] for arg in fact[1:])) not in statics for fact in here):
+            continue
+        if len(open_choices) == len(order):
+            yield dict(image)
+        else:
+            open_choices.append(iter(_alike(order[len(open_choices)], looks, image)))
+
+
+def _alike(name: str, looks: dict[str, int], image: dict[str, str]) -> list[str]:
+    taken = set(image.values())
+    return [other for other in looks if looks[other] == looks[name] and other not in taken]
+
+
+def _looks(domain: Domain, problem: Problem, statics: set[tuple[str, ...]]) -> dict[str, int]:
+    """A number for each object, equal for those that types and static facts cannot tell apart (colour refinement)."""
+    start = {
+        name: (name if name in domain.constants else "", tuple(sorted(types)))
+        for name, types in problem.objects.items()
+    }
+    looks = _numbered(start)
+    while True:
+        seen: dict[str, list[tuple[object, ...]]] = {name: [] for name in looks}
+        for fact in statics:
+            colours = tuple(looks[arg] for arg in fact[1:])
+            for place, arg in enumerate(fact[1:]):
+                seen[arg].append((fact[0], place, *colours))
+        finer = _numbered({name: (looks[name], tuple(sorted(seen[name], key=str))) for name in looks})
+        if len(set(finer.values())) == len(set(looks.values())):
+            return finer
+        looks = finer
+
+
+def _numbered(keys: Mapping[str, object]) -> dict[str, int]:
+    numbers: dict[object, int] = {}
+    return {name: numbers.setdefault(keys[name], len(numbers)) for name in sorted(keys, key=natural)}
+
+
+def _joined_order(objects: Iterable[str], statics: set[tuple[str, ...]]) -> list[str]:
+    """Objects so that each, where possible, shares a fact with an earlier one: mistakes are then met early."""
+    near: dict[str, set[str]] = {name: set() for name in objects}
+    for fact in statics:
+        for arg in fact[1:]:
+            near[arg].update(fact[1:])
+    order: list[str] = []
+    waiting = sorted(near, key=natural)
+    while waiting:
+        joined = set().union(*(near[name] for name in order)) if order else set()
+        chosen = next((name for name in waiting if name in joined), waiting[0])
+        order.append(chosen)
+        waiting.remove(chosen)
+    return order
 
 
 def _keeps_actions(model: JointModel, renaming: Renaming) -> bool:

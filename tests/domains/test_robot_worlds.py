@@ -1,26 +1,307 @@
-"""The robot worlds: their README files are true, their languages hold, Fast Downward agrees, their pictures exist."""
+"""The worlds that are no maps: their rules hold in every step, and what their README files say is true."""
 
 from __future__ import annotations
 
 import re
-import shlex
 import sys
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from functools import cache
-from itertools import pairwise
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
-from click.testing import CliRunner
 
-from coordlang.build import build_language
-from coordlang.cli.app import cli
+from coordlang.build import Inseparable, build_language
+from coordlang.language import WordTable
 from coordlang.tasks import Candidates, all_pairs, from_listed, from_problems, read_task_file
+from coordlang.verify import verify
 from coordlang.witness import miscoordination
 from planners.fast_downward import optimal_cost
 from planners.joint import Cost
-from planners.model import Loaded, ModelOptions, load
+from planners.model import ModelOptions, load
 from planners.optimal import search
-from planners.plans import Plans
 from planners.pddl import read_domain, read_problem
-from planners.space import explore
+from planners.plans import Plans
+from planners.space import Space
+
+ROOT = Path(__file__).resolve().parents[2]
+DOMAINS = ROOT / "domains"
+sys.path.insert(0, str(ROOT))  # this folder is no package, so pytest does not do it
+
+from tests.docs.pages import blocks, commands, links  # noqa: E402
+from tests.docs.test_run import run_command  # noqa: E402
+
+#: How the robots are found, and the schemas that show what the world is there for.
+WORLDS = {
+    "handover": "type robot",
+    "two-arms": "type robot",
+    "push-box": ":agent of type robot",
+    "tray": ":agent of type robot",
+    "vans": ":agent of type driver, van",
+    "lock": ":agent of type robot",
+    "charger": ":agent of type robot",
+    "elevator": "type robot",
+}
+
+Row = dict[str, str]
+
+
+def tables(folder: str, first: str) -> Iterator[Row]:
+    """The rows of the README tables whose first column is ``first``."""
+    text = (DOMAINS / folder / "README.md").read_text()
+    for table in re.findall(rf"^\| {first} \|.*\n(?:\|.*\n)+", text, re.MULTILINE):
+        columns, _, *rows = ([cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines())
+        yield from (dict(zip(columns, row, strict=True)) for row in rows)
+
+
+PROBLEMS = [(folder, row) for folder in WORLDS for row in tables(folder, "problem")]
+LANGUAGES = [(folder, row) for folder in WORLDS for row in tables(folder, "language for")]
+by_problem = pytest.mark.parametrize(
+    ("folder", "row"), [pytest.param(f, r, id=f"{f}-{r['problem']}") for f, r in PROBLEMS]
+)
+by_language = pytest.mark.parametrize(
+    ("folder", "row"), [pytest.param(f, r, id=f"{f}-{r['language for']}-{r['--tasks']}") for f, r in LANGUAGES]
+)
+by_world = pytest.mark.parametrize("folder", WORLDS)
+
+
+# What the README files say
+
+
+@by_problem
+def test_the_table_of_problems(world, folder: str, row: Row) -> None:
+    here = world(folder, row["problem"])
+    assert len(here.loaded.model.robots) == int(row["robots"])
+    assert len(here.space) == int(row["states"])
+    assert here.plans.cost_of(0)[0] == int(row["makespan"])
+    assert Plans.of(here.plans).count == int(row["optimal plans"])
+    assert plans_under(folder, row["problem"], "makespan+actions") == int(row["with fewest actions"])
+    if "with least fuel" in row:
+        assert plans_under(folder, row["problem"], "makespan+cost") == int(row["with least fuel"])
+    required = miscoordination(here.plans, 0) is not None
+    assert row["coordination"] == ("required" if required else "not required")
+
+
+def plans_under(folder: str, problem: str, cost: Cost) -> int:
+    loaded = load(*files(folder, problem), ModelOptions(cost=cost))
+    return Plans.of(search(loaded.model, loaded.tasks[0])).count
+
+
+def files(folder: str, problem: str) -> tuple[Path, list[Path]]:
+    return DOMAINS / folder / "domain.pddl", [DOMAINS / folder / f"{problem}.pddl"]
+
+
+def candidates(folder: str, row: Row) -> Candidates:
+    """The tasks of a row about a language."""
+    path, (problem_path,) = files(folder, row["language for"])
+    domain = read_domain(path)
+    problems = [read_problem(problem_path, domain)]
+    words = row["options"].split()
+    cost = words[words.index("--cost") + 1] if "--cost" in words else "makespan"
+    options = ModelOptions(cost=cost, remember_actions="--remember-actions" in words)  # type: ignore[arg-type]
+    assert len(words) == 2 * ("--cost" in words) + options.remember_actions
+    match row["--tasks"]:
+        case "all":
+            return all_pairs(domain, problems, options)
+        case "its own":
+            return from_problems(domain, problems, options)
+        case name:
+            return from_listed(domain, problems, read_task_file(DOMAINS / folder / name), options)
+
+
+@by_language
+def test_the_table_of_languages(folder: str, row: Row) -> None:
+    tasks = candidates(folder, row)
+    assert tasks.count == int(row["tasks"])
+    for method in ("greedy", "minimal"):
+        built = build_language(tasks, method)
+        guarantee = built.language.guarantee
+        assert built.alphas.requiring == int(row["requiring coordination"])
+        assert guarantee.size == int(row[f"{method} words"])
+        assert guarantee.proved_minimal or method == "greedy"
+        assert verify(WordTable.of(built.language, tasks.model), tasks.spaces).holds
+
+
+@by_world
+def test_the_commands_in_the_readme(folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "domains").symlink_to(DOMAINS)
+    monkeypatch.chdir(tmp_path)
+    page = DOMAINS / folder / "README.md"
+    run = [command for block in blocks(page) if block.kind == "console" for command in commands(block)]
+    assert {command.text.split()[1] for command in run} == {"coordination", "build", "verify"}
+    for command in run:
+        run_command(command, folder, monkeypatch)
+
+
+@by_world
+def test_the_picture(folder: str) -> None:
+    page = DOMAINS / folder / "README.md"
+    assert f"{folder}.svg" in links(page)
+    root = ElementTree.parse(DOMAINS / folder / f"{folder}.svg").getroot()
+    shown = [element.text for element in root.iter("{http://www.w3.org/2000/svg}text")]
+    title = root.findtext("{http://www.w3.org/2000/svg}title") or ""
+    name, _, problem = title.partition(": ")
+    assert name == folder
+    # Every robot carries its name, so that no colour has to be told from another one.
+    assert set(load(*files(folder, problem)).model.robots) <= set(shown)
+
+
+@by_world
+def test_there_is_a_problem_of_each_kind(folder: str) -> None:
+    rows = [row for other, row in PROBLEMS if other == folder]
+    assert {row["coordination"] for row in rows} == {"required", "not required"}
+    assert 2 <= len(rows) <= 4
+    assert all(10 <= int(row["states"]) <= 2000 for row in rows)
+
+
+# Fast Downward
+
+
+@pytest.mark.parametrize(
+    ("folder", "problem"),
+    [
+        pytest.param(folder, row["problem"], id=f"{folder}-{row['problem']}", marks=[] if first else pytest.mark.slow)
+        for (folder, row), first in zip(
+            PROBLEMS, [n == 0 or PROBLEMS[n - 1][0] != f for n, (f, _) in enumerate(PROBLEMS)], strict=True
+        )
+    ],
+)
+def test_fast_downward_agrees(folder: str, problem: str) -> None:
+    loaded = load(*files(folder, problem), ModelOptions(cost="makespan+actions"))
+    ours = search(loaded.model, loaded.tasks[0]).cost_of(0)
+    assert optimal_cost(loaded.model, loaded.tasks[0], time_limit=60).cost == ours
+
+
+@pytest.mark.parametrize(("problem", "fuel"), [("one-van", 5), ("two-each", 6)])
+def test_fast_downward_agrees_about_fuel(problem: str, fuel: int) -> None:
+    loaded = load(*files("vans", problem), ModelOptions(cost="makespan+cost"))
+    ours = search(loaded.model, loaded.tasks[0]).cost_of(0)
+    assert ours[1] == fuel
+    assert optimal_cost(loaded.model, loaded.tasks[0], time_limit=60).cost == ours
+
+
+# The rules of each world, in every joint step that there is
+
+
+@by_world
+def test_who_the_robots_are(folder: str) -> None:
+    for other, row in PROBLEMS:
+        if other == folder:
+            assert load(*files(folder, row["problem"])).team.by == WORLDS[folder]
+
+
+State = frozenset[tuple[str, ...]]
+#: (state, subactions by robot, next state); the words of an atom or a subaction are apart.
+Step = tuple[State, dict[str, tuple[str, ...]], State]
+
+
+@cache
+def atoms(key: str) -> State:
+    return frozenset(tuple(atom.split()) for atom in re.findall(r"\(([^()]*)\)", key))
+
+
+def steps(space: Space) -> Iterator[Step]:
+    model = space.model
+    keys = [atoms(model.codec.key(row)) for row in space.rows]
+    for source, before in enumerate(keys):
+        for edge in range(space.first[source], space.first[source + 1]):
+            texts = zip(model.robots, model.texts(space.labels[edge]), strict=True)
+            chosen = {robot: tuple(text.strip("()").split()) for robot, text in texts if text}
+            yield before, chosen, keys[space.target[edge]]
+
+
+def handover_rule(before: State, chosen: dict[str, tuple[str, ...]], after: State) -> bool:
+    """Giver and taker choose a hand-over together, at the two sides of a door."""
+    given = {action for action in chosen.values() if action[0] == "hand-over"}
+    return all(
+        chosen.get(giver) == chosen.get(taker) == action
+        and here.split("-")[0] != there.split("-")[0]
+        and ("holds", taker, parcel) in after
+        for action in given
+        for _, giver, taker, parcel, here, there in [action]
+    )
+
+
+def two_arms_rule(before: State, chosen: dict[str, tuple[str, ...]], after: State) -> bool:
+    """One arm over a place; nobody swings to where somebody was."""
+    over = [atom[2] for atom in after if atom[0] == "over"]
+    was = {atom[2] for atom in before if atom[0] == "over"}
+    return len(set(over)) == len(over) and not any(a[0] == "swing" and a[3] in was for a in chosen.values())
+
+
+def push_box_rule(before: State, chosen: dict[str, tuple[str, ...]], after: State) -> bool:
+    """The box moves exactly if at least two push, all the same way, and nobody walks through that door."""
+    pushes = [action[2:] for action in chosen.values() if action[0] == "push"]
+    doors = {frozenset(way[1:]) for way in pushes}
+    walks = {frozenset(action[2:]) for action in chosen.values() if action[0] == "go"}
+    places = [{atom[2] for atom in state if atom[0] == "stands"} for state in (before, after)]
+    moved = places[0] != places[1]
+    return len(set(pushes)) == moved and (not moved or len(pushes) >= 2) and not doors & walks
+
+
+def tray_rule(before: State, chosen: dict[str, tuple[str, ...]], after: State) -> bool:
+    """Glasses slide exactly if one end is lifted or lowered alone; nobody carries alone."""
+    kinds = [action[0] for action in chosen.values()]
+    alone = kinds.count("lift") == 1 or kinds.count("lower") == 1
+    spilled = (("spilled",) in after) == (("spilled",) in before or alone)
+    return spilled and kinds.count("carry") in (0, 2)
+
+
+def vans_rule(before: State, chosen: dict[str, tuple[str, ...]], after: State) -> bool:
+    """A van that drives has somebody in it, before and after the step, and never two."""
+    drivers = [
+        [atom[1] for atom in state if atom[0] == "aboard" and atom[2] == van]
+        for van, action in chosen.items()
+        if action[0] == "drive"
+        for state in (before, after)
+    ]
+    seats = [atom[2] for atom in after if atom[0] == "aboard"]
+    return all(len(d) == 1 for d in drivers) and drivers[::2] == drivers[1::2] and len(set(seats)) == len(seats)
+
+
+def lock_rule(before: State, chosen: dict[str, tuple[str, ...]], after: State) -> bool:
+    """A door that is passed is held by somebody else, and the switches of one door only are held."""
+    held = {robot: action[2] for robot, action in chosen.items() if action[0] == "hold"}
+    passed = {robot: action[2] for robot, action in chosen.items() if action[0] == "pass"}
+    return len(set(held.values())) <= 1 and set(passed.values()) <= set(held.values()) and not held.keys() & passed
+
+
+def charger_rule(before: State, chosen: dict[str, tuple[str, ...]], after: State) -> bool:
+    """One robot charges at a time, and no two mop one room."""
+    kinds = [action[0] for action in chosen.values()]
+    mopped = [action[2] for action in chosen.values() if action[0] == "mop"]
+    return kinds.count("charge") <= 1 and len(set(mopped)) == len(mopped)
+
+
+def elevator_rule(before: State, chosen: dict[str, tuple[str, ...]], after: State) -> bool:
+    """Whoever is inside is where the elevator is; nobody enters or leaves while it moves."""
+    (cabin,) = [atom[1] for atom in after if atom[0] == "stops"]
+    inside = {atom[1] for atom in after if atom[0] == "inside"}
+    moving = any(action[0] == "move" for action in chosen.values())
+    return all(("on", walker, cabin) in after for walker in inside) and not (moving and len(chosen) > 1)
+
+
+RULES: dict[str, Callable[[State, dict[str, tuple[str, ...]], State], bool]] = {
+    "handover": handover_rule,
+    "two-arms": two_arms_rule,
+    "push-box": push_box_rule,
+    "tray": tray_rule,
+    "vans": vans_rule,
+    "lock": lock_rule,
+    "charger": charger_rule,
+    "elevator": elevator_rule,
+}
+
+
+@by_problem
+def test_the_rules_hold_in_every_step(world, folder: str, row: Row) -> None:
+    rule = RULES[folder]
+    broken = [step for step in steps(world(folder, row["problem"]).space) if not rule(*step)]
+    assert broken[:1] == []
+
+
+def test_no_state_tells_who_holds_the_switch() -> None:
+    """Two actions without effects, either of which will do: only remembering tells them apart."""
+    row = {"language for": "three-robots", "--tasks": "its own", "options": ""}
+    with pytest.raises(Inseparable):
+        build_language(candidates("lock", row))

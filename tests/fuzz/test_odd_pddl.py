@@ -114,6 +114,10 @@ CASES = {
     "nobody's action, environment": Case(6, BELL, goal("(rung)"), ENVIRONMENT),
     "nobody's action, fewest actions": Case(1, BELL, goal("(rung)"), (*ENVIRONMENT, "--cost", "makespan+actions")),
     "nobody's action, shared": Case(1, BELL, goal("(rung)"), ("--unowned", "shared")),
+    "--robot-type of others than the agents": Case((2, "--robot-type"), options=("--robot-type", "room")),
+    "--robot-type that is nothing": Case((2, "--robot-type"), options=("--robot-type", "nonsense")),
+    "a robot called environment": Case((2, "environment"), BELL, change(
+        goal("(rung)"), ("r1", "environment")), ENVIRONMENT),
     # types and objects
     "supertypes forward and undeclared": Case(2, domain(
         ("(:types robot room)", "(:types robot - mobile mobile - thing room - place)"))),
@@ -214,11 +218,7 @@ WRONG = {
     "a constant cost of 400 digits": Case((34, "d.pddl"), change(COSTLY, ("(far ?x ?y)))", f"{'9' * 400}))"))),
     "a superscript as a name": Case(2, problem=problem(("r1", "\u00b2"))),
     "a name of 5000 digits": Case(2, problem=problem(("r1", "9" * 5000))),
-    "--robot-type of others than the agents": Case((2, "--robot-type"), options=("--robot-type", "room")),
-    "--robot-type that is nothing": Case((2, "--robot-type"), options=("--robot-type", "nonsense")),
     "--robots without a name": Case((2, "--robots"), options=("--robots", ",")),
-    "a robot called environment": Case((2, "environment"), BELL, change(
-        goal("(rung)"), ("r1", "environment")), ENVIRONMENT),
     "two variables behind :agent": Case((31, "d.pddl:5"), domain((":agent ?r - robot", ":agent ?r ?q - robot"))),
     "a comment about subactions": Case(2, domain((":precondition", "; subactions of one robot\n :precondition"))),
     "a predicate called last": Case(2, DOMAIN.replace("(at ", "(last "), PROBLEM.replace("(at ", "(last "), options=(
