@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coordlang.coordination import Divergences, Walk, unique_divergences, walk
+from coordlang.warping import pair
 from planners.matching import Ints
 from planners.optimal import PlanSpace
 
@@ -68,13 +69,9 @@ def separations(divergences: Divergences) -> list[tuple[Separation, ...]]:
         states = [s for s in row if s >= 0]
         result.append(
             tuple(
-                Separation(frozenset({_pair(last, a), _pair(last, b), _pair(a, b)}))
+                Separation(frozenset({pair(last, a), pair(last, b), pair(a, b)}))
                 for n, b in enumerate(states)
                 for a in states[:n]
             )
         )
     return result
-
-
-def _pair(a: int, b: int) -> tuple[int, int]:
-    return (a, b) if a < b else (b, a)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import gzip
 import os
 import sys
 import tempfile
 import zlib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
@@ -27,19 +29,21 @@ FORMAT = "coordlang/language"
 VERSION = 1
 
 
-class DomainRecord(msgspec.Struct, omit_defaults=True):
+class DomainRecord(msgspec.Struct):
     """The domain that a language belongs to; a file without ``sha256`` is not held to one text."""
 
     name: str
     sha256: str | None = None
 
 
-class ModelRecord(msgspec.Struct, omit_defaults=True):
-    """How the PDDL files are understood.  ``world_sha256`` is over objects, static facts and function values."""
+class ModelRecord(msgspec.Struct):
+    """How the PDDL files are understood.  ``idle``: the robots that may idle without an action of their own (a language
+    without it: found from the model).  ``world_sha256`` is over objects, static facts and function values."""
 
     cost: Cost = "makespan"
     unowned: Unowned = "error"
     remember_actions: bool = False
+    idle: list[str] | None = None
     problem_sha256: str | None = None
     world_sha256: str | None = None
 
@@ -51,12 +55,12 @@ class TaskRecord(msgspec.Struct):
     goal: list[str]
 
 
-class TasksRecord(msgspec.Struct, omit_defaults=True):
+class TasksRecord(msgspec.Struct):
     """The candidate tasks that the language is guaranteed for."""
 
     kind: Kind
     count: int
-    tasks: list[TaskRecord] = []
+    tasks: list[TaskRecord] | None = None
 
 
 class GuaranteeRecord(msgspec.Struct):
@@ -107,6 +111,7 @@ def signed(language: Language, candidates: Candidates, producer: Mapping[str, An
             "cost": loaded.options.cost,
             "unowned": loaded.options.robots.unowned,
             "remember_actions": loaded.options.remember_actions,
+            "idle": [r for r, keeps in zip(loaded.model.robots, loaded.model.keeps_idle, strict=True) if keeps],
             "problem_sha256": problem.source.sha256,
             "world_sha256": world_sha256(loaded.domain, problem),
         },
@@ -119,7 +124,7 @@ def world_sha256(domain: Domain, problem: Problem) -> str:
     """A hash of what the problems of one language share: objects, static facts, function values."""
     lines = [f"{name} - {' '.join(sorted(types))}" for name, types in sorted(problem.objects.items())]
     lines += sorted(show(atom) for atom in static_atoms(domain, problem))
-    lines += sorted(f"{show(atom)} = {value:g}" for atom, value in problem.values.items())
+    lines += sorted(f"{show(atom)} = {value!r}" for atom, value in problem.values.items())
     return sha256("\n".join(lines).encode()).hexdigest()
 
 
@@ -156,8 +161,14 @@ def write_language(language: Language, path: str | Path) -> None:
 
 def write_atomically(path: str | Path, data: bytes) -> None:
     """Write beside, then rename.  Raises `UsageError` when the place cannot be written."""
-    target = Path(path)
+    target = Path(os.path.realpath(path))
     try:
+        if target.exists() and not target.is_file():  # a device or a pipe: written to, never replaced
+            if target.is_dir():
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+            with open(path, "wb") as file:
+                file.write(data)
+            return
         handle, beside = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
         try:
             with os.fdopen(handle, "wb") as file:
@@ -165,7 +176,8 @@ def write_atomically(path: str | Path, data: bytes) -> None:
             os.chmod(beside, 0o666 & ~_umask())
             os.replace(beside, target)
         except BaseException:
-            os.unlink(beside)
+            with suppress(FileNotFoundError):
+                os.unlink(beside)
             raise
     except OSError as error:
         raise UsageError(f"{path} cannot be written: {error.strerror}") from None
@@ -208,6 +220,7 @@ def language_from_bytes(data: bytes, place: Place) -> Language:
     for key, word in [*record.states.items(), ("default", record.default)]:
         if word not in words:
             raise BadInput(f"{word!r} (of {key!r}) is not among the words", place=place)
+    _check_guarantee(record, place)
     return Language(
         words=tuple(record.words),
         states=record.states,
@@ -219,11 +232,29 @@ def language_from_bytes(data: bytes, place: Place) -> Language:
             record.guarantee.lower_bound,
             record.guarantee.proved_minimal,
         ),
-        domain=msgspec.to_builtins(record.domain),
-        model=msgspec.to_builtins(record.model),
-        tasks=msgspec.to_builtins(record.tasks),
+        domain=_present(record.domain),
+        model=_present(record.model),
+        tasks=_present(record.tasks),
         producer=record.producer,
     )
+
+
+def _present(record: msgspec.Struct) -> dict[str, Any]:
+    """The entries of a record that its file has."""
+    return {key: value for key, value in msgspec.to_builtins(record).items() if value is not None}
+
+
+def _check_guarantee(record: LanguageRecord, place: Place) -> None:
+    g = record.guarantee
+    if g.size != len(record.words) or not 1 <= g.lower_bound <= g.size:
+        raise BadInput(
+            f"the guarantee (size {g.size}, lower bound {g.lower_bound}) contradicts the {len(record.words)} words",
+            place=place,
+        )
+    if g.proved_minimal != (g.lower_bound == g.size):
+        raise BadInput("'proved_minimal' contradicts the lower bound", place=place)
+    if len(set(record.robots)) < len(record.robots) or not record.robots:
+        raise BadInput("the robots must be different, and at least one", place=place)
 
 
 class _Head(msgspec.Struct):
@@ -237,7 +268,7 @@ def _check_head(data: bytes, place: Place) -> None:
         head = msgspec.json.decode(data, type=_Head)
     except msgspec.ValidationError as error:
         raise BadInput(f"this is no language file: {error}", place=place) from None
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise BadInput(f"this is no JSON, or it is cut off: {error}", place=place) from None
     if head.format != FORMAT:
         raise BadInput(f"format {head.format!r}, expected {FORMAT!r}", place=place)
@@ -268,8 +299,12 @@ def options_of(
     own = tuple(r for r in language.robots if r != ENVIRONMENT or recorded["--unowned"] != "environment")
     if robots and set(robots) != set(own):
         raise UsageError(f"--robots contradicts the language file: its robots are {', '.join(own)}")
+    idle = model.get("idle")
     return ModelOptions(
-        RobotChoice(own, None, recorded["--unowned"]), recorded["--cost"], recorded["--remember-actions"]
+        RobotChoice(own, None, recorded["--unowned"]),
+        recorded["--cost"],
+        recorded["--remember-actions"],
+        tuple(idle) if idle is not None else None,
     )
 
 
@@ -309,6 +344,11 @@ def recorded_candidates(
                 )
             return candidates
         listed = [ListedTask(tuple(t["init"]), tuple(t["goal"])) for t in language.tasks.get("tasks", [])]
+        if not listed or len(listed) != language.tasks["count"]:
+            raise BadInput(
+                f"the language records {language.tasks['count']} tasks but lists {len(listed)}",
+                remedy="Say --tasks all or --tasks FILE.",
+            )
         make = from_listed if kind == "file" else from_recorded
         return make(domain, problems, listed, options, place)
     except BadInput as error:

@@ -82,12 +82,18 @@ class WordTable:
 
 def _row(model: JointModel, key: str) -> Rows:
     try:
-        return model.codec.parse_key(key)
+        row = model.codec.parse_key(key)
     except BadInput as error:
         raise BadInput(
             f"the language maps a state that this problem cannot have: {error.what}",
             remedy="Give the problem that the language was built for.",
         ) from None
+    if model.codec.key(row) != key:
+        raise BadInput(
+            f"{key!r} is no key of a state; it would be {model.codec.key(row)!r}",
+            remedy="A key lists the true fluents, sorted, joined by one space.",
+        )
+    return row
 
 
 def sentence(words: Iterable[int]) -> tuple[int, ...]:

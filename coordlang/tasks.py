@@ -129,7 +129,7 @@ def from_listed(
     if not listed:
         raise BadInput("the list of tasks is empty", place=place, remedy="Give at least one task.")
     inits = [_read_init(domain, problems[0], task, place) for task in listed]
-    loaded = build(domain, problems, options, also={a for init in inits for a in init})
+    loaded = build(domain, problems, options, inits=inits)
     model = loaded.model
     space = explore(model, np.stack([task.init for task in loaded.tasks]))
     reached, _ = unique_rows(space.rows[:, : model.codec.fact_words])
@@ -163,7 +163,7 @@ def from_recorded(
 ) -> Candidates:
     """Problems' tasks as a language file records them: searched one by one, without the rest of the space."""
     inits = [_read_init(domain, problems[0], task, place) for task in listed]
-    loaded = build(domain, problems, options, also={a for init in inits for a in init})
+    loaded = build(domain, problems, options, inits=inits)
     tasks = [
         PlanningTask(
             f"{number}",
@@ -179,10 +179,10 @@ def read_task_file(path: str | Path) -> tuple[ListedTask, ...]:
     """Read a task file (docs/formats.md).  Raises `BadInput` for anything else."""
     place = Place(str(path))
     try:
-        data = json.loads(sys.stdin.read() if str(path) == "-" else Path(path).read_text())
+        data = json.loads(sys.stdin.read() if str(path) == "-" else Path(path).read_text("utf-8-sig"))
     except OSError as error:
         raise BadInput(f"cannot be read: {error.strerror}", place=place) from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise BadInput(f"this is no JSON: {error}", place=place) from None
     return tasks_from_data(data, place)
 
@@ -191,7 +191,7 @@ def tasks_from_data(data: Any, place: Place) -> tuple[ListedTask, ...]:
     """The tasks in the data of a task file."""
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise BadInput(f'expected a task file: {{"format": "{FORMAT}", ..}}', place=place)
-    if data.get("version") != VERSION:
+    if data.get("version") != VERSION or data.get("version") is True:
         raise BadInput(f"task file version {data.get('version')!r}, expected {VERSION}", place=place)
     tasks = data.get("tasks")
     if not isinstance(tasks, list):
@@ -220,7 +220,8 @@ def goal_text(model: JointModel, goal: Goal) -> str:
     if isinstance(goal, FullState):
         row = np.zeros(model.codec.width, np.uint64)
         row[: model.codec.fact_words] = goal.words
-        return " ".join(a for a in model.codec.decode(row) if not a.startswith("(last "))
+        atoms = model.codec.decode(row)
+        return " ".join(a for a in atoms if not (model.remembers and a.startswith("(last ")))
     return " ".join(formula_text(part) for part in (goal.parts if isinstance(goal, And) else (goal,)))
 
 

@@ -115,7 +115,7 @@ class _Check:
         self._edge_sorted = self._edge_key[self._edge_order]
 
     def run(self, starts: Ints) -> tuple[int | None, int]:
-        """The node where some violating walk starts is not known here: returns its goal number, and the nodes walked."""
+        """The goal number of some violating walk (None: there is none), and the nodes walked."""
         table = np.zeros((0, 2 * self.robots), np.int64)
         walked = 0
         for number in range(len(self.space.layers) - 1, 0, -1):

@@ -7,7 +7,7 @@ subactions is never stored: `JointModel.successors` composes what is applicable,
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
@@ -83,7 +83,6 @@ class JointModel:
     cost: Cost = "makespan"
     statics: frozenset[Atom] = frozenset()
     is_joint_action: bool = False
-    free_labels: tuple[frozenset[int], ...] = field(default=())
 
     @property
     def remembers(self) -> bool:

@@ -8,20 +8,24 @@ from __future__ import annotations
 
 import resource
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
 from planners.errors import OutOfMemory, OutOfTime
 
-#: The alarm rings again until somebody has caught it: an exception inside a finalizer is lost.
-_AGAIN = 0.5
+#: The alarm rings again, should nobody have caught it (an exception inside a finalizer is lost); not too soon, so that
+#: whoever caught it can save his work and stop the clock.
+_AGAIN = 5.0
+#: Seconds that no timer counts to the end (some cannot be set to more).
+_FOR_EVER = 1e9
 
 
 @contextmanager
 def time_limit(seconds: float | None) -> Iterator[None]:
     """Raise `OutOfTime` in the block when ``seconds`` of wall time are over (main thread only)."""
-    if seconds is None:
+    if seconds is None or seconds > _FOR_EVER:
         yield
         return
 
@@ -46,7 +50,8 @@ def limit_memory(size: int | None) -> None:
     """Let this process and its children have at most ``size`` bytes of address space."""
     if size is not None:
         _, hard = resource.getrlimit(resource.RLIMIT_AS)
-        resource.setrlimit(resource.RLIMIT_AS, (size, hard))
+        most = sys.maxsize if hard == resource.RLIM_INFINITY else hard
+        resource.setrlimit(resource.RLIMIT_AS, (min(size, most), hard))
 
 
 def require_memory(size: int) -> None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from planners.composition import Composition
 from planners.conditions import Evaluator
-from planners.errors import BadInput, Place
+from planners.errors import BadInput, Place, UsageError
 from planners.grounding import GroundAction, ground_actions, ground_goal
 from planners.grounding.networks import apply_network
 from planners.joint import IDLE, Cost, Goal, JointModel, show
@@ -29,11 +29,15 @@ from planners.whole import WholeActions
 
 @dataclass(frozen=True, slots=True)
 class ModelOptions:
-    """How the files are to be understood; all of it is recorded in a language file."""
+    """How the files are to be understood; all of it is recorded in a language file.
+
+    ``idle`` names the robots that may idle without an action of their own; None: found from the model.
+    """
 
     robots: RobotChoice = field(default_factory=RobotChoice)
     cost: Cost = "makespan"
     remember_actions: bool = False
+    idle: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,22 +74,29 @@ def build(
     domain: Domain,
     problems: Sequence[Problem],
     options: ModelOptions | None = None,
-    also: Iterable[Atom] = (),
+    inits: Sequence[frozenset[Atom]] = (),
 ) -> Loaded:
     """The joint model of problems over the same objects and statics.
 
-    ``also`` are fluent atoms of further initial states (of a task file).
+    ``inits`` are the fluents of further initial states (of a task file): what can be true, and whether idling is
+    dropped, depends on where tasks start.
     """
     options = options or ModelOptions()
+    if options.remember_actions and "last" in domain.predicates:
+        raise UsageError(
+            "--remember-actions writes facts (last ROBOT ACTION), but this domain has a predicate 'last'",
+            remedy="Rename the predicate.",
+        )
     first = problems[0]
     for other in problems[1:]:
         _check_same_world(domain, first, other)
     team = find_team(domain, first, options.robots)
-    extra = {atom for problem in problems for atom in problem.init} | set(also)
+    starts = [*(problem.init for problem in problems), *inits]
+    extra = {atom for start in starts for atom in start}
     actions = ground_actions(domain, first, team, also=extra, costs=options.cost == "makespan+cost")
     actions = apply_network(domain, first, actions)
     team = without_idle_environment(team, (i for action in actions for i in action.owners))
-    model = _joint_model(domain, problems, team, actions, extra, options)
+    model = _joint_model(domain, problems, team, actions, starts, options)
     tasks = tuple(task_of(model, domain, problem) for problem in problems)
     return Loaded(domain, tuple(problems), model, tasks, options, team)
 
@@ -115,11 +126,11 @@ def _joint_model(
     problems: Sequence[Problem],
     team: Team,
     actions: tuple[GroundAction, ...],
-    extra: set[Atom],
+    starts: Sequence[frozenset[Atom]],
     options: ModelOptions,
 ) -> JointModel:
     fluents = fluent_predicates(domain)
-    possible = {a for a in extra if a.predicate in fluents}
+    possible = {atom for start in starts for atom in start if atom.predicate in fluents}
     possible |= {e.atom for action in actions for e in action.effects if e.adds}
     by_text = {show(atom): atom for atom in possible}
     texts = tuple(sorted(by_text))
@@ -141,9 +152,10 @@ def _joint_model(
             for n, a in enumerate(own)
         },
     )  # fmt: skip
-    inits = [frozenset(problem.init) for problem in problems]
     keeps_idle = tuple(
-        domain.is_joint_action or not _always_has_nothing_to_do(i, own, actions, inits)
+        robots[i] in options.idle
+        if options.idle is not None
+        else domain.is_joint_action or not _always_has_nothing_to_do(i, own, actions, starts)
         for i, own in enumerate(subactions)
     )
     stepper: Composition | WholeActions

@@ -16,10 +16,14 @@ Unowned = Literal["error", "environment", "shared"]
 ENVIRONMENT = "environment"
 
 
+_DIGITS = frozenset("0123456789")
+
+
 def natural(name: str) -> tuple[tuple[int, int, str], ...]:
     """A sort key in which ``r2`` comes before ``r10``."""
-    parts = re.split(r"(\d+)", name)
-    return tuple((1, int(p), p) if p.isdigit() else (0, 0, p) for p in parts)
+    parts = re.split(r"([0-9]+)", name)
+    # Numbers compare by their length without leading zeros, then as text: no int() that has limits.
+    return tuple((1, len(p.lstrip("0")), f"{p.lstrip('0')} {p}") if p[:1] in _DIGITS else (0, 0, p) for p in parts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,14 +88,14 @@ def find_team(domain: Domain, problem: Problem, choice: RobotChoice) -> Team:
     declared = _declared(domain, problem)
     if declared is not None:
         robots, by = declared
+        if choice.type and set(_of_kind(domain, problem, choice.type)) != set(robots):
+            raise UsageError(
+                f"--robot-type {choice.type} contradicts the domain",
+                remedy=f"The robots are {', '.join(robots)} (by {by}).",
+            )
         if choice.names and set(choice.names) != set(robots):
             raise UsageError(
                 f"--robots {','.join(choice.names)} contradicts the domain",
-                remedy=f"The robots are {', '.join(robots)} (by {by}).",
-            )
-        if choice.type:
-            raise UsageError(
-                f"--robot-type {choice.type}: the domain says itself who the robots are",
                 remedy=f"The robots are {', '.join(robots)} (by {by}).",
             )
     elif choice.names:
@@ -167,18 +171,18 @@ def _of_kind(domain: Domain, problem: Problem, kind: str) -> tuple[str, ...]:
 
 
 def _detect(domain: Domain, problem: Problem) -> tuple[tuple[str, ...], str]:
-    for kind in ("robot", "agent"):
-        robots = _of_kind(domain, problem, kind)
-        if robots:
-            return robots, f"type {kind}"
-    candidates = _candidates(domain, problem)
+    named = {kind: robots for kind in ("robot", "agent") if (robots := _of_kind(domain, problem, kind))}
+    if len(set(named.values())) == 1:
+        kind, robots = next(iter(named.items()))
+        return robots, f"type {kind}"
+    candidates = sorted(named) or _candidates(domain, problem)
     if len(candidates) == 1:
         return _of_kind(domain, problem, candidates[0]), f"type {candidates[0]}"
     raise BadInput(
         "which objects are the robots? " + ("Several types could be" if candidates else "No type could be"),
         place=Place(domain.source.name),
         remedy="Say --robot-type TYPE or --robots NAME,NAME."
-        + (f" Every action takes one of: {', '.join(candidates)}." if candidates else ""),
+        + (f" Candidates: {', '.join(candidates)}." if candidates else ""),
     )
 
 

@@ -108,19 +108,22 @@ def split_atoms(text: str) -> list[str]:
     Raises `BadInput` when the parentheses do not match.
     """
     parts: list[str] = []
-    depth = start = 0
+    depth = start = end = 0
     for match in re.finditer(r"[()]", text):
         if match.group() == "(":
             if depth == 0:
+                if text[end : match.start()].strip():
+                    break
                 start = match.start()
             depth += 1
         else:
             depth -= 1
             if depth == 0:
-                parts.append(" ".join(text[start : match.end()].split()))
+                end = match.end()
+                parts.append(" ".join(text[start:end].split()))
         if depth < 0:
             break
-    if depth != 0 or (text.strip() and not parts):
+    if depth != 0 or text[end:].strip():
         raise BadInput(f"cannot read the atoms {text[:60]!r}", remedy="Expected '(p a b) (q c) ..'.")
     return parts
 

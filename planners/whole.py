@@ -101,10 +101,11 @@ class WholeActions:
         return f"the joint action {self._actions[found[0]].label} is not applicable here"
 
     def name(self, row: Rows, labels: Sequence[int]) -> str:
-        """The ground joint action that these labels are in a state."""
+        """The ground joint action that these labels are in a state: the cheapest, as `steps` takes it."""
         found = np.flatnonzero((self._labels == np.array(labels)).all(axis=1))
         _, operators = self._applicable(row[None, :])
-        return self._actions[min(set(found.tolist()) & set(operators.tolist()))].label
+        here = set(found.tolist()) & set(operators.tolist())
+        return self._actions[min(here, key=lambda n: (int(self._cost[n]), n))].label
 
     def _applicable(self, rows: Rows) -> tuple[Ints, Ints]:
         row, operator = self._matcher.match(rows)

@@ -5,6 +5,7 @@ Data goes to stdout, logs and progress to stderr.  Exit codes are an interface (
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 import traceback
@@ -12,7 +13,7 @@ from typing import NoReturn
 
 import click
 
-from coordlang.cli.app import EXIT_INTERRUPTED, cli
+from coordlang.cli.app import EXIT_BROKEN_PIPE, EXIT_INTERRUPTED, cli
 from planners.errors import CoordlangError, OutOfMemory
 
 
@@ -26,7 +27,8 @@ def run(arguments: list[str]) -> int:
     debug = "--debug" in arguments
     try:
         result = cli.main(args=arguments, prog_name="coordlang", standalone_mode=False)
-        sys.stdout.flush()
+        if sys.stdout is not None:
+            sys.stdout.flush()
         return result if isinstance(result, int) else 0
     except click.exceptions.Exit as done:
         return int(done.exit_code)
@@ -38,13 +40,25 @@ def run(arguments: list[str]) -> int:
     except BrokenPipeError:
         # The reader has gone (`| head`): no more output, and no complaint at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+        return EXIT_BROKEN_PIPE
+    except SystemExit:
+        return EXIT_BROKEN_PIPE  # so ends click a command whose reader has gone
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EIO, errno.EBADF):
+            raise
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - what is still in the buffer has no place to go
+        return _fail(f"the output cannot be written: {error.strerror}", 2)
     except MemoryError:
         return _fail("out of memory\n  Use a smaller task, or a larger --memory-limit.", OutOfMemory.exit_code)
     except CoordlangError as error:
         if debug:
             traceback.print_exc()
         return _fail(str(error), error.exit_code)
+    except Exception as error:  # a bug of ours: said plainly, with its own exit code, and never hidden
+        if debug:
+            traceback.print_exc()
+        what = f"internal error: {type(error).__name__}: {error}"
+        return _fail(f"{what}\n  This is a bug; --debug shows where.", CoordlangError.exit_code)
 
 
 def _fail(message: str, code: int) -> int:

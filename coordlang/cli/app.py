@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import math
 import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
 
 EXIT_UNPROVED = 3
 EXIT_INTERRUPTED = 130
+#: As a shell reports a process that wrote into a pipe nobody reads: the answer did not arrive.
+EXIT_BROKEN_PIPE = 141
 
 #: Command -> its module below `coordlang.cli`; imported when it is called.
 COMMANDS = {
@@ -94,6 +97,8 @@ def limits(function: Callable[..., Any]) -> Callable[..., Any]:
         from planners.limits import limit_memory, require_memory
         from planners.limits import time_limit as limit_time
 
+        if time_limit is not None and math.isnan(time_limit):
+            raise click.UsageError("--time-limit: expected a number of seconds")
         if memory_limit is not None:
             require_memory(memory_limit)
             limit_memory(memory_limit)
@@ -147,6 +152,8 @@ class GivenOptions:
         cost: str | None,
         remember_actions: bool,
     ) -> None:
+        if robots is not None and not robots.replace(",", "").strip():
+            raise click.UsageError("--robots: expected names, as in --robots r1,r2")
         self.robots = tuple(r.strip().lower() for r in robots.split(",") if r.strip()) if robots else ()
         self.robot_type = robot_type.lower() if robot_type else None
         self.unowned: Any = unowned

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from dataclasses import replace
 from importlib.metadata import version
@@ -59,7 +60,11 @@ def command(
     from coordlang.build import Inseparable, build_language
     from coordlang.cli.coordination import show
     from coordlang.file import to_bytes, write_language
+    from planners.limits import stop_clock
 
+    if output != "-" and any(os.path.exists(f) and os.path.samefile(f, output) for f in (domain, *problems)
+                             if os.path.exists(output)):  # fmt: skip
+        raise click.UsageError(f"-o {output} would overwrite an input file")
     start = perf_counter()
     lifted, read = read_files(domain, problems)
     candidates = make_candidates(lifted, read, tasks, given)
@@ -70,11 +75,12 @@ def command(
     except Inseparable as error:
         click.echo(show(error.witness), err=True)
         raise
+    stop_clock()  # the work is done; from here on it is saved
     seconds |= built.seconds
     producer = {
         "program": "coordlang",
         "version": version("coordlang"),
-        "arguments": sys.argv[1:],
+        "arguments": [a.encode("utf-8", "replace").decode() for a in sys.argv[1:]],
         "seed": seed,
         "solver": f"python-sat {version('python-sat')}",
         "seconds": {name: round(value, 3) for name, value in seconds.items()},

@@ -2,7 +2,8 @@
 
 Loop for K words: find a partition that satisfies all clauses so far; look for plans of one sentence whose mixture fails;
 each such tuple gives a clause that every language must satisfy (`coordlang.warping`).  No partition left: K words do not
-suffice, and K + 1 are tried with the same clauses.  No counterexample left: a language, and the least.
+suffice.  No counterexample left: a language.  Numbers of words are tried from below, and from above where that takes long,
+with the same clauses, until the two meet.
 """
 
 from __future__ import annotations
@@ -44,7 +45,8 @@ def minimal(job: Job) -> Outcome:
         stop_clock()
         if search.best is None:
             raise
-        return Outcome(search.best, search.lower, search.figures(), error)
+        # Without its traceback, which holds on to all that the search had in memory.
+        return Outcome(search.best, search.lower, search.figures(), error.with_traceback(None))
     assert search.best is not None
     return Outcome(search.best, search.lower, search.figures())
 

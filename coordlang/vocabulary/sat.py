@@ -6,6 +6,9 @@ from collections.abc import Iterable, Sequence
 
 from coordlang.warping import Clause, Pair
 
+#: Conflicts after which the solver comes back.
+_SLICE = 2_000
+
 
 class Colouring:
     """An incremental SAT problem: give each of ``states`` one of ``size`` words so that every clause holds.
@@ -35,10 +38,23 @@ class Colouring:
 
     def solve(self) -> dict[int, int] | None:
         """A partition (state -> word), or None if there is none: a proof that ``size`` words do not suffice."""
-        if not self._solver.solve():
+        if not self._decide():
             return None
         true = {v for v in self._solver.get_model() if v > 0}
         return {s: next(w for w, v in enumerate(own) if v in true) for s, own in self._word.items()}
+
+    def _decide(self) -> bool:
+        """In slices: the solver hears no signal (time limit, Ctrl-C), so it must come back now and then."""
+        while True:
+            self._solver.conf_budget(_SLICE)
+            try:
+                answer = self._solver.solve_limited()
+            except Exception as error:  # python-sat catches SIGINT itself and raises an error of its own
+                if "interrupt" in str(error).lower():
+                    raise KeyboardInterrupt from None
+                raise
+            if answer is not None:
+                return bool(answer)
 
     def delete(self) -> None:
         self._solver.delete()

@@ -8,6 +8,7 @@ from itertools import product
 
 from planners.errors import BadInput, Place
 from planners.grounding.reachability import reachable_arguments
+from planners.pddl.formulas import MAX_COST
 from planners.pddl.lifted import (
     FALSE,
     TRUE,
@@ -230,9 +231,9 @@ class _Grounder:
             return schema.cost or 0
         atom = self._atom(schema.cost.predicate, schema.cost.args, binding)
         value = self._problem.values.get(atom)
-        if value is None or value < 0 or value != int(value):
+        if value is None or not 0 <= value <= MAX_COST or value != int(value):
             raise BadInput(
-                f"the cost {label(atom.predicate, atom.args)} has no whole value from 0 in the initial state",
+                f"the cost {label(atom.predicate, atom.args)} has no whole value from 0 to {MAX_COST} in the initial state",
                 place=Place(self._problem.source.name),
             )
         return int(value)

@@ -197,6 +197,8 @@ def _read_predicates(document: Document, sections: dict[str, list[Group]]) -> di
             if len(entry) == 0:
                 raise document.fail("expected a predicate, found '()'", entry)
             name = word(document, entry.items[0], "the name of a predicate").text
+            if name == "=":  # some domains declare it; it stays the equality of objects
+                continue
             arity = len(typed_list(document, entry.items[1:], "a variable"))
             predicates[name] = predicates.get(name, frozenset()) | {arity}
 
@@ -282,6 +284,11 @@ def _parameter_items(
     name = agent_items[0].text
     if any(isinstance(item, Word) and item.text == name for item in listed):
         return listed, name
+    if len(agent_items) > 1 and not (isinstance(agent_items[1], Word) and agent_items[1].text == "-"):
+        raise document.fail("expected '- TYPE' or nothing after the agent's variable", agent_items[1])
+    if len(agent_items) == 1:  # an untyped agent must not take the type of the parameters behind it
+        at = agent_items[0].offset
+        agent_items = (agent_items[0], Word("-", at), Word("object", at))
     return (*agent_items, *listed), name
 
 
@@ -312,7 +319,7 @@ def _read_parts(names: Names, item: Group) -> tuple[Part, ...]:
     document = names.document
     parts: dict[str, Part] = {}
     for comment in document.comments:
-        if not item.offset < comment.offset < item.end or not comment.text.startswith("subaction"):
+        if not item.offset < comment.offset < item.end or comment.text.split(maxsplit=1)[:1] != ["subaction"]:
             continue
         found = _PART.match(comment.text)
         expected = "Expected '; subaction ROBOT (name args)' or '; subaction ROBOT idle'."

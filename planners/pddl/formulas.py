@@ -23,6 +23,8 @@ from planners.pddl.names import Names, group, known, word
 from planners.pddl.sexpr import Expression, Group, Word
 
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)$")
+#: Costs are summed as 64-bit integers.
+MAX_COST = 2**31
 _NUMERIC_TESTS = frozenset({"<", "<=", ">", ">="})
 _NUMERIC_EFFECTS = frozenset({"assign", "increase", "decrease", "scale-up", "scale-down"})
 _TEMPORAL = frozenset({"always", "sometime", "within", "at-most-once", "sometime-after", "hold-after"})
@@ -154,7 +156,7 @@ def _cost(names: Names, item: Group, *, conditional: bool) -> int | Atom:
         if not _NUMBER.match(amount.text):
             raise document.fail(f"expected a number, found {amount.text!r}", amount)
         value = float(amount.text)
-        if value < 0 or value != int(value):
+        if not 0 <= value <= MAX_COST or value != int(value):
             raise _unsupported(names, f"action cost {amount.text} (whole numbers from 0 only)", item)
         return int(value)
     if amount.head not in names.functions:

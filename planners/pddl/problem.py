@@ -98,5 +98,9 @@ def _read_value(names: Names, item: Group, values: dict[Atom, float]) -> None:
             "a function value that is no number is not supported",
             place=document.source.place(item.offset),
         )
+    if function.head in names.functions:
+        error = names.arity(function, function.head, names.functions[function.head], "function")
+        if error:
+            raise error
     args = tuple(names.term(term) for term in function.items[1:])
     values[Atom(function.head, args)] = float(number.text)

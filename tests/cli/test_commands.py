@@ -16,7 +16,7 @@ from planners.model import load
 from planners.planfile import read_plans
 from planners.robots import RobotChoice, find_team
 from planners.validate import validate
-from tests.cli.conftest import DOMAINS, ROOT, Command
+from tests.conftest import DOMAINS, ROOT, Command
 
 GRID = DOMAINS / "grid"
 JOINT = DOMAINS / "grid-joint"

@@ -30,10 +30,8 @@ def candidates_of(seed: int, robots: int) -> Candidates:
     """All pairs of states of a random model, or its one task with its partial goal."""
     domain, problem, options = random_model(seed, robots)
     try:
-        if seed % 3:
-            found = all_pairs(domain, [problem], options)
-        else:
-            found = from_problems(domain, [problem], options)
+        make = all_pairs if seed % 3 else from_problems
+        found = make(domain, [problem], options)
     except ProvedImpossible:
         assume(False)
         raise

@@ -17,7 +17,7 @@ from coordlang.witness import inseparable
 from planners.errors import ProvedImpossible
 from planners.optimal import PlanSpace
 from planners.pddl import read_domain, read_problem
-from tests.cli.conftest import DOMAINS
+from tests.conftest import DOMAINS
 from tests.coordlang import naive
 from tests.coordlang.random_models import random_model
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 import pytest
 
-from coordlang.cli.app import COMMANDS, EXIT_INTERRUPTED, cli
+from coordlang.cli.app import COMMANDS, EXIT_BROKEN_PIPE, EXIT_INTERRUPTED, cli
 from planners.errors import CoordlangError
 from tests.docs.pages import DOCS, PAGES, ROOT, anchor, blocks, code, links, prose, rows, sections
 
@@ -96,7 +96,7 @@ def test_exit_codes() -> None:
     importlib.import_module("coordlang.build")
     listed = [int(cells[0]) for cells in rows(sections(CLI)["Exit codes"])]
     assert listed == sorted(listed)
-    assert set(listed) == {0, EXIT_INTERRUPTED, *(kind.exit_code for kind in error_tree(CoordlangError))}
+    assert set(listed) == {0, EXIT_INTERRUPTED, EXIT_BROKEN_PIPE, *(kind.exit_code for kind in error_tree(CoordlangError))}
 
 
 def error_tree(kind: type[CoordlangError]) -> list[type[CoordlangError]]:

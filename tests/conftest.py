@@ -10,7 +10,7 @@ import pytest
 
 from coordlang.cli import run
 
-ROOT = Path(__file__).parent.parent.parent
+ROOT = Path(__file__).parent.parent
 DOMAINS = ROOT / "domains"
 
 
