@@ -14,7 +14,8 @@ from coordlang.verify import Verdict, verify
 from coordlang.vocabulary import METHODS, Job, Outcome, greedy
 from coordlang.vocabulary.job import Partition
 from coordlang.witness import Miscoordination, inseparable
-from planners.errors import ProvedImpossible
+from planners.errors import OutOfMemory, OutOfTime, ProvedImpossible
+from planners.limits import stop_clock
 
 
 class Inseparable(ProvedImpossible):
@@ -81,11 +82,17 @@ def build_language(
         job = replace(job, incumbent=first)
         clock.note("incumbent")
     progress(f"building words ({method})")
-    outcome = METHODS[method](job)
-    clock.note("vocabulary")
-    if not any(partition is outcome.partition for partition, _ in checked):
-        progress("verifying by definition")
-        check(outcome.partition)
+    try:
+        outcome = METHODS[method](job)
+        clock.note("vocabulary")
+        if not any(partition is outcome.partition for partition, _ in checked):
+            progress("verifying by definition")
+            check(outcome.partition)
+    except (OutOfTime, OutOfMemory, MemoryError, KeyboardInterrupt) as error:
+        stop_clock()
+        if not checked:
+            raise
+        outcome = Outcome(checked[-1][0], job.lower_bound, {}, error.with_traceback(None))
     verdict = next(verdict for partition, verdict in checked if partition is outcome.partition)
     clock.note("verify")
     language = _language(candidates, method, outcome)

@@ -110,6 +110,12 @@ def moves(space: PlanSpace, index: EdgeIndex, nodes: Ints, *, together: bool = F
     robots = nodes.shape[1] - 1
     degree = np.diff(space.first)
     sizes = np.prod(degree[nodes[:, :robots]].astype(np.float64), axis=1)
+    if 100 * sizes.max(initial=0) > memory_left():
+        raise OutOfMemory(
+            f"a state has {sizes.max():,.0f} combinations of {robots} plans' next steps: about "
+            f"{100 * sizes.max() / 2**30:,.0f} GiB at once",
+            remedy="Use fewer robots or --cost makespan+actions, or a larger --memory-limit.",
+        )
     for span in _spans(sizes):
         source = np.arange(span.start, span.stop)
         prefix = nodes[span, robots]

@@ -8,7 +8,7 @@ with all leads empty: n plans with one sentence whose mixture is no optimal plan
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -58,6 +58,13 @@ def _explain(space: PlanSpace, table: WordTable, check: _Check, trail: Trail) ->
     first_plan = [trail.start, *(int(space.target[step[0]]) for step in trail.edges)]
     words = sentence(int(check.word[node]) for node in first_plan)
     return describe_failure(space, trail, tuple(table.words[w] for w in words))
+
+
+def _too_large(what: str) -> OutOfMemory:
+    return OutOfMemory(
+        f"verification needs more memory for {what}",
+        remedy="Check fewer tasks at a time, or use a larger --memory-limit.",
+    )
 
 
 class _Leads:
@@ -121,11 +128,12 @@ class _Check:
         for number in range(len(self.space.layers) - 1, 0, -1):
             table = self._with_starts(table, starts, number)
             walked += len(table)
-            parts = [child for _, _, child in self._moves(table)]
-            table = np.unique(np.concatenate(parts), axis=0) if parts else table[:0]
-            if 8 * table.nbytes > memory_left():
-                raise OutOfMemory(f"verification holds {len(table):,} nodes in one layer and needs more memory",
-                                  remedy="Check fewer tasks at a time, or use a larger --memory-limit.")  # fmt: skip
+            parts = [table[:0]]
+            for _, _, child in self._moves(table):
+                parts.append(np.unique(child, axis=0))
+                if 4 * sum(part.nbytes for part in parts) > memory_left():
+                    raise _too_large(f"a layer of {len(table):,} nodes")
+            table = np.unique(np.concatenate(parts), axis=0)
         bad = self._violations(table)
         if len(bad):
             return int(self.space.goal[table[bad[0], 0]]), walked
@@ -172,14 +180,15 @@ class _Check:
         failed = table[:, self.robots] == self._failed
         return np.flatnonzero(failed & (table[:, self.robots + 1 :] == 0).all(axis=1))
 
-    def _moves(self, table: Ints) -> list[tuple[Ints, Ints, Ints]]:
+    def _moves(self, table: Ints) -> Iterator[tuple[Ints, Ints, Ints]]:
         """(row, edges taken, node reached) of every move, without those whose sentences part."""
         sizes = np.prod(self._degree[table[:, : self.robots]].astype(np.float64), axis=1)
         cuts = np.searchsorted(np.cumsum(sizes), np.arange(_CHUNK, sizes.sum() + _CHUNK, _CHUNK)) + 1
         bounds = np.unique(np.concatenate(([0], np.minimum(cuts, len(table)))))
-        return [
-            self._some_moves(table, np.arange(low, high)) for low, high in pairwise(bounds)
-        ]
+        if 100 * sizes.max(initial=0) > memory_left():
+            raise _too_large(f"a state with {sizes.max():,.0f} combinations of moves")
+        for low, high in pairwise(bounds):
+            yield self._some_moves(table, np.arange(low, high))
 
     def _some_moves(self, table: Ints, rows: Ints) -> tuple[Ints, Ints, Ints]:
         space, robots = self.space, self.robots
