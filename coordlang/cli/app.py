@@ -190,6 +190,11 @@ def read_files(domain: str, problems: tuple[str, ...]) -> tuple[Any, list[Any]]:
     return lifted, [read_problem(path, lifted) for path in problems]
 
 
+def counted(number: int, noun: str) -> str:
+    """``1 word``, ``3 words``, ``12,345 tasks``."""
+    return f"{number:,} {noun}{'s' * (number != 1)}"
+
+
 def note_single_robot(robots: tuple[str, ...]) -> None:
     """One robot is no mistake in itself, but surely not what this program is for."""
     if len(robots) == 1:

@@ -16,6 +16,7 @@ from coordlang.cli.app import (
     EXIT_INTERRUPTED,
     EXIT_UNPROVED,
     GivenOptions,
+    counted,
     domain_argument,
     limits,
     model_options,
@@ -150,7 +151,7 @@ def _summary(figures: dict[str, Any], output: str) -> str:
     words, total = figures["words"], sum(figures["seconds"].values())
     proof = "proved minimal, " if figures["proved_minimal"] else f"at least {figures['lower_bound']} needed, "
     return (
-        f"{words} word{'s' * (words != 1)} ({figures['method']}, {proof}verified) for {figures['tasks']:,} tasks, "
+        f"{counted(words, 'word')} ({figures['method']}, {proof}verified) for {counted(figures['tasks'], 'task')}, "
         f"{figures['tasks_requiring_coordination']:,} of which require coordination\n"
         f"{figures['states_on_plans']:,} states on optimal plans, {figures['divergences']:,} divergences, "
         f"{figures['walk_nodes']:,} walk nodes, {total:.2f} s\n"

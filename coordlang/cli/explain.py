@@ -9,6 +9,7 @@ import click
 
 from coordlang.cli.app import (
     GivenOptions,
+    counted,
     domain_argument,
     language_argument,
     limits,
@@ -76,11 +77,11 @@ def _words(language: Language) -> str:
         members[word].append(key)
     g = language.guarantee
     proof = "proved minimal" if g.proved_minimal else f"at least {g.lower_bound} needed"
-    lines = [f"{len(language.words)} words ({g.method}, {proof}) for {language.tasks.get('count', '?')} tasks "
+    lines = [f"{counted(len(language.words), 'word')} ({g.method}, {proof}) for {counted(language.tasks['count'], 'task')} "
              f"of {', '.join(language.robots)}:"]  # fmt: skip
     for word, states in members.items():
         rest = len(states) - _STATES_SHOWN
-        size = f"{len(states)} state{'s' * (len(states) != 1)}"
+        size = counted(len(states), "state")
         other = " and every state not listed" if word == language.default else ""
         lines.append(f"  {word}: {size}{other}")
         lines += [f"      {state}" for state in states[:_STATES_SHOWN]]

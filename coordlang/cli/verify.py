@@ -8,6 +8,7 @@ import click
 
 from coordlang.cli.app import (
     GivenOptions,
+    counted,
     domain_argument,
     language_argument,
     limits,
@@ -61,8 +62,9 @@ def command(
             "miscoordination": witness_data(verdict.witness) if verdict.witness else None,
         }))  # fmt: skip
     elif verdict.holds:
-        click.echo(f"verified: {len(spoken.words)} words, {verdict.tasks:,} tasks: all optimal plans of one "
-                   f"sentence mix freely ({verdict.nodes:,} walk nodes)")  # fmt: skip
+        checked = f"{counted(len(spoken.words), 'word')}, {counted(verdict.tasks, 'task')}"
+        mixing = f"all optimal plans of one sentence mix freely ({verdict.nodes:,} walk nodes)"
+        click.echo(f"verified: {checked}: {mixing}")
     if verdict.witness:
         if not as_json:
             click.echo(

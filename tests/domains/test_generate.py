@@ -18,7 +18,9 @@ from planners.model import load
 
 DOMAINS = Path(__file__).resolve().parents[2] / "domains"
 
-#: What people write; everything else in domains/ comes from the generator.
+#: The folders that the generator writes; the other worlds are written by hand.
+MAPS = ("grid", "grid-joint", "three-cells", "t-map", "corridor")
+#: What people write in them; everything else there comes from the generator.
 BY_HAND = {
     "README.md",
     "generate.py",
@@ -44,7 +46,8 @@ def test_the_shipped_files_are_what_the_generator_writes(tmp_path):
     # In a process of its own with another hash seed: the order of sets must not show.
     command = [sys.executable, str(DOMAINS / "generate.py"), "all", "--into", str(tmp_path)]
     subprocess.run(command, check=True, env={**os.environ, "PYTHONHASHSEED": "77"})
-    shipped = {name: data for name, data in files(DOMAINS).items() if name not in BY_HAND}
+    ours = {name: data for name, data in files(DOMAINS).items() if name.split("/")[0] in MAPS}
+    shipped = {name: data for name, data in ours.items() if name not in BY_HAND}
     written = files(tmp_path)
     assert sorted(written) == sorted(shipped)
     assert [name for name in written if written[name] != shipped[name]] == []
