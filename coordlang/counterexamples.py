@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from random import Random
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from planners.matching import Ints
 from planners.optimal import PlanSpace
 
 _FAR = np.iinfo(np.int64).max // 4
+#: Random ways to a violation that are taken from one start at most.
+_AGAIN = 40
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +83,10 @@ class _Layer:
 def counterexamples(
     space: PlanSpace, index: EdgeIndex, word: Ints, most: int, starts: Ints | None = None
 ) -> Iterator[Counterexample]:
-    """Failing tuples of plans with one sentence under ``word`` (word of each plan-space node): one for each start that
-    has any, at most ``most``, those that differ at the fewest steps first.  None: ``word`` is a language for these tasks.
+    """Failing tuples of plans with one sentence under ``word`` (word of each plan-space node), about ``most`` of them.
+
+    For each node that all plans and their mixture share, the rest of plans that begin alike: those that differ at the
+    fewest steps, and then others.  None at all: ``word`` is a language for these tasks.
     """
     layers = _forward(space, index, word, np.unique(space.starts) if starts is None else starts)
     _backward(space, layers)
@@ -178,14 +183,34 @@ def _retrace(space: PlanSpace, layers: list[_Layer], most: int) -> Iterator[Coun
         diagonal = (x == x[:, :1]).all(axis=1) & (layer.nodes[:, robots + 1 :] == 0).all(axis=1)
         hit = np.flatnonzero(diagonal & (layer.best < _FAR)) if number else np.zeros(0, np.int64)
         starts += [(int(layer.best[row]), number, int(row)) for row in hit]
-    for _, number, row in sorted(starts)[:most]:
-        start = int(layers[number].nodes[row, 0])
-        edges = []
-        for layer in layers[number:0:-1]:
-            move = int(layer.choice[row])
-            edges.append(tuple(layer.edges[move].tolist()))
-            row = int(layer.child[move])
-        states = tuple(
-            (int(space.state[start]), *(int(space.state[space.target[step[i]]]) for step in edges)) for i in range(robots)
-        )
-        yield Counterexample(start, tuple(edges), states)
+    chosen = sorted(starts)[:most]
+    for _, number, row in chosen:
+        yield _follow(space, layers, number, row, None)
+    if not chosen:
+        return
+    # Few starts: more ways to a violation from each, drawn at random (always the same ones).
+    random = Random(0)
+    for _ in range(min(_AGAIN, most // len(chosen) - 1)):
+        for _, number, row in chosen:
+            yield _follow(space, layers, number, row, random)
+
+
+def _follow(
+    space: PlanSpace, layers: list[_Layer], number: int, row: int, random: Random | None
+) -> Counterexample:
+    """One way from a node to a violation: the best one, or at each node any move that still leads to one."""
+    robots = space.labels.shape[1]
+    start = int(layers[number].nodes[row, 0])
+    edges = []
+    for below, layer in zip(layers[number - 1 :: -1], layers[number:0:-1], strict=True):
+        move = int(layer.choice[row])
+        if random is not None:
+            low, high = np.searchsorted(layer.source, (row, row + 1))
+            open_moves = low + np.flatnonzero(below.best[layer.child[low:high]] < _FAR)
+            move = int(open_moves[random.randrange(len(open_moves))])
+        edges.append(tuple(layer.edges[move].tolist()))
+        row = int(layer.child[move])
+    states = tuple(
+        (int(space.state[start]), *(int(space.state[space.target[step[i]]]) for step in edges)) for i in range(robots)
+    )
+    return Counterexample(start, tuple(edges), states)
