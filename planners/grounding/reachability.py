@@ -48,11 +48,13 @@ def reachable_arguments(
             raise _failure(error) from error
         finally:
             tempfile.tempdir = before
+    # Objects are numbered in natural order, so arguments sort as their numbers do.
+    place = {symbol: int(symbol[1:]) for symbol in core.objects}
     return {
-        name: sorted(
-            (tuple(core.objects[o] for o in args) for args in groundings[symbol]),
-            key=lambda args: tuple(natural(a) for a in args),
-        )
+        name: [
+            tuple(core.objects[o] for o in args)
+            for args in sorted(groundings[symbol], key=lambda args: [place[o] for o in args])
+        ]
         for name, symbol in core.actions.items()
     }
 

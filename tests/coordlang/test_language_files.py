@@ -9,13 +9,16 @@ import pytest
 
 from coordlang.build import build_language
 from coordlang.file import read_language, to_bytes, write_atomically
+from coordlang.language import WordTable
 from coordlang.symmetry import state_symmetries
 from coordlang.tasks import Candidates, all_pairs, from_problems
+from coordlang.verify import verify
 from planners.errors import BadInput
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
 from planners.plans import Plans, counts
 from tests.conftest import Command
+from tests.coordlang import naive
 from tests.coordlang.test_minimal import shipped
 
 PARKING = """(define (domain parking) (:types robot place)
@@ -144,3 +147,25 @@ def test_symmetries_map_plans_to_plans(candidates: Candidates) -> None:
         assert sorted(permutation.tolist()) == list(range(len(candidates.rows)))
         image = {frozenset(tuple(int(permutation[s]) for s in states) for states in plans) for plans in lists}
         assert image == lists
+
+
+@pytest.mark.parametrize(("folder", "stem"), [("three-cells", "problem"), ("t-map", "problem"), ("grid", "gw1-2x2")])
+@pytest.mark.parametrize("method", ["greedy", "minimal"])
+def test_every_single_corruption_that_matters_is_caught(folder: str, stem: str, method: str) -> None:
+    """Each state moved to each other word, or to a new one: `verify` says what the definition says."""
+    candidates = shipped(folder, stem)
+    language = build_language(candidates, method).language
+    table = WordTable.of(language, candidates.model)
+    word = table.of_rows(candidates.rows)
+    verdicts = {True: 0, False: 0}
+    for state in range(len(word)):
+        for other in range(len(language.words) + 1):
+            changed = word.copy()
+            changed[state] = other
+            corrupt = WordTable((*language.words, "new"), candidates.rows, changed, 0)
+            expected = all(
+                naive.is_language(space, dict(enumerate(changed.tolist())), 1000) for space in candidates.spaces
+            )
+            assert verify(corrupt, candidates.spaces).holds == expected, (state, other)
+            verdicts[expected] += 1
+    assert verdicts[False] > 0
