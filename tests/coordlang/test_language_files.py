@@ -168,4 +168,5 @@ def test_every_single_corruption_that_matters_is_caught(folder: str, stem: str, 
             )
             assert verify(corrupt, candidates.spaces).holds == expected, (state, other)
             verdicts[expected] += 1
-    assert verdicts[False] > 0
+    # A language with words to spare may survive any one change; a smallest one does not.
+    assert method == "greedy" or verdicts[False] > 0
