@@ -160,8 +160,8 @@ def _joint_model(
     )
     stepper: Composition | WholeActions
     if domain.is_joint_action:
-        place = Place(domain.source.name)
-        stepper = WholeActions(codec, evaluator, robots, labels, actions, options.cost, place)
+        places = {schema.name: domain.source.place(schema.offset) for schema in domain.schemas}
+        stepper = WholeActions(codec, evaluator, robots, labels, actions, options.cost, places)
     else:
         stepper = Composition(codec, evaluator, robots, subactions, keeps_idle, options.cost)
     return JointModel(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -20,7 +20,7 @@ class WholeActions:
     """The `Stepper` of joint-action PDDL.
 
     Actions with the same parts are one joint action if they do the same; different results for the same parts are
-    an error (`BadInput`), because no robot could tell them apart.
+    an error (`BadInput`), because no robot could tell them apart.  ``places`` are the schemas' places, for that message.
     """
 
     def __init__(
@@ -31,9 +31,9 @@ class WholeActions:
         labels: Sequence[Sequence[str]],
         actions: Sequence[GroundAction],
         cost: Cost,
-        place: Place | None = None,
+        places: Mapping[str, Place],
     ) -> None:
-        self._place = place
+        self._places = places
         self._codec, self._evaluator, self._robots = codec, evaluator, tuple(robots)
         self._names, self._actions = [tuple(own) for own in labels], tuple(actions)
         numbers = [{text: n for n, text in enumerate(own)} for own in labels]
@@ -83,7 +83,7 @@ class WholeActions:
             first, second = (self._actions[operator[differs[0] + k]] for k in (0, 1))
             raise BadInput(
                 f"{first.label} and {second.label} have the same subactions but different results",
-                place=self._place,
+                place=self._places.get(second.schema),
                 remedy="The subactions of a joint action must determine what it does: rename one of them.",
             )
         keep = ~same

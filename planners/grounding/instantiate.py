@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import product
 
-from planners.errors import BadInput, Place
+from planners.errors import BadInput
 from planners.grounding.reachability import reachable_arguments
 from planners.pddl.formulas import MAX_COST
 from planners.pddl.lifted import (
@@ -233,8 +233,10 @@ class _Grounder:
         value = self._problem.values.get(atom)
         if value is None or not 0 <= value <= MAX_COST or value != int(value):
             raise BadInput(
-                f"the cost {label(atom.predicate, atom.args)} has no whole value from 0 to {MAX_COST} in the initial state",
-                place=Place(self._problem.source.name),
+                f"the cost {label(atom.predicate, atom.args)} has no whole value from 0 to {MAX_COST} in the initial state "
+                f"of {self._problem.source.name}",
+                place=self._domain.source.place(schema.offset),
+                remedy="Give it a value in (:init ..), or leave out --cost makespan+cost.",
             )
         return int(value)
 

@@ -285,7 +285,7 @@ def test_remembered_actions_change_no_cost(form: str) -> None:
 @pytest.mark.parametrize("form", FORMS)
 def test_without_its_conflicts_a_model_is_cheaper(form: str, monkeypatch: pytest.MonkeyPatch) -> None:
     loaded = read(TOOL, TOOL_TASK)
-    monkeypatch.setattr(plain_module, "_clashes", lambda actions: (frozenset(),) * len(actions))
+    monkeypatch.setattr(plain_module.choosers, "clashes", lambda actions: (frozenset(),) * len(actions))
     assert solved(compile_plain(loaded.model, loaded.tasks[0], FORMS[form])) == (1, 0)
 
 
@@ -343,7 +343,7 @@ def test_the_pddl_says_the_same(name: str, form: str) -> None:
 
 
 def test_equal_names_after_cleaning_stay_apart() -> None:
-    names = plain_module._safe_names(["(at r_1 a)", "(at r 1_a)", "(at r 1 a)", "and", "9", "(#)"])
+    names = plain_module.pddl._safe_names(["(at r_1 a)", "(at r 1_a)", "(at r 1 a)", "and", "9", "(#)"])
     assert len(set(names)) == len(names)
     assert all(name[0].isalpha() for name in names)
 

@@ -1,0 +1,55 @@
+"""The plain task: what every planner reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from planners.pddl.lifted import Atom
+
+Form = Literal["explicit", "select-then-apply"]
+#: A condition on a plain state: the number of a fact, and whether it is to be true.
+Condition = tuple[int, bool]
+Known = Mapping[Atom, bool]
+
+#: The makespan up to which `PlainTask.cost` is sure to be lexicographic by default.
+LONGEST = 100
+
+
+@dataclass(frozen=True, slots=True)
+class PlainAction:
+    """A ground STRIPS action with negative preconditions; facts by number, ``adds`` and ``deletes`` are disjoint."""
+
+    name: str
+    preconditions: tuple[Condition, ...]
+    adds: tuple[int, ...]
+    deletes: tuple[int, ...]
+    cost: int
+
+
+@dataclass(frozen=True, slots=True)
+class PlainTask:
+    """A ground planning task.
+
+    ``facts`` are texts; facts of the model are its PDDL atoms.  A plan of total cost ``step_cost * m + s`` stands for
+    a joint plan of makespan ``m`` and second cost ``s``; ``dearest`` is the most that one joint step adds to ``s``.
+    """
+
+    name: str
+    form: Form
+    facts: tuple[str, ...]
+    init: frozenset[int]
+    actions: tuple[PlainAction, ...]
+    goal: tuple[Condition, ...]
+    step_cost: int
+    dearest: int
+
+    def cost(self, total: int) -> tuple[int, int] | None:
+        """An optimal total cost as (makespan, second cost); None if ``step_cost`` is too small to be sure.
+
+        A plan of ``k`` steps costs from ``step_cost * k`` to ``(step_cost + dearest) * k``, which is less than
+        ``step_cost * m`` for every ``k < m`` when ``step_cost > dearest * m``: then no plan has fewer than ``m`` steps.
+        """
+        makespan, second = divmod(total, self.step_cost)
+        return (makespan, second) if self.step_cost > self.dearest * makespan else None
