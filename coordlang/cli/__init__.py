@@ -45,7 +45,7 @@ def run(arguments: list[str]) -> int:
         return EXIT_BROKEN_PIPE  # so ends click a command whose reader has gone
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EIO, errno.EBADF):
-            raise
+            return _internal(error, debug)
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - what is still in the buffer has no place to go
         return _fail(f"the output cannot be written: {error.strerror}", 2)
     except MemoryError:
@@ -54,11 +54,16 @@ def run(arguments: list[str]) -> int:
         if debug:
             traceback.print_exc()
         return _fail(str(error), error.exit_code)
-    except Exception as error:  # a bug of ours: said plainly, with its own exit code, and never hidden
-        if debug:
-            traceback.print_exc()
-        what = f"internal error: {type(error).__name__}: {error}"
-        return _fail(f"{what}\n  This is a bug; --debug shows where.", CoordlangError.exit_code)
+    except Exception as error:
+        return _internal(error, debug)
+
+
+def _internal(error: Exception, debug: bool) -> int:
+    """A bug of ours: said plainly, with its own exit code, and never hidden."""
+    if debug:
+        traceback.print_exception(error)
+    what = f"internal error: {type(error).__name__}: {error}"
+    return _fail(f"{what}\n  This is a bug; --debug shows where.", CoordlangError.exit_code)
 
 
 def _fail(message: str, code: int) -> int:

@@ -213,3 +213,17 @@ def test_commands_are_all_listed(coordlang: Command) -> None:
     for name in COMMANDS:
         assert coordlang(name, "--help").code == 0
     assert (ROOT / "README.md").exists()
+
+
+@pytest.mark.parametrize("error", [ValueError("odd"), OSError(1, "odd")])
+def test_a_bug_is_said_plainly(error: Exception, coordlang: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever goes wrong inside: one message, exit code 32, no traceback."""
+
+    def broken() -> None:
+        raise error
+
+    monkeypatch.setattr("coordlang.file.json_schema", broken)
+    outcome = coordlang("schema")
+    assert outcome.code == 32
+    assert "internal error" in outcome.err
+    assert "--debug shows where" in outcome.err
