@@ -68,10 +68,10 @@ def build_language(
     progress("walking pairs of plans")
     found = alphas(candidates.spaces)
     clock.note("coordination")
-    checked: list[tuple[Partition, Verdict]] = []
+    checked: list[_Checked] = []
 
     def check(partition: Partition) -> None:
-        checked.append((partition, _verify(candidates, partition)))
+        checked.append(_verified(candidates, partition))
 
     states = tuple(states_on_plans(candidates.spaces).tolist())
     job = Job(candidates, states, found, None, seed, progress, check)
@@ -85,36 +85,39 @@ def build_language(
     try:
         outcome = METHODS[method](job)
         clock.note("vocabulary")
-        if not any(partition is outcome.partition for partition, _ in checked):
+        if not any(known.partition is outcome.partition for known in checked):
             progress("verifying by definition")
             check(outcome.partition)
     except (OutOfTime, OutOfMemory, MemoryError, KeyboardInterrupt) as error:
         stop_clock()
         if not checked:
             raise
-        outcome = Outcome(checked[-1][0], job.lower_bound, {}, error.with_traceback(None))
-    verdict = next(verdict for partition, verdict in checked if partition is outcome.partition)
+        outcome = Outcome(checked[-1].partition, job.lower_bound, {}, error.with_traceback(None))
+    best = next(known for known in checked if known.partition is outcome.partition)
     clock.note("verify")
-    language = _language(candidates, method, outcome)
-    return Built(language, found, len(job.states), verdict, outcome.figures, clock.seconds, outcome.stopped)
+    size = len(best.language.words)
+    guarantee = Guarantee(method, size, outcome.lower_bound, size == outcome.lower_bound)
+    language = signed(replace(best.language, guarantee=guarantee), candidates, {"program": "coordlang"})
+    return Built(language, found, len(job.states), best.verdict, outcome.figures, clock.seconds, outcome.stopped)
 
 
-def _verify(candidates: Candidates, partition: Partition) -> Verdict:
+@dataclass(frozen=True, slots=True)
+class _Checked:
+    """A partition with its words named and its verdict, which is that it holds."""
+
+    partition: Partition
+    language: Language
+    verdict: Verdict
+
+
+def _verified(candidates: Candidates, partition: Partition) -> _Checked:
     words, mapping, default = name_words(candidates.model, candidates.rows, partition)
-    language = Language(
-        words, mapping, default, candidates.model.robots, Guarantee("", 0, 0, False), {}, {}, {}, {}
-    )
+    unknown = Guarantee("", len(words), 1, False)
+    language = Language(words, mapping, default, candidates.model.robots, unknown, {}, {}, {}, {})
     verdict = verify(WordTable.of(language, candidates.model), candidates.spaces)
     if not verdict.holds:
         raise AssertionError(f"a method returned what is no coordination language: {verdict.witness}")
-    return verdict
-
-
-def _language(candidates: Candidates, method: str, outcome: Outcome) -> Language:
-    words, mapping, default = name_words(candidates.model, candidates.rows, outcome.partition)
-    guarantee = Guarantee(method, len(words), outcome.lower_bound, len(words) == outcome.lower_bound)
-    language = Language(words, mapping, default, candidates.model.robots, guarantee, {}, {}, {}, {})
-    return signed(language, candidates, {"program": "coordlang"})
+    return _Checked(partition, language, verdict)
 
 
 class _Clock:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from coordlang.tuples import EdgeIndex, unique_tuples
 from planners.errors import OutOfMemory
 from planners.limits import memory_left
-from planners.matching import Ints, ranges
+from planners.matching import Ints, ranges, spans
 from planners.optimal import PlanSpace
 
 Bools = NDArray[np.bool_]
@@ -116,7 +116,7 @@ def moves(space: PlanSpace, index: EdgeIndex, nodes: Ints, *, together: bool = F
             f"{100 * sizes.max() / 2**30:,.0f} GiB at once",
             remedy="Use fewer robots or --cost makespan+actions, or a larger --memory-limit.",
         )
-    for span in _spans(sizes):
+    for span in spans(sizes, _CHUNK):
         source = np.arange(span.start, span.stop)
         prefix = nodes[span, robots]
         edges: list[Ints] = []
@@ -253,19 +253,6 @@ def _sorted_different(states: Ints) -> Ints:
     largest = np.iinfo(np.int64).max
     states = np.sort(np.where(repeated, largest, states), axis=1)
     return np.where(states == largest, -1, states)
-
-
-def _spans(sizes: NDArray[np.float64]) -> Iterator[slice]:
-    """Cut a table so that each piece has about `_CHUNK` moves."""
-    if not len(sizes):
-        return
-    ends = np.cumsum(sizes)
-    start = 0
-    while start < len(sizes):
-        before = ends[start - 1] if start else 0.0
-        end = max(start + 1, int(np.searchsorted(ends, before + _CHUNK, side="right")))
-        yield slice(start, end)
-        start = end
 
 
 def _check_memory(held: int, parts: Sequence[Ints], progress: float, total: int) -> None:

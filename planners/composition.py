@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from planners.conditions import Evaluator, Labels, speaks_of_step
 from planners.grounding import GroundAction, GroundEffect
 from planners.interference import compatible, conflict, conjuncts
-from planners.joint import IDLE, Cost, Steps, show
-from planners.matching import Ints, Matcher, ranges
+from planners.joint import Cost, Steps, show
+from planners.matching import Ints, Matcher, ranges, spans
 from planners.pddl.lifted import TRUE, Atom, Formula, Not, StepAtom
 from planners.states import Rows, StateCodec
 
@@ -55,7 +55,9 @@ class Composition:
         sizes = np.ones(len(rows))
         for first, _ in options:
             sizes *= np.diff(first)
-        parts = [self._compose(rows, options, span) for span in _spans(sizes)]
+        parts = [self._compose(rows, options, span) for span in spans(sizes, _CHUNK)] or [
+            self._compose(rows, options, slice(0, 0))
+        ]
         return Steps(
             np.concatenate([p.source for p in parts]),
             np.concatenate([p.labels for p in parts]),
@@ -233,17 +235,6 @@ def cost_of(action: GroundAction, cost: Cost) -> int:
     return int(cost == "makespan+actions" and not action.does_nothing)
 
 
-def _spans(sizes: NDArray[np.float64]) -> Iterator[slice]:
-    """Cut the table of states so that each piece composes about `_CHUNK` joint steps."""
-    start, total = 0, 0.0
-    for end, size in enumerate(sizes):
-        if total + size > _CHUNK and end > start:
-            yield slice(start, end)
-            start, total = end, 0.0
-        total += size
-    yield slice(start, len(sizes))
-
-
 def _text(formula: Formula) -> str:
     match formula:
         case Atom() | StepAtom():
@@ -252,5 +243,3 @@ def _text(formula: Formula) -> str:
             return f"(not {_text(part)})"
     return "a formula of its precondition"
 
-
-__all__ = ["IDLE", "Composition", "cost_of", "split"]

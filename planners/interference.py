@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.grounding import GroundAction
+from planners.grounding import GroundAction, label
 from planners.pddl.lifted import And, Atom, Formula, Not, Or, StepAtom
 
 
@@ -95,7 +95,7 @@ def _linked(a: GroundAction, b: GroundAction, first: Footprint, second: Footprin
 
 def _show(atoms: frozenset[Atom]) -> str:
     atom = min(atoms, key=str)
-    return "(" + " ".join((atom.predicate, *atom.args)) + ")"
+    return label(atom.predicate, atom.args)
 
 
 def compatible(

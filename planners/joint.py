@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.conditions import Evaluator, Labels
-from planners.grounding import GroundAction
+from planners.grounding import GroundAction, label
 from planners.matching import Ints
 from planners.pddl.lifted import Atom, Formula, StepAtom
 from planners.states import Rows, StateCodec
 
 Cost = Literal["makespan", "makespan+actions", "makespan+cost"]
-COSTS: tuple[Cost, ...] = ("makespan", "makespan+actions", "makespan+cost")
 
 #: The text of label 0.
 IDLE = "idle"
@@ -129,5 +128,4 @@ class JointModel:
 
 def show(atom: Atom | StepAtom) -> str:
     """PDDL syntax of a ground atom."""
-    name = atom.predicate if isinstance(atom, Atom) else atom.action
-    return "(" + " ".join((name, *atom.args)) + ")"
+    return label(atom.predicate if isinstance(atom, Atom) else atom.action, atom.args)

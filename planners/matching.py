@@ -4,7 +4,7 @@ states at a time."""
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +21,17 @@ def ranges(starts: Ints, counts: Ints) -> Ints:
     ends = np.cumsum(counts)
     within: Ints = np.arange(total) + np.repeat(starts - (ends - counts), counts)
     return within
+
+
+def spans(sizes: NDArray[np.float64], most: int) -> Iterator[slice]:
+    """Cut a table so that the sizes of each piece sum to at most ``most``; a larger row is a piece of its own."""
+    ends = np.cumsum(sizes)
+    start = 0
+    while start < len(sizes):
+        before = ends[start - 1] if start else 0.0
+        end = max(start + 1, int(np.searchsorted(ends, before + most, side="right")))
+        yield slice(start, end)
+        start = end
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,12 @@ Texts = tuple[str | None, ...]
 #: Larger counts are written as strings: not every JSON reader has big integers.
 _EXACT = 2**53
 
+
+def json_count(number: int) -> int | str:
+    """A count as it stands in JSON: a string above 2^53."""
+    return number if number <= _EXACT else str(number)
+
+
 _LINE = re.compile(r"(?:(?P<step>\d+)\s*:)?\s*(?P<action>\([^()]*\))\s*(?:\[\s*[\d.]+\s*\])?$")
 
 
@@ -54,7 +60,7 @@ def to_json(plans: Plans, listed: Sequence[Plan], task: int = 0) -> dict[str, An
     makespan, second = plans.space.cost_of(task)
     data: dict[str, Any] = {
         "plans": [{"cost": len(plan), "actions": [list(step) for step in texts(model, plan)]} for plan in listed],
-        "count": plans.count if plans.count <= _EXACT else str(plans.count),
+        "count": json_count(plans.count),
         "complete": len(listed) == plans.count,
         "optimal_cost": makespan,
         "robots": list(model.robots),

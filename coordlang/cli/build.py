@@ -28,6 +28,7 @@ from coordlang.cli.app import (
 if TYPE_CHECKING:
     from coordlang.build import Built
     from coordlang.tasks import Candidates
+    from planners.model import ModelOptions
 
 
 @click.command(name="build")
@@ -68,7 +69,7 @@ def command(
         raise click.UsageError(f"-o {output} would overwrite an input file")
     start = perf_counter()
     lifted, read = read_files(domain, problems)
-    candidates = make_candidates(lifted, read, tasks, given)
+    candidates = make_candidates(lifted, read, tasks, given.options())
     note_single_robot(candidates.model.robots)
     seconds = {"space": perf_counter() - start}
     try:
@@ -106,12 +107,11 @@ def command(
     return EXIT_UNPROVED if unproved else 0
 
 
-def make_candidates(lifted: Any, read: list[Any], tasks: str | None, given: GivenOptions) -> Candidates:
-    """The candidate tasks that ``--tasks`` asks for."""
+def make_candidates(lifted: Any, read: list[Any], tasks: str | None, options: ModelOptions) -> Candidates:
+    """The candidate tasks that ``--tasks`` asks for; without it the problems' own."""
     from coordlang.tasks import all_pairs, from_listed, from_problems, read_task_file
     from planners.errors import Place
 
-    options = given.options()
     if tasks is None:
         return from_problems(lifted, read, options)
     if tasks == "all":

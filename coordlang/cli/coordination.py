@@ -9,6 +9,7 @@ import click
 
 from coordlang.cli.app import (
     GivenOptions,
+    counted,
     domain_argument,
     limits,
     model_options,
@@ -48,17 +49,19 @@ def command(domain: str, problems: tuple[str, ...], as_json: bool, given: GivenO
         return
     for name, makespan, plans, witness in entries:
         answer = "is required" if witness else "is not required: any mixture of them is optimal"
-        click.echo(f"{name}: {plans:,} optimal plan{'s' * (plans != 1)} of {makespan} steps; coordination {answer}")
+        click.echo(f"{name}: {counted(plans, 'optimal plan')} of {makespan} steps; coordination {answer}")
         if witness:
             click.echo()
             click.echo(show(witness))
 
 
 def _data(name: str, makespan: int, plans: int, witness: Miscoordination | None) -> dict[str, Any]:
+    from planners.planfile import json_count
+
     return {
         "problem": name,
         "makespan": makespan,
-        "plans": plans if plans <= 2**53 else str(plans),
+        "plans": json_count(plans),
         "requires_coordination": witness is not None,
         "miscoordination": witness_data(witness) if witness else None,
     }

@@ -56,6 +56,8 @@ def command(language: str, domain: str, problem: str, as_json: bool, given: Give
 
 
 def _data(language: Language, task: str, sentences: list[TaskSentence]) -> dict[str, Any]:
+    from planners.planfile import json_count
+
     return {
         "words": language.sizes(),
         "default": language.default,
@@ -63,7 +65,7 @@ def _data(language: Language, task: str, sentences: list[TaskSentence]) -> dict[
         "sentences": [
             {
                 "sentence": " ".join(s.words),
-                "plans": s.plans if s.plans <= 2**53 else str(s.plans),
+                "plans": json_count(s.plans),
                 "choices": [[list(own) for own in step] for step in s.choices],
             }
             for s in sentences
@@ -92,11 +94,11 @@ def _words(language: Language) -> str:
 
 def _sentences(task: str, robots: tuple[str, ...], sentences: list[TaskSentence]) -> str:
     total = sum(s.plans for s in sentences)
-    lines = [f"The task {task}", f"has {total:,} optimal plan{'s' * (total != 1)} in {len(sentences)} "
-             f"sentence{'s' * (len(sentences) != 1)}:"]  # fmt: skip
+    lines = [f"The task {task}"]
+    lines.append(f"has {counted(total, 'optimal plan')} in {counted(len(sentences), 'sentence')}:")
     for sentence in sentences[:_SENTENCES_SHOWN]:
         lines.append(
-            f'  "{" ".join(sentence.words)}" leaves {sentence.plans:,} plan{"s" * (sentence.plans != 1)} open:'
+            f'  "{" ".join(sentence.words)}" leaves {counted(sentence.plans, "plan")} open:'
         )
         for number, step in enumerate(sentence.choices, 1):
             parts = [f"{robot} {_either(own)}" for robot, own in zip(robots, step, strict=True)]

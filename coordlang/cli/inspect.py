@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from coordlang.cli.app import limits, model_options, note_single_robot, task_files
+from coordlang.cli.app import counted, limits, model_options, note_single_robot, task_files
 
 if TYPE_CHECKING:
     from planners.inspection import Inspection
@@ -52,7 +52,7 @@ def _text(found: Inspection) -> str:
     ]
     for robot, schemas in found.subactions.items():
         total = sum(schemas.values())
-        lines.append((f"  {robot}", f"{total} subaction{'s' * (total != 1)}: {_counts(schemas)}; {found.idle[robot]}"))
+        lines.append((f"  {robot}", f"{counted(total, 'subaction')}: {_counts(schemas)}; {found.idle[robot]}"))
     lines += [
         ("shared", _counts(found.shared) or "none"),
         ("no robot named", {"error": "not allowed (--unowned)"}.get(found.unowned, f"--unowned {found.unowned}")),

@@ -38,10 +38,10 @@ def command(
 
     Exit 0: it is.  1: it is not, and two plans that miscoordinate are shown.
     """
+    from coordlang.cli.build import make_candidates
     from coordlang.cli.coordination import show, witness_data
     from coordlang.file import check_source, read_language, recorded_candidates
     from coordlang.language import WordTable
-    from coordlang.tasks import all_pairs, from_listed, read_task_file
     from coordlang.verify import verify
     from planners.errors import Place
 
@@ -51,10 +51,8 @@ def command(
     options = given.for_language(spoken)
     if tasks is None:
         candidates = recorded_candidates(spoken, lifted, read, options, Place(language))
-    elif tasks == "all":
-        candidates = all_pairs(lifted, read, options)
     else:
-        candidates = from_listed(lifted, read, read_task_file(tasks), options, Place(tasks))
+        candidates = make_candidates(lifted, read, tasks, options)
     verdict = verify(WordTable.of(spoken, candidates.model), candidates.spaces)
     if as_json:
         click.echo(json.dumps({

@@ -26,7 +26,6 @@ class Colouring:
         self._solver = Solver(name=solver)
         self._word = {s: [self._new() for _ in range(size)] for s in self._states}
         self._separated: dict[Pair, int] = {}
-        self.clauses = 0
         for state in self._states:
             self._one_word(self._word[state])
         self._break_symmetry()
@@ -34,7 +33,6 @@ class Colouring:
     def add(self, clause: Iterable[Pair]) -> None:
         """Require that one of these pairs of states lies in different words."""
         self._solver.add_clause([self._separate(p) for p in sorted(clause)])
-        self.clauses += 1
 
     def solve(self) -> dict[int, int] | None:
         """A partition (state -> word), or None if there is none: a proof that ``size`` words do not suffice."""

@@ -22,7 +22,8 @@ from planners.pddl.lifted import (
 from planners.pddl.names import Names, group, known, word
 from planners.pddl.sexpr import Expression, Group, Word
 
-_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)$")
+#: How PDDL writes a number.
+NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)$")
 #: Costs are summed as 64-bit integers.
 MAX_COST = 2**31
 _NUMERIC_TESTS = frozenset({"<", "<=", ">", ">="})
@@ -153,7 +154,7 @@ def _cost(names: Names, item: Group, *, conditional: bool) -> int | Atom:
         raise _unsupported(names, "a cost that depends on a condition", item)
     amount = item.items[2]
     if isinstance(amount, Word):
-        if not _NUMBER.match(amount.text):
+        if not NUMBER.match(amount.text):
             raise document.fail(f"expected a number, found {amount.text!r}", amount)
         value = float(amount.text)
         if not 0 <= value <= MAX_COST or value != int(value):
@@ -182,7 +183,7 @@ def _equal(names: Names, item: Group) -> Formula:
     _expect(names, item, 2)
     left, right = item.items[1:]
     for side in (left, right):
-        if isinstance(side, Group) or (_NUMBER.match(side.text) and side.text not in names.objects):
+        if isinstance(side, Group) or (NUMBER.match(side.text) and side.text not in names.objects):
             raise _unsupported(names, "numeric condition '(= ..)'", item)
     return Equal(names.term(left), names.term(right))
 

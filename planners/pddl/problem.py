@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 from planners.errors import Unsupported
 from planners.pddl.domain import read_header, read_objects
-from planners.pddl.formulas import read_formula
+from planners.pddl.formulas import NUMBER, read_formula
 from planners.pddl.lifted import Atom, Domain, Formula, Problem
 from planners.pddl.names import Names, group, word
 from planners.pddl.sexpr import Document, Group, Source, Word, parse, read_source
-
-_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)$")
 
 
 def read_problem(path: str | Path, domain: Domain) -> Problem:
@@ -93,7 +90,7 @@ def _read_value(names: Names, item: Group, values: dict[Atom, float]) -> None:
     number = item.items[2]
     if function.head not in names.functions and function.head != "total-cost":
         raise document.fail(f"unknown function {function.head!r}", function)
-    if not isinstance(number, Word) or not _NUMBER.match(number.text):
+    if not isinstance(number, Word) or not NUMBER.match(number.text):
         raise Unsupported(
             "a function value that is no number is not supported",
             place=document.source.place(item.offset),
