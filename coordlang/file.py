@@ -328,6 +328,11 @@ def check_source(language: Language, domain: Domain, problems: list[Problem], pl
             )
 
 
+def recorded_list(language: Language) -> list[ListedTask]:
+    """The candidate tasks that a language file lists; none under ``--tasks all``."""
+    return [ListedTask(tuple(t["init"]), tuple(t["goal"])) for t in language.tasks.get("tasks", [])]
+
+
 def recorded_candidates(
     language: Language, domain: Domain, problems: list[Problem], options: ModelOptions, place: Place
 ) -> Candidates:
@@ -343,7 +348,7 @@ def recorded_candidates(
                     remedy="Give the problem that the language was built for, or say --tasks all to check these.",
                 )
             return candidates
-        listed = [ListedTask(tuple(t["init"]), tuple(t["goal"])) for t in language.tasks.get("tasks", [])]
+        listed = recorded_list(language)
         if not listed or len(listed) != language.tasks["count"]:
             raise BadInput(
                 f"the language records {language.tasks['count']} tasks but lists {len(listed)}",

@@ -128,13 +128,13 @@ def from_listed(
     """
     if not listed:
         raise BadInput("the list of tasks is empty", place=place, remedy="Give at least one task.")
-    inits = [_read_init(domain, problems[0], task, place) for task in listed]
-    loaded = build(domain, problems, options, inits=inits)
+    ground = ground_tasks(domain, problems[0], listed, place)
+    loaded = build(domain, problems, options, inits=[init for init, _ in ground])
     model = loaded.model
     space = explore(model, np.stack([task.init for task in loaded.tasks]))
     reached, _ = unique_rows(space.rows[:, : model.codec.fact_words])
     groups: dict[Goal, list[Rows]] = {}
-    for number, (task, init) in enumerate(zip(listed, inits, strict=True), 1):
+    for number, (init, goal) in enumerate(ground, 1):
         row = model.state(init)
         if find_rows(reached, row[None, : model.codec.fact_words])[0] < 0:
             raise BadInput(
@@ -143,7 +143,6 @@ def from_listed(
                 place=place,
                 remedy="Is a fluent missing or one too many?  List all fluents that are true.",
             )
-        goal = ground_goal(domain, problems[0], _read_goal(domain, problems[0], task, place))
         groups.setdefault(goal, []).append(row)
     if model.remembers:  # a task starts with no action to remember: those are states of their own
         space = explore(model, np.stack([row for rows in groups.values() for row in rows]))
@@ -162,17 +161,23 @@ def from_recorded(
     place: Place | None = None,
 ) -> Candidates:
     """Problems' tasks as a language file records them: searched one by one, without the rest of the space."""
-    inits = [_read_init(domain, problems[0], task, place) for task in listed]
-    loaded = build(domain, problems, options, inits=inits)
-    tasks = [
-        PlanningTask(
-            f"{number}",
-            loaded.model.state(init),
-            ground_goal(domain, problems[0], _read_goal(domain, problems[0], task, place)),
-        )
-        for number, (task, init) in enumerate(zip(listed, inits, strict=True), 1)
-    ]
+    ground = ground_tasks(domain, problems[0], listed, place)
+    loaded = build(domain, problems, options, inits=[init for init, _ in ground])
+    tasks = [PlanningTask(f"{n}", loaded.model.state(init), goal) for n, (init, goal) in enumerate(ground, 1)]
     return Candidates("problems", loaded, tuple(listed), (search_each(loaded.model, tasks),), None)
+
+
+def ground_tasks(
+    domain: Domain, problem: Problem, listed: Sequence[ListedTask], place: Place | None = None
+) -> list[tuple[frozenset[Atom], Formula]]:
+    """Listed tasks as (true fluents, ground goal); everything static comes from the problem."""
+    return [
+        (
+            _read_init(domain, problem, task, place),
+            ground_goal(domain, problem, And(tuple(_read_text(domain, problem, text, place) for text in task.goal))),
+        )
+        for task in listed
+    ]
 
 
 def read_task_file(path: str | Path) -> tuple[ListedTask, ...]:
@@ -274,10 +279,6 @@ def _read_init(domain: Domain, problem: Problem, task: ListedTask, place: Place 
             raise BadInput(f"{text} is static and false in {problem.source.name}", place=place)
         atoms.add(formula)
     return frozenset(atom for atom in atoms if atom.predicate in fluents)
-
-
-def _read_goal(domain: Domain, problem: Problem, task: ListedTask, place: Place | None) -> Formula:
-    return And(tuple(_read_text(domain, problem, text, place) for text in task.goal))
 
 
 def _read_text(domain: Domain, problem: Problem, text: str, place: Place | None) -> Formula:
