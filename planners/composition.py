@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.conditions import Evaluator, Labels, speaks_of_step
+from planners.errors import OutOfMemory
 from planners.grounding import GroundAction, GroundEffect
 from planners.interference import compatible, conflict, conjuncts
 from planners.joint import Cost, Steps, show
+from planners.limits import memory_left
 from planners.matching import Ints, Matcher, ranges, spans
 from planners.pddl.lifted import TRUE, Atom, Formula, Not, StepAtom
 from planners.states import Rows, StateCodec
@@ -51,7 +53,7 @@ class Composition:
 
     def steps(self, rows: Rows) -> Steps:
         """All joint steps applicable in the states of a table, sorted by source and labels."""
-        options = [self._options(robot, number, rows) for number, robot in enumerate(self._robot)]
+        options = self.choices(rows)
         sizes = np.ones(len(rows))
         for first, _ in options:
             sizes *= np.diff(first)
@@ -64,6 +66,10 @@ class Composition:
             np.concatenate([p.result for p in parts]),
             np.concatenate([p.cost for p in parts]),
         )
+
+    def choices(self, rows: Rows) -> list[tuple[Ints, Ints]]:
+        """For each robot the labels whose conditions on the state hold, by state: (first index, labels), CSR."""
+        return [self._options(robot, number, rows) for number, robot in enumerate(self._robot)]
 
     def why_not(self, row: Rows, labels: Sequence[int]) -> str:
         """Why these labels are no joint step in a state: the first rule that they break."""
@@ -109,6 +115,7 @@ class Composition:
         chosen: list[Ints] = []
         for j, (first, label) in enumerate(options):
             counts = first[source + 1] - first[source]
+            self._require_room(int(counts.sum()), j, len(rows[span]))
             new = label[ranges(first[source], counts)]
             source = np.repeat(source, counts)
             chosen = [np.repeat(old, counts) for old in chosen]
@@ -122,6 +129,17 @@ class Composition:
             robot.drop_unmet(fits, i, rows, source, labels)
         source, labels = source[fits], labels[fits]
         return Steps(source, labels, *self._apply(rows, source, labels))
+
+    def _require_room(self, combinations: int, robot: int, states: int) -> None:
+        """Stop before the combinations of one more robot's labels take more memory than there is."""
+        # A number of the state and one of each label so far, in two copies, and what compares them.
+        needed = 8 * (2 * robot + 6) * combinations
+        if combinations > _CHUNK and needed > memory_left():
+            raise OutOfMemory(
+                f"{robot + 1} of {len(self._robots)} robots have {combinations:,} combinations of subactions in {states:,} "
+                f"state{'s' * (states != 1)}: about {needed / 2**30:,.1f} GiB, and {memory_left() / 2**30:.1f} GiB are left",
+                remedy="Use fewer robots, or a larger --memory-limit.",
+            )
 
     def _apply(self, rows: Rows, source: Ints, labels: Labels) -> tuple[Rows, Ints]:
         shape = (len(source), self._codec.fact_words)

@@ -33,6 +33,8 @@ class CoordlangError(Exception):
         The file position it was found at, where there is one.
     remedy
         One sentence: what the user can do.
+
+    ``reached`` says how far the work got that a limit ended (`planners.limits.reaching`).
     """
 
     #: A program that coordlang relies on failed (the other codes are set below).
@@ -43,10 +45,11 @@ class CoordlangError(Exception):
         self.what = what
         self.place = place
         self.remedy = remedy
+        self.reached: str | None = None
 
     def __str__(self) -> str:
         text = f"{self.place}: {self.what}" if self.place else self.what
-        return f"{text}\n  {self.remedy}" if self.remedy else text
+        return "\n  ".join((text, *(line for line in (self.reached, self.remedy) if line)))
 
 
 class Refuted(CoordlangError):

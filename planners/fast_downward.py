@@ -91,6 +91,11 @@ def optimal_cost(
         longest = total // plain.step_cost
 
 
+def total_cost(plain: PlainTask, *, time_limit: float | None = None, memory_limit: int | None = None) -> int | None:
+    """The total cost of an optimal plan of a plain task by Fast Downward, None if there is none; see `optimal_cost`."""
+    return _solve(plain, time_limit, time_limit, memory_limit)
+
+
 def as_json(plain: PlainTask, memory_limit: int | None) -> str:
     """The task as `planners.fast_downward_worker` reads it; names stay here."""
     return json.dumps(

@@ -5,23 +5,45 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
+from planners.composition import Composition
 from planners.grounding import GroundAction
 from planners.interference import conflict, footprint
-from planners.joint import JointModel
+from planners.joint import JointModel, show
 from planners.model import Loaded
-from planners.pddl.lifted import Domain
+from planners.pddl.lifted import (
+    And,
+    Atom,
+    Domain,
+    Equal,
+    Exists,
+    Forall,
+    Formula,
+    Not,
+    Or,
+    StepAtom,
+    Truth,
+    Variable,
+)
+from planners.states import Rows, find_rows, unique_rows
+
+#: States in which an example of interference is looked for.
+_LOOK_AT = 2000
 
 
 @dataclass(frozen=True, slots=True)
 class Inspection:
     """Everything that a user needs to see whether the domain was read as it was meant.
 
-    ``subactions[robot][schema]`` counts ground subactions; ``idle[robot]`` says how the robot may do nothing;
-    ``interfering`` counts pairs of subactions of different robots that cannot share a step, with one example.
+    ``objects`` counts them by type, each in all its types; ``subactions[robot][schema]`` counts ground subactions, and
+    ``impossible`` are the schemas that have none; ``idle[robot]`` says how the robot may do nothing; ``formulas`` shows
+    for each schema of ``step_formulas`` what one of its subactions asks of the others.  ``interfering`` counts pairs of
+    subactions of different robots that cannot share a step; the ``example`` is one that meets in a reachable state, None
+    if no state near the start has one.  ``start`` counts the fluents that are true at first, ``never`` are the predicates
+    that no state can make true.
     """
 
     domain: str
@@ -29,17 +51,22 @@ class Inspection:
     style: str
     robots: tuple[str, ...]
     robots_by: str
+    objects: dict[str, int]
     subactions: dict[str, dict[str, int]]
+    impossible: tuple[str, ...]
     idle: dict[str, str]
     shared: dict[str, int]
     unowned: str
     step_formulas: dict[str, int]
+    formulas: tuple[str, ...]
     without_effects: tuple[str, ...]
     costs: str
     interfering: int
     example: str | None
     fluents: dict[str, int]
+    start: dict[str, int]
     statics: dict[str, int]
+    never: tuple[str, ...]
     facts: int
     goal: str
 
@@ -50,26 +77,32 @@ def inspect(loaded: Loaded) -> Inspection:
     O(pairs of subactions) for the interference count.
     """
     model, domain = loaded.model, loaded.domain
-    pairs, example = _interference(model)
+    start = model.codec.decode(loaded.tasks[0].init)
+    possible = {fact[1:-1].split(" ")[0] for fact in model.codec.facts} | {a.predicate for a in model.statics}
     return Inspection(
         domain=domain.name,
         problem=loaded.problems[0].name,
         style=_style(domain),
         robots=model.robots,
         robots_by=loaded.team.by,
+        objects=_objects(loaded),
         subactions=_subactions(model),
+        impossible=tuple(s.name for s in domain.schemas if s.name not in {a.schema for a in model.actions}),
         idle=_idle(model),
         shared=_counted(a.schema for a in model.actions if len(a.owners) > 1 and not a.parts),
         unowned=loaded.options.robots.unowned,
         step_formulas=_counted(a.schema for a in model.actions if _speaks_of_others(a)),
+        formulas=_formulas(model),
         without_effects=tuple(sorted({a.schema for a in model.actions if not a.effects})),
         costs=_costs(domain, model.cost),
-        interfering=pairs,
-        example=example,
+        interfering=_interfering(model),
+        example=_example(model, loaded.tasks[0].init),
         fluents=_counted(fact[1:-1].split(" ")[0] for fact in model.codec.facts),
+        start=_counted(fact[1:-1].split(" ")[0] for fact in start if not fact.startswith("(last ")),
         statics=_counted(a.predicate for a in model.statics),
+        never=tuple(sorted(set(domain.predicates) - possible)),
         facts=len(model.codec.facts),
-        goal=_source_of_goal(loaded),
+        goal=unparse(loaded.problems[0].goal),
     )
 
 
@@ -108,20 +141,63 @@ def _speaks_of_others(action: GroundAction) -> bool:
     return bool(touched.partners or touched.excluded)
 
 
-def _interference(model: JointModel) -> tuple[int, str | None]:
-    """Pairs of subactions of different robots that may not share a step, and why, for the first."""
-    if model.is_joint_action:
-        return 0, None
-    count = 0
-    example: str | None = None
-    own = [[a for a in model.actions if a.owners == (i,)] for i in range(len(model.robots))]
-    tables = getattr(model.stepper, "tables", {})
-    for i, j in combinations(range(len(model.robots)), 2):
-        table = tables[i, j]
-        count += int(np.count_nonzero(~table[1:, 1:]))
-        if example is None:
-            example = next((c for a in own[i] for b in own[j] if (c := conflict(a, b))), None)
-    return count, example
+def _objects(loaded: Loaded) -> dict[str, int]:
+    """How many objects each type has; untyped ones count as ``object``."""
+    domain = loaded.domain
+    types = [
+        frozenset().union(*(domain.supertypes(t) for t in own)) - ({"object"} if own != ("object",) else set())
+        for own in loaded.problems[0].objects.values()
+    ]
+    return _counted(t for own in types for t in own)
+
+
+def _formulas(model: JointModel) -> tuple[str, ...]:
+    """What the first subaction of each schema with a formula about the step asks of the others."""
+    there = {StepAtom(action.schema, action.args) for action in model.actions}
+    found: dict[str, str] = {}
+    for action in model.actions:
+        touched = footprint(action)
+        for kind, others in (("speaks of", touched.partners), ("forbids", touched.excluded)):
+            if others and (key := f"{action.schema} {kind}") not in found:
+                found[key] = f"{action.label} {kind} {_some(others & there) or _nobody(others)} in the same step"
+    return tuple(found.values())
+
+
+def _some(atoms: frozenset[StepAtom]) -> str:
+    names = sorted(map(show, atoms))
+    return ", ".join(names[:2]) + (f" and {len(names) - 2:,} more" if len(names) > 2 else "")
+
+
+def _nobody(atoms: frozenset[StepAtom]) -> str:
+    """What a formula speaks of in vain: often a mistake in the domain."""
+    return f"{_some(atoms)}, which nobody can ever do,"
+
+
+def _interfering(model: JointModel) -> int:
+    """Pairs of subactions of different robots that may not share a step."""
+    if not isinstance(model.stepper, Composition):
+        return 0
+    return sum(int(np.count_nonzero(~table[1:, 1:])) for table in model.stepper.tables.values())
+
+
+def _example(model: JointModel, init: Rows) -> str | None:
+    """Why two subactions interfere that are both possible in some state: breadth first from the start, some states."""
+    stepper = model.stepper
+    if not isinstance(stepper, Composition):
+        return None
+    own = [[a for a in model.actions if i in a.owners] for i in range(len(model.robots))]
+    layer = seen = init[None, :]
+    while len(layer) and len(seen) <= _LOOK_AT:
+        choices = stepper.choices(np.ascontiguousarray(layer[:, : model.codec.fact_words]))
+        for state, (i, j) in product(range(len(layer)), combinations(range(len(own)), 2)):
+            mine, theirs = (labels[first[state] : first[state + 1]] for first, labels in (choices[i], choices[j]))
+            for a, b in np.argwhere(~stepper.tables[i, j][np.ix_(mine, theirs)]).tolist():
+                if mine[a] and theirs[b] and (why := conflict(own[i][mine[a] - 1], own[j][theirs[b] - 1])):
+                    return why
+        new, _ = unique_rows(model.successors(layer[:_LOOK_AT]).result)
+        layer = new[find_rows(seen, new) < 0]
+        seen, _ = unique_rows(np.concatenate((seen, layer)))
+    return None
 
 
 def _costs(domain: Domain, cost: str) -> str:
@@ -133,15 +209,29 @@ def _costs(domain: Domain, cost: str) -> str:
     return f"declared ({', '.join(declared)}) and ignored: --cost makespan+cost uses them"
 
 
-def _source_of_goal(loaded: Loaded) -> str:
-    text = loaded.problems[0].source.text
-    start = text.lower().find("(:goal")
-    depth = 0
-    for position in range(start, len(text)):
-        depth += {"(": 1, ")": -1}.get(text[position], 0)
-        if depth == 0:
-            return " ".join(text[start : position + 1].split())
-    return ""
+def unparse(formula: Formula) -> str:
+    """A lifted formula as PDDL text."""
+    match formula:
+        case Atom() | StepAtom():
+            return show(formula)
+        case Equal(left, right):
+            return f"(= {left} {right})"
+        case Truth(value):
+            return "()" if value else "(or)"
+        case Not(part):
+            return f"(not {unparse(part)})"
+        case And(parts) | Or(parts):
+            name = "and" if isinstance(formula, And) else "or"
+            return f"({' '.join((name, *map(unparse, parts)))})"
+        case Forall(variables, part) | Exists(variables, part):
+            name = "forall" if isinstance(formula, Forall) else "exists"
+            return f"({name} ({' '.join(map(_typed, variables))}) {unparse(part)})"
+    raise AssertionError(formula)
+
+
+def _typed(variable: Variable) -> str:
+    types = variable.types[0] if len(variable.types) == 1 else f"(either {' '.join(variable.types)})"
+    return f"{variable.name} - {types}"
 
 
 def _counted(names: Iterable[str]) -> dict[str, int]:

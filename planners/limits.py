@@ -6,10 +6,11 @@ it and return what they have.  The memory limit is the operating system's (addre
 
 from __future__ import annotations
 
+import math
 import resource
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
@@ -20,6 +21,7 @@ from planners.errors import OutOfMemory, OutOfTime
 _AGAIN = 5.0
 #: Seconds that no timer counts to the end (some cannot be set to more).
 _FOR_EVER = 1e9
+_LONGER = "Use a larger --time-limit."
 
 
 @contextmanager
@@ -30,7 +32,7 @@ def time_limit(seconds: float | None) -> Iterator[None]:
         return
 
     def ring(_signal: int, _frame: FrameType | None) -> None:
-        raise OutOfTime(f"the time limit of {seconds:g} s is over", remedy="Use a larger --time-limit.")
+        raise OutOfTime(f"the time limit of {seconds:g} s is over", remedy=_LONGER)
 
     before = signal.signal(signal.SIGALRM, ring)
     signal.setitimer(signal.ITIMER_REAL, seconds, _AGAIN)
@@ -44,6 +46,35 @@ def time_limit(seconds: float | None) -> Iterator[None]:
 def stop_clock() -> None:
     """Ring no more: for work that has met its time limit and still has to save what it has."""
     signal.setitimer(signal.ITIMER_REAL, 0)
+
+
+def time_left() -> float:
+    """Seconds until the alarm of the innermost `time_limit` rings; infinite without one."""
+    left, _ = signal.getitimer(signal.ITIMER_REAL)
+    return left if left > 0 else math.inf
+
+
+@contextmanager
+def reaching(so_far: Callable[[], str], instead: str) -> Iterator[None]:
+    """Should a limit end the block, let the error say how far it got.
+
+    ``so_far`` says it, in numbers; ``instead`` is what to try besides a larger limit ("fewer objects").  Of nested blocks
+    the innermost speaks.  Memory that is used up (`MemoryError`) leaves the block as `OutOfMemory`.
+    """
+    try:
+        yield
+        return
+    except (OutOfTime, OutOfMemory) as error:
+        if error.reached is None:
+            error.reached = f"Reached: {so_far()}."
+            if error.remedy == _LONGER:
+                error.remedy = f"Use a larger --time-limit, or {instead}."
+        raise
+    except MemoryError:
+        pass  # what the frames below hold is free once this block is left
+    full = OutOfMemory("the memory is used up", remedy=f"Use a larger --memory-limit, or {instead}.")
+    full.reached = f"Reached: {so_far()}."
+    raise full
 
 
 def limit_memory(size: int | None) -> None:

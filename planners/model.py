@@ -8,10 +8,11 @@ from pathlib import Path
 
 from planners.composition import Composition
 from planners.conditions import Evaluator
-from planners.errors import BadInput, Place, UsageError
-from planners.grounding import GroundAction, ground_actions, ground_goal
+from planners.errors import BadInput, UsageError
+from planners.grounding import FEWER, GroundAction, ground_actions, ground_goal
 from planners.grounding.networks import apply_network
 from planners.joint import IDLE, Cost, Goal, JointModel, show
+from planners.limits import reaching
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import TRUE, Atom, Domain, Problem, StepAtom
 from planners.robots import (
@@ -94,9 +95,10 @@ def build(
     starts = [*(problem.init for problem in problems), *inits]
     extra = {atom for start in starts for atom in start}
     actions = ground_actions(domain, first, team, also=extra, costs=options.cost == "makespan+cost")
-    actions = apply_network(domain, first, actions)
-    team = without_idle_environment(team, (i for action in actions for i in action.owners))
-    model = _joint_model(domain, problems, team, actions, starts, options)
+    with reaching(lambda: f"comparing {len(actions):,} ground actions of {len(team.robots)} robots", FEWER):
+        actions = apply_network(domain, first, actions)
+        team = without_idle_environment(team, (i for action in actions for i in action.owners))
+        model = _joint_model(domain, problems, team, actions, starts, options)
     tasks = tuple(task_of(model, domain, problem) for problem in problems)
     return Loaded(domain, tuple(problems), model, tasks, options, team)
 
@@ -109,16 +111,16 @@ def task_of(model: JointModel, domain: Domain, problem: Problem) -> PlanningTask
 
 def _check_same_world(domain: Domain, first: Problem, other: Problem) -> None:
     remedy = f"Compared with {first.source.name}: the problems of one model have the same objects and statics."
-    place = Place(other.source.name)
+    objects, init = other.source.section(":objects"), other.source.section(":init")
     if first.objects != other.objects:
         odd = sorted({*first.objects.items()} ^ {*other.objects.items()})[0][0]
-        raise BadInput(f"object {odd!r} is not the same in all problems", place=place, remedy=remedy)
+        raise BadInput(f"object {odd!r} is not the same in all problems", place=objects, remedy=remedy)
     changed = static_atoms(domain, first) ^ static_atoms(domain, other)
     if changed:
         odd = min(show(atom) for atom in changed)
-        raise BadInput(f"static fact {odd} is not the same in all problems", place=place, remedy=remedy)
+        raise BadInput(f"static fact {odd} is not the same in all problems", place=init, remedy=remedy)
     if first.values != other.values:
-        raise BadInput("function values differ between the problems", place=place, remedy=remedy)
+        raise BadInput("function values differ between the problems", place=init, remedy=remedy)
 
 
 def _joint_model(

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from planners.conditions import Labels
 from planners.errors import ProvedImpossible
 from planners.joint import Goal, JointModel, Steps
+from planners.limits import reaching
 from planners.matching import Ints, ranges
 from planners.model import PlanningTask
-from planners.space import BLOCK, Space, blocks
+from planners.space import Space, blocks
 from planners.states import Rows, find_rows, unique_rows
 
 #: (goal, state) pairs handled in one plan space when many tasks are asked for.
@@ -26,6 +27,9 @@ _BATCH = 2_000_000
 #: Joint steps kept from the forward search; beyond, layers are expanded again on the way back.
 _KEEP = 8_000_000
 _FAR = np.iinfo(np.int64).max // 4
+
+#: The steps of a layer in pieces: (number of the first state, steps).
+Stored = list[tuple[int, Steps]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,23 +82,35 @@ def search(model: JointModel, task: PlanningTask) -> PlanSpace:
     Forward search to the first layer that holds a goal state, then back along optimal edges.
     Raises `ProvedImpossible` if the goal cannot be reached.
     """
-    layers, kept = _forward(model, task)
-    return _backward(model, task, layers, kept)
+    layers: list[Rows] = []
+    kept: list[Stored | None] = []
+
+    def so_far() -> str:
+        return (
+            f"{sum(map(len, layers)):,} states within {len(layers) - 1} steps of the initial state of {task.name}, "
+            f"{len(layers[-1]) if layers else 0:,} of them new in the last step"
+        )
+
+    with reaching(so_far, "a task with a shorter plan, fewer objects or fewer robots"):
+        _forward(model, task, layers, kept)
+        return _backward(model, task, layers, kept)
 
 
-def _forward(model: JointModel, task: PlanningTask) -> tuple[list[Rows], list[list[Steps] | None]]:
+def _forward(model: JointModel, task: PlanningTask, layers: list[Rows], kept: list[Stored | None]) -> None:
+    """Fill ``layers`` with the states by their distance from the start, ``kept`` with the joint steps out of them."""
     layer = task.init[None, :]
     seen = layer
-    layers, kept, total = [layer], [], 0
+    total = 0
+    layers.append(layer)
     while not model.holds(task.goal, layer).any():
         fresh: list[Rows] = []
-        steps_here: list[Steps] | None = []
-        for _, steps in blocks(model, layer):
+        steps_here: Stored | None = []
+        for start, steps in blocks(model, layer):
             total += len(steps)
             if total > _KEEP:
                 steps_here = None
             if steps_here is not None:
-                steps_here.append(steps)
+                steps_here.append((start, steps))
             fresh.append(unique_rows(steps.result)[0])
         new, _ = unique_rows(np.concatenate(fresh))
         layer = new[find_rows(seen, new) < 0]
@@ -106,14 +122,13 @@ def _forward(model: JointModel, task: PlanningTask) -> tuple[list[Rows], list[li
         seen, _ = unique_rows(np.concatenate((seen, layer)))
         layers.append(layer)
         kept.append(steps_here)
-    return layers, kept
 
 
 def _backward(
     model: JointModel,
     task: PlanningTask,
     layers: list[Rows],
-    kept: list[list[Steps] | None],
+    kept: list[Stored | None],
 ) -> PlanSpace:
     """Keep the edges that lead to the goal in time and at least cost, from the last layer to the first."""
     goal_rows = layers[-1][model.holds(task.goal, layers[-1])]
@@ -150,16 +165,14 @@ def _backward(
 
 
 def _edges_into(
-    model: JointModel, rows: Rows, stored: list[Steps] | None, table: Rows
+    model: JointModel, rows: Rows, stored: Stored | None, table: Rows
 ) -> tuple[Ints, Ints, Labels, Ints]:
     """The steps from ``rows`` into the sorted ``table``."""
     parts: list[tuple[Ints, Ints, Labels, Ints]] = []
-    start = 0
-    for block in stored if stored is not None else (s for _, s in blocks(model, rows)):
+    for start, block in stored if stored is not None else blocks(model, rows):
         target = find_rows(table, block.result)
         hit = target >= 0
         parts.append((block.source[hit] + start, target[hit], block.labels[hit], block.cost[hit]))
-        start += BLOCK
     source, target, labels, cost = (np.concatenate(column) for column in zip(*parts, strict=True))
     return source, target, labels, cost
 
@@ -172,14 +185,18 @@ def _sort_states(graph: PlanSpace) -> PlanSpace:
 
 def search_each(model: JointModel, tasks: Sequence[PlanningTask]) -> PlanSpace:
     """`search` for each task, as one plan space in which every task has a goal of its own."""
-    spaces = [search(model, task) for task in tasks]
+    return joined([search(model, task) for task in tasks])
+
+
+def joined(spaces: Sequence[PlanSpace]) -> PlanSpace:
+    """Plan spaces of one task each as one plan space in which every task has a goal of its own."""
     if len(spaces) == 1:
         return spaces[0]
     rows, number = unique_rows(np.concatenate([s.rows for s in spaces]))
     row_offset = np.cumsum([0, *(len(s.rows) for s in spaces)])
     node_offset = np.cumsum([0, *(len(s) for s in spaces)])
-    joined = PlanSpace(
-        model=model,
+    together = PlanSpace(
+        model=spaces[0].model,
         rows=rows,
         state=np.concatenate([number[s.state + row_offset[k]] for k, s in enumerate(spaces)]),
         goal=np.repeat(np.arange(len(spaces)), np.diff(node_offset)),
@@ -190,11 +207,11 @@ def search_each(model: JointModel, tasks: Sequence[PlanningTask]) -> PlanSpace:
         target=np.concatenate([s.target + node_offset[k] for k, s in enumerate(spaces)]),
         labels=np.concatenate([s.labels for s in spaces]),
         cost=np.concatenate([s.cost for s in spaces]),
-        goals=tuple(task.goal for task in tasks),
+        goals=tuple(space.goals[0] for space in spaces),
         starts=np.array([s.starts[0] + node_offset[k] for k, s in enumerate(spaces)]),
         second=np.concatenate([s.second for s in spaces]),
     )
-    return _reordered(joined, np.lexsort((joined.state, joined.goal, joined.layer)))
+    return _reordered(together, np.lexsort((together.state, together.goal, together.layer)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,6 +222,20 @@ class TaskGroup:
     inits: Rows | None = None
 
 
+def solvable(space: Space, groups: Sequence[TaskGroup]) -> list[TaskGroup]:
+    """The groups without the tasks whose goal cannot be reached."""
+    size = max(1, _BATCH // max(1, len(space)))
+    kept = []
+    for start in range(0, len(groups), size):
+        batch = groups[start : start + size]
+        far = distances(space, np.stack([space.model.holds(group.goal, space.rows) for group in batch]))
+        for own, group in zip(far, batch, strict=True):
+            inits = group.inits if group.inits is None else group.inits[own[space.numbers(group.inits)] >= 0]
+            if inits is None or len(inits):
+                kept.append(replace(group, inits=inits))
+    return kept
+
+
 def plan_spaces(space: Space, groups: Sequence[TaskGroup]) -> Iterator[PlanSpace]:
     """The optimal plans of many tasks over one explored space, in batches of goals.
 
@@ -213,12 +244,18 @@ def plan_spaces(space: Space, groups: Sequence[TaskGroup]) -> Iterator[PlanSpace
     """
     size = max(1, _BATCH // max(1, len(space)))
     for start in range(0, len(groups), size):
-        yield _batch(space, groups[start : start + size])
+
+        def so_far(done: int = start) -> str:
+            return f"the optimal plans to {done:,} of {len(groups):,} goals, over {len(space):,} states"
+
+        with reaching(so_far, "fewer candidate tasks (a task file)"):
+            batch = _batch(space, groups[start : start + size])
+        yield batch
 
 
 def _batch(space: Space, groups: Sequence[TaskGroup]) -> PlanSpace:
     reached = np.stack([space.model.holds(group.goal, space.rows) for group in groups])
-    distance = _distances(space, reached)
+    distance = distances(space, reached)
     states: list[Ints] = []
     for number, group in enumerate(groups):
         if group.inits is None:
@@ -247,8 +284,11 @@ def _batch(space: Space, groups: Sequence[TaskGroup]) -> PlanSpace:
     )
 
 
-def _distances(space: Space, reached: NDArray[np.bool_]) -> Ints:
-    """Least makespan from every state to every goal, (goals, states), -1 where there is none."""
+def distances(space: Space, reached: NDArray[np.bool_]) -> Ints:
+    """Least makespan from every state to every goal, (goals, states), -1 where there is none.
+
+    ``reached`` (goals, states): which states satisfy which goal.  O(goals x joint steps).
+    """
     order = np.argsort(space.target, kind="stable")
     source = np.repeat(np.arange(len(space)), np.diff(space.first))[order]
     into = np.searchsorted(space.target[order], np.arange(len(space) + 1))

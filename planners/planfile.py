@@ -19,11 +19,21 @@ Texts = tuple[str | None, ...]
 
 #: Larger counts are written as strings: not every JSON reader has big integers.
 _EXACT = 2**53
+#: A step number above this one is a mistake, not a plan with so many steps in which all robots idle.
+_MOST_STEPS = 1_000_000
 
 
 def json_count(number: int) -> int | str:
     """A count as it stands in JSON: a string above 2^53."""
     return number if number <= _EXACT else str(number)
+
+
+class NoSuchAction(BadInput):
+    """A plan names an action that the problem does not have; ``step`` is where, from 0."""
+
+    def __init__(self, action: str, step: int, place: Place) -> None:
+        super().__init__(f"{action} is no action of this problem", place=place)
+        self.step = step
 
 
 _LINE = re.compile(r"(?:(?P<step>\d+)\s*:)?\s*(?P<action>\([^()]*\))\s*(?:\[\s*[\d.]+\s*\])?$")
@@ -77,6 +87,8 @@ def read_plans(path: str | Path, model: JointModel) -> list[tuple[Texts, ...]]:
         text = sys.stdin.read() if str(path) == "-" else Path(path).read_text()
     except OSError as error:
         raise BadInput(f"cannot be read: {error.strerror}", place=place) from None
+    except UnicodeDecodeError as error:
+        raise BadInput(f"this is no text: {error}", place=place) from None
     if text.lstrip().startswith("{"):
         return _from_json(text, model, place)
     return [_from_ipc(text, model, str(path))]
@@ -86,7 +98,7 @@ def _from_json(text: str, model: JointModel, place: Place) -> list[tuple[Texts, 
     try:
         entries = json.loads(text)["plans"]
         found = [tuple(tuple(step) for step in entry["actions"]) for entry in entries]
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise BadInput(f"this is no JSON plan file: {error}", place=place) from None
     for plan in found:
         for number, step in enumerate(plan):
@@ -107,29 +119,29 @@ def _from_ipc(text: str, model: JointModel, name: str) -> tuple[Texts, ...]:
         if match is None:
             raise BadInput(f"expected '0: (action args)', found {raw.strip()!r}", place=Place(name, number, 1))
         action = "(" + " ".join(match["action"][1:-1].split()) + ")"
-        step = int(match["step"]) if match["step"] else len(steps)
+        step = int(match["step"][-8:]) if match["step"] else len(steps)
+        if match["step"] and (len(match["step"]) > 8 or step > _MOST_STEPS):
+            raise BadInput(f"step {match['step'][:20]} is too many steps", place=Place(name, number, 1))
         own = steps.setdefault(step, [None] * len(model.robots))
-        _put(own, action, model, Place(name, number, 1))
+        _put(own, step, action, model, Place(name, number, 1))
     last = max(steps, default=-1)
     return tuple(tuple(steps.get(k, [None] * len(model.robots))) for k in range(last + 1))
 
 
-def _put(step: list[str | None], action: str, model: JointModel, place: Place) -> None:
+def _put(own: list[str | None], step: int, action: str, model: JointModel, place: Place) -> None:
     """Enter an action for the robots that it belongs to."""
     if model.is_joint_action:
         parts = next((a.parts for a in model.actions if a.label == action), None)
         if parts is None:
-            raise BadInput(f"{action} is no action of this problem", place=place)
-        if any(step):
+            raise NoSuchAction(action, step, place)
+        if any(own):
             raise BadInput(f"two joint actions in one step: {action} is the second", place=place)
-        step[:] = parts
+        own[:] = parts
         return
     owners = next((a.owners for a in model.actions if a.label == action), None)
     if owners is None:
-        raise BadInput(f"{action} is no action of this problem", place=place)
+        raise NoSuchAction(action, step, place)
     for robot in owners:
-        if step[robot] is not None:
-            raise BadInput(
-                f"{model.robots[robot]} does two things in one step: {step[robot]} and {action}", place=place
-            )
-        step[robot] = action
+        if own[robot] is not None:
+            raise BadInput(f"{model.robots[robot]} does two things in one step: {own[robot]} and {action}", place=place)
+        own[robot] = action

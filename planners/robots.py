@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from planners.errors import BadInput, Place, UsageError
+from planners.errors import BadInput, UsageError
 from planners.pddl.lifted import And, Atom, Domain, Problem, Schema
 
 Unowned = Literal["error", "environment", "shared"]
@@ -114,7 +114,7 @@ def find_team(domain: Domain, problem: Problem, choice: RobotChoice) -> Team:
     if not robots:
         raise BadInput(
             "there is no robot in this problem",
-            place=Place(problem.source.name),
+            place=problem.source.section(":objects"),
             remedy=f"Robots are found by {by}; declare at least one such object.",
         )
     if choice.unowned == "environment" and any(s.agent is None and not s.parts for s in domain.schemas):
@@ -180,7 +180,7 @@ def _detect(domain: Domain, problem: Problem) -> tuple[tuple[str, ...], str]:
         return _of_kind(domain, problem, candidates[0]), f"type {candidates[0]}"
     raise BadInput(
         "which objects are the robots? " + ("Several types could be" if candidates else "No type could be"),
-        place=Place(domain.source.name),
+        place=domain.source.section(":types"),
         remedy="Say --robot-type TYPE or --robots NAME,NAME."
         + (f" Candidates: {', '.join(candidates)}." if candidates else ""),
     )

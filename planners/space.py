@@ -9,11 +9,13 @@ import numpy as np
 
 from planners.conditions import Labels
 from planners.joint import JointModel, Steps
+from planners.limits import reaching
 from planners.matching import Ints
 from planners.states import Rows, find_rows, unique_rows
 
-#: States expanded at a time; bounds the memory of one expansion.
-BLOCK = 20_000
+#: States expanded at a time, and the joint steps that this should give: they bound the memory of one expansion.
+_BLOCK = 20_000
+_STEPS = 4_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +42,16 @@ class Space:
 
 
 def blocks(model: JointModel, rows: Rows) -> Iterator[tuple[int, Steps]]:
-    """`JointModel.successors` of a long table in pieces: (number of the piece's first row, its steps)."""
-    for start in range(0, len(rows), BLOCK):
-        yield start, model.successors(rows[start : start + BLOCK])
+    """`JointModel.successors` of a long table in pieces: (number of the piece's first row, its steps).
+
+    The first piece is short; how many steps its states have says how long the next ones may be.
+    """
+    start, size = 0, min(_BLOCK, 500)
+    while start < len(rows):
+        steps = model.successors(rows[start : start + size])
+        yield start, steps
+        start += size
+        size = max(1, min(_BLOCK, int(_STEPS * size / max(1, len(steps)))))
 
 
 def explore(model: JointModel, inits: Rows) -> Space:
@@ -54,15 +63,29 @@ def explore(model: JointModel, inits: Rows) -> Space:
     seen = layer
     sources: list[Rows] = []
     found: list[Steps] = []
-    while len(layer):
-        fresh: list[Rows] = []
-        for start, steps in blocks(model, layer):
-            sources.append(layer[start : start + BLOCK])
-            found.append(steps)
-            fresh.append(unique_rows(steps.result)[0])
-        new, _ = unique_rows(np.concatenate(fresh))
-        layer = new[find_rows(seen, new) < 0]
-        seen, _ = unique_rows(np.concatenate((seen, layer)))
+    depth = 0
+
+    def so_far() -> str:
+        return (
+            f"{len(seen):,} states within {depth} steps of the initial states, {sum(map(len, found)):,} joint steps; "
+            f"{len(layer):,} states are new in the last step"
+        )
+
+    with reaching(so_far, "fewer objects or robots (and no --tasks: then only states nearer than a goal are searched)"):
+        while len(layer):
+            fresh: list[Rows] = []
+            for start, steps in blocks(model, layer):
+                sources.append(layer[start:])
+                found.append(steps)
+                fresh.append(unique_rows(steps.result)[0])
+            new, _ = unique_rows(np.concatenate(fresh))
+            layer = new[find_rows(seen, new) < 0]
+            seen, _ = unique_rows(np.concatenate((seen, layer)))
+            depth += 1
+        return _joined(model, seen, sources, found)
+
+
+def _joined(model: JointModel, seen: Rows, sources: list[Rows], found: list[Steps]) -> Space:
     source = np.concatenate([find_rows(seen, rows)[steps.source] for rows, steps in zip(sources, found, strict=True)])
     order = np.argsort(source, kind="stable")
     return Space(

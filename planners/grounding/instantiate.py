@@ -8,6 +8,7 @@ from itertools import product
 
 from planners.errors import BadInput
 from planners.grounding.reachability import reachable_arguments
+from planners.limits import reaching
 from planners.pddl.formulas import MAX_COST
 from planners.pddl.lifted import (
     FALSE,
@@ -30,6 +31,8 @@ from planners.pddl.lifted import (
 )
 from planners.robots import Team, fluent_predicates, objects_of, static_atoms
 
+#: What to try when grounding is too much.
+FEWER = "fewer objects, or actions with fewer parameters"
 Binding = dict[str, str]
 
 
@@ -90,13 +93,17 @@ def ground_actions(
         An action that no robot owns (``--unowned error``), or a missing cost value.
     """
     grounder = _Grounder(domain, problem, team)
-    reachable = reachable_arguments(domain, problem.objects, sorted({*problem.init, *also}, key=str))
-    actions = [
-        action
-        for schema in domain.schemas
-        for args in reachable[schema.name]
-        if (action := grounder.action(schema, args, costs)) is not None
-    ]
+    world = f"{len(domain.schemas):,} action schemas over {len(problem.objects):,} objects"
+    with reaching(lambda: f"looking for the applicable instances of {world}", FEWER):
+        reachable = reachable_arguments(domain, problem.objects, sorted({*problem.init, *also}, key=str))
+    total = sum(map(len, reachable.values()))
+    actions: list[GroundAction] = []
+    with reaching(lambda: f"{len(actions):,} of at most {total:,} ground actions, of {world}", FEWER):
+        for schema in domain.schemas:
+            for args in reachable[schema.name]:
+                action = grounder.action(schema, args, costs)
+                if action is not None:
+                    actions.append(action)
     return tuple(actions)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from planners.errors import Unsupported
+from planners.limits import reaching
 from planners.pddl.formulas import read_effects, read_formula
 from planners.pddl.lifted import TRUE, Domain, Formula, Part, Schema
 from planners.pddl.names import Names, group, typed_list, word
@@ -25,7 +26,8 @@ _UNSUPPORTED = {
 
 def read_domain(path: str | Path) -> Domain:
     """Read a domain file; see `parse_domain`."""
-    return parse_domain(read_source(path))
+    with reaching(lambda: f"reading {path}", "a shorter file"):
+        return parse_domain(read_source(path))
 
 
 def parse_domain(source: Source) -> Domain:

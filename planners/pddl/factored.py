@@ -13,7 +13,7 @@ from planners.errors import BadInput, Place
 from planners.pddl.domain import read_domain
 from planners.pddl.lifted import And, Atom, Domain, Formula, Problem, Schema
 from planners.pddl.problem import read_problem
-from planners.pddl.sexpr import Source
+from planners.pddl.sexpr import JoinedSource
 
 
 def read_factored(directory: str | Path) -> tuple[Domain, Problem]:
@@ -34,8 +34,7 @@ def read_factored(directory: str | Path) -> tuple[Domain, Problem]:
     for robot, path in domains.items():
         domain = read_domain(path)
         views.append(_of_robot(robot, domain, read_problem(problems[robot], domain)))
-    text = "\n".join(domain.source.text for domain, _ in views)
-    domain = _join_domains([domain for domain, _ in views], Source(str(directory), text))
+    domain = _join_domains([domain for domain, _ in views], str(directory))
     return domain, _join_problems([problem for _, problem in views], domain, str(directory))
 
 
@@ -43,7 +42,7 @@ def _of_robot(robot: str, domain: Domain, problem: Problem) -> tuple[Domain, Pro
     """The robot's view with its own parameter in every action marked as the agent."""
     if robot not in problem.objects:
         raise BadInput(
-            f"robot {robot!r} of the file name is no object of its problem", place=Place(problem.source.name)
+            f"robot {robot!r} of the file name is no object of its problem", place=problem.source.section(":objects")
         )
     schemas = tuple(replace(s, agent=_agent(robot, s, domain, problem)) for s in domain.schemas)
     return replace(domain, schemas=schemas), problem
@@ -66,14 +65,15 @@ def _agent(robot: str, schema: Schema, domain: Domain, problem: Problem) -> int:
     )
 
 
-def _join_domains(domains: list[Domain], source: Source) -> Domain:
+def _join_domains(domains: list[Domain], name: str) -> Domain:
     first = domains[0]
+    source = JoinedSource(name, [domain.source for domain in domains])
     schemas: dict[str, Schema] = {}
     for domain in domains:
         if domain.name != first.name:
-            raise BadInput(f"domain {domain.name!r}, expected {first.name!r}", place=Place(domain.source.name))
+            raise BadInput(f"domain {domain.name!r}, expected {first.name!r}", place=domain.source.section("domain"))
         for schema in domain.schemas:
-            known = schemas.setdefault(schema.name, schema)
+            known = schemas.setdefault(schema.name, replace(schema, offset=source.offset(domain.source, schema.offset)))
             if replace(known, offset=0) != replace(schema, offset=0):
                 raise BadInput(
                     f"action {schema.name!r} differs between the robots' files",
@@ -82,14 +82,23 @@ def _join_domains(domains: list[Domain], source: Source) -> Domain:
     return replace(
         first,
         source=source,
-        types={k: v for domain in domains for k, v in domain.types.items()},
-        constants={k: v for domain in domains for k, v in domain.constants.items()},
+        types=_all_types([domain.types for domain in domains]),
+        constants=_all_types([domain.constants for domain in domains]),
         predicates=_union([domain.predicates for domain in domains]),
         functions=_union([domain.functions for domain in domains]),
         schemas=tuple(schemas.values()),
         constraints=tuple(dict.fromkeys(c for domain in domains for c in domain.constraints)),
         dependences=tuple(dict.fromkeys(d for domain in domains for d in domain.dependences)),
     )
+
+
+def _all_types(tables: list[dict[str, tuple[str, ...]]]) -> dict[str, tuple[str, ...]]:
+    """Types (or objects) with all the supertypes (types) that they have in some file."""
+    joined: dict[str, tuple[str, ...]] = {}
+    for table in tables:
+        for name, types in table.items():
+            joined[name] = tuple(dict.fromkeys((*joined.get(name, ()), *types)))
+    return joined
 
 
 def _union(tables: list[dict[str, frozenset[int]]]) -> dict[str, frozenset[int]]:
@@ -112,18 +121,17 @@ def _join_problems(problems: list[Problem], domain: Domain, name: str) -> Proble
             if values.setdefault(function, value) != value:
                 raise BadInput(
                     f"{function.predicate} {' '.join(function.args)} has another value elsewhere",
-                    place=Place(problem.source.name),
+                    place=problem.source.section(":init"),
                 )
         for obj, types in problem.objects.items():
             if objects.setdefault(obj, types) != types:
-                raise BadInput(f"object {obj!r} has other types elsewhere", place=Place(problem.source.name))
+                raise BadInput(f"object {obj!r} has other types elsewhere", place=problem.source.section(":objects"))
         init |= problem.init
         goals[problem.goal] = None
     goal = next(iter(goals)) if len(goals) == 1 else And(tuple(goals))
-    text = "\n".join(problem.source.text for problem in problems)
     return replace(
         first,
-        source=Source(name, text),
+        source=JoinedSource(name, [problem.source for problem in problems]),
         objects=dict(sorted(objects.items())),
         init=frozenset(init),
         goal=goal,

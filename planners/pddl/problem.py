@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from planners.errors import Unsupported
+from planners.limits import reaching
 from planners.pddl.domain import read_header, read_objects
 from planners.pddl.formulas import NUMBER, read_formula
 from planners.pddl.lifted import Atom, Domain, Formula, Problem
@@ -14,7 +15,8 @@ from planners.pddl.sexpr import Document, Group, Source, Word, parse, read_sourc
 
 def read_problem(path: str | Path, domain: Domain) -> Problem:
     """Read a problem file of ``domain``; see `parse_problem`."""
-    return parse_problem(read_source(path), domain)
+    with reaching(lambda: f"reading {path}", "a shorter file"):
+        return parse_problem(read_source(path), domain)
 
 
 def parse_problem(source: Source, domain: Domain) -> Problem:

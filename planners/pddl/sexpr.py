@@ -8,9 +8,10 @@ from __future__ import annotations
 import re
 import sys
 from bisect import bisect_right
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
+from itertools import accumulate
 from pathlib import Path
 
 from planners.errors import BadInput, Place
@@ -38,9 +39,34 @@ class Source:
         line = bisect_right(self._line_starts, offset)
         return Place(self.name, line, offset - self._line_starts[line - 1] + 1)
 
+    def section(self, name: str) -> Place:
+        """Where a section such as ``:objects`` begins; the first parenthesis if there is none."""
+        places = [m.start() for m in _TOKEN.finditer(self.text) if m.group().lower() == name]
+        places += [m.start() for m in _TOKEN.finditer(self.text) if m.group() == "("][:1]
+        return self.place(places[0] if places else 0)
+
     @property
     def sha256(self) -> str:
         return sha256(self.text.encode()).hexdigest()
+
+
+class JoinedSource(Source):
+    """Several texts as one, one below the other; its places are those in the texts themselves."""
+
+    __slots__ = ("_parts", "_starts")
+
+    def __init__(self, name: str, parts: Sequence[Source]) -> None:
+        super().__init__(name, "\n".join(part.text for part in parts))
+        self._parts = tuple(parts)
+        self._starts = [0, *accumulate(len(part.text) + 1 for part in parts)][:-1]
+
+    def place(self, offset: int) -> Place:
+        number = bisect_right(self._starts, offset) - 1
+        return self._parts[number].place(offset - self._starts[number])
+
+    def offset(self, part: Source, offset: int) -> int:
+        """An offset in one of the texts as an offset in the whole."""
+        return self._starts[self._parts.index(part)] + offset
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,9 @@ Two forms.  *Explicit*: one plain action per joint action.  *Select-then-apply*,
 after another, what they chose is checked, and only then the effects happen, one robot after another; all choices and
 checks see the state before the step, and only the first choice of a step pays for it.
 
+In both forms the optimal plans stand one to one for the optimal joint plans (sequences of the robots' labels): cases and
+formulas are decided in one order, so that nothing can be done in two ways.
+
 This is the cross-check of `planners.composition`, `planners.interference` and `planners.whole`, so it shares their
 input and nothing else: interference, formulas about the joint step and conditional effects are worked out anew here.
 """
@@ -16,12 +19,12 @@ from planners.joint import Goal, JointModel, show
 from planners.model import PlanningTask
 from planners.plain.choosers import Choosers, choosers_of
 from planners.plain.explicit import TooManyError, explicit
-from planners.plain.pddl import to_pddl
+from planners.plain.pddl import action_names, to_pddl
 from planners.plain.selection import select_then_apply
 from planners.plain.task import LONGEST, Condition, Form, PlainAction, PlainTask
 from planners.plain.writer import Writer, state_literals
 
-__all__ = ["LONGEST", "Condition", "Form", "PlainAction", "PlainTask", "compile_plain", "to_pddl"]
+__all__ = ["LONGEST", "Condition", "Form", "PlainAction", "PlainTask", "action_names", "compile_plain", "to_pddl"]
 
 
 def compile_plain(model: JointModel, task: PlanningTask, limit: int = 2000, longest: int = LONGEST) -> PlainTask:

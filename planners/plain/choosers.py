@@ -18,6 +18,8 @@ class Choosers:
     """Who chooses what: for joint-action PDDL there is one chooser, of whole joint actions.
 
     ``seconds`` is the second cost of each action, ``clashes`` the actions of others that cannot share a step with it.
+    ``covered_by``: in joint-action PDDL, the cheaper (or earlier) actions with the same parts.  Where one of them is
+    applicable too, both are one joint action, and it stands for both.
     """
 
     choosers: tuple[str, ...]
@@ -26,6 +28,7 @@ class Choosers:
     owners: tuple[tuple[int, ...], ...]
     seconds: tuple[int, ...]
     clashes: tuple[frozenset[int], ...]
+    covered_by: tuple[tuple[int, ...], ...]
 
     @property
     def dearest(self) -> int:
@@ -41,9 +44,18 @@ def choosers_of(model: JointModel) -> Choosers:
     seconds = tuple(second_cost(model, action) for action in actions)
     if model.is_joint_action:
         nothing = (frozenset[int](),) * len(actions)
-        return Choosers(("team",), (False,), actions, ((0,),) * len(actions), seconds, nothing)
+        return Choosers(
+            ("team",), (False,), actions, ((0,),) * len(actions), seconds, nothing, _covered_by(actions, seconds)
+        )
     owners = tuple(action.owners for action in actions)
-    return Choosers(model.robots, model.keeps_idle, actions, owners, seconds, clashes(actions))
+    return Choosers(model.robots, model.keeps_idle, actions, owners, seconds, clashes(actions), ((),) * len(actions))
+
+
+def _covered_by(actions: Sequence[GroundAction], seconds: Sequence[int]) -> tuple[tuple[int, ...], ...]:
+    groups: dict[tuple[str | None, ...], list[int]] = defaultdict(list)
+    for number in sorted(range(len(actions)), key=lambda n: (seconds[n], n)):
+        groups[actions[number].parts].append(number)
+    return tuple(tuple(groups[action.parts][: groups[action.parts].index(n)]) for n, action in enumerate(actions))
 
 
 def second_cost(model: JointModel, action: GroundAction) -> int:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from planners.joint import Goal, JointModel
 from planners.pddl.lifted import FALSE, TRUE, And, Atom, Formula, StepAtom, Truth
 from planners.plain.choosers import Choosers
-from planners.plain.formulas import Leaf, joined, leaves, literals_of, put
+from planners.plain.formulas import Leaf, joined, leaves, literals_of, negated, put
 from planners.plain.task import Known
 from planners.plain.writer import Writer, fact_atoms, goal_formula, own_fact, state_reader
 
@@ -32,7 +32,7 @@ def explicit(team: Choosers, model: JointModel, goal: Goal, step_cost: int, limi
     done = own_fact("goal reached")
     out.goal = out.conditions({done: True})
     for known in _split({}, [wanted], []):
-        out.action("reach the goal", known, (done,), ())
+        out.action("reach the goal", {**known, done: False}, (done,), ())
         if len(out.actions) > limit:
             raise TooManyError
     return out
@@ -75,7 +75,9 @@ def _cases_of(team: Choosers, model: JointModel, step: Sequence[int]) -> Iterato
 
     effects = [effect for n in step for effect in team.actions[n].effects if on_state(effect.atom) != FALSE]
     conditions = [put(effect.condition, value) for effect in effects]
-    for known in _split({}, [put(team.actions[n].precondition, value) for n in step], conditions):
+    wanted = [put(team.actions[n].precondition, value) for n in step]
+    wanted += [negated(put(team.actions[other].precondition, value)) for n in step for other in team.covered_by[n]]
+    for known in _split({}, wanted, conditions):
         fired = [e for e, c in zip(effects, conditions, strict=True) if put(c, _lookup(known)) == TRUE]
         adds = {e.atom for e in fired if e.adds}
         yield known, adds, {e.atom for e in fired if not e.adds} - adds

@@ -15,7 +15,7 @@ def to_pddl(plain: PlainTask) -> tuple[str, str]:
     Facts become predicates without arguments; a comment keeps what each predicate and action stands for.
     """
     facts = _safe_names(plain.facts)
-    actions = _safe_names(action.name for action in plain.actions)
+    actions = action_names(plain)
     domain = [
         f"; {plain.name}: {plain.form} form; one joint step costs {plain.step_cost}",
         "(define (domain plain)",
@@ -45,6 +45,11 @@ def to_pddl(plain: PlainTask) -> tuple[str, str]:
         "  (:metric minimize (total-cost)))",
     ]
     return "\n".join((*domain, ")", "")), "\n".join((*problem, ""))
+
+
+def action_names(plain: PlainTask) -> list[str]:
+    """The names of the actions in `to_pddl`, in the order of ``plain.actions``."""
+    return _safe_names(action.name for action in plain.actions)
 
 
 def _all_of(names: Sequence[str], conditions: Iterable[Condition]) -> str:

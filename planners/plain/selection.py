@@ -76,6 +76,7 @@ class _Choice:
             if isinstance(part, Not) and isinstance(part.part, StepAtom):
                 continue  # among the clashes
             (later if isinstance(part, And | Or | StepAtom) else now).append(put(part, value))
+        later += [negated(put(team.actions[other].precondition, value)) for other in team.covered_by[number]]
         found = literals_of(joined(And, now))
         self.literals = None if found is None else found[0]
         self.checks = joined(And, later)
@@ -165,8 +166,7 @@ def _check(out: Writer, choice: _Choice, here: Atom, after: Atom) -> None:
         here = end
     for k, (condition, _) in enumerate(choice.groups):
         end = after if k + 1 == len(choice.groups) else out.place()
-        out.route(f"{name} fires {k}", condition, here, end, known, (choice.fires(k),))
-        out.route(f"{name} does not fire {k}", negated(condition), here, end, known)
+        out.route(f"{name} fires {k} or not", condition, here, end, known, (choice.fires(k),), otherwise=end)
         here = end
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from planners.joint import FullState, Goal, JointModel
 from planners.pddl.lifted import FALSE, And, Atom, Formula, Not, Or
-from planners.plain.formulas import Leaf, literals_of, put
+from planners.plain.formulas import Leaf, literals_of, negated, put
 from planners.plain.task import Condition, Known, PlainAction
 
 
@@ -42,30 +42,60 @@ class Writer:
         return own_fact("at place", str(self._places))
 
     def route(
-        self, name: str, formula: Formula, start: Atom, end: Atom, known: Known, gain: tuple[Atom, ...] = ()
+        self,
+        name: str,
+        formula: Formula,
+        start: Atom,
+        end: Atom,
+        known: Known,
+        gain: tuple[Atom, ...] = (),
+        otherwise: Atom | None = None,
     ) -> None:
         """Zero-cost actions that lead from ``start`` to ``end`` (and add ``gain``) exactly if ``formula`` holds.
 
-        A conjunction is a way through places, a disjunction a fork, so that the size is linear.
+        With ``otherwise`` they lead there if it does not hold.  Formulas are evaluated from left to right, as in a
+        programming language, so that there is one way in every state, and the size is linear.
         """
-        if isinstance(formula, Or):
-            for part in formula.parts:
-                self.route(name, part, start, end, known, gain)
+        if isinstance(formula, And | Or) and formula.parts:
+            if isinstance(formula, And) and otherwise is None:
+                self._route_conjunction(name, formula, start, end, known, gain)
+                return
+            here = start
+            for left, part in zip(range(len(formula.parts) - 1, -1, -1), formula.parts, strict=True):
+                after = self.place() if left else None
+                if isinstance(formula, And):
+                    self.route(name, part, here, after or end, known, () if left else gain, otherwise)
+                else:
+                    self.route(name, part, here, end, known, gain, after or otherwise)
+                here = after or here
             return
+        self._test(name, formula, start, (end, *gain), known)
+        if otherwise is not None:
+            self._test(name, negated(formula), start, (otherwise,), known)
+
+    def _route_conjunction(
+        self, name: str, formula: And, start: Atom, end: Atom, known: Known, gain: tuple[Atom, ...]
+    ) -> None:
+        """Of what must hold all literals are tested at once."""
         found = literals_of(formula)
         if found is None or any(known.get(atom, value) != value for atom, value in found[0].items()):
             return
         literals, forks = found
         here = start
         if literals or not forks:
-            after = self.place() if forks else end
-            self.action(name, {**known, **literals, here: True}, (after, *(() if forks else gain)), (here,))
-            here = after
+            here = self.place() if forks else end
+            self.action(name, {**known, **literals, start: True}, (here, *(() if forks else gain)), (start,))
         for left, fork in zip(range(len(forks) - 1, -1, -1), forks, strict=True):
             after = self.place() if left else end
             self.route(name, fork, here, after, known, () if left else gain)
             here = after
 
+    def _test(self, name: str, literal: Formula, start: Atom, gain: tuple[Atom, ...], known: Known) -> None:
+        """An action that is possible exactly if a literal (or truth value) holds."""
+        found = literals_of(literal)
+        if found is None or any(known.get(atom, value) != value for atom, value in found[0].items()):
+            return
+        self.action(name, {**known, **found[0], start: True}, gain, (start,))
 
 def own_fact(kind: str, *args: str) -> Atom:
     """A fact of the compilation: its predicate contains a space, so that no name of the user's can be the same."""

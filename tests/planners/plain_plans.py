@@ -1,0 +1,89 @@
+"""All optimal plans of a plain task by brute force."""
+
+from __future__ import annotations
+
+import heapq
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+from planners.plain import PlainTask
+
+PlainState = frozenset[int]
+
+
+@dataclass(frozen=True)
+class OptimalPlans:
+    """The optimal cost of a plain task and its optimal action sequences.
+
+    ``edges`` are (action number, cost, next state); a cycle without cost would make infinitely many plans: `RecursionError`.
+    """
+
+    plain: PlainTask
+    edges: dict[PlainState, list[tuple[int, int, PlainState]]]
+    distance: dict[PlainState, int]
+
+    @property
+    def cost(self) -> int | None:
+        return self.distance.get(self.plain.init)
+
+    def count(self) -> int:
+        @cache
+        def below(state: PlainState) -> int:
+            return self._ends(state) + sum(below(after) for _, after in self._tight(state))
+
+        return below(self.plain.init) if self.cost is not None else 0
+
+    def __iter__(self) -> Iterator[tuple[int, ...]]:
+        def below(state: PlainState) -> Iterator[tuple[int, ...]]:
+            if self._ends(state):
+                yield ()
+            for action, after in self._tight(state):
+                for rest in below(after):
+                    yield (action, *rest)
+
+        return below(self.plain.init) if self.cost is not None else iter(())
+
+    def _ends(self, state: PlainState) -> bool:
+        return holds(self.plain.goal, state)
+
+    def _tight(self, state: PlainState) -> list[tuple[int, PlainState]]:
+        far = self.distance[state]
+        return [(n, after) for n, cost, after in self.edges[state] if cost + self.distance.get(after, far + 1) == far]
+
+
+def holds(conditions: Sequence[tuple[int, bool]], state: PlainState) -> bool:
+    return all((fact in state) == positive for fact, positive in conditions)
+
+
+def optimal_plans(plain: PlainTask) -> OptimalPlans:
+    """Everything that can be reached, and Dijkstra's algorithm from the goals back."""
+    edges: dict[PlainState, list[tuple[int, int, PlainState]]] = {}
+    into = defaultdict(list)
+    todo = [plain.init]
+    while todo:
+        if (state := todo.pop()) in edges:
+            continue
+        edges[state] = [
+            (n, a.cost, (state - {*a.deletes}) | {*a.adds})
+            for n, a in enumerate(plain.actions)
+            if holds(a.preconditions, state)
+        ]
+        for _, cost, after in edges[state]:
+            into[after].append((cost, state))
+            todo.append(after)
+    number = {state: n for n, state in enumerate(edges)}
+    distance = {state: 0 for state in edges if holds(plain.goal, state)}
+    queue = [(0, number[state]) for state in distance]
+    heapq.heapify(queue)
+    states = [*edges]
+    while queue:
+        far, place = heapq.heappop(queue)
+        if far > distance[states[place]]:
+            continue
+        for cost, before in into[states[place]]:
+            if far + cost < distance.get(before, far + cost + 1):
+                distance[before] = far + cost
+                heapq.heappush(queue, (far + cost, number[before]))
+    return OptimalPlans(plain, edges, distance)

@@ -1,0 +1,146 @@
+"""`coordlang inspect`: whatever was misread has to show there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from random_pddl import KINDS, Kind, random_model
+
+from planners.composition import Composition
+from planners.inspection import inspect, unparse
+from planners.model import Loaded, ModelOptions, build, load
+from planners.pddl import parse_domain, parse_problem
+from planners.pddl.formulas import read_formula
+from planners.pddl.names import Names
+from planners.pddl.sexpr import Source, parse
+from planners.robots import RobotChoice
+from planners.space import explore
+
+DOMAINS = Path(__file__).parents[2] / "domains"
+
+PUSHING = """(define (domain pushing) (:types robot place heavy light)
+  (:predicates (at ?r - robot ?p - place) (in ?x - (either heavy light) ?p - place) (glows ?p - place) (seen ?p - place))
+  (:action push :agent ?r - robot :parameters (?x - heavy ?from ?to - place)
+    :precondition (and (at ?r ?from) (in ?x ?from) (not (= ?from ?to))
+                       (exists (?o - robot) (and (not (= ?o ?r)) (push ?o ?x ?from ?to))))
+    :effect (and (not (at ?r ?from)) (at ?r ?to) (not (in ?x ?from)) (in ?x ?to)))
+  (:action carry :agent ?r - robot :parameters (?x - light ?from ?to - place)
+    :precondition (and (at ?r ?from) (in ?x ?from) (not (= ?from ?to)))
+    :effect (and (not (at ?r ?from)) (at ?r ?to) (not (in ?x ?from)) (in ?x ?to)))
+  (:action look :agent ?r - robot :parameters (?p - place)
+    :precondition (and (at ?r ?p) (forall (?o - robot) (not (look ?o ?p)))) :effect (seen ?p))
+  (:action melt :agent ?r - robot :parameters (?x - heavy ?p - place)
+    :precondition (and (at ?r ?p) (glows ?p)) :effect (not (in ?x ?p))))"""
+TASK = """(define (problem p) (:domain pushing) (:objects r1 r2 - robot a b - place anvil - heavy)
+  ; (:goal (in anvil a)) is what it is not
+  (:init (at r1 a) (at r2 a) (in anvil a))
+  ( :goal (forall (?x - heavy) (or (in ?x b) (not (seen a))))))"""
+
+
+def made(domain: str, problem: str, options: ModelOptions | None = None) -> Loaded:
+    lifted = parse_domain(Source("d.pddl", domain))
+    return build(lifted, [parse_problem(Source("p.pddl", problem), lifted)], options)
+
+
+def test_what_can_never_be_is_shown() -> None:
+    found = inspect(made(PUSHING, TASK))
+    assert found.impossible == ("carry", "melt")
+    assert found.never == ("glows",)
+    assert found.objects == {"heavy": 1, "place": 2, "robot": 2}
+    assert found.start == {"at": 2, "in": 1}
+
+
+def test_formulas_are_shown_with_what_is_there() -> None:
+    assert inspect(made(PUSHING, TASK)).formulas == (
+        "(push r1 anvil a b) speaks of (push r2 anvil a b) in the same step",
+        "(look r1 a) forbids (look r2 a) in the same step",
+    )
+    # The partner's places in the wrong order: it would have to push the other way from where the anvil is not.
+    misread = PUSHING.replace("(push ?o ?x ?from ?to)", "(push ?o ?x ?from ?from)")
+    shown = inspect(made(misread, TASK)).formulas
+    assert "(push r1 anvil a b) speaks of (push r2 anvil a a), which nobody can ever do, in the same step" in shown
+
+
+def test_the_goal_is_the_one_that_was_understood() -> None:
+    assert inspect(made(PUSHING, TASK)).goal == "(forall (?x - heavy) (or (in ?x b) (not (seen a))))"
+
+
+def both_possible(loaded: Loaded, first: str, second: str) -> bool:
+    """Whether different robots can choose these subactions in one reachable state, each for itself."""
+    model = loaded.model
+    assert isinstance(model.stepper, Composition)
+    space = explore(model, loaded.tasks[0].init[None, :])
+    choices = model.stepper.choices(space.rows)
+    for state in range(len(space)):
+        texts = [
+            {own[label] for label in labels[begin[state] : begin[state + 1]]}
+            for own, (begin, labels) in zip(model.labels, choices, strict=True)
+        ]
+        if any(first in a and second in b for i, a in enumerate(texts) for j, b in enumerate(texts) if i != j):
+            return True
+    return False
+
+
+def named(loaded: Loaded, example: str) -> tuple[str, str]:
+    labels = {text for own in loaded.model.labels for text in own}
+    first, second = [text for text in re.findall(r"\([^()]*\)", example) if text in labels]
+    return first, second
+
+
+@pytest.mark.parametrize(
+    ("folder", "problem"),
+    [
+        ("two-arms", "exchange"), ("push-box", "next-door"), ("tray", "serve"), ("vans", "two-each"), ("lock", "both-in"),
+        ("charger", "three-robots"), ("elevator", "two-calls"), ("handover", "exchange"), ("grid", "three-robots-3x3"),
+    ],
+)  # fmt: skip
+def test_the_example_can_happen_in_the_shipped_domains(folder: str, problem: str) -> None:
+    loaded = load(DOMAINS / folder / "domain.pddl", [DOMAINS / folder / f"{problem}.pddl"])
+    example = inspect(loaded).example
+    assert example is not None
+    assert both_possible(loaded, *named(loaded, example))
+
+
+def test_the_example_can_happen_in_random_models() -> None:
+    shown = hidden = 0
+    for seed in range(60):
+        text = random_model(seed, ("agent", "plain")[seed % 2])
+        loaded = made(text.domain, text.problem, ModelOptions(RobotChoice(unowned=text.unowned)))
+        found = inspect(loaded)
+        if found.example is None:
+            hidden += found.interfering > 0
+            continue
+        shown += 1
+        assert both_possible(loaded, *named(loaded, found.example)), (seed, found.example)
+    assert shown >= 15
+    assert hidden >= 2, "some clash only between what is never possible together"
+
+
+def test_a_clash_that_never_meets_has_no_example() -> None:
+    shifts = """(define (domain shifts) (:types robot) (:predicates (turn ?r - robot) (next ?r ?o - robot) (lit))
+      (:action light :agent ?r - robot :parameters () :precondition (and (turn ?r) (not (lit))) :effect (lit))
+      (:action hand-over :agent ?r - robot :parameters (?o - robot) :precondition (and (turn ?r) (next ?r ?o) (lit))
+        :effect (and (not (turn ?r)) (turn ?o) (not (lit)))))"""
+    task = """(define (problem p) (:domain shifts) (:objects r1 r2 - robot)
+      (:init (turn r1) (next r1 r2) (next r2 r1)) (:goal (turn r2)))"""
+    found = inspect(made(shifts, task))
+    assert found.interfering > 0
+    assert found.example is None
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_unparsed_formulas_read_as_they_were(kind: Kind) -> None:
+    read = 0
+    for seed in range(40):
+        domain = parse_domain(Source("d.pddl", random_model(seed, kind).domain))
+        for schema in domain.schemas:
+            document = parse(Source("f", unparse(schema.precondition)))
+            actions = {s.name: len(s.parameters) for s in domain.schemas}
+            scope = {v.name for v in schema.parameters}
+            constants, types = frozenset(domain.constants), frozenset(domain.types)
+            names = Names(document, types, domain.predicates, {}, actions, constants, frozenset(scope))
+            assert read_formula(names, document.root) == schema.precondition
+            read += 1
+    assert read >= 40

@@ -1,0 +1,234 @@
+"""A limit ends the work with an error that says how far it got, in numbers, and what else may help."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coordlang import coordination, verify
+from coordlang.coordination import walk
+from coordlang.language import WordTable
+from coordlang.witness import miscoordination
+from planners import grounding
+from planners.errors import CoordlangError, OutOfMemory, OutOfTime
+from planners.grounding import instantiate
+from planners.joint import Stepper, Steps
+from planners.limits import reaching, time_left, time_limit
+from planners.model import Loaded, load
+from planners.optimal import PlanSpace, TaskGroup, plan_spaces, search
+from planners.space import explore
+from planners.states import Rows
+
+DOMAINS = Path(__file__).parents[2] / "domains"
+
+
+def late() -> OutOfTime:
+    """What the alarm raises."""
+    try:
+        with time_limit(0.01):
+            while True:
+                pass
+    except OutOfTime as error:
+        return error
+
+
+def test_the_innermost_block_speaks() -> None:
+    with (
+        pytest.raises(OutOfTime) as caught,
+        reaching(lambda: "the whole", "less of everything"),
+        reaching(lambda: f"{2 + 1} of 9 parts", "fewer parts"),
+    ):
+        raise late()
+    assert str(caught.value).splitlines()[1:] == [
+        "  Reached: 3 of 9 parts.",
+        "  Use a larger --time-limit, or fewer parts.",
+    ]
+
+
+def test_memory_that_is_used_up_is_an_error_with_a_code() -> None:
+    with pytest.raises(OutOfMemory) as caught, reaching(lambda: "half of it", "fewer parts"):
+        raise MemoryError
+    assert caught.value.exit_code == 22
+    assert "Reached: half of it." in str(caught.value)
+    assert "Use a larger --memory-limit, or fewer parts." in str(caught.value)
+
+
+def test_an_estimate_keeps_its_own_remedy() -> None:
+    with pytest.raises(OutOfMemory) as caught, reaching(lambda: "half of it", "fewer parts"):
+        raise OutOfMemory("this would need 9 GiB", remedy="Use fewer robots.")
+    assert str(caught.value) == "this would need 9 GiB\n  Reached: half of it.\n  Use fewer robots."
+
+
+def test_other_errors_pass() -> None:
+    with pytest.raises(KeyError), reaching(lambda: "half of it", "fewer parts"):
+        raise KeyError
+
+
+def test_time_left() -> None:
+    assert time_left() == float("inf")
+    with time_limit(100):
+        assert 50 < time_left() <= 100
+    assert time_left() == float("inf")
+
+
+@dataclass(frozen=True)
+class Stopping:
+    """A stepper that a limit stops after some tables of states."""
+
+    stepper: Stepper
+    error: BaseException
+    left: list[int]
+
+    def steps(self, rows: Rows) -> Steps:
+        self.left[0] -= 1
+        if self.left[0] < 0:
+            raise self.error
+        return self.stepper.steps(rows)
+
+    def why_not(self, row: Rows, labels: Sequence[int]) -> str:
+        return self.stepper.why_not(row, labels)
+
+
+def corners(problem: str = "corners-3x3") -> Loaded:
+    return load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / f"{problem}.pddl"])
+
+
+def stopped(loaded: Loaded, after: int, error: BaseException) -> Loaded:
+    return replace(loaded, model=replace(loaded.model, stepper=Stopping(loaded.model.stepper, error, [after])))
+
+
+@pytest.mark.parametrize("error", [late(), MemoryError()], ids=["time", "memory"])
+def test_search_says_how_far_it_got(error: BaseException) -> None:
+    loaded = stopped(corners(), 2, error)
+    with pytest.raises((OutOfTime, OutOfMemory)) as caught:
+        search(loaded.model, loaded.tasks[0])
+    # Six cells are within two steps of each of two opposite corners, three of them of both: 6 * 6 - 3.  One step: 3 * 3.
+    assert f"33 states within 2 steps of the initial state of {loaded.tasks[0].name}, 24 of them new" in str(caught.value)
+
+
+def test_exploring_says_how_far_it_got() -> None:
+    loaded = stopped(corners(), 1, late())
+    with pytest.raises(OutOfTime, match=r"time limit") as caught:
+        explore(loaded.model, loaded.tasks[0].init[None, :])
+    assert caught.value.reached == (
+        "Reached: 9 states within 1 steps of the initial states, 9 joint steps; 8 states are new in the last step."
+    )
+
+
+def test_the_goals_done_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    loaded = corners()
+    space = explore(loaded.model, loaded.tasks[0].init[None, :])
+    groups = [TaskGroup(loaded.tasks[0].goal)] * 3
+    monkeypatch.setattr("planners.optimal._BATCH", len(space))
+    batches = plan_spaces(space, groups)
+    next(batches)
+
+    def fail(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("planners.optimal.distances", fail)
+    with pytest.raises(OutOfMemory) as caught:
+        next(batches)
+    assert "the optimal plans to 1 of 3 goals, over 72 states" in str(caught.value)
+
+
+def test_grounding_says_how_far_it_got(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise late()
+
+    with monkeypatch.context() as patched:
+        patched.setattr(instantiate, "reachable_arguments", fail)
+        with pytest.raises(OutOfTime) as caught:
+            corners()
+    assert "looking for the applicable instances of 1 action schemas over 11 objects" in str(caught.value)
+    assert grounding.FEWER in str(caught.value)
+    monkeypatch.setattr(instantiate._Grounder, "action", fail)
+    with pytest.raises(OutOfTime, match="time limit") as caught:
+        corners()
+    assert "0 of at most 48 ground actions" in str(caught.value)
+
+
+def plans(problem: str) -> PlanSpace:
+    loaded = corners(problem)
+    return search(loaded.model, loaded.tasks[0])
+
+
+@pytest.mark.parametrize(
+    ("left", "seconds", "error", "said"),
+    [
+        (2e6, float("inf"), OutOfMemory, "GiB more to pass one layer of"),
+        (1e12, 1e-9, OutOfTime, "s more to pass one layer of"),
+    ],
+)
+def test_a_walk_that_will_not_fit_is_not_begun_in_earnest(
+    left: float, seconds: float, error: type[CoordlangError], said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    space = plans("three-robots-3x3")
+    whole = walk(space)
+    monkeypatch.setattr(coordination, "_CHUNK", 300)
+    monkeypatch.setattr(coordination, "memory_left", lambda: left)
+    monkeypatch.setattr(coordination, "time_left", lambda: seconds)
+    with pytest.raises(error, match=said) as caught:
+        walk(space)
+    assert "layers of the composition walk" in str(caught.value)
+    assert "Use fewer robots" in str(caught.value)
+    # Where it fits, pieces of any size give the same.
+    monkeypatch.setattr(coordination, "memory_left", lambda: 2**40)
+    monkeypatch.setattr(coordination, "time_left", lambda: float("inf"))
+    again = walk(space)
+    assert (again.nodes, len(again.divergences)) == (whole.nodes, len(whole.divergences))
+
+
+def test_a_size_that_nobody_can_wait_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    space = plans("three-robots-3x3")
+    monkeypatch.setattr(coordination, "_MOST", 1000.0)
+    with pytest.raises(OutOfMemory, match=r"nodes of one layer of the walk have .* combinations of 3 plans' next steps"):
+        walk(space)
+
+
+def test_verification_and_the_search_for_a_break_say_how_far_they_got(monkeypatch: pytest.MonkeyPatch) -> None:
+    space = plans("corners-3x3")
+    table = WordTable(("w0",), np.zeros((0, space.rows.shape[1]), np.uint64), np.zeros(0, np.int64), 0)
+
+    def fail(*_: object, **__: object) -> None:
+        raise late()
+
+    monkeypatch.setattr(verify._Check, "_some_moves", fail)
+    with pytest.raises(OutOfTime) as caught:
+        verify.verify(table, [space])
+    assert "layer 1 of 5 of the verification, 1 nodes of its walk" in str(caught.value)
+    monkeypatch.setattr("coordlang.witness.moves", fail)
+    with pytest.raises(OutOfTime) as caught:
+        miscoordination(space, 0)
+    assert "0 of 4 steps of the composition walk, 1 nodes" in str(caught.value)
+
+
+@pytest.mark.parametrize("problem", ["corners-4x4", "three-robots-3x3"])
+def test_work_in_pieces_is_the_same_work(problem: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    loaded = corners(problem)
+    init = loaded.tasks[0].init[None, :]
+    whole, space = search(loaded.model, loaded.tasks[0]), explore(loaded.model, init)
+    monkeypatch.setattr("planners.space._BLOCK", 7)
+    monkeypatch.setattr("planners.space._STEPS", 40)
+    monkeypatch.setattr("planners.composition._CHUNK", 11)
+    for keep in (8_000_000, 100, 0):
+        monkeypatch.setattr("planners.optimal._KEEP", keep)
+        pieces = search(loaded.model, loaded.tasks[0])
+        for name in ("rows", "state", "layer", "first", "target", "labels", "cost", "starts"):
+            assert (getattr(pieces, name) == getattr(whole, name)).all(), name
+    again = explore(loaded.model, init)
+    for name in ("rows", "first", "target", "labels", "cost"):
+        assert (getattr(again, name) == getattr(space, name)).all(), name
+
+
+def test_combinations_that_do_not_fit_are_not_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    loaded = corners("three-robots-3x3")
+    monkeypatch.setattr("planners.composition._CHUNK", 10)
+    monkeypatch.setattr("planners.composition.memory_left", lambda: 1000)
+    # Each robot in its corner may go two ways or stay; two of them may not go to the one cell between them.
+    with pytest.raises(OutOfMemory, match="3 of 3 robots have 24 combinations of subactions in 1 state: about"):
+        search(loaded.model, loaded.tasks[0])
