@@ -5,14 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from time import perf_counter
+from typing import Literal
 
+from coordlang.certificate import Certificate, certify
+from coordlang.coordination import walk
 from coordlang.divergence import Alphas, alphas, states_on_plans
 from coordlang.file import signed
-from coordlang.language import Guarantee, Language, WordTable, name_words
+from coordlang.language import Guarantee, Language, WordTable, name_words, words_of_states
 from coordlang.tasks import Candidates, require_solvable
 from coordlang.verify import Verdict, verify
+from coordlang.verify_overlapping import verify_overlapping
 from coordlang.vocabulary import METHODS, Job, Outcome, greedy
-from coordlang.vocabulary.job import Partition
+from coordlang.vocabulary.enlarging import enlarge
+from coordlang.vocabulary.flexible import flexible
+from coordlang.vocabulary.job import Evidence, Partition
+from coordlang.vocabulary.minimal import refute
+from coordlang.warping import Clause
 from coordlang.witness import Miscoordination, inseparable
 from planners.errors import OutOfMemory, OutOfTime, ProvedImpossible
 from planners.limits import stop_clock
@@ -35,7 +43,7 @@ class Built:
     """A verified language and the figures of its making.
 
     ``figures`` are the method's own (rounds, clauses, ..), ``seconds`` are by phase.  ``stopped`` is the error that ended
-    the method before its proof was complete, or None.
+    the method before its proof was complete, or None.  ``job`` and ``evidence`` are what `certificate_of` needs.
     """
 
     language: Language
@@ -45,6 +53,8 @@ class Built:
     figures: Mapping[str, float]
     seconds: dict[str, float]
     stopped: BaseException | None
+    job: Job
+    evidence: Mapping[Clause, Evidence]
 
 
 def build_language(
@@ -52,9 +62,16 @@ def build_language(
     method: str = "greedy",
     *,
     seed: int = 0,
+    alpha_only: bool = False,
+    prefer: Literal["flexible"] | None = None,
+    overlap: bool = False,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Built:
     """Build a coordination language for candidate tasks and verify it by definition.
+
+    ``alpha_only`` is for the method "separating": plans are separated where they part, never where they meet.  ``prefer``
+    "flexible": of the languages with as many words as the method finds, one whose sentences leave many plans open.
+    ``overlap``: then give states further words as long as that leaves more plans open (`coordlang.overlapping`).
 
     Raises `Inseparable` (with the two plans) when there is none, `OutOfMemory` before the memory budget is used up.
     """
@@ -74,7 +91,7 @@ def build_language(
         checked.append(_verified(candidates, partition))
 
     states = tuple(states_on_plans(candidates.spaces).tolist())
-    job = Job(candidates, states, found, None, seed, progress, check)
+    job = Job(candidates, states, found, None, seed, alpha_only, progress, check)
     if method != "greedy":
         # What is left when an anytime method is stopped; verified now, because there is no time then.
         first = greedy(job).partition
@@ -85,6 +102,9 @@ def build_language(
     try:
         outcome = METHODS[method](job)
         clock.note("vocabulary")
+        if prefer == "flexible" and outcome.stopped is None:
+            outcome = flexible(job, outcome)
+            clock.note("flexible")
         if not any(known.partition is outcome.partition for known in checked):
             progress("verifying by definition")
             check(outcome.partition)
@@ -98,7 +118,48 @@ def build_language(
     size = len(best.language.words)
     guarantee = Guarantee(method, size, outcome.lower_bound, size == outcome.lower_bound)
     language = signed(replace(best.language, guarantee=guarantee), candidates, {"program": "coordlang"})
-    return Built(language, found, len(job.states), best.verdict, outcome.figures, clock.seconds, outcome.stopped)
+    if overlap and outcome.stopped is None:
+        progress("enlarging words")
+        language, outcome = _overlapping(candidates, language, outcome)
+        clock.note("overlap")
+    return Built(
+        language, found, len(job.states), best.verdict, outcome.figures, clock.seconds, outcome.stopped, job, outcome.evidence
+    )
+
+
+def _overlapping(candidates: Candidates, language: Language, outcome: Outcome) -> tuple[Language, Outcome]:
+    """The language with further words of its states, verified by definition."""
+    model, spaces = candidates.model, candidates.spaces
+    word = WordTable.of(language, model).of_rows(candidates.rows)
+    enlarged = enlarge(
+        spaces, [walk(space).requires for space in spaces], {state: int(word[state]) for state in outcome.partition}
+    )
+    also = {
+        model.codec.key(candidates.rows[state]): tuple(language.words[w] for w in sorted(words - {int(word[state])}))
+        for state, words in enlarged.words.items()
+        if len(words) > 1
+    }
+    language = replace(language, also=dict(sorted(also.items())))
+    verdict = verify_overlapping(language.words, words_of_states(language, model, candidates.rows), spaces)
+    if not verdict.holds:
+        raise AssertionError(f"the enlarged words are no coordination language: {verdict.witness}")
+    figures = {
+        **outcome.figures,
+        "overlapping_words": enlarged.further,
+        "overlapping_flexibility": float(enlarged.expected.mean()),
+        "partition_flexibility": float(enlarged.before.mean()),
+    }
+    return language, replace(outcome, figures=figures, stopped=enlarged.stopped)
+
+
+def certificate_of(built: Built) -> Certificate:
+    """Why no language has fewer words than the proved lower bound, for others to check.
+
+    Uses what the method met on its way; for a method that meets nothing the search of `minimal` finds reasons.
+    """
+    refuted = built.language.guarantee.lower_bound - 1
+    evidence = built.evidence or (refute(built.job, refuted) if refuted else {})
+    return certify(built.job.candidates, evidence, refuted)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,13 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coordlang.tuples import EdgeIndex, unique_tuples
-from planners.errors import OutOfMemory
-from planners.limits import memory_left
+from planners.errors import OutOfMemory, OutOfTime
+from planners.limits import memory_left, reaching, time_left
 from planners.matching import Ints, ranges, spans
 from planners.optimal import PlanSpace
 
@@ -25,6 +26,10 @@ Bools = NDArray[np.bool_]
 
 #: Walk edges handled at a time.
 _CHUNK = 1_000_000
+#: More walk edges out of one layer than this are not tried: hours of work.
+_MOST = 1e10
+#: What else may help.
+INSTEAD = "fewer robots, smaller tasks or --cost makespan+actions"
 #: Mixtures that failed have no state: this in place of ``y``.
 FAILED = -1
 
@@ -95,11 +100,21 @@ def walk(space: PlanSpace) -> Walk:
     before: the proof is in docs/concepts.md.
 
     Complexity: per goal at most (nodes of a layer)^(robots + 1) walk nodes, in grid-like domains about ^2; each has
-    (optimal joint actions)^robots edges.  Raises `OutOfMemory` with an estimate before the memory budget is used up.
+    (optimal joint actions)^robots edges.  Raises `OutOfMemory` or `OutOfTime` with an estimate as soon as a part of a layer
+    shows that the rest of it will not fit.
     """
     index = EdgeIndex.of(space)
-    layers = _forward(space, index)
-    return _backward(space, layers)
+    layers: list[_Layer] = []
+
+    def so_far() -> str:
+        return (
+            f"{len(layers)} of {len(space.layers)} layers of the composition walk over {len(space):,} states on optimal "
+            f"plans, {sum(len(layer.nodes) for layer in layers):,} nodes"
+        )
+
+    with reaching(so_far, INSTEAD):
+        _forward(space, index, layers)
+        return _backward(space, layers)
 
 
 def moves(space: PlanSpace, index: EdgeIndex, nodes: Ints, *, together: bool = False) -> Iterator[Moves]:
@@ -109,13 +124,9 @@ def moves(space: PlanSpace, index: EdgeIndex, nodes: Ints, *, together: bool = F
     """
     robots = nodes.shape[1] - 1
     degree = np.diff(space.first)
-    sizes = np.prod(degree[nodes[:, :robots]].astype(np.float64), axis=1)
-    if 100 * sizes.max(initial=0) > memory_left():
-        raise OutOfMemory(
-            f"a state has {sizes.max():,.0f} combinations of {robots} plans' next steps: about "
-            f"{100 * sizes.max() / 2**30:,.0f} GiB at once",
-            remedy="Use fewer robots or --cost makespan+actions, or a larger --memory-limit.",
-        )
+    sizes = edges_out_of(space, nodes)
+    if not together:
+        _check_size(sizes, robots)
     for span in spans(sizes, _CHUNK):
         source = np.arange(span.start, span.stop)
         prefix = nodes[span, robots]
@@ -136,11 +147,34 @@ def moves(space: PlanSpace, index: EdgeIndex, nodes: Ints, *, together: bool = F
         yield Moves(source, np.stack(edges, axis=1), mixed)
 
 
-def _forward(space: PlanSpace, index: EdgeIndex) -> list[_Layer]:
-    """Walk down from the highest layer; every plan-space node starts at its own layer."""
+def edges_out_of(space: PlanSpace, nodes: Ints) -> NDArray[np.float64]:
+    """How many edges of the walk leave each of its nodes: one for every choice of the plans' next steps."""
+    degree = np.diff(space.first)
+    product: NDArray[np.float64] = np.prod(degree[nodes[:, :-1]].astype(np.float64), axis=1)
+    return product
+
+
+def _check_size(sizes: NDArray[np.float64], robots: int) -> None:
+    """What one node needs at once must fit, and what a layer needs be thinkable."""
+    largest, total = sizes.max(initial=0), sizes.sum()
+    # One row of a chunk holds its source, a prefix and an edge for each robot, and copies of them.
+    if 100 * largest > memory_left():
+        raise OutOfMemory(
+            f"a state has {largest:,.0f} combinations of {robots} plans' next steps: about "
+            f"{100 * largest / 2**30:,.1f} GiB at once",
+            remedy=f"Use {INSTEAD}, or a larger --memory-limit.",
+        )
+    if total > _MOST:
+        raise OutOfMemory(
+            f"the {len(sizes):,} nodes of one layer of the walk have {total:.1e} combinations of {robots} plans' next steps",
+            remedy=f"Use {INSTEAD}.",
+        )
+
+
+def _forward(space: PlanSpace, index: EdgeIndex, layers: list[_Layer]) -> None:
+    """Walk down from the highest layer into ``layers``; every plan-space node starts at its own layer."""
     columns = space.labels.shape[1] + 1
     spans = space.layers
-    layers: list[_Layer] = []
     arriving = np.zeros((0, columns), np.int64)
     held = 0
     for number in range(len(spans) - 1, -1, -1):
@@ -158,7 +192,6 @@ def _forward(space: PlanSpace, index: EdgeIndex) -> list[_Layer]:
         layer, arriving = _expand(space, index, table, spans[number - 1], held)
         held += layer.nodes.nbytes + layer.links.nbytes + layer.parting.nbytes
         layers.append(layer)
-    return layers
 
 
 def _expand(space: PlanSpace, index: EdgeIndex, table: Ints, below: slice, held: int) -> tuple[_Layer, Ints]:
@@ -171,6 +204,8 @@ def _expand(space: PlanSpace, index: EdgeIndex, table: Ints, below: slice, held:
     links: list[Ints] = [np.zeros((0, 2), np.int64)]
     parting: list[Ints] = [np.zeros((0, columns + 1), np.int64)]
     count = 0
+    ends = np.cumsum(edges_out_of(space, table))
+    begin = perf_counter()
     for move in moves(space, index, table):
         broken = move.mixed == FAILED
         fails[move.source[broken]] = True
@@ -184,8 +219,9 @@ def _expand(space: PlanSpace, index: EdgeIndex, table: Ints, below: slice, held:
         count += len(fresh)
         parts = diagonal[move.source] & (target != target[:, :1]).any(axis=1)
         parting.append(np.column_stack((table[move.source[parts], 0], target[parts], child[parts])))
-        progress = (int(move.source[-1]) + 1) / len(table) if len(move.source) else 1.0
-        _check_memory(held, (*links, *children, *parting), progress, len(table))
+        if len(move.source):
+            done = int(move.source[-1])
+            _check_rest(held, (*links, *children, *parting), ends[done] / ends[-1], ends, perf_counter() - begin)
     nodes, number = unique_tuples(np.concatenate(children), bounds)
     layer = _Layer(table, fails, np.concatenate(links), np.concatenate(parting))
     layer.point_to(number)
@@ -255,12 +291,26 @@ def _sorted_different(states: Ints) -> Ints:
     return np.where(states == largest, -1, states)
 
 
-def _check_memory(held: int, parts: Sequence[Ints], progress: float, total: int) -> None:
+def _check_rest(
+    held: int, parts: Sequence[Ints], progress: float, ends: NDArray[np.float64], seconds: float
+) -> None:
+    """Stop when the part of a layer that is done shows that the rest of it does not fit: memory and time are linear in it.
+
+    ``ends``: walk edges out of the layer's first nodes, summed up; ``seconds`` were spent on the part that is done.
+    """
     used = sum(part.nbytes for part in parts)
-    # What the sorting needs for a moment is about twice what is kept.
-    if 3 * used > memory_left():
+    size = f"{len(ends):,} nodes and {ends[-1]:,.0f} edges ({100 * progress:.2g} % of it done)"
+    # What the sorting at the end needs for a moment is about twice what is kept.
+    more = 3 * used / progress - used
+    if more > memory_left():
         raise OutOfMemory(
-            f"the composition walk needs about {(held + used / progress) / 2**30:.1f} GiB to pass one layer of "
-            f"{total:,} nodes ({100 * progress:.0f} % of it done)",
-            remedy="Use fewer robots, smaller tasks or --cost makespan+actions, or a larger --memory-limit.",
+            f"the composition walk needs about {more / 2**30:.1f} GiB more to pass one layer of {size}; it holds "
+            f"{(held + used) / 2**30:.1f} GiB, and {memory_left() / 2**30:.1f} GiB are left",
+            remedy=f"Use {INSTEAD}, or a larger --memory-limit.",
+        )
+    left = seconds / progress - seconds
+    if left > 2 * time_left():
+        raise OutOfTime(
+            f"the composition walk needs about {left:.0f} s more to pass one layer of {size}; {time_left():.0f} s are left",
+            remedy=f"Use {INSTEAD}, or a larger --time-limit.",
         )

@@ -16,85 +16,17 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+from msgspec import UNSET
 
+from coordlang.duplicate_keys import duplicate_key
 from coordlang.language import Guarantee, Language
-from coordlang.tasks import Candidates, Kind, ListedTask, all_pairs, from_listed, from_recorded, task_data
+from coordlang.record import FORMAT, VERSION, LanguageRecord, TasksRecord
+from coordlang.tasks import Candidates, ListedTask, all_pairs, from_listed, from_problems, from_recorded, task_data
 from planners.errors import BadInput, Place, UsageError
-from planners.joint import Cost, show
+from planners.joint import show
 from planners.model import ModelOptions
 from planners.pddl.lifted import Domain, Problem
-from planners.robots import ENVIRONMENT, RobotChoice, Unowned, static_atoms
-
-FORMAT = "coordlang/language"
-VERSION = 1
-
-
-class DomainRecord(msgspec.Struct):
-    """The domain that a language belongs to; a file without ``sha256`` is not held to one text."""
-
-    name: str
-    sha256: str | None = None
-
-
-class ModelRecord(msgspec.Struct):
-    """How the PDDL files are understood.  ``idle``: the robots that may idle without an action of their own (a language
-    without it: found from the model).  ``world_sha256`` is over objects, static facts and function values."""
-
-    cost: Cost = "makespan"
-    unowned: Unowned = "error"
-    remember_actions: bool = False
-    idle: list[str] | None = None
-    problem_sha256: str | None = None
-    world_sha256: str | None = None
-
-
-class TaskRecord(msgspec.Struct):
-    """One candidate task: true fluents at the start, PDDL literals or formulas at the end."""
-
-    init: list[str]
-    goal: list[str]
-
-
-class TasksRecord(msgspec.Struct):
-    """The candidate tasks that the language is guaranteed for."""
-
-    kind: Kind
-    count: int
-    tasks: list[TaskRecord] | None = None
-
-
-class GuaranteeRecord(msgspec.Struct):
-    """What is known of the language's size."""
-
-    method: str
-    size: int
-    lower_bound: int
-    proved_minimal: bool
-
-
-class LanguageRecord(msgspec.Struct):
-    """A language file, version 1.  Keys that are not listed here are ignored by readers."""
-
-    format: str
-    version: int
-    domain: DomainRecord
-    robots: list[str]
-    model: ModelRecord
-    tasks: TasksRecord
-    words: list[str]
-    states: dict[str, str]
-    default: str
-    guarantee: GuaranteeRecord
-    producer: dict[str, Any] = {}
-
-
-def json_schema() -> dict[str, Any]:
-    """The JSON Schema of language files."""
-    schema: dict[str, Any] = msgspec.json.schema(LanguageRecord)
-    definitions = schema["$defs"]["LanguageRecord"]["properties"]
-    definitions["format"] = {"const": FORMAT}
-    definitions["version"] = {"const": VERSION}
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "coordlang language", **schema}
+from planners.robots import ENVIRONMENT, RobotChoice, static_atoms
 
 
 def signed(language: Language, candidates: Candidates, producer: Mapping[str, Any]) -> Language:
@@ -148,6 +80,8 @@ def to_bytes(language: Language) -> bytes:
         },
         "producer": dict(language.producer),
     }
+    if language.also:
+        data["also"] = {state: list(words) for state, words in language.also.items()}
     return msgspec.json.format(msgspec.json.encode(data), indent=1) + b"\n"
 
 
@@ -155,7 +89,7 @@ def write_language(language: Language, path: str | Path) -> None:
     """Write a language file (gzip for ``.gz``).  The file is complete or not there at all."""
     data = to_bytes(language)
     if str(path).endswith(".gz"):
-        data = gzip.compress(data, mtime=0)
+        data = gzip.compress(data, compresslevel=6, mtime=0)
     write_atomically(path, data)
 
 
@@ -208,34 +142,32 @@ def read_language(path: str | Path) -> Language:
 
 def language_from_bytes(data: bytes, place: Place) -> Language:
     """The language in the text of a language file; see `read_language`."""
-    _check_head(data, place)
+    head = _head(data, place)
     try:
         record = msgspec.json.decode(data, type=LanguageRecord)
+        twice = duplicate_key(data, memoryview(head.states), len(record.states))
     except msgspec.ValidationError as error:
         raise BadInput(f"this is no language file: {error}", place=place,
                        remedy="`coordlang schema` prints what a language file holds.") from None  # fmt: skip
-    words = set(record.words)
-    if len(words) < len(record.words) or not words:
-        raise BadInput("the words must be different, and at least one", place=place)
-    for key, word in [*record.states.items(), ("default", record.default)]:
-        if word not in words:
-            raise BadInput(f"{word!r} (of {key!r}) is not among the words", place=place)
-    _check_guarantee(record, place)
+    except RecursionError as error:
+        raise BadInput(f"this is no JSON that can be read: {error}", place=place) from None
+    if twice is not None:
+        raise BadInput(f"the key {twice!r} occurs twice", place=place, remedy="Of two entries one would be lost.")
+    _check_words(record, place)
+    robots = [] if record.robots is UNSET else record.robots
+    if len(set(robots)) < len(robots) or (not robots and record.robots is not UNSET):
+        raise BadInput("the robots must be different, and at least one", place=place)
     return Language(
         words=tuple(record.words),
         states=record.states,
         default=record.default,
-        robots=tuple(record.robots),
-        guarantee=Guarantee(
-            record.guarantee.method,
-            record.guarantee.size,
-            record.guarantee.lower_bound,
-            record.guarantee.proved_minimal,
-        ),
-        domain=_present(record.domain),
+        robots=tuple(robots),
+        guarantee=_guarantee(record, place),
+        domain={} if record.domain is UNSET else _present(record.domain),
         model=_present(record.model),
-        tasks=_present(record.tasks),
+        tasks=_present(TasksRecord("problems", 0) if record.tasks is UNSET else record.tasks),
         producer=record.producer,
+        also={key: tuple(further) for key, further in record.also.items()},
     )
 
 
@@ -244,25 +176,44 @@ def _present(record: msgspec.Struct) -> dict[str, Any]:
     return {key: value for key, value in msgspec.to_builtins(record).items() if value is not None}
 
 
-def _check_guarantee(record: LanguageRecord, place: Place) -> None:
+def _check_words(record: LanguageRecord, place: Place) -> None:
+    words = set(record.words)
+    if len(words) < len(record.words) or not words:
+        raise BadInput("the words must be different, and at least one", place=place)
+    for word in record.words:
+        if word.split() != [word]:
+            raise BadInput(f"{word!r} is no word", place=place, remedy="Words are not empty and have no blanks in them.")
+    if not {*record.states.values(), record.default} <= words:
+        key, word = next((k, w) for k, w in [*record.states.items(), ("default", record.default)] if w not in words)
+        raise BadInput(f"{word!r} (of {key!r}) is not among the words", place=place)
+    for key, further in record.also.items():
+        good = bool(further) and len(set(further)) == len(further)
+        if not good or key not in record.states or not set(further) <= words - {record.states[key]}:
+            raise BadInput(f"'also' of {key!r} must hold further words of a state that 'states' has", place=place)
+
+
+def _guarantee(record: LanguageRecord, place: Place) -> Guarantee:
+    """What the file says of the language's size; a file that says nothing claims nothing."""
+    size = len(record.words)
+    if record.guarantee is UNSET:
+        return Guarantee("unknown", size, 1, size == 1)
     g = record.guarantee
-    if g.size != len(record.words) or not 1 <= g.lower_bound <= g.size:
+    if g.size != size or not 1 <= g.lower_bound <= g.size:
         raise BadInput(
-            f"the guarantee (size {g.size}, lower bound {g.lower_bound}) contradicts the {len(record.words)} words",
-            place=place,
+            f"the guarantee (size {g.size}, lower bound {g.lower_bound}) contradicts the {size} words", place=place
         )
     if g.proved_minimal != (g.lower_bound == g.size):
         raise BadInput("'proved_minimal' contradicts the lower bound", place=place)
-    if len(set(record.robots)) < len(record.robots) or not record.robots:
-        raise BadInput("the robots must be different, and at least one", place=place)
+    return Guarantee(g.method, g.size, g.lower_bound, g.proved_minimal)
 
 
 class _Head(msgspec.Struct):
     format: Any = None
     version: Any = None
+    states: msgspec.Raw = msgspec.Raw()
 
 
-def _check_head(data: bytes, place: Place) -> None:
+def _head(data: bytes, place: Place) -> _Head:
     """Format and version first: a file of another version need not look like ours."""
     try:
         head = msgspec.json.decode(data, type=_Head)
@@ -274,6 +225,7 @@ def _check_head(data: bytes, place: Place) -> None:
         raise BadInput(f"format {head.format!r}, expected {FORMAT!r}", place=place)
     if head.version != VERSION:
         raise BadInput(f"language file version {head.version!r}; this program reads version {VERSION}", place=place)
+    return head
 
 
 def options_of(
@@ -296,7 +248,7 @@ def options_of(
         if value is not None and value != recorded[flag]:
             said = flag if value is True else f"{flag} {value}"
             raise UsageError(f"{said} contradicts the language file, which was built with {recorded[flag]}")
-    own = tuple(r for r in language.robots if r != ENVIRONMENT or recorded["--unowned"] != "environment")
+    own = tuple(r for r in language.robots or robots if r != ENVIRONMENT or recorded["--unowned"] != "environment")
     if robots and set(robots) != set(own):
         raise UsageError(f"--robots contradicts the language file: its robots are {', '.join(own)}")
     idle = model.get("idle")
@@ -336,8 +288,10 @@ def recorded_list(language: Language) -> list[ListedTask]:
 def recorded_candidates(
     language: Language, domain: Domain, problems: list[Problem], options: ModelOptions, place: Place
 ) -> Candidates:
-    """The candidate tasks that a language file records."""
+    """The candidate tasks that a language file records; the problems' own ones if it records none."""
     kind = language.tasks["kind"]
+    if kind == "problems" and not language.tasks["count"]:
+        return from_problems(domain, problems, options)
     try:
         if kind == "all":
             candidates = all_pairs(domain, problems, options)

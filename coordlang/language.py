@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from itertools import islice
+from typing import Any, NoReturn
 
 import numpy as np
 
+from coordlang.keys import keys_of, read_keys
 from planners.errors import BadInput
 from planners.joint import JointModel
 from planners.matching import Ints
@@ -29,7 +32,8 @@ class Language:
     """A partition ``f: states -> words`` (the paper, section 4), with what is needed to use it.
 
     ``states`` maps state keys (see `planners.states.StateCodec`) to words; all other states have the word ``default``.
-    ``domain``, ``model``, ``tasks`` and ``producer`` are recorded as in a language file (docs/formats.md).
+    ``domain``, ``model``, ``tasks`` and ``producer`` are recorded as in a language file (docs/formats.md).  ``also`` maps
+    states to further words where words overlap (`coordlang.overlapping`); without it this is still a language.
     """
 
     words: tuple[str, ...]
@@ -41,13 +45,12 @@ class Language:
     model: Mapping[str, Any]
     tasks: Mapping[str, Any]
     producer: Mapping[str, Any]
+    also: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def sizes(self) -> dict[str, int]:
         """How many of the mapped states each word holds."""
-        sizes = dict.fromkeys(self.words, 0)
-        for word in self.states.values():
-            sizes[word] += 1
-        return sizes
+        counts = Counter(self.states.values())
+        return {word: counts[word] for word in self.words}
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,10 +69,9 @@ class WordTable:
             none = np.zeros((0, model.codec.width), np.uint64)
             return cls(language.words, none, np.zeros(0, np.int64), language.words.index(language.default))
         number = {word: n for n, word in enumerate(language.words)}
-        rows = np.stack([_row(model, key) for key in language.states])
-        table, place = unique_rows(rows)
+        table, place = unique_rows(_rows(model, language.states))
         word = np.zeros(len(table), np.int64)
-        word[place] = [number[w] for w in language.states.values()]
+        word[place] = np.fromiter(map(number.__getitem__, language.states.values()), np.int64, len(place))
         return cls(language.words, table, word, number[language.default])
 
     def of_rows(self, rows: Rows) -> Ints:
@@ -80,7 +82,28 @@ class WordTable:
         return np.where(found >= 0, self.word[np.maximum(found, 0)], self.default)
 
 
-def _row(model: JointModel, key: str) -> Rows:
+def words_of_states(language: Language, model: JointModel, rows: Rows) -> list[frozenset[int]]:
+    """All words of each state of a table: its own one and those of ``also``.  Raises `BadInput` as `WordTable.of` does."""
+    own = WordTable.of(language, model).of_rows(rows).tolist()
+    words = [frozenset((word,)) for word in own]
+    number = {word: n for n, word in enumerate(language.words)}
+    if language.also:
+        table, place = unique_rows(_rows(model, language.also))
+        further = dict(zip(place.tolist(), language.also.values(), strict=True))
+        for state, at in enumerate(find_rows(table, rows).tolist()):
+            if at >= 0:
+                words[state] |= {number[word] for word in further[at]}
+    return words
+
+
+def _rows(model: JointModel, keys: Iterable[str]) -> Rows:
+    rows, wrong = read_keys(model.codec, keys)
+    if len(wrong):
+        _refuse(model, next(islice(keys, int(wrong[0]), None)))
+    return rows
+
+
+def _refuse(model: JointModel, key: str) -> NoReturn:
     try:
         row = model.codec.parse_key(key)
     except BadInput as error:
@@ -88,12 +111,10 @@ def _row(model: JointModel, key: str) -> Rows:
             f"the language maps a state that this problem cannot have: {error.what}",
             remedy="Give the problem that the language was built for.",
         ) from None
-    if model.codec.key(row) != key:
-        raise BadInput(
-            f"{key!r} is no key of a state; it would be {model.codec.key(row)!r}",
-            remedy="A key lists the true fluents, sorted, joined by one space.",
-        )
-    return row
+    raise BadInput(
+        f"{key!r} is no key of a state; it would be {model.codec.key(row)!r}",
+        remedy="A key lists the true fluents, sorted, joined by one space.",
+    )
 
 
 def sentence(words: Iterable[int]) -> tuple[int, ...]:
@@ -116,6 +137,7 @@ def name_words(
     for state in sorted(partition):
         order.setdefault(partition[state], len(order))
     words = tuple(f"w{n}" for n in range(max(1, len(order))))
-    states = {model.codec.key(rows[state]): words[order[partition[state]]] for state in sorted(partition)}
+    keys = keys_of(model.codec, rows[sorted(partition)]) if partition else []
+    states = {key: words[order[partition[state]]] for key, state in zip(keys, sorted(partition), strict=True)}
     counts: Sequence[int] = np.bincount([order[w] for w in partition.values()], minlength=len(words)).tolist()
     return words, dict(sorted(states.items())), words[counts.index(max(counts))]

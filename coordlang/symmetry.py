@@ -7,7 +7,9 @@ a necessary clause is necessary.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,7 +29,35 @@ MOST = 64
 _TRIED = 200_000
 
 
+@dataclass(frozen=True, slots=True)
+class Symmetry:
+    """A symmetry: ``renaming`` of objects, and ``states``, where it takes each state number."""
+
+    renaming: Renaming
+    states: Ints
+
+    def text(self, text: str) -> str:
+        """The image of an atom, a formula or a subaction, as text with single spaces."""
+        return re.sub(r"(?<= )[^ ()]+", lambda match: self.renaming.get(match[0], match[0]), text)
+
+    def robot(self, robots: Sequence[str], number: int) -> int:
+        """The number of the robot that robot ``number`` goes to."""
+        return robots.index(self.renaming.get(robots[number], robots[number]))
+
+    def joint_action(self, robots: Sequence[str], texts: Sequence[str | None]) -> tuple[str | None, ...]:
+        """The image of a joint action, given and returned as each robot's text."""
+        image: list[str | None] = [None] * len(robots)
+        for number, text in enumerate(texts):
+            image[self.robot(robots, number)] = self.text(text) if text is not None else None
+        return tuple(image)
+
+
 def state_symmetries(candidates: Candidates) -> list[Ints]:
+    """The permutations of `symmetries`."""
+    return [found.states for found in symmetries(candidates)]
+
+
+def symmetries(candidates: Candidates) -> list[Symmetry]:
     """Permutations of the state numbers in ``candidates.rows``, without the identity (at most `MOST`).
 
     Empty under ``--remember-actions``, or where the search finds none: symmetries only save work.
@@ -36,7 +66,7 @@ def state_symmetries(candidates: Candidates) -> list[Ints]:
     if model.remembers:
         return []
     tasks = _tasks(candidates.spaces)
-    found: list[Ints] = []
+    found: list[Symmetry] = []
     seen = {tuple(range(len(candidates.rows)))}
     for renaming in _renamings(candidates.loaded.domain, candidates.loaded.problems[0]):
         if len(found) >= MOST:
@@ -48,7 +78,7 @@ def state_symmetries(candidates: Candidates) -> list[Ints]:
             continue
         if _keeps_tasks(candidates.spaces, tasks, renaming, permutation, model):
             seen.add(tuple(permutation.tolist()))
-            found.append(permutation)
+            found.append(Symmetry(renaming, permutation))
     return found
 
 

@@ -15,7 +15,7 @@ from planners.errors import BadInput, Place, ProvedImpossible
 from planners.grounding import ground_goal
 from planners.joint import FullState, Goal, JointModel, show
 from planners.model import Loaded, ModelOptions, PlanningTask, build
-from planners.optimal import PlanSpace, TaskGroup, plan_spaces, search_each
+from planners.optimal import PlanSpace, TaskGroup, joined, plan_spaces, search, search_each, solvable
 from planners.pddl.formulas import read_formula
 from planners.pddl.lifted import And, Atom, Domain, Formula, Not, Or, Problem, Truth
 from planners.pddl.names import Names
@@ -45,6 +45,7 @@ class Candidates:
     ``kind`` "problems": the problems' own tasks; "all": every ordered pair of different reachable states;
     "file": ``listed``.  ``spaces`` are their optimal plans, in batches over one common table of states; ``count`` is
     the number of tasks.  ``states`` is the number of reachable states where the whole space was explored, else None.
+    ``skipped`` names tasks that were left out because they have no plan.
     """
 
     kind: Kind
@@ -52,6 +53,7 @@ class Candidates:
     listed: tuple[ListedTask, ...]
     spaces: tuple[PlanSpace, ...]
     states: int | None
+    skipped: tuple[str, ...] = ()
 
     @property
     def model(self) -> JointModel:
@@ -67,12 +69,31 @@ class Candidates:
         return self.spaces[0].rows
 
 
-def from_problems(domain: Domain, problems: Sequence[Problem], options: ModelOptions | None = None) -> Candidates:
-    """The tasks of the given problems.  Raises `ProvedImpossible` for an unsolvable one, naming it."""
+def from_problems(
+    domain: Domain,
+    problems: Sequence[Problem],
+    options: ModelOptions | None = None,
+    *,
+    skip_unsolvable: bool = False,
+) -> Candidates:
+    """The tasks of the given problems.
+
+    Raises `ProvedImpossible` for an unsolvable one, naming it; with ``skip_unsolvable`` only if there is no other.
+    """
     loaded = build(domain, problems, options)
-    space = search_each(loaded.model, loaded.tasks)
-    listed = tuple(_as_listed(domain, problem, task) for problem, task in zip(problems, loaded.tasks, strict=True))
-    return Candidates("problems", loaded, listed, (space,), None)
+    listed: list[ListedTask] = []
+    spaces: list[PlanSpace] = []
+    skipped: list[str] = []
+    for problem, task in zip(problems, loaded.tasks, strict=True):
+        try:
+            spaces.append(search(loaded.model, task))
+        except ProvedImpossible:
+            if not skip_unsolvable or len(skipped) == len(problems) - 1:
+                raise
+            skipped.append(problem.source.name)
+            continue
+        listed.append(_as_listed(domain, problem, task))
+    return Candidates("problems", loaded, tuple(listed), (joined(spaces),), None, tuple(skipped))
 
 
 def all_pairs(domain: Domain, problems: Sequence[Problem], options: ModelOptions | None = None) -> Candidates:
@@ -117,11 +138,15 @@ def from_listed(
     listed: Sequence[ListedTask],
     options: ModelOptions | None = None,
     place: Place | None = None,
+    *,
+    skip_unsolvable: bool = False,
 ) -> Candidates:
     """The tasks of a task file; everything static comes from the problem.
 
     Raises
     ------
+    ProvedImpossible
+        A task without a plan; with ``skip_unsolvable`` only if no other task is left.
     BadInput
         An empty list, an atom that the problem does not have, or an initial state that the problem's initial
         state does not reach (such a state is taken for a mistake).
@@ -149,8 +174,17 @@ def from_listed(
         states = len(reached)
     else:
         states = len(space)
-    spaces = plan_spaces(space, [TaskGroup(goal, np.stack(rows)) for goal, rows in groups.items()])
-    return Candidates("file", loaded, tuple(listed), tuple(spaces), states)
+    grouped = [TaskGroup(goal, np.stack(rows)) for goal, rows in groups.items()]
+    skipped: list[str] = []
+    if skip_unsolvable and (kept := solvable(space, grouped)):
+        served = {(g.goal, tuple(row.tolist())) for g in kept if g.inits is not None for row in g.inits}
+        good = [(goal, tuple(model.state(init).tolist())) in served for init, goal in ground]
+        skipped = [f"task {n} ({' '.join(t.init)} -> {' '.join(t.goal)})"
+                   for n, (t, ok) in enumerate(zip(listed, good, strict=True), 1) if not ok]  # fmt: skip
+        listed = [task for task, ok in zip(listed, good, strict=True) if ok]
+        grouped = kept
+    spaces = plan_spaces(space, grouped)
+    return Candidates("file", loaded, tuple(listed), tuple(spaces), states, tuple(skipped))
 
 
 def from_recorded(
@@ -230,6 +264,13 @@ def goal_text(model: JointModel, goal: Goal) -> str:
     return " ".join(formula_text(part) for part in (goal.parts if isinstance(goal, And) else (goal,)))
 
 
+def goal_atoms(goal: Goal) -> tuple[str, ...]:
+    """The parts of a goal formula as a task file lists them."""
+    assert not isinstance(goal, FullState)
+    parts = goal.parts if isinstance(goal, And) else (goal,)
+    return tuple(formula_text(p) for p in parts if p != Truth(True))
+
+
 def formula_text(formula: Formula) -> str:
     """A ground formula as PDDL text."""
     match formula:
@@ -248,9 +289,7 @@ def formula_text(formula: Formula) -> str:
 def _as_listed(domain: Domain, problem: Problem, task: PlanningTask) -> ListedTask:
     fluents = fluent_predicates(domain)
     init = sorted(show(a) for a in problem.init if a.predicate in fluents)
-    assert not isinstance(task.goal, FullState)
-    parts = task.goal.parts if isinstance(task.goal, And) else (task.goal,)
-    return ListedTask(tuple(init), tuple(formula_text(p) for p in parts if p != Truth(True)))
+    return ListedTask(tuple(init), goal_atoms(task.goal))
 
 
 def _listed(entry: Any, number: int, place: Place) -> ListedTask:

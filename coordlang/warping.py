@@ -27,25 +27,32 @@ def warping_clause(u: Sequence[int], v: Sequence[int], word: Mapping[int, int] |
 
     None if the two sentences differ.  O(|u| |v|).
     """
+    first, second = [word[a] for a in u], [word[b] for b in v]
+    path = warping_path(u, v, [[a == b for b in second] for a in first])
+    return None if path is None else frozenset(pair(u[i], v[j]) for i, j in path if u[i] != v[j])
+
+
+def warping_path(
+    u: Sequence[int], v: Sequence[int], joined: Sequence[Sequence[bool]]
+) -> list[tuple[int, int]] | None:
+    """A warping path over cells with ``joined[i][j]`` that has the fewest non-identical cells; None if there is none."""
     best = [[_NO_PATH] * len(v) for _ in u]
     for i, a in enumerate(u):
         for j, b in enumerate(v):
-            if word[a] != word[b]:
+            if not joined[i][j]:
                 continue
             before = min(_before(best, i, j)) if i or j else 0
             if before < _NO_PATH:
                 best[i][j] = before + (a != b)
     if best[-1][-1] >= _NO_PATH:
         return None
-    pairs: set[Pair] = set()
     i, j = len(u) - 1, len(v) - 1
-    while True:
-        if u[i] != v[j]:
-            pairs.add(pair(u[i], v[j]))
-        if i == 0 and j == 0:
-            return frozenset(pairs)
+    path = [(i, j)]
+    while i or j:
         options = _before(best, i, j)
         i, j = ((i - 1, j - 1), (i - 1, j), (i, j - 1))[options.index(min(options))]
+        path.append((i, j))
+    return path[::-1]
 
 
 def _before(best: list[list[int]], i: int, j: int) -> tuple[int, int, int]:

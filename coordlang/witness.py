@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coordlang.coordination import FAILED, moves
+from coordlang.coordination import FAILED, INSTEAD, moves
 from coordlang.tasks import describe
 from coordlang.tuples import EdgeIndex, unique_tuples
 from planners.errors import ProvedImpossible
+from planners.limits import reaching
 from planners.matching import Ints
 from planners.model import PlanningTask
 from planners.optimal import PlanSpace, search
@@ -71,6 +72,17 @@ def _first_failure(space: PlanSpace, starts: Ints, *, together: bool) -> Miscoor
 
 def _trail(space: PlanSpace, starts: Ints, *, together: bool) -> Trail | None:
     """Breadth first through the layers, until a mixture breaks; of several breaks the first in order."""
+    walked = [0, 0]
+
+    def so_far() -> str:
+        return f"{walked[0]} of {len(space.layers) - 1} steps of the composition walk, {walked[1]:,} nodes"
+
+    with reaching(so_far, INSTEAD):
+        return _walk_to_a_break(space, starts, walked, together=together)
+
+
+def _walk_to_a_break(space: PlanSpace, starts: Ints, walked: list[int], *, together: bool) -> Trail | None:
+    """See `_trail`; ``walked`` counts layers and nodes."""
     robots = space.labels.shape[1]
     index = EdgeIndex.of(space)
     table = np.zeros((0, robots + 1), np.int64)
@@ -82,6 +94,7 @@ def _trail(space: PlanSpace, starts: Ints, *, together: bool) -> Trail | None:
         parents = np.concatenate((parents, np.full(len(fresh), -1)))
         came = np.concatenate((came, np.full((len(fresh), robots), -1)))
         history.append((table, parents, came))
+        walked[1] += len(table)
         found: list[Ints] = []
         for move in moves(space, index, table, together=together):
             broken = np.flatnonzero(move.mixed == FAILED)
@@ -95,6 +108,7 @@ def _trail(space: PlanSpace, starts: Ints, *, together: bool) -> Trail | None:
         one = np.zeros(len(table), np.int64)
         one[number_of[::-1]] = np.arange(len(step))[::-1]
         parents, came = step[one, robots + 1], step[one, robots + 2 :]
+        walked[0] += 1
     return None
 
 

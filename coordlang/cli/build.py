@@ -8,7 +8,7 @@ import sys
 from dataclasses import replace
 from importlib.metadata import version
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -36,8 +36,17 @@ if TYPE_CHECKING:
 @problems_argument
 @click.option("--tasks", metavar="all|FILE", help="Candidate tasks: every pair of reachable states, or a task file "
               "(default: the problems' own).")  # fmt: skip
-@click.option("--method", type=click.Choice(["greedy", "minimal", "exhaustive"]), default="greedy",
-              show_default=True, help="greedy: fast.  minimal: fewest words, with proof.  exhaustive: brute force.")
+@click.option("--method", type=click.Choice(["greedy", "separating", "minimal", "exhaustive"]), default="greedy",
+              show_default=True, help="greedy: fast.  separating: fewest words that part plans where they differ first or "
+              "last.  minimal: fewest words at all, with proof.  exhaustive: brute force.")
+@click.option("--alpha-only", is_flag=True, help="separating: part plans where they differ first, never where last.")
+@click.option("--prefer", type=click.Choice(["flexible"]), help="flexible: of the languages with the fewest words, one "
+              "whose sentences leave many plans open (with --method minimal or exhaustive).")
+@click.option("--overlap", is_flag=True, help="Then give states further words while that leaves more plans open.")
+@click.option("--certificate", metavar="FILE", help="Also write why fewer words do not suffice, for `verify "
+              "--lower-bound`.")
+@click.option("--unsolvable", type=click.Choice(["fail", "skip"]), default="fail", show_default=True,
+              help="What to do about candidate tasks without plans: stop (exit 11), or name and leave them out.")
 @click.option(
     "-o", "--output", required=True, metavar="LANGUAGE", help="The language file; .json or .json.gz, - for stdout."
 )
@@ -50,6 +59,11 @@ def command(
     problems: tuple[str, ...],
     tasks: str | None,
     method: str,
+    alpha_only: bool,
+    prefer: Literal["flexible"] | None,
+    overlap: bool,
+    certificate: str | None,
+    unsolvable: str,
     output: str,
     seed: int,
     as_json: bool,
@@ -59,7 +73,8 @@ def command(
 
     Exit 0: written, with the proof that the method promises.  3: written without it (a limit was hit).
     """
-    from coordlang.build import Inseparable, build_language
+    from coordlang.build import Inseparable, build_language, certificate_of
+    from coordlang.certificate import write_certificate
     from coordlang.cli.coordination import show
     from coordlang.file import to_bytes, write_language
     from planners.limits import stop_clock
@@ -67,16 +82,27 @@ def command(
     if output != "-" and any(os.path.exists(f) and os.path.samefile(f, output) for f in (domain, *problems)
                              if os.path.exists(output)):  # fmt: skip
         raise click.UsageError(f"-o {output} would overwrite an input file")
+    if alpha_only and method != "separating":
+        raise click.UsageError("--alpha-only belongs to --method separating")
+    exact = method in ("minimal", "exhaustive")
+    if prefer and not exact:
+        raise click.UsageError(f"--prefer {prefer} belongs to --method minimal or exhaustive")
     start = perf_counter()
     lifted, read = read_files(domain, problems)
-    candidates = make_candidates(lifted, read, tasks, given.options())
+    candidates = make_candidates(lifted, read, tasks, given.options(), skip_unsolvable=unsolvable == "skip")
+    for name in candidates.skipped:
+        click.echo(f"coordlang: left out, it has no plan: {name}", err=True)
     note_single_robot(candidates.model.robots)
     seconds = {"space": perf_counter() - start}
     try:
-        built = build_language(candidates, method, seed=seed, progress=progress)
+        built = build_language(
+            candidates, method, seed=seed, alpha_only=alpha_only, prefer=prefer, overlap=overlap, progress=progress
+        )
     except Inseparable as error:
         click.echo(show(error.witness), err=True)
         raise
+    proved = built.language.guarantee.proved_minimal
+    proof = certificate_of(built) if certificate and (built.stopped is None or proved) else None
     stop_clock()  # the work is done; from here on it is saved
     seconds |= built.seconds
     producer = {
@@ -92,6 +118,10 @@ def command(
         click.echo(to_bytes(language).decode(), nl=False)
     else:
         write_language(language, output)
+    if proof is not None and certificate is not None:
+        write_certificate(proof, certificate)
+    elif certificate:
+        click.echo("coordlang: no certificate is written: the search was stopped", err=True)
     figures = _figures(candidates, built, seconds)
     if as_json and output != "-":
         click.echo(json.dumps(figures))
@@ -102,21 +132,25 @@ def command(
         return EXIT_INTERRUPTED
     if built.stopped is not None:
         reason = str(built.stopped).splitlines()[0] if str(built.stopped) else "out of memory"
-        click.echo(f"coordlang: {reason}; the best language so far is written, without proof", err=True)
-    unproved = method in ("minimal", "exhaustive") and not language.guarantee.proved_minimal
+        short_of = "" if proved and exact else ", without proof"
+        click.echo(f"coordlang: {reason}; the best language so far is written{short_of}", err=True)
+    unproved = not proved if exact else built.stopped is not None
     return EXIT_UNPROVED if unproved else 0
 
 
-def make_candidates(lifted: Any, read: list[Any], tasks: str | None, options: ModelOptions) -> Candidates:
+def make_candidates(
+    lifted: Any, read: list[Any], tasks: str | None, options: ModelOptions, *, skip_unsolvable: bool = False
+) -> Candidates:
     """The candidate tasks that ``--tasks`` asks for; without it the problems' own."""
     from coordlang.tasks import all_pairs, from_listed, from_problems, read_task_file
     from planners.errors import Place
 
     if tasks is None:
-        return from_problems(lifted, read, options)
+        return from_problems(lifted, read, options, skip_unsolvable=skip_unsolvable)
     if tasks == "all":
         return all_pairs(lifted, read, options)
-    return from_listed(lifted, read, read_task_file(tasks), options, Place(tasks))
+    listed = read_task_file(tasks)
+    return from_listed(lifted, read, listed, options, Place(tasks), skip_unsolvable=skip_unsolvable)
 
 
 def progress(message: str) -> None:
@@ -150,10 +184,24 @@ def _summary(figures: dict[str, Any], output: str) -> str:
         click.echo("\r\033[K", nl=False, err=True)
     words, total = figures["words"], sum(figures["seconds"].values())
     proof = "proved minimal, " if figures["proved_minimal"] else f"at least {figures['lower_bound']} needed, "
+    flexible = (
+        f"a sentence leaves {figures['flexibility']:,.2f} plans open on average ("
+        f"{figures['flexibility_before']:,.2f} before, {figures['flexibility_bound']:,.2f} at most), "
+        f"communication saving {100 * figures['communication_saving']:.1f} %\n"
+        if "flexibility" in figures
+        else ""
+    )
+    if "overlapping_words" in figures:
+        flexible += (
+            f"{counted(figures['overlapping_words'], 'further word')} of states: a sentence well chosen leaves "
+            f"{figures['overlapping_flexibility']:,.2f} plans open on average (without them "
+            f"{figures['partition_flexibility']:,.2f})\n"
+        )
     return (
         f"{counted(words, 'word')} ({figures['method']}, {proof}verified) for {counted(figures['tasks'], 'task')}, "
         f"{figures['tasks_requiring_coordination']:,} of which require coordination\n"
         f"{figures['states_on_plans']:,} states on optimal plans, {figures['divergences']:,} divergences, "
         f"{figures['walk_nodes']:,} walk nodes, {total:.2f} s\n"
+        f"{flexible}"
         f"written to {'stdout' if output == '-' else output}"
     )

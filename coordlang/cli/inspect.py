@@ -48,6 +48,7 @@ def _text(found: Inspection) -> str:
     lines = [
         ("domain", f"{found.domain}, problem {found.problem}"),
         ("read as", found.style),
+        ("objects", _counts(found.objects) or "none"),
         ("robots", f"{', '.join(found.robots)} (by {found.robots_by})"),
     ]
     for robot, schemas in found.subactions.items():
@@ -57,14 +58,24 @@ def _text(found: Inspection) -> str:
         ("shared", _counts(found.shared) or "none"),
         ("no robot named", {"error": "not allowed (--unowned)"}.get(found.unowned, f"--unowned {found.unowned}")),
         ("step formulas", _counts(found.step_formulas) or "none"),
+        *(("", f"e.g. {example}") for example in found.formulas),
+        ("never possible", ", ".join(found.impossible) or "none"),
         ("no effects", ", ".join(found.without_effects) or "none"),
         ("action costs", found.costs),
-        ("interference", f"{found.interfering:,} pairs" + (f", e.g. {found.example}" if found.example else "")),
+        ("interference", f"{found.interfering:,} pairs" + _example(found)),
         ("fluents", f"{found.facts} facts: {_counts(found.fluents)}"),
+        ("at the start", _counts(found.start) or "none is true"),
         ("statics", _counts(found.statics) or "none"),
+        ("never true", ", ".join(found.never) or "none"),
         ("goal", found.goal),
     ]
     return "\n".join(f"{name:<14}  {text}" for name, text in lines)
+
+
+def _example(found: Inspection) -> str:
+    if found.example:
+        return f", e.g. {found.example}"
+    return ", none of them possible in one state near the start" if found.interfering else ""
 
 
 def _counts(counts: dict[str, int]) -> str:

@@ -23,6 +23,10 @@ from coordlang.cli.app import (
 @domain_argument
 @problems_argument
 @click.option("--tasks", metavar="all|FILE", help="Check these tasks (default: those that the language file records).")
+@click.option("--lower-bound", "certificate", metavar="CERTIFICATE", help="Also check why fewer words do not suffice "
+              "(a file of `build --certificate`).")
+@click.option("--dimacs", metavar="FILE", help="With --lower-bound: write the formula that was refuted, for any SAT "
+              "solver.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
 @model_options
 @limits
@@ -31,6 +35,8 @@ def command(
     domain: str,
     problems: tuple[str, ...],
     tasks: str | None,
+    certificate: str | None,
+    dimacs: str | None,
     as_json: bool,
     given: GivenOptions,
 ) -> int:
@@ -38,14 +44,19 @@ def command(
 
     Exit 0: it is.  1: it is not, and two plans that miscoordinate are shown.
     """
-    from coordlang.cli.build import make_candidates
+    from coordlang.certificate import check, read_certificate
+    from coordlang.cli.build import make_candidates, progress
     from coordlang.cli.coordination import show, witness_data
-    from coordlang.file import check_source, read_language, recorded_candidates
-    from coordlang.language import WordTable
+    from coordlang.file import check_source, read_language, recorded_candidates, write_atomically
+    from coordlang.language import WordTable, words_of_states
     from coordlang.verify import verify
-    from planners.errors import Place
+    from coordlang.verify_overlapping import verify_overlapping
+    from planners.errors import Place, Refuted
 
+    if dimacs and not certificate:
+        raise click.UsageError("--dimacs belongs to --lower-bound")
     spoken = read_language(language)
+    proof = read_certificate(certificate) if certificate else None
     lifted, read = read_files(domain, problems)
     check_source(spoken, lifted, read, Place(language))
     options = given.for_language(spoken)
@@ -54,20 +65,41 @@ def command(
     else:
         candidates = make_candidates(lifted, read, tasks, options)
     verdict = verify(WordTable.of(spoken, candidates.model), candidates.spaces)
+    if spoken.also and verdict.holds:
+        words = words_of_states(spoken, candidates.model, candidates.rows)
+        verdict = verify_overlapping(spoken.words, words, candidates.spaces)
+    bound = check(proof, candidates, progress) if proof and verdict.holds else None
     if as_json:
         click.echo(json.dumps({
             "holds": verdict.holds, "tasks": verdict.tasks, "words": len(spoken.words), "nodes": verdict.nodes,
             "miscoordination": witness_data(verdict.witness) if verdict.witness else None,
+            "lower_bound": bound and bound.lower_bound, "reasons": bound and bound.reasons,
         }))  # fmt: skip
-    elif verdict.holds:
-        checked = f"{counted(len(spoken.words), 'word')}, {counted(verdict.tasks, 'task')}"
-        mixing = f"all optimal plans of one sentence mix freely ({verdict.nodes:,} walk nodes)"
-        click.echo(f"verified: {checked}: {mixing}")
     if verdict.witness:
         if not as_json:
-            click.echo(
-                f'refuted: plans with the sentence "{" ".join(verdict.witness.sentence or ())} .." miscoordinate'
-            )
+            said = " ".join(verdict.witness.sentence or ())
+            click.echo(f'refuted: plans with the sentence "{said} .." miscoordinate')
             click.echo(show(verdict.witness))
         return 1
+    if not as_json:
+        checked = f"{counted(len(spoken.words), 'word')}, {counted(verdict.tasks, 'task')}"
+        mixing = "all optimal plans of one sentence mix freely"
+        if spoken.also:
+            mixing = "words overlap, every optimal plan has a sentence whose plans mix freely"
+        mixing = f"{mixing} ({verdict.nodes:,} walk nodes)"
+        click.echo(f"verified: {checked}: {mixing}")
+    if bound is None:
+        return 0
+    if dimacs:
+        write_atomically(dimacs, bound.dimacs().encode())
+    claimed = spoken.guarantee.lower_bound
+    if bound.lower_bound < claimed:
+        raise Refuted(
+            f"{language} says that {counted(claimed, 'word')} are needed; the certificate proves {bound.lower_bound} only"
+        )
+    if not as_json:
+        click.echo(
+            f"lower bound {bound.lower_bound}: {counted(bound.reasons, 'reason')} checked, and with "
+            f"{bound.lower_bound - 1} words they contradict each other ({len(bound.cnf.clauses):,} clauses)"
+        )
     return 0

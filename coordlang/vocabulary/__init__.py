@@ -6,12 +6,14 @@ from coordlang.vocabulary.exhaustive import exhaustive
 from coordlang.vocabulary.greedy import greedy
 from coordlang.vocabulary.job import Job, Outcome
 from coordlang.vocabulary.minimal import minimal
+from coordlang.vocabulary.separating import separating
 
 #: The ways to a partition, by the name that ``--method`` takes.
 METHODS: dict[str, Callable[[Job], Outcome]] = {
     "greedy": greedy,
+    "separating": separating,
     "minimal": minimal,
     "exhaustive": exhaustive,
 }
 
-__all__ = ["METHODS", "Job", "Outcome", "exhaustive", "greedy", "minimal"]
+__all__ = ["METHODS", "Job", "Outcome", "exhaustive", "greedy", "minimal", "separating"]

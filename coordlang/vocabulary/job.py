@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from coordlang.counterexamples import Counterexample
 from coordlang.divergence import Alphas
+from coordlang.symmetry import Symmetry
 from coordlang.tasks import Candidates
+from coordlang.warping import Clause
+from planners.optimal import PlanSpace
 
 #: State number -> word number.
 Partition = Mapping[int, int]
@@ -18,7 +22,7 @@ class Job:
 
     ``incumbent`` is a partition that is known to be a language, what an anytime method returns in the worst case.
     ``check`` verifies a partition by definition and raises if it is none; an anytime method calls it for every better
-    one that it finds, because when it is stopped there is no time left.
+    one that it finds, because when it is stopped there is no time left.  ``alpha_only`` is for `separating`.
     """
 
     candidates: Candidates
@@ -26,6 +30,7 @@ class Job:
     alphas: Alphas
     incumbent: Partition | None = None
     seed: int = 0
+    alpha_only: bool = False
     progress: Callable[[str], None] = lambda _: None
     check: Callable[[Partition], None] = lambda _: None
 
@@ -36,17 +41,28 @@ class Job:
 
 
 @dataclass(frozen=True, slots=True)
+class Evidence:
+    """Why a clause is necessary: plans of ``space`` whose mixture fails, or their image under a symmetry."""
+
+    space: PlanSpace
+    example: Counterexample
+    symmetry: Symmetry | None
+
+
+@dataclass(frozen=True, slots=True)
 class Outcome:
     """A partition with what is proved of it.
 
     ``lower_bound``: no coordination language has fewer words.  ``figures`` are the work done.  ``stopped`` is the error
-    that ended the search early, None if it came to its end.
+    that ended the search early, None if it came to its end.  ``evidence`` are the necessary clauses that were met, of
+    which no partition into ``lower_bound - 1`` words satisfies all (nothing for methods that meet none).
     """
 
     partition: Partition
     lower_bound: int
     figures: Mapping[str, float] = field(default_factory=dict)
     stopped: BaseException | None = None
+    evidence: Mapping[Clause, Evidence] = field(default_factory=dict)
 
     @property
     def size(self) -> int:

@@ -8,16 +8,19 @@ with the same clauses, until the two meet.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from random import Random
 
 import numpy as np
 
 from coordlang.counterexamples import counterexamples
-from coordlang.symmetry import state_symmetries
+from coordlang.symmetry import Symmetry, symmetries
 from coordlang.tuples import EdgeIndex
-from coordlang.vocabulary.job import Job, Outcome, Partition
-from coordlang.vocabulary.sat import Colouring, reduce
+from coordlang.vocabulary.job import Evidence, Job, Outcome, Partition
+from coordlang.vocabulary.sat import Colouring, Effort, Undecided, by_demand, close_in, reduce
+from coordlang.vocabulary.separating import filled as separated
 from coordlang.warping import Clause, pair, separation_clause
 from planners.errors import OutOfMemory, OutOfTime
 from planners.limits import stop_clock
@@ -28,8 +31,6 @@ from planners.optimal import PlanSpace
 _PARTS, _TASKS = 8, 1_500
 #: Counterexamples taken from one part.
 _MOST = 200
-#: Rounds with counterexamples before another number of words is tried; doubled when nothing else is left.
-_PATIENCE = 250
 
 
 def minimal(job: Job) -> Outcome:
@@ -46,9 +47,20 @@ def minimal(job: Job) -> Outcome:
         if search.best is None:
             raise
         # Without its traceback, which holds on to all that the search had in memory.
-        return Outcome(search.best, search.lower, search.figures(), error.with_traceback(None))
+        return Outcome(search.best, search.lower, search.figures(), error.with_traceback(None), search.evidence)
     assert search.best is not None
-    return Outcome(search.best, search.lower, search.figures())
+    return Outcome(search.best, search.lower, search.figures(), evidence=search.evidence)
+
+
+def refute(job: Job, size: int) -> Mapping[Clause, Evidence]:
+    """Necessary clauses that no partition into ``size`` words satisfies together.
+
+    Raises `ValueError` if there is a language with so few words.
+    """
+    search = _Search(replace(job, incumbent=None))
+    if not search.exceeds(size):
+        raise ValueError(f"there is a language with {size} words")
+    return search.evidence
 
 
 class _Search:
@@ -61,8 +73,8 @@ class _Search:
         self._rounds = 0
         self._found = 0
         self._clauses: list[Clause] = []
-        self._known: set[Clause] = set()
-        self._symmetries: list[list[int]] = []
+        self.evidence: dict[Clause, Evidence] = {}
+        self._symmetries: list[tuple[Symmetry, list[int]]] = []
 
     @property
     def _upper(self) -> int:
@@ -73,26 +85,45 @@ class _Search:
         if not job.alphas.requiring:
             self.best = dict.fromkeys(job.states, 0)
             return
-        self._symmetries = [p.tolist() for p in state_symmetries(job.candidates)]
-        parts = _parts(job.candidates.spaces, Random(job.seed))
-        patience = _PATIENCE
-        while self.best is None or self.lower < self._upper:
-            # From below as long as that is quick; what is slow is first closed in from above, to have a good language.
-            if self._decide(self.lower, parts, patience):
-                continue
-            middle = (self.lower + self._upper) // 2
-            if middle == self.lower or not self._decide(middle, parts, patience):
-                patience *= 2
+        parts = self._prepare()
+        filled = False
 
-    def _decide(self, size: int, parts: Sequence[_Part], patience: int) -> bool:
-        """Find a language with ``size`` words or prove that there is none; False if patience ran out before."""
+        def decide(size: int, effort: Effort) -> bool:
+            nonlocal filled
+            if size > self.lower and not filled:  # from below it takes long: a better language first
+                filled = True
+                if self._fill():
+                    return True
+            return self._decide(size, parts, effort)
+
+        close_in(lambda: (self.lower, self._upper), decide)
+
+    def _fill(self) -> bool:
+        """A separating partition, if it has fewer words than the best language so far."""
+        before = self._upper
+        try:
+            self.best = separated(replace(self._job, incumbent=self.best))
+        except OutOfMemory:
+            return False  # its walk is larger than ours; we can do without
+        return self._upper < before
+
+    def exceeds(self, size: int) -> bool:
+        """Whether every language has more words than ``size``."""
+        return self._decide(size, self._prepare(), Effort(sys.maxsize, sys.maxsize)) and self.lower > size
+
+    def _prepare(self) -> list[_Part]:
+        self._symmetries = [(s, s.states.tolist()) for s in symmetries(self._job.candidates)]
+        return _parts(self._job.candidates.spaces, Random(self._job.seed))
+
+    def _decide(self, size: int, parts: Sequence[_Part], effort: Effort) -> bool:
+        """Find a language with ``size`` words or prove that there is none; False if the effort was not enough."""
         self._clauses = reduce(self._clauses)
-        colouring = Colouring(_by_demand(self._job.states, self._clauses), size)
+        colouring = Colouring(by_demand(self._job.states, self._clauses), size)
         try:
             for clause in self._clauses:
                 colouring.add(clause)
-            partition = self._refine(colouring, parts, patience)
-        except _Impatient:
+            partition = self._refine(colouring, parts, effort)
+        except Undecided:
             return False
         finally:
             colouring.delete()
@@ -103,14 +134,14 @@ class _Search:
             self.best = partition
         return True
 
-    def _refine(self, colouring: Colouring, parts: Sequence[_Part], patience: int) -> Partition | None:
+    def _refine(self, colouring: Colouring, parts: Sequence[_Part], effort: Effort) -> Partition | None:
         """The loop for one number of words: a language, or None if there is none."""
-        partition = colouring.solve()
-        clean = position = 0
+        partition = colouring.solve(effort.conflicts)
+        clean = position = rounds = 0
         word = np.zeros(len(self._job.candidates.rows), np.int64)
         while partition is not None and clean < len(parts):
-            if patience <= 0:
-                raise _Impatient
+            if rounds >= effort.rounds:
+                raise Undecided
             self._rounds += 1
             word[list(partition)] = list(partition.values())
             fresh = parts[position].clauses(word)
@@ -123,12 +154,12 @@ class _Search:
                 clean += 1
                 continue
             clean = 0
-            patience -= 1
+            rounds += 1
             self._found += len(fresh)
-            for clause in self._images(reduce(fresh)):
+            for clause in self._images(fresh):
                 self._clauses.append(clause)
                 colouring.add(clause)
-            partition = colouring.solve()
+            partition = colouring.solve(effort.conflicts)
         return partition
 
     def figures(self) -> dict[str, float]:
@@ -139,18 +170,18 @@ class _Search:
             "symmetries": len(self._symmetries),
         }
 
-    def _images(self, clauses: Iterable[Clause]) -> Iterable[Clause]:
+    def _images(self, found: Mapping[Clause, Evidence]) -> Iterator[Clause]:
         """New clauses with their images under the symmetries."""
-        for clause in clauses:
-            images = [clause, *(frozenset(pair(s[a], s[b]) for a, b in clause) for s in self._symmetries)]
-            for image in images:
-                if image not in self._known:
-                    self._known.add(image)
+        for clause in reduce(found):
+            evidence = found[clause]
+            images = [(clause, evidence)]
+            for symmetry, s in self._symmetries:
+                image = frozenset(pair(s[a], s[b]) for a, b in clause)
+                images.append((image, replace(evidence, symmetry=symmetry)))
+            for image, why in images:
+                if image not in self.evidence:
+                    self.evidence[image] = why
                     yield image
-
-
-class _Impatient(Exception):
-    """A number of words is not decided yet, and others may be easier."""
 
 
 class _Part:
@@ -159,15 +190,15 @@ class _Part:
     def __init__(self, space: PlanSpace, index: EdgeIndex, starts: Ints) -> None:
         self._space, self._index, self._starts = space, index, starts
 
-    def clauses(self, word: Ints) -> list[Clause]:
+    def clauses(self, word: Ints) -> dict[Clause, Evidence]:
         """Clauses that the words (one per state) violate."""
-        found = set()
+        found: dict[Clause, Evidence] = {}
         nodes = word[self._space.state]
         for example in counterexamples(self._space, self._index, nodes, _MOST, self._starts):
             clause = separation_clause(example.states, word)  # type: ignore[arg-type]
             assert clause, "the plans have one sentence, and none of them is the other"
-            found.add(clause)
-        return sorted(found, key=sorted)
+            found.setdefault(clause, Evidence(self._space, example, None))
+        return found
 
 
 def _parts(spaces: Sequence[PlanSpace], random: Random) -> list[_Part]:
@@ -182,13 +213,3 @@ def _parts(spaces: Sequence[PlanSpace], random: Random) -> list[_Part]:
             mine = np.isin(goal_of_start, goals[number::count])
             parts.append(_Part(space, index, np.unique(space.starts[mine])))
     return parts
-
-
-def _by_demand(states: Iterable[int], clauses: Iterable[Clause]) -> list[int]:
-    """States in the order of how much the clauses ask of them: a good order to break the symmetry of words."""
-    demand: dict[int, float] = {}
-    for clause in clauses:
-        for states_of_pair in clause:
-            for state in states_of_pair:
-                demand[state] = demand.get(state, 0.0) + 1 / len(clause)
-    return sorted(states, key=lambda s: (-demand.get(s, 0.0), s))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 from coordlang.warping import Clause, Pair
 
@@ -26,6 +28,7 @@ class Colouring:
         self._solver = Solver(name=solver)
         self._word = {s: [self._new() for _ in range(size)] for s in self._states}
         self._separated: dict[Pair, int] = {}
+        self._all: dict[Clause, int] = {}
         for state in self._states:
             self._one_word(self._word[state])
         self._break_symmetry()
@@ -34,25 +37,23 @@ class Colouring:
         """Require that one of these pairs of states lies in different words."""
         self._solver.add_clause([self._separate(p) for p in sorted(clause)])
 
-    def solve(self) -> dict[int, int] | None:
-        """A partition (state -> word), or None if there is none: a proof that ``size`` words do not suffice."""
-        if not self._decide():
+    def choose(self, alternatives: Sequence[Clause]) -> None:
+        """Require that all pairs of one of these sets lie in different words."""
+        if len(alternatives) == 1:
+            for states in sorted(alternatives[0]):
+                self.add([states])
+            return
+        self._solver.add_clause([self._all_separate(pairs) for pairs in alternatives])
+
+    def solve(self, conflicts: int | None = None) -> dict[int, int] | None:
+        """A partition (state -> word), or None if there is none: a proof that ``size`` words do not suffice.
+
+        Raises `Undecided` after about so many ``conflicts`` of the solver.
+        """
+        if not solved(self._solver, conflicts=conflicts):
             return None
         true = {v for v in self._solver.get_model() if v > 0}
         return {s: next(w for w, v in enumerate(own) if v in true) for s, own in self._word.items()}
-
-    def _decide(self) -> bool:
-        """In slices: the solver hears no signal (time limit, Ctrl-C), so it must come back now and then."""
-        while True:
-            self._solver.conf_budget(_SLICE)
-            try:
-                answer = self._solver.solve_limited()
-            except Exception as error:  # python-sat catches SIGINT itself and raises an error of its own
-                if "interrupt" in str(error).lower():
-                    raise KeyboardInterrupt from None
-                raise
-            if answer is not None:
-                return bool(answer)
 
     def delete(self) -> None:
         self._solver.delete()
@@ -73,6 +74,13 @@ class Colouring:
             for a, b in zip(*(self._word[s] for s in states), strict=True):
                 self._solver.add_clause([-variable, -a, -b])
         return self._separated[states]
+
+    def _all_separate(self, pairs: Clause) -> int:
+        if pairs not in self._all:
+            variable = self._all[pairs] = self._new()
+            for states in sorted(pairs):
+                self._solver.add_clause([-variable, self._separate(states)])
+        return self._all[pairs]
 
     def _break_symmetry(self) -> None:
         used: list[int] = []  # used[w]: some state so far has word w
@@ -96,6 +104,54 @@ class Colouring:
             used = after
 
 
+class Undecided(Exception):
+    """The effort allowed was used up: a number of words is not decided yet, and others may be easier."""
+
+
+def solved(solver: Any, assumptions: Sequence[int] = (), conflicts: int | None = None) -> bool:
+    """Whether a python-sat solver's clauses can be satisfied.  Raises `Undecided` after so many ``conflicts``.
+
+    In slices: the solver hears no signal (time limit, Ctrl-C), so it must come back now and then.
+    """
+    spent = 0
+    while conflicts is None or spent < conflicts:
+        solver.conf_budget(_SLICE)
+        try:
+            answer = solver.solve_limited(assumptions=list(assumptions))
+        except Exception as error:  # python-sat catches SIGINT itself and raises an error of its own
+            if "interrupt" in str(error).lower():
+                raise KeyboardInterrupt from None
+            raise
+        if answer is not None:
+            return bool(answer)
+        spent += _SLICE
+    raise Undecided
+
+
+def close_in(bounds: Callable[[], tuple[int, int]], decide: Callable[[int, Effort], bool]) -> None:
+    """Decide numbers of words until the bounds (proved to be needed, known to suffice) meet.
+
+    From below as long as that is quick; what is slow is first closed in from above, to have a good language early.
+    ``decide`` moves a bound, or returns False when the effort was not enough, which then is doubled.
+    """
+    effort = Effort()
+    while (span := bounds())[0] < span[1]:
+        lower, upper = span
+        if decide(lower, effort):
+            continue
+        middle = (lower + upper) // 2
+        if middle == lower or not decide(middle, effort):
+            effort = Effort(2 * effort.rounds, 2 * effort.conflicts)
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """What may be spent on one number of words: partitions refuted, and conflicts for each of them."""
+
+    rounds: int = 250
+    conflicts: int = 100_000
+
+
 def reduce(clauses: Iterable[Clause]) -> list[Clause]:
     """The clauses that no other one implies (a subset of its pairs), shortest first."""
     kept: list[Clause] = []
@@ -107,3 +163,13 @@ def reduce(clauses: Iterable[Clause]) -> list[Clause]:
         for p in clause:
             by_pair.setdefault(p, []).append(clause)
     return kept
+
+
+def by_demand(states: Iterable[int], clauses: Iterable[Clause]) -> list[int]:
+    """States in the order of how much the clauses ask of them: a good order to break the symmetry of words."""
+    demand: dict[int, float] = {}
+    for clause in clauses:
+        for states_of_pair in clause:
+            for state in states_of_pair:
+                demand[state] = demand.get(state, 0.0) + 1 / len(clause)
+    return sorted(states, key=lambda s: (-demand.get(s, 0.0), s))

@@ -94,7 +94,7 @@ def test_build_verify_explain(coordlang: Command, language: Path, t_map: tuple[P
     explained = coordlang("explain", language, *t_map)
     assert explained.code == 0
     assert "in 2 sentences" in explained.out
-    assert "step 1: r1 idles; r2 (move r2 c1-0 c1-1)" in explained.out
+    assert "w0 (6 states): at(r1) != c1-1 and at(r2) != c1-1" in explained.out
 
 
 def test_language_file_fits_its_schema(coordlang: Command, language: Path) -> None:
@@ -222,7 +222,7 @@ def test_a_bug_is_said_plainly(error: Exception, coordlang: Command, monkeypatch
     def broken() -> None:
         raise error
 
-    monkeypatch.setattr("coordlang.file.json_schema", broken)
+    monkeypatch.setattr("coordlang.record.json_schema", broken)
     outcome = coordlang("schema")
     assert outcome.code == 32
     assert "internal error" in outcome.err

@@ -42,6 +42,7 @@ WORLDS = {
     "lock": ":agent of type robot",
     "charger": ":agent of type robot",
     "elevator": "type robot",
+    "flags": ":agent of type robot",
 }
 
 Row = dict[str, str]
@@ -283,6 +284,14 @@ def elevator_rule(before: State, chosen: dict[str, tuple[str, ...]], after: Stat
     return all(("on", walker, cabin) in after for walker in inside) and not (moving and len(chosen) > 1)
 
 
+def flags_rule(before: State, chosen: dict[str, tuple[str, ...]], after: State) -> bool:
+    """Every robot waits or shows one flag, and nobody marches unless some colour is shown twice."""
+    shown = [atom[2] for atom in before if atom[0] == "shows"]
+    marching = any(action[0] == "march" for action in chosen.values())
+    ready = [atom[1] for atom in after if atom[0] in ("waits", "shows")]
+    return (not marching or len(set(shown)) < len(shown)) and sorted(ready) == ["r1", "r2", "r3"]
+
+
 RULES: dict[str, Callable[[State, dict[str, tuple[str, ...]], State], bool]] = {
     "handover": handover_rule,
     "two-arms": two_arms_rule,
@@ -292,6 +301,7 @@ RULES: dict[str, Callable[[State, dict[str, tuple[str, ...]], State], bool]] = {
     "lock": lock_rule,
     "charger": charger_rule,
     "elevator": elevator_rule,
+    "flags": flags_rule,
 }
 
 

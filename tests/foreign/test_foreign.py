@@ -3,59 +3,26 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+import re
+import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from coordlang.build import Inseparable
 from coordlang.cli import run
+from coordlang.variation import varied_tasks
 
-SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
+
+import foreign
+from foreign_rows import BY_NAME, LANGUAGE_BY_NAME, LANGUAGES, ROWS, SHARED, Row
 
 pytestmark = [
     pytest.mark.foreign,
     pytest.mark.skipif(not SHARED.is_dir(), reason=f"the inputs that others wrote are not here: {SHARED}"),
 ]
-
-
-@dataclass(frozen=True)
-class Case:
-    """Files, options, and the reference: states, makespan, plans, plans with fewest actions."""
-
-    folder: str
-    domain: str
-    problem: str
-    options: tuple[str, ...]
-    states: int
-    makespan: int
-    plans: int
-    fewest: int
-
-    @property
-    def files(self) -> tuple[str, ...]:
-        place = SHARED / "foreign" / self.folder
-        return str(place / self.domain), str(place / self.problem)
-
-
-CASES = [
-    Case("boxpushing", "domain.pddl", "p2_3_2_1_1_0.pddl", (), 1296, 6, 2038, 55),
-    Case("workshop", "workshop_dom_cal.pddl", "workshop2_1_2_2_2.pddl", (), 1200, 5, 8, 4),
-    Case("workshop", "workshop_dom_cn.pddl", "workshop2_1_2_2_2.pddl", (), 1200, 5, 8, 4),
-    Case("grippers", "domain.pddl", "n2-r3-o3-s2.pddl", (), 2403, 7, 100752, 3640),
-    Case("transport", "p11.DOMAIN.pddl", "p11.pddl", ("--robot-type", "vehicle"), 576, 7, 18, 14),
-    Case("driverlog", "domain.pddl", "pfile1.pddl", (), 10575, 6, 536, 2),
-    Case("driverlog", "domain_constrained.pddl", "pfile1.pddl", (), 10575, 6, 536, 2),
-    Case("taxi", "domain.pddl", "p01.pddl", (), 280, 10, 28, 4),
-    Case("depot", "domain.pddl", "pfile1.pddl", (), 576, 5, 768, 1),
-    Case("depot", "domain_constrained.pddl", "pfile1.pddl", (), 576, 5, 48, 1),
-    Case("mapf", "mapf-domain.pddl", "mapf-problem2.pddl", (), 42, 2, 1, 1),
-    Case("storage", "domain.pddl", "p05.pddl", ("--robot-type", "hoist"), 1460, 6, 34, 14),
-    Case("blocks-arms", "original_domain.pddl", "original_problem_3.pddl", (), 361, 5, 204, 84),
-    Case(
-        "gripper", "domain.pddl", "prob01.pddl",
-        ("--robot-type", "gripper", "--unowned", "environment"), 256, 7, 384, 24,
-    ),
-]  # fmt: skip
 
 
 def output(capfd: pytest.CaptureFixture[str], *arguments: str) -> dict[str, object]:
@@ -64,22 +31,42 @@ def output(capfd: pytest.CaptureFixture[str], *arguments: str) -> dict[str, obje
     return data
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda c: f"{c.folder}-{c.domain}")
-def test_numbers(case: Case, capfd: pytest.CaptureFixture[str]) -> None:
-    inspected = output(capfd, "inspect", *case.files, *case.options, "--states", "--json")
-    assert inspected["states"] == case.states
-    makespan = output(capfd, "plans", *case.files, *case.options, "--count", "--json")
-    assert (makespan["optimal_cost"], makespan["count"]) == (case.makespan, case.plans)
-    actions = output(capfd, "plans", *case.files, *case.options, "--count", "--json", "--cost", "makespan+actions")
-    assert (actions["optimal_cost"], actions["count"]) == (case.makespan, case.fewest)
+SMALL = [row for row in ROWS if row.name != "logistics00"]
 
 
-@pytest.mark.parametrize(("cost", "plans"), [("makespan", 536), ("makespan+actions", 2)])
-def test_factored_equals_unfactored(cost: str, plans: int, capfd: pytest.CaptureFixture[str]) -> None:
-    place = str(SHARED / "foreign" / "driverlog-factored")
-    data = output(capfd, "plans", "--factored", place, "--count", "--json", "--cost", cost)
-    assert (data["optimal_cost"], data["count"]) == (6, plans)
-    assert output(capfd, "inspect", "--factored", place, "--states", "--json")["states"] == 10575
+@pytest.mark.parametrize("row", SMALL, ids=lambda row: row.name)
+def test_numbers(row: Row, capfd: pytest.CaptureFixture[str]) -> None:
+    inspected = output(capfd, "inspect", *row.arguments, "--states", "--json")
+    assert inspected["states"] == row.states
+    makespan = output(capfd, "plans", *row.arguments, "--count", "--json")
+    assert (makespan["optimal_cost"], makespan["count"]) == (row.makespan, row.plans)
+    actions = output(capfd, "plans", *row.arguments, "--count", "--json", "--cost", "makespan+actions")
+    assert (actions["optimal_cost"], actions["count"]) == (row.makespan, row.fewest)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("row", SMALL, ids=lambda row: row.name)
+def test_fast_downward_agrees(row: Row, capfd: pytest.CaptureFixture[str]) -> None:
+    checked = output(capfd, "check", *row.arguments, "--json", "--cost", "makespan+actions")
+    assert checked["agree"]
+    assert checked["fast_downward"][0] == row.makespan  # type: ignore[index]
+
+
+def test_both_forms_of_workshop_have_the_same_plans_of_fewest_actions(capfd: pytest.CaptureFixture[str]) -> None:
+    """The network form only forbids more in steps that no plan needs: pressing both switches, unlocking twice."""
+    plans = [
+        output(capfd, "plans", *BY_NAME[name].arguments, "--max", "100", "--format", "json", *more)["plans"]
+        for name in ("workshop-cal", "workshop-cn")
+        for more in ((), ("--cost", "makespan+actions"))
+    ]
+    assert [len(found) for found in plans] == [8, 4, 8, 4]  # type: ignore[arg-type]
+    assert plans[0] == plans[2]
+    assert plans[1] == plans[3]
+    joint_steps = [
+        output(capfd, "inspect", *BY_NAME[name].arguments, "--states", "--json")["joint_steps"]
+        for name in ("workshop-cal", "workshop-cn")
+    ]
+    assert joint_steps[0] > joint_steps[1]  # type: ignore[operator]
 
 
 @pytest.mark.slow
@@ -113,11 +100,78 @@ def test_refused(path: str, message: str, capfd: pytest.CaptureFixture[str]) -> 
 
 
 def test_the_numeric_sample_is_plain_strips(capfd: pytest.CaptureFixture[str]) -> None:
-    """`refuse/numeric` has no numeric feature in it (no functions, no fluents): it is read, with one robot."""
+    """`refuse/numeric` has no numeric feature, so there is nothing in it to refuse, and it is read.
+
+    Its only requirement is :typing.  It declares no function, has no number, no assignment, no comparison and no metric:
+    each word of the two files is a keyword of STRIPS with types or one of the domain's own names.
+    """
     place = SHARED / "refuse" / "numeric"
-    text = (place / "domain.pddl").read_text() + (place / "problem.pddl").read_text()
-    assert ":functions" not in text
-    assert "increase" not in text
+    domain, problem = (re.sub(";.*", "", (place / f"{name}.pddl").read_text()) for name in ("domain", "problem"))
+    assert re.findall(r"\(:requirements([^)]*)\)", domain) == [" :typing"]
+    assert "requirements" not in problem
+    keywords = set(re.findall(r":[a-z-]+|(?<=\()(?:and|not|define|domain|problem)(?=[ \n])", domain + problem))
+    assert keywords == {
+        "define", "domain", "problem", ":requirements", ":typing", ":types", ":predicates", ":action", ":parameters",
+        ":precondition", ":effect", ":domain", ":objects", ":init", ":goal", "and", "not",
+    }  # fmt: skip
+    heads = set(re.findall(r"\(([^\s():?]+)", domain[domain.index("(:action") :]))
+    assert heads == {"and", "not", "at", "in", "link", "path"}
+    words = set(re.split(r"[\s()]+", domain + problem)) - {"", "-"}
+    assert not [word for word in words if re.match(r"[-+]?[\d.]", word) or word in "<>=+*/"]
     files = str(place / "domain.pddl"), str(place / "problem.pddl")
-    data = output(capfd, "plans", *files, "--robots", "driver", "--unowned", "environment", "--count", "--json")
-    assert data["count"] != 0
+    data = output(capfd, "plans", *files, "--robots", "driver,truck", "--count", "--json")
+    # By hand: walk (meanwhile the truck is loaded), board, drive, drive, unload.
+    assert data["optimal_cost"] == 5
+    assert run(["plans", *files, "--count"]) == 31
+    assert "domain.pddl:4:2: which objects are the robots?" in capfd.readouterr().err
+
+
+QUICK = ("workshop-cal", "grippers", "transport", "mapf", "storage", "gripper-2")
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_a_language_for_varied_tasks(name: str) -> None:
+    figures = foreign.build(LANGUAGE_BY_NAME[name], 60)
+    tasks, requiring, words = {
+        "workshop-cal": (16, 8, 2),
+        "grippers": (24, 20, 2),
+        "transport": (240, 78, 2),
+        "mapf": (1722, 110, 3),
+        "storage": (63, 27, 2),
+        "gripper-2": (6, 6, 2),
+    }[name]
+    assert figures["verified"]
+    assert figures["proved"]
+    assert (figures["tasks"], figures["requiring"], figures["words"]) == (tasks, requiring, words)
+    assert figures["greedy"] >= words  # type: ignore[operator]
+    # What the words are said to mean: all plans of every sentence agree on it.
+    assert figures["told"] == figures["different"] > 0  # type: ignore[operator]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("language", [x for x in LANGUAGES if x.name not in QUICK], ids=lambda language: language.name)
+def test_the_other_languages(language: foreign.Language) -> None:
+    figures = foreign.build(language, 200)
+    assert figures["verified"]
+    assert figures["told"] == figures["different"] > 0  # type: ignore[operator]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("row", ["depot", "depot-con", "taxi"])
+def test_a_language_of_four_or_five_robots(row: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    figures = output(capfd, "build", *BY_NAME[row].arguments, "-o", str(tmp_path / "language.json"), "--json")
+    assert figures["verified"]
+    assert figures["tasks_requiring_coordination"] == 1
+
+
+def test_plans_that_no_state_tells_apart(capfd: pytest.CaptureFixture[str]) -> None:
+    """Of two robots beside the small box either may push it while the other one walks: remembering tells them apart."""
+    row = BY_NAME["boxpushing"]
+    language = LANGUAGE_BY_NAME["boxpushing"]
+    with pytest.raises(Inseparable) as caught:
+        foreign.build(replace(language, cost="makespan"), 60)
+    plans = caught.value.witness.plans
+    assert caught.value.witness.states[0] == caught.value.witness.states[1]
+    assert plans[0] != plans[1]
+    tasks = varied_tasks(foreign.load(row, "makespan"), (), ("(at s1 r2x2)", "(at m1 ?)"))
+    assert len(tasks) == 6

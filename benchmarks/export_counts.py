@@ -1,0 +1,223 @@
+"""How many plans fit a sentence: by our graph, by listing all optimal plans, and by other planners on the exported PDDL.
+
+    python benchmarks/export_counts.py [FOLDER ..] [--time-limit SECONDS] [--language greedy|minimal]
+
+For every problem in `domains/` a language is built, and of its sentences the one that leaves most plans open and the one
+that leaves fewest are exported, in both forms.  Columns: all optimal plans of the task; those that fit by the graph, by
+listing (each optimal plan's sentence by definition); optimal plans of the export by K* and by SymK, every one distinct;
+and the optimal cost by Fast Downward, through unified-planning.  ``-``: too many to list, or no answer in the time limit.
+
+K* and SymK come with ``pip install '.[oracles]'``.  Exit code 1 if two numbers differ.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from coordlang.build import Inseparable, build_language
+from coordlang.language import sentence
+from coordlang.sentences import task_sentences
+from coordlang.tasks import from_problems
+from coordlang.use.export.pddl import Exported, export_pddl
+from coordlang.use.fitting import fitting
+from coordlang.use.spoken import Spoken, speak_candidates
+from planners.errors import CoordlangError, OutOfMemory
+from planners.model import ModelOptions
+from planners.pddl import read_domain, read_problem
+from planners.plans import Plans
+
+DOMAINS = Path(__file__).resolve().parent.parent / "domains"
+#: More plans than this are not listed, neither by us nor by others.
+MOST = 5_000
+#: A search for invariants among facts without arguments takes seconds and gains nothing.
+TRANSLATE = ("--translate-options", "--invariant-generation-max-time", "0", "--search-options")
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One sentence of one problem, exported in one form; None: no answer."""
+
+    problem: str
+    sentence: str
+    form: str
+    actions: int
+    plans: int
+    graph: int
+    listing: int | None
+    kstar: int | None
+    symk: int | None
+    cost: int
+    fast_downward: int | None
+
+    @property
+    def agrees(self) -> bool:
+        counts = {n for n in (self.graph, self.listing, self.kstar, self.symk) if n is not None}
+        return len(counts) == 1 and self.fast_downward in (None, self.cost)
+
+
+def rows(folders: list[str], seconds: float, method: str = "greedy", *, other: bool = True) -> Iterator[Row]:
+    """The rows of every problem in these folders (all without any)."""
+    for path in sorted(DOMAINS.glob("*/*.pddl")):
+        if path.name == "domain.pddl" or (folders and path.parent.name not in folders):
+            continue
+        try:
+            yield from problem_rows(path, seconds, method, other=other)
+        except (Inseparable, OutOfMemory) as error:
+            print(f"{path.parent.name}/{path.stem}: {str(error).splitlines()[0]}", file=sys.stderr)
+
+
+def problem_rows(path: Path, seconds: float, method: str = "greedy", *, other: bool = True) -> Iterator[Row]:
+    """Two sentences of a problem in both forms."""
+    domain = read_domain(path.parent / "domain.pddl")
+    problem = read_problem(path, domain)
+    try:
+        candidates = from_problems(domain, [problem])
+        language = build_language(candidates, method).language
+    except Inseparable:  # no state tells its plans apart; the last actions do
+        candidates = from_problems(domain, [problem], ModelOptions(remember_actions=True))
+        language = build_language(candidates, method).language
+    spoken = next(speak_candidates(language, candidates))
+    for words in two_sentences(spoken):
+        last = None
+        for limit in (2000, 0):
+            exported = export_pddl(spoken, words, limit)
+            if exported.plain.form != last:
+                yield row(f"{path.parent.name}/{path.stem}", spoken, words, exported, seconds, other=other)
+            last = exported.plain.form
+
+
+def two_sentences(spoken: Spoken) -> list[tuple[int, ...]]:
+    """The sentence of most and that of fewest plans; of the first and the last plan where there are too many to compare."""
+    try:
+        listed = task_sentences(spoken.space, spoken.task, spoken.table)
+        found = [spoken.words_of(s.words) for s in (listed[0], listed[-1])]
+    except OutOfMemory:
+        plans = Plans.of(spoken.space, spoken.task)
+        word = spoken.table.of_rows(spoken.space.rows)
+        chosen = [plans.unrank(rank) for rank in (0, plans.count - 1)]
+        found = [sentence(word[plans.states(plan)].tolist()) for plan in chosen]
+    return list(dict.fromkeys(found))
+
+
+def row(name: str, spoken: Spoken, words: tuple[int, ...], exported: Exported, seconds: float, *, other: bool) -> Row:
+    """All answers for one exported problem."""
+    plans = Plans.of(spoken.space, spoken.task)
+    fits = Plans.of(fitting(spoken, words)).count
+    found: dict[str, int | None] = dict.fromkeys(("kstar", "symk", "fast_downward"))
+    if other:
+        with tempfile.TemporaryDirectory(prefix="coordlang-") as directory:
+            folder = Path(directory)
+            (folder / "domain.pddl").write_text(exported.domain)
+            (folder / "problem.pddl").write_text(exported.problem)
+            if fits <= MOST:
+                found["kstar"] = by_kstar(folder, exported, seconds)
+                found["symk"] = by_symk(folder, exported, seconds)
+            found["fast_downward"] = by_fast_downward(exported, seconds)
+    return Row(
+        name, spoken.text(words), exported.plain.form, len(exported.plain.actions), plans.count, fits,
+        by_listing(spoken, plans, words), found["kstar"], found["symk"], exported.cost, found["fast_downward"],
+    )  # fmt: skip
+
+
+def by_listing(spoken: Spoken, plans: Plans, words: tuple[int, ...]) -> int | None:
+    """The definition: of all optimal plans those whose states' words, repeated ones collapsed, are the sentence."""
+    if plans.count > 40 * MOST:
+        return None
+    word = spoken.table.of_rows(plans.space.rows).tolist()
+    return sum(sentence(word[state] for state in plans.states(plan)) == words for plan in plans)
+
+
+def by_kstar(folder: Path, exported: Exported, seconds: float) -> int | None:
+    """The number of optimal plans that K* lists, read back as joint plans, all different."""
+    try:
+        from kstar_planner.planners import run_planner
+    except ImportError:
+        return None
+    search = (
+        f"kstar(blind(transform=undo_to_origin()), q=1.0, k={10 * MOST}, max_time={seconds}, find_unordered_plans=false, "
+        "dump_plan_files=false, json_file_to_dump=PLANS_JSON_NAME)"
+    )
+    files = [str(folder / "domain.pddl"), str(folder / "problem.pddl")]
+    limit = ["--sas-file", str(folder / "kstar.sas"), "--overall-time-limit", f"{int(seconds)}s"]
+    try:
+        answer = run_planner([*limit, *files, *TRANSLATE, "--search", search])
+    except json.JSONDecodeError:  # it was stopped while it wrote
+        return None
+    if answer["timeout_triggered"] or "search exit code: 0" not in answer["planner_output"]:
+        return None
+    found = [exported.joint_plan([name.strip() for name in plan["actions"]]) for plan in answer["plans"]]
+    assert all(plan["cost"] == exported.cost for plan in answer["plans"])
+    return _distinct(found)
+
+
+def by_symk(folder: Path, exported: Exported, seconds: float) -> int | None:
+    """The number of optimal plans that SymK lists, read back as joint plans, all different."""
+    try:
+        from up_symk.symk_base import get_resource_path
+    except ImportError:
+        return None
+    from coordlang.use.export.pddl import plan_names
+
+    search = (
+        "symq_bd(simple=false,plan_selection=top_k(num_plans=infinity,dump_plans=false),bound=infinity,quality=1.0)"
+    )
+    command = [sys.executable, get_resource_path(), "--plan-file", "plan", "--overall-time-limit", f"{int(seconds)}s"]
+    done = subprocess.run(
+        [*command, "domain.pddl", "problem.pddl", *TRANSLATE, "--search", search],
+        cwd=folder, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    if done.returncode != 0:
+        return None
+    texts = [path.read_text() for path in folder.glob("plan*")]
+    assert all(re.search(r"; cost = (\d+)", text)[1] == str(exported.cost) for text in texts)  # type: ignore[index]
+    return _distinct([exported.joint_plan(plan_names(text)) for text in texts])
+
+
+def by_fast_downward(exported: Exported, seconds: float) -> int | None:
+    """The optimal cost by Fast Downward, through unified-planning."""
+    from planners.fast_downward import total_cost
+
+    try:
+        return total_cost(exported.plain, time_limit=seconds)
+    except CoordlangError:
+        return None
+
+
+def _distinct(plans: list[tuple[tuple[int, ...], ...]]) -> int:
+    assert len(set(plans)) == len(plans), "one plan in two guises"
+    return len(plans)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folders", nargs="*")
+    parser.add_argument("--time-limit", type=float, default=60.0, help="seconds for each planner and problem")
+    parser.add_argument("--language", choices=["greedy", "minimal"], default="greedy")
+    arguments = parser.parse_args()
+    header = ("problem", "form", "actions", "words", "plans", "graph", "listing", "K*", "SymK", "cost", "FD", "")
+    widths = (24, 8, 7, 5, 15, 9, 9, 7, 7, 4, 4, 1)
+    print("  ".join(f"{h:>{w}}" for h, w in zip(header, widths, strict=True)))
+    wrong = total = 0
+    for found in rows(arguments.folders, arguments.time_limit, arguments.language):
+        cells = (
+            found.problem, found.form.split("-")[0], found.actions, len(found.sentence.split()), found.plans, found.graph,
+            found.listing, found.kstar, found.symk, found.cost, found.fast_downward, "" if found.agrees else "!",
+        )  # fmt: skip
+        texts = ("-" if c is None else f"{c:,}" if isinstance(c, int) else c for c in cells)
+        print("  ".join(f"{t:>{w}}" for t, w in zip(texts, widths, strict=True)), flush=True)
+        total += 1
+        wrong += not found.agrees
+    print(f"{total} exports; {total - wrong} agree" + (f", {wrong} DO NOT" if wrong else ""))
+    return int(wrong > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,157 @@
+"""Is a certificate right?  Every reason is checked against the model, and the rest is left to a SAT solver.
+
+Code of its own: it shares the joint model and the plan spaces with the builders, and the encoding, which is what the
+solver is asked about.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from coordlang.certificate.encoding import Cnf, encode
+from coordlang.certificate.file import Certificate, PlanTexts, Reason
+from coordlang.tasks import Candidates, goal_text
+from coordlang.warping import Clause, pair
+from planners.errors import BadInput, Refuted
+from planners.joint import JointModel
+from planners.optimal import PlanSpace
+from planners.pddl.sexpr import Expression, Source, Word, parse
+from planners.states import find_rows, split_atoms
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """A certificate that holds: every language for the tasks has at least ``lower_bound`` words.
+
+    ``cnf`` is the formula that was refuted, ``names`` are the keys of the states in it.
+    """
+
+    lower_bound: int
+    reasons: int
+    cnf: Cnf
+    names: dict[int, str]
+
+    def dimacs(self) -> str:
+        """The refuted formula as DIMACS text."""
+        return self.cnf.dimacs(self.names)
+
+
+def check(
+    certificate: Certificate, candidates: Candidates, progress: Callable[[str], None] = lambda _: None
+) -> Checked:
+    """Check a certificate for candidate tasks.
+
+    For every reason: its plans are optimal plans of one candidate task, their mixture is not, and its cells are warping
+    paths.  Then no partition of states into the refuted number of words separates a pair on every reason's paths.
+    Raises `Refuted` with the reason that is wrong.
+    """
+    if tuple(certificate.robots) != candidates.model.robots:
+        raise Refuted(f"the certificate is about other robots: {', '.join(certificate.robots)}")
+    if certificate.refuted < 0:
+        raise Refuted(f"the certificate speaks of {certificate.refuted} words")
+    tasks = _Tasks(candidates)
+    clauses: list[Clause] = []
+    for number, reason in enumerate(certificate.reasons, 1):
+        progress(f"checking reason {number:,} of {len(certificate.reasons):,}")
+        try:
+            clauses.append(_clause(reason, tasks))
+        except (Refuted, BadInput) as error:
+            raise Refuted(f"reason {number} of the certificate is wrong: {error.what}") from None
+    progress(f"refuting {certificate.refuted} words")
+    cnf = encode(clauses, certificate.refuted)
+    if certificate.refuted and not cnf.refuted():
+        raise Refuted(f"the certificate's {len(clauses):,} reasons leave languages with {certificate.refuted} words")
+    names = {state: candidates.model.codec.key(candidates.rows[state]) for state in cnf.word}
+    return Checked(certificate.refuted + 1, len(clauses), cnf, names)
+
+
+def _clause(reason: Reason, tasks: _Tasks) -> Clause:
+    """The pairs of states one of which must be separated."""
+    space, start = tasks.find(reason)
+    robots = len(space.model.robots)
+    if len(reason.plans) != robots:
+        raise Refuted(f"expected a plan for each of {robots} robots")
+    states = [_states(space, start, plan, f"plan {n}") for n, plan in enumerate(reason.plans)]
+    mixture = [[steps[robot][robot] for robot in range(robots)] for steps in zip(*reason.plans, strict=True)]
+    if _follow(space, start, mixture) is not None:
+        raise Refuted("the mixture of its plans is an optimal plan: they need no separation")
+    clause = set()
+    joined = [{number} for number in range(robots)]
+    for path in reason.paths:
+        a, b = path.plans
+        if not (0 <= a < robots and 0 <= b < robots):
+            raise Refuted(f"there are no plans {a} and {b}")
+        _check_path(path.cells, len(states[a]), len(states[b]), f"the path of plans {a} and {b}")
+        clause |= {pair(states[a][i], states[b][j]) for i, j in path.cells if states[a][i] != states[b][j]}
+        union = joined[a] | joined[b]
+        for number in union:
+            joined[number] = union
+    if len(joined[0]) < robots:
+        raise Refuted("its warping paths do not join all of its plans")
+    return frozenset(clause)
+
+
+def _states(space: PlanSpace, start: int, plan: PlanTexts, name: str) -> list[int]:
+    states = _follow(space, start, plan)
+    if states is None:
+        raise Refuted(f"{name} is no optimal plan of the task")
+    return states
+
+
+def _follow(space: PlanSpace, start: int, plan: PlanTexts) -> list[int] | None:
+    """The states that a plan passes through, or None if it is no optimal plan."""
+    node = start
+    states = [int(space.state[node])]
+    for step in plan:
+        labels = space.model.numbers(step) if len(step) == len(space.model.robots) else None
+        edges = np.arange(space.first[node], space.first[node + 1])
+        hit = edges[(space.labels[edges] == np.array(labels)).all(axis=1)] if labels is not None else edges[:0]
+        if not len(hit):
+            return None
+        node = int(space.target[hit[0]])
+        states.append(int(space.state[node]))
+    return states if space.layer[node] == 0 else None
+
+
+def _check_path(path: list[tuple[int, int]], rows: int, columns: int, name: str) -> None:
+    ends = [(0, 0), (rows - 1, columns - 1)]
+    steps = [(c - a, d - b) for (a, b), (c, d) in pairwise(path)]
+    if not path or [path[0], path[-1]] != ends or not set(steps) <= {(0, 1), (1, 0), (1, 1)}:
+        raise Refuted(f"{name} is no warping path from {ends[0]} to {ends[1]}")
+
+
+class _Tasks:
+    """Finds the candidate task that a reason speaks of."""
+
+    def __init__(self, candidates: Candidates) -> None:
+        self._model: JointModel = candidates.model
+        self._rows = candidates.rows
+        self._tasks: dict[tuple[int, object], tuple[PlanSpace, int]] = {}
+        for space in candidates.spaces:
+            goals = [_canonical(split_atoms(goal_text(space.model, goal))) for goal in space.goals]
+            for node in space.starts.tolist():
+                self._tasks[int(space.state[node]), goals[space.goal[node]]] = (space, node)
+
+    def find(self, reason: Reason) -> tuple[PlanSpace, int]:
+        row = self._model.codec.encode(reason.init)
+        state = int(find_rows(self._rows, row[None, :])[0])
+        goal = _canonical(part for text in reason.goal for part in split_atoms(text))
+        if (state, goal) not in self._tasks:
+            raise Refuted(f"{' '.join(reason.init)} -> {' '.join(reason.goal)} is no candidate task")
+        return self._tasks[state, goal]
+
+
+def _canonical(goal: Iterable[str]) -> object:
+    """Literals in a form in which their order does not count."""
+    return frozenset(_tree(parse(Source("goal", text)).root) for text in goal)
+
+
+def _tree(node: Expression) -> object:
+    if isinstance(node, Word):
+        return node.text
+    parts = [_tree(part) for part in node]
+    return (node.head, frozenset(parts[1:])) if node.head in ("and", "or") else tuple(parts)

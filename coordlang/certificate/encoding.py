@@ -1,0 +1,134 @@
+"""Clauses "one of these pairs of states is separated" -> a plain CNF that any SAT solver reads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from coordlang.vocabulary.sat import Colouring, by_demand, solved
+from coordlang.warping import Clause, Pair
+
+#: Clauses that a core takes in for each partition that breaks them.
+_AT_ONCE = 50
+
+
+@dataclass(frozen=True, slots=True)
+class Cnf:
+    """A formula in conjunctive normal form: "the states can be given ``size`` words so that every clause holds".
+
+    The last of ``clauses`` are the necessary ones, in their order; those before say what words are.
+    ``word[state]`` are the variables "the state has word 0, 1, ..", ``separated[pair]`` "the two have different words".
+    """
+
+    size: int
+    variables: int
+    clauses: tuple[tuple[int, ...], ...]
+    word: dict[int, tuple[int, ...]]
+    separated: dict[Pair, int]
+
+    def dimacs(self, names: Mapping[int, str]) -> str:
+        """DIMACS text.  ``names`` are the states' keys, for the comments."""
+        lines = [f"c Unsatisfiable iff no {self.size} words satisfy the clauses of a coordlang certificate."]
+        for state, variables in self.word.items():
+            lines += [f"c {v}: word {n} holds {names[state]}" for n, v in enumerate(variables)]
+        lines += [f"c {v}: {names[a]} and {names[b]} have different words" for (a, b), v in self.separated.items()]
+        lines.append(f"p cnf {self.variables} {len(self.clauses)}")
+        lines += [" ".join(map(str, (*clause, 0))) for clause in self.clauses]
+        return "\n".join(lines) + "\n"
+
+    def refuted(self, solver: str = "glucose4") -> bool:
+        """Whether the formula is unsatisfiable, by a solver that the builders do not use."""
+        from pysat.solvers import Solver
+
+        with Solver(name=solver, bootstrap_with=self.clauses) as sat:
+            return not solved(sat)
+
+
+def encode(clauses: Sequence[Clause], size: int) -> Cnf:
+    """The CNF of necessary clauses for ``size`` words.
+
+    Words are interchangeable: a state may have word w only if a state before it, in the order of ``word``, has word w - 1.
+    Any partition can be named like that, so the formula stays satisfiable if it was.
+    """
+    states = by_demand(sorted({s for clause in clauses for p in clause for s in p}), clauses)
+    counter = iter(range(1, 2**62))
+    word = {s: tuple(next(counter) for _ in range(size)) for s in states}
+    pairs = sorted({p for clause in clauses for p in clause})
+    separated = {p: next(counter) for p in pairs}
+    cnf: list[tuple[int, ...]] = []
+    for own in word.values():
+        cnf.append(own)
+        cnf += [(-a, -b) for a, b in combinations(own, 2)]
+    for (a, b), variable in separated.items():
+        cnf += [(-variable, -x, -y) for x, y in zip(word[a], word[b], strict=True)]
+    cnf += _words_in_order(list(word.values()), size, counter)
+    cnf += [tuple(separated[p] for p in sorted(clause)) for clause in clauses]
+    return Cnf(size, next(counter) - 1, tuple(cnf), word, separated)
+
+
+def _words_in_order(words: Sequence[Sequence[int]], size: int, counter: Iterable[int]) -> list[tuple[int, ...]]:
+    """``used[w]`` after each state: some state so far has word w."""
+    fresh = iter(counter)
+    cnf: list[tuple[int, ...]] = []
+    used: list[int] | None = None
+    for own in words:
+        if used is None:
+            cnf += [(-v,) for v in own[1:]]
+            used = list(own)
+            continue
+        cnf += [(-own[w], used[w - 1]) for w in range(1, size)]
+        after = [next(fresh) for _ in range(size)]
+        for w in range(size):
+            cnf += [(-after[w], used[w], own[w]), (after[w], -used[w]), (after[w], -own[w])]
+        used = after
+    return cnf
+
+
+def core(clauses: Iterable[Clause], size: int) -> list[Clause]:
+    """A part of the clauses that still refutes ``size`` words, small but not least.
+
+    Raises `ValueError` if they do not refute it.
+    """
+    return _used(_in_the_way(sorted(clauses, key=lambda c: (len(c), sorted(c))), size), size)
+
+
+def _in_the_way(clauses: Sequence[Clause], size: int) -> list[Clause]:
+    """Clauses that some partition, found under those before, broke; short ones first."""
+    states = by_demand(sorted({s for clause in clauses for p in clause for s in p}), clauses)
+    pairs = np.array([p for clause in clauses for p in sorted(clause)], np.int64).reshape(-1, 2)
+    bounds = np.cumsum([0, *(len(clause) for clause in clauses)])[:-1]
+    words = np.zeros(max(states, default=0) + 1, np.int64)
+    kept: list[Clause] = []
+    colouring = Colouring(states, size)
+    try:
+        while (partition := colouring.solve()) is not None:
+            words[list(partition)] = list(partition.values())
+            apart = words[pairs[:, 0]] != words[pairs[:, 1]]
+            broken = np.flatnonzero(~np.logical_or.reduceat(apart, bounds)) if len(clauses) else bounds
+            if not len(broken):
+                raise ValueError(f"the clauses leave a partition into {size} words")
+            for number in broken[:_AT_ONCE].tolist():
+                colouring.add(clauses[number])
+                kept.append(clauses[number])
+    finally:
+        colouring.delete()
+    return kept
+
+
+def _used(clauses: Sequence[Clause], size: int) -> list[Clause]:
+    """The clauses that a solver's refutation used."""
+    from pysat.solvers import Solver
+
+    cnf = encode(clauses, size)
+    rest, asked = cnf.clauses[: -len(clauses)], cnf.clauses[-len(clauses) :]
+    with Solver(name="cadical153", bootstrap_with=rest) as sat:
+        select = [cnf.variables + 1 + n for n in range(len(clauses))]
+        for variable, clause in zip(select, asked, strict=True):
+            sat.add_clause([*clause, -variable])
+        if solved(sat, select):
+            raise AssertionError("a subset of the clauses refuted the words a moment ago")
+        needed = set(sat.get_core() or ())
+    return [clause for clause, variable in zip(clauses, select, strict=True) if variable in needed]

@@ -1,0 +1,205 @@
+"""The flexibility of partitions that differ in few states, measured again and again: the inner loop of `flexible`.
+
+The same sum as `coordlang.flexibility`, E = sum_s n_s^2 / N for every task.  Two things make it fast.  Sentences are told
+apart by 63-bit hashes, not by tables.  And when some states change their words, only the tasks with plans through them
+are measured, each over its own part of the plan graph.  A collision of hashes can only mislead the search: what is
+reported is measured by `coordlang.flexibility`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coordlang.flexibility import MANY, Floats, edge_shares
+from planners.matching import Ints, ranges
+from planners.optimal import PlanSpace
+from planners.plans import counts
+
+_MIX = np.uint64(0x9E3779B97F4A7C15)
+#: Edges kept in parts of plan graphs, one part for each state; beyond, parts are cut out anew each time.
+_KEEP = 20_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class _Layer:
+    """Nodes ``low:high`` of a part; its edges go from ``source`` to ``target``, both counted from their layers' first node.
+
+    ``state`` of each node; of each edge ``leaving`` and ``entering`` the states at its ends, ``share`` of the source's plans.
+    """
+
+    low: int
+    high: int
+    state: Ints
+    source: Ints
+    target: Ints
+    leaving: Ints
+    entering: Ints
+    share: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """Some tasks of a plan space: the layers of their plan graph, the node of each task and its number of plans."""
+
+    tasks: Ints
+    layers: tuple[_Layer, ...]
+    nodes: int
+    edges: int
+    start: Ints
+    plans: Floats
+
+    def expected(self, word: Ints, code: NDArray[np.uint64]) -> Floats:
+        """E of each task; ``word`` of every state, ``code`` a random number for every word."""
+        together = np.zeros(self.nodes)
+        node = first = np.zeros(0, np.int64)
+        said = np.zeros(0, np.uint64)
+        share = np.zeros(0)
+        for number, layer in enumerate(self.layers):
+            if number == 0:
+                said, share = code[word[layer.state]], np.ones(len(layer.state))
+                node = np.arange(len(said))
+            else:
+                node, said, share = _sentences_above(layer, first, said, share, word, code)
+            first = np.searchsorted(node, np.arange(layer.high - layer.low + 1))
+            together[layer.low : layer.high] = np.bincount(node, share * share, layer.high - layer.low)
+        return self.plans * together[self.start]
+
+
+def _sentences_above(
+    layer: _Layer, first: Ints, said: NDArray[np.uint64], share: Floats, word: Ints, code: NDArray[np.uint64]
+) -> tuple[Ints, NDArray[np.uint64], Floats]:
+    """Entries (node, sentence, share of its plans) of a layer from those of the layer below, sorted by node."""
+    leaving, entering = word[layer.leaving], word[layer.entering]
+    source, weight = layer.source, layer.share
+    if len(first) - 1 == len(said):  # one sentence for every node below
+        entry = layer.target
+    else:
+        number = first[layer.target + 1] - first[layer.target]
+        entry = ranges(first[layer.target], number)
+        leaving, entering = np.repeat(leaving, number), np.repeat(entering, number)
+        source, weight = np.repeat(source, number), np.repeat(weight, number)
+    rest = said[entry]
+    new = np.where(leaving != entering, (rest ^ (rest >> np.uint64(29))) * _MIX + code[leaving], rest)
+    order = np.lexsort((new, source))
+    source, new = source[order], new[order]
+    fresh = np.ones(len(order), np.bool_)
+    fresh[1:] = (source[1:] != source[:-1]) | (new[1:] != new[:-1])
+    at = np.flatnonzero(fresh)
+    return source[at], new[at], np.add.reduceat((share[entry] * weight)[order], at)
+
+
+class Objective:
+    """Flexibility of partitions of the states of ``spaces``: one number for each task, in the order of the spaces."""
+
+    def __init__(self, spaces: Sequence[PlanSpace], words: int) -> None:
+        self._spaces = [_Measured(space, sum(len(s.starts) for s in spaces[:k])) for k, space in enumerate(spaces)]
+        self._code = np.random.default_rng(0).integers(1, 2**63, words, np.uint64)
+        self._all = [space.part(np.ones(len(space.space.starts), np.bool_)) for space in self._spaces]
+        self._of_state: dict[int, list[_Part]] = {}
+        self._kept = 0
+        #: Edges over which was summed so far: the work done.
+        self.edges = 0
+
+    def expected(self, word: Ints) -> Floats:
+        """E of every task; ``word`` of every state number."""
+        return np.concatenate([self._one(part, word) for part in self._all])
+
+    def update(self, expected: Floats, word: Ints, changed: Sequence[int]) -> Floats:
+        """E of every task when ``changed`` states have got other words than ``expected`` was measured with."""
+        parts = [self._through(state) for state in changed]
+        if sum(part.edges for own in parts for part in own) >= sum(part.edges for part in self._all):
+            return self.expected(word)
+        result = expected.copy()
+        for own in parts:
+            for part in own:
+                result[part.tasks] = self._one(part, word)
+        return result
+
+    def room(self, expected: Floats, bound: Floats, changed: Sequence[int]) -> float:
+        """How much the average can rise at most when ``changed`` states get other words; ``bound`` of each task's E."""
+        tasks = {id(part): part.tasks for state in changed for part in self._through(state)}
+        if not tasks:
+            return 0.0
+        affected = np.unique(np.concatenate(list(tasks.values())))
+        return float((bound[affected] - expected[affected]).sum()) / len(bound)
+
+    def _one(self, part: _Part, word: Ints) -> Floats:
+        self.edges += part.edges
+        return part.expected(word, self._code)
+
+    def _through(self, state: int) -> list[_Part]:
+        """The tasks with plans through a state."""
+        if state not in self._of_state:
+            parts = [p for space in self._spaces for p in [space.part(space.passing(state))] if len(p.tasks)]
+            if self._kept > _KEEP:
+                return parts
+            self._kept += sum(part.edges for part in parts)
+            self._of_state[state] = parts
+        return self._of_state[state]
+
+
+class _Measured:
+    """A plan space with the numbers of plans that measuring needs."""
+
+    def __init__(self, space: PlanSpace, before: int) -> None:
+        self.space = space
+        self._before = before
+        counted = counts(space)
+        self._share = edge_shares(space, counted)
+        self._source = space.sources
+        self._spans = space.layers
+        self._plans = np.array([float(min(counted[n], MANY)) for n in space.starts.tolist()], np.float64)
+
+    def passing(self, state: int) -> NDArray[np.bool_]:
+        """Which tasks have plans through a state."""
+        space = self.space
+        above = space.state == state
+        for span in self._spans:
+            low, high = int(space.first[span.start]), int(space.first[span.stop])
+            above[self._source[low:high][above[space.target[low:high]]]] = True
+        passing: NDArray[np.bool_] = above[space.starts]
+        return passing
+
+    def part(self, wanted: NDArray[np.bool_]) -> _Part:
+        """The part of the graph on the plans of the wanted tasks."""
+        space, source = self.space, self._source
+        alive = np.zeros(len(space), np.bool_)
+        alive[space.starts[wanted]] = True
+        for span in reversed(self._spans):
+            low, high = int(space.first[span.start]), int(space.first[span.stop])
+            alive[space.target[low:high][alive[source[low:high]]]] = True
+        number = np.cumsum(alive) - 1
+        layers: list[_Layer] = []
+        for span in self._spans:
+            nodes = np.arange(span.start, span.stop)[alive[span]]
+            if not len(nodes):
+                continue
+            edges = np.arange(int(space.first[span.start]), int(space.first[span.stop]))
+            edges = edges[alive[source[edges]]]
+            low = layers[-1].high if layers else 0
+            below = layers[-1].low if layers else 0
+            layers.append(
+                _Layer(
+                    low,
+                    low + len(nodes),
+                    space.state[nodes],
+                    number[source[edges]] - low,
+                    number[space.target[edges]] - below,
+                    space.state[source[edges]],
+                    space.state[space.target[edges]],
+                    self._share[edges],
+                )
+            )
+        tasks = np.flatnonzero(wanted)
+        return _Part(
+            tasks + self._before,
+            tuple(layers),
+            int(alive.sum()),
+            sum(len(layer.source) for layer in layers),
+            number[space.starts[tasks]],
+            self._plans[tasks],
+        )

@@ -1,0 +1,215 @@
+"""The least partition that satisfies Theorem 3 - alpha or beta, or with ``alpha_only`` alpha - with proof, by SAT.
+
+Between `greedy`, which satisfies alpha, and `minimal`, which is least among all languages: separating words tell RC plans
+apart where they part or where they meet, so a sentence can be understood without looking at whole plans.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from coordlang.divergence import Separation, separations
+from coordlang.separation import Constraint, SeparationWalk, ordered
+from coordlang.symmetry import state_symmetries
+from coordlang.vocabulary.greedy import fill
+from coordlang.vocabulary.job import Job, Outcome, Partition
+from coordlang.vocabulary.sat import Colouring, Effort, Undecided, by_demand, close_in
+from coordlang.warping import Pair, pair
+from planners.errors import OutOfMemory, OutOfTime
+from planners.limits import stop_clock
+
+#: Partitions filled greedily, for a first upper bound, before SAT takes over.
+_FILLED = 20
+
+
+def separating(job: Job) -> Outcome:
+    """A separating partition with the fewest words.
+
+    ``figures["separating_lower_bound"]`` is the proved bound on separating partitions; other languages may have fewer
+    words.  Anytime, like `minimal`.
+    """
+    search = _AlphaOnly(job) if job.alpha_only else _AlphaOrBeta(job)
+    stopped: BaseException | None = None
+    try:
+        search.run()
+    except (OutOfTime, OutOfMemory, MemoryError, KeyboardInterrupt) as error:
+        stop_clock()
+        if search.best is None:
+            raise
+        stopped = error.with_traceback(None)
+    assert search.best is not None
+    return Outcome(search.best, job.lower_bound, search.figures(), stopped)
+
+
+def filled(job: Job) -> Partition | None:
+    """The job's incumbent, or a separating partition with fewer words that greedy filling finds under alpha or beta."""
+    search = _AlphaOrBeta(job)
+    search.prepare()
+    return search.best
+
+
+class _Search:
+    """Closes in on the least number of words from below; subclasses know where constraints come from."""
+
+    def __init__(self, job: Job) -> None:
+        self._job = job
+        self.lower = job.lower_bound
+        self.best: Partition | None = job.incumbent
+        self._constraints: list[Constraint] = []
+        self._rounds = 0
+        #: States that need words of their own; naming these first leaves fewest symmetries to search.
+        self._first: list[int] = []
+
+    @property
+    def _upper(self) -> int:
+        return len(set(self.best.values())) if self.best is not None else len(self._job.states) + 1
+
+    def run(self) -> None:
+        if not self._job.alphas.requiring:
+            self.best = dict.fromkeys(self._job.states, 0)
+            return
+        self.prepare()
+        close_in(lambda: (self.lower, self._upper), self._decide)
+
+    def prepare(self) -> None:
+        raise NotImplementedError
+
+    def _broken(self, partition: Partition) -> Iterable[Constraint]:
+        """Constraints that a partition breaks, none of them known yet; empty: it is separating."""
+        raise NotImplementedError
+
+    def _decide(self, size: int, effort: Effort) -> bool:
+        """Find a separating partition with ``size`` words, or prove that there is none; False: not with this effort."""
+        order = by_demand(self._job.states, (s.pairs for c in self._constraints for s in c))
+        colouring = Colouring([*self._first, *(s for s in order if s not in set(self._first))], size)
+        try:
+            for constraint in self._constraints:
+                colouring.choose([s.pairs for s in constraint])
+            for _ in range(effort.rounds):
+                partition = colouring.solve(effort.conflicts)
+                self._rounds += 1
+                self._job.progress(
+                    f"trying {size} words, {self.lower} to {self._upper} needed: round {self._rounds}, "
+                    f"{len(self._constraints):,} constraints"
+                )
+                if partition is None:
+                    self.lower = size + 1
+                    return True
+                fresh = list(self._broken(partition))
+                if not fresh:
+                    self._job.check(partition)
+                    self.best = partition
+                    return True
+                for constraint in fresh:
+                    self._constraints.append(constraint)
+                    colouring.choose([s.pairs for s in constraint])
+        except Undecided:
+            return False
+        finally:
+            colouring.delete()
+        return False
+
+    def figures(self) -> dict[str, float]:
+        return {
+            "separating_lower_bound": self.lower,
+            "rounds": self._rounds,
+            "constraints": len(self._constraints),
+        }
+
+
+class _AlphaOnly(_Search):
+    """All constraints are known; with two robots they are the edges of a graph to colour."""
+
+    def prepare(self) -> None:
+        self._constraints = separations(self._job.alphas.divergences)
+        edges = {p for c in self._constraints if len(c) == 1 for p in c[0].pairs}
+        self._first = _clique(edges)
+        self.lower = max(self.lower, len(self._first))
+        if all(len(c) == 1 for c in self._constraints):
+            coloured = _dsatur(self._job.states, edges)
+        else:
+            coloured = fill(by_demand(self._job.states, [frozenset(edges)]), self._constraints)
+        if len(set(coloured.values())) < self._upper:
+            self._job.check(coloured)
+            self.best = coloured
+
+    def _broken(self, partition: Partition) -> Iterable[Constraint]:
+        return ()
+
+
+class _AlphaOrBeta(_Search):
+    """Constraints are asked of the composition walks, with their images under the model's symmetries."""
+
+    def prepare(self) -> None:
+        job = self._job
+        self._known: set[Constraint] = set()
+        self._random = np.random.default_rng(job.seed)
+        self._symmetries = [p.tolist() for p in state_symmetries(job.candidates)]
+        job.progress("walking to the last differences")
+        self._walks = [SeparationWalk(space) for space in job.candidates.spaces]
+        self.fill()
+
+    def fill(self) -> None:
+        """A first separating partition, greedily: broken constraints in, until none is."""
+        job = self._job
+        for _ in range(_FILLED):
+            filled = fill(by_demand(job.states, (s.pairs for c in self._constraints for s in c)), self._constraints)
+            fresh = list(self._broken(filled))
+            if not fresh:
+                if len(set(filled.values())) < self._upper:
+                    job.check(filled)
+                    self.best = filled
+                return
+            self._constraints += fresh
+
+    def _broken(self, partition: Partition) -> Iterator[Constraint]:
+        word = np.zeros(len(self._job.candidates.rows), np.int64)
+        word[list(partition)] = list(partition.values())
+        for walk in self._walks:
+            for constraint in walk.unseparated(word, self._random):
+                for image in (constraint, *(_image(constraint, s) for s in self._symmetries)):
+                    if image not in self._known:
+                        self._known.add(image)
+                        yield image
+
+    def figures(self) -> dict[str, float]:
+        walks = getattr(self, "_walks", [])
+        return super().figures() | {
+            "walk_nodes": sum(walk.nodes for walk in walks),
+            "walk_edges": sum(walk.edges for walk in walks),
+        }
+
+
+def _image(constraint: Constraint, permutation: Sequence[int]) -> Constraint:
+    return ordered(
+        Separation(frozenset(pair(permutation[a], permutation[b]) for a, b in s.pairs)) for s in constraint
+    )
+
+
+def _clique(edges: Iterable[Pair]) -> list[int]:
+    """A large clique, the best that greedy search finds from any state: its states need words of their own."""
+    near: dict[int, set[int]] = {}
+    for a, b in sorted(edges):
+        near.setdefault(a, set()).add(b)
+        near.setdefault(b, set()).add(a)
+    best: list[int] = []
+    for start in sorted(near):
+        clique, candidates = [start], set(near[start])
+        while candidates:
+            chosen = max(candidates, key=lambda s: (len(near[s] & candidates), -s))
+            clique.append(chosen)
+            candidates &= near[chosen]
+        best = max(best, clique, key=len)
+    return best
+
+
+def _dsatur(states: Sequence[int], edges: Iterable[Pair]) -> dict[int, int]:
+    import networkx as nx
+
+    graph = nx.Graph()
+    graph.add_nodes_from(states)
+    graph.add_edges_from(sorted(edges))
+    colours: dict[int, int] = nx.greedy_color(graph, strategy="DSATUR")
+    return {state: colours[state] for state in states}

@@ -1,0 +1,188 @@
+"""What the READMEs say in words of a smallest language is true.
+
+Some describe the words: then that partition is a language, and none has fewer words.  Some say what the sentences tell:
+then all plans of a sentence agree on it, in every task that requires coordination.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from test_robot_worlds import DOMAINS, ROOT, Row, candidates, tables
+
+from coordlang.build import build_language
+from coordlang.language import Guarantee, Language, WordTable
+from coordlang.tasks import Candidates
+from coordlang.verify import Verdict, verify
+from planners.states import split_atoms
+from tests.docs.pages import blocks, commands
+from tests.docs.test_run import run_command
+
+sys.path.insert(0, str(ROOT / "benchmarks"))
+
+from telling import Feature, Plan, exactly, said, who, who_does_what
+
+#: Says of a state, given as its atoms, whether it belongs to a word.
+Word = Callable[[frozenset[str]], bool]
+
+
+def only(robot: str) -> Word:
+    """Of three robots this one is the only one that is charged, or the only one that is not."""
+
+    def word(atoms: frozenset[str]) -> bool:
+        charged = {name for name in ("r1", "r2", "r3") if f"(charged {name})" in atoms}
+        return charged in ({robot}, {"r1", "r2", "r3"} - {robot})
+
+    return word
+
+
+def has(*wanted: str, without: tuple[str, ...] = ()) -> Word:
+    return lambda atoms: set(wanted) <= atoms and not atoms & set(without)
+
+
+def either(*words: Word) -> Word:
+    return lambda atoms: any(word(atoms) for word in words)
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """A language of ``len(words) + 1`` words, as a README describes it: the other word holds the rest."""
+
+    folder: str
+    problem: str
+    tasks: str
+    options: str
+    words: tuple[Word, ...]
+
+    @property
+    def row(self) -> Row:
+        return {"language for": self.problem, "--tasks": self.tasks, "options": self.options}
+
+
+CARRYING = ("(holds arm1 red)", "(holds arm2 blue)")
+MEANINGS = [
+    Meaning("three-cells", "problem", "all", "", (has("(at r2 a)"), has("(at r2 b)"))),
+    Meaning("t-map", "problem", "all", "", (has("(at r1 c1-1)", "(at r2 c0-1)"), has("(at r1 c1-1)", "(at r2 c1-0)"))),
+    Meaning("corridor", "problem", "its own", "", (has("(at r1 c0-4)"),)),
+    Meaning("charger", "three-robots", "its own", "--cost makespan+actions", (
+        only("r1"), only("r2"), has("(charged r3)", without=("(charged r1)", "(charged r2)")))),
+    Meaning("elevator", "two-calls", "its own", "", (has("(stops second)", "(outside r1)", "(outside r2)"),)),
+    Meaning("handover", "two-doors", "its own", "", (has("(at r1 west-south)", "(at r2 east-south)", "(holds r2 box)"),)),
+    Meaning("handover", "exchange", "its own", "", (lambda s: sum("west" in a and "lies" in a for a in s) == 2,)),
+    Meaning("lock", "both-in", "all", "", (
+        either(has("(at r1 yard)", "(at r2 yard)"), has("(at r1 hall)", "(at r2 hall)")),
+        either(has("(at r1 lock)", "(at r2 yard)"), has("(at r1 hall)", "(at r2 lock)")))),
+    Meaning("lock", "three-robots", "its own", "--remember-actions --cost makespan+actions", (
+        lambda s: any(a.startswith("(last r2 (hold") for a in s),)),
+    Meaning("push-box", "around", "all", "", tuple(
+        has(f"(at r1 {p})", f"(at r2 {p})", f"(stands box {p})") for p in ("store", "yard"))),
+    Meaning("push-box", "around", "its own", "", (has("(at r1 yard)", "(at r2 yard)", "(stands box yard)"),)),
+    Meaning("tray", "serve", "its own", "", (has("(holds r1 back)", "(tray-at parlour)"),)),
+    Meaning("tray", "three-robots", "its own", "", (has("(holds r1 back)", "(tray-at parlour)"),)),
+    Meaning("two-arms", "exchange", "exchange.tasks.json", "", (
+        has("(over arm1 back)", "(over arm2 front)", *CARRYING),
+        either(has("(over arm1 back)", "(over arm2 right)", *CARRYING),
+               has("(over arm1 back)", "(over arm2 front)", "(on red front)", "(on blue back)")))),
+    Meaning("vans", "one-van", "one-van.tasks.json", "", (has("(aboard d1 v1)", without=("(at v1 depot)",)),)),
+]  # fmt: skip
+
+
+def verdict(meaning: Meaning, tasks: Candidates) -> Verdict:
+    states = {}
+    for key in map(tasks.model.codec.key, tasks.rows):
+        mine = [n for n, word in enumerate(meaning.words) if word(frozenset(split_atoms(key)))]
+        assert len(mine) <= 1, "words do not overlap"
+        if mine:
+            states[key] = f"w{mine[0]}"
+    names = (*(f"w{n}" for n in range(len(meaning.words))), "rest")
+    assert set(states.values()) == set(names[:-1]), "no word is empty"
+    unknown = Guarantee("", len(names), 1, False)
+    language = Language(names, states, "rest", tasks.model.robots, unknown, {}, {}, {}, {})
+    return verify(WordTable.of(language, tasks.model), tasks.spaces)
+
+
+@pytest.mark.parametrize("meaning", MEANINGS, ids=lambda m: f"{m.folder}-{m.problem}-{m.tasks}")
+def test_the_words_of_the_readme_are_a_smallest_language(meaning: Meaning) -> None:
+    tasks = candidates(meaning.folder, meaning.row)
+    found = verdict(meaning, tasks)
+    assert found.holds, found.witness
+    guarantee = build_language(tasks, "minimal").language.guarantee
+    assert guarantee.proved_minimal
+    assert guarantee.size == len(meaning.words) + 1
+
+
+def moves(plan: Plan) -> frozenset[tuple[int, str]]:
+    return frozenset((robot, text) for step in plan for robot, text in enumerate(step) if text)
+
+
+def first(schema: str) -> Feature:
+    """Who does the first subaction of this schema."""
+
+    def feature(plan: Plan) -> frozenset[int]:
+        steps = [frozenset(r for r, text in enumerate(step) if text and text.startswith(f"({schema} ")) for step in plan]
+        return next(filter(None, steps), frozenset())
+
+    return feature
+
+
+def aside(plan: Plan) -> frozenset[int]:
+    return frozenset(robot for robot, text in moves(plan) if text.endswith(" c0-4)"))
+
+
+@pytest.mark.parametrize(
+    ("folder", "problem", "tasks", "told", "leaves"),
+    [
+        ("three-cells", "problem", "all", moves, True),
+        ("t-map", "problem", "all", exactly, False),
+        ("corridor", "problem", "rooms.tasks.json", aside, True),
+        ("grid", "gwb5-3x3", "gwb5-3x3.tasks.json", moves, False),
+        ("charger", "queue", "queue.tasks.json", who_does_what("mop"), True),
+        ("elevator", "two-calls", "its own", first("enter"), False),
+        ("handover", "two-doors", "its own", who_does_what("hand-over"), True),
+        ("vans", "one-van", "one-van.tasks.json", who("board"), True),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_what_the_sentences_tell(folder: str, problem: str, tasks: str, told: Feature, leaves: bool) -> None:
+    given = candidates(folder, {"language for": problem, "--tasks": tasks, "options": ""})
+    figures = said(build_language(given, "minimal").language, given, told)
+    assert figures["different"] > 0
+    assert figures["told"] == figures["different"]
+    assert (figures["left"] > 0) == leaves
+
+
+#: The maps; the READMEs of the other worlds are read in test_robot_worlds.
+MAPS = [(folder, row) for folder in ("three-cells", "t-map", "corridor", "grid") for row in tables(folder, "language for")]
+
+
+@pytest.mark.parametrize(("folder", "row"), [pytest.param(f, r, id=f"{f}-{r['language for']}") for f, r in MAPS])
+def test_the_languages_of_the_maps(folder: str, row: Row) -> None:
+    tasks = candidates(folder, row)
+    assert tasks.count == int(row["tasks"])
+    for method in ("greedy", "minimal"):
+        built = build_language(tasks, method)
+        assert built.alphas.requiring == int(row["requiring coordination"])
+        assert built.language.guarantee.size == int(row[f"{method} words"])
+        assert built.verdict.holds
+        assert built.language.guarantee.proved_minimal or method == "greedy"
+
+
+@pytest.mark.parametrize("folder", ["corridor"])
+def test_the_commands_of_the_maps(folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "domains").symlink_to(DOMAINS)
+    monkeypatch.chdir(tmp_path)
+    run = [c for block in blocks(DOMAINS / folder / "README.md") if block.kind == "console" for c in commands(block)]
+    assert {command.text.split()[1] for command in run} == {"build", "verify"}
+    for command in run:
+        run_command(command, folder, monkeypatch)
+
+
+def test_every_readme_says_what_words_mean() -> None:
+    for readme in sorted(DOMAINS.glob("*/README.md")):
+        text = readme.read_text()
+        assert re.search("What the words mean here|#what-the-words-mean-here", text), readme
