@@ -19,10 +19,13 @@ from coordlang.cli.app import (
 )
 
 if TYPE_CHECKING:
-    from coordlang.language import Language
+    from coordlang.explain.asks import Asked
+    from coordlang.explain.cover import Cover
+    from coordlang.explain.telling import Telling
+    from coordlang.explain.words import Mapped
     from coordlang.sentences import TaskSentence
+    from coordlang.use.spoken import Spoken
 
-_STATES_SHOWN = 4
 _SENTENCES_SHOWN = 10
 
 
@@ -30,83 +33,146 @@ _SENTENCES_SHOWN = 10
 @language_argument
 @domain_argument
 @problem_argument
+@click.option("--task", is_flag=True, help="What each sentence of PROBLEM's task asks of each robot.")
+@click.option("--sentence", metavar="WORDS", help='With --task: this sentence only, as in "w1 w0".')
+@click.option("--each", is_flag=True, help="A formula of its own for every word, also where less would say the same.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
 @model_options
 @limits
-def command(language: str, domain: str, problem: str, as_json: bool, given: GivenOptions) -> None:
-    """Show a language: its words and their sizes, and what the sentences of PROBLEM's task ask of each robot."""
-    from coordlang.file import check_source, read_language
-    from coordlang.language import WordTable
+def command(
+    language: str,
+    domain: str,
+    problem: str,
+    task: bool,
+    sentence: str | None,
+    each: bool,
+    as_json: bool,
+    given: GivenOptions,
+) -> int:
+    """Show a language: each word as a short formula, and with --task what the sentences of a task ask of each robot."""
+    from coordlang.explain.telling import telling
+    from coordlang.explain.words import all_covers, mapped_states
+    from coordlang.file import read_language
     from coordlang.sentences import task_sentences
-    from coordlang.tasks import describe, from_problems
+    from coordlang.use.spoken import speak
     from planners.errors import Place
 
-    spoken = read_language(language)
-    lifted, read = read_files(domain, (problem,))
-    check_source(spoken, lifted, read, Place(language))
-    candidates = from_problems(lifted, read, given.for_language(spoken))
-    space = candidates.spaces[0]
-    sentences = task_sentences(space, 0, WordTable.of(spoken, candidates.model))
+    if sentence is not None and not task:
+        raise click.UsageError("--sentence: only with --task")
+    read = read_language(language)
+    lifted, (lifted_problem,) = read_files(domain, (problem,))
+    spoken = speak(read, lifted, lifted_problem, given.for_language(read), Place(language))
+    mapped = mapped_states(read, spoken.model)
+    formulas = all_covers(mapped)
+    told = telling(mapped, formulas, each)
+    if not as_json:
+        click.echo(_words(spoken, mapped, told) + "\n")  # first: a task may have too many sentences to list
+    every = task_sentences(spoken.space, spoken.task, spoken.table)
+    sentences = every if sentence is None else _only(spoken, every, sentence)
+    asks = [_asked(spoken, formulas, s) for s in (sentences if as_json else sentences[:_SENTENCES_SHOWN])] if task else []
     if as_json:
-        click.echo(json.dumps(_data(spoken, describe(space, 0), sentences)))
-        return
-    click.echo(_words(spoken))
-    click.echo()
-    click.echo(_sentences(describe(space, 0), candidates.model.robots, sentences))
+        click.echo(json.dumps(_data(spoken, mapped, formulas, told, sentences, asks)))
+    else:
+        click.echo(_task(spoken, len(every), sentences, asks))
+    if task and not spoken.covered:
+        click.echo("coordlang: warning: the language does not cover this task: it guarantees nothing here", err=True)
+        return 1
+    return 0
 
 
-def _data(language: Language, task: str, sentences: list[TaskSentence]) -> dict[str, Any]:
+def _only(spoken: Spoken, sentences: list[TaskSentence], sentence: str) -> list[TaskSentence]:
+    from coordlang.use.fitting import fitting
+
+    words = spoken.words_of(sentence)
+    said = [s for s in sentences if s.words == tuple(spoken.table.words[w] for w in words)]
+    if not said:
+        fitting(spoken, words)  # raises, and says where no plan fits any more
+    return said
+
+
+def _asked(spoken: Spoken, formulas: dict[str, Cover], sentence: TaskSentence) -> Asked:
+    from coordlang.explain.asks import asked
+    from coordlang.use.fitting import fitting
+
+    return asked(fitting(spoken, spoken.words_of(sentence.words)), spoken.table, formulas)
+
+
+def _data(
+    spoken: Spoken,
+    mapped: Mapped,
+    formulas: dict[str, Cover],
+    told: Telling,
+    sentences: list[TaskSentence],
+    asks: list[Asked],
+) -> dict[str, Any]:
+    from coordlang.explain.text import asked_data, cover_data, shown
+    from coordlang.tasks import describe
     from planners.planfile import json_count
 
+    listed = [
+        {
+            "sentence": " ".join(s.words),
+            "plans": json_count(s.plans),
+            "choices": [[list(own) for own in step] for step in s.choices],
+        }
+        for s in sentences
+    ]
+    for entry, ask in zip(listed, asks, strict=False):
+        entry |= asked_data(ask)
     return {
-        "words": language.sizes(),
-        "default": language.default,
-        "task": task,
-        "sentences": [
-            {
-                "sentence": " ".join(s.words),
-                "plans": json_count(s.plans),
-                "choices": [[list(own) for own in step] for step in s.choices],
-            }
-            for s in sentences
-        ],
+        "words": dict(zip(mapped.words, mapped.states, strict=True)),
+        "default": spoken.language.default,
+        "variables": [{"name": v.name, "values": list(v.values)} for v in mapped.valuation.variables],
+        "formulas": {word: cover_data(formula) for word, formula in formulas.items()},
+        "told": {
+            "in_order": told.in_order,
+            "rules": [{"word": word, "text": shown(formula) if formula else None} for word, formula in told.rules],
+        },
+        "task": describe(spoken.space, spoken.task),
+        "covered": spoken.covered,
+        "sentences": listed,
     }
 
 
-def _words(language: Language) -> str:
-    members: dict[str, list[str]] = {word: [] for word in language.words}
-    for key, word in language.states.items():
-        members[word].append(key)
+def _words(spoken: Spoken, mapped: Mapped, told: Telling) -> str:
+    from coordlang.explain.text import telling_text
+
+    language = spoken.language
     g = language.guarantee
     proof = "proved minimal" if g.proved_minimal else f"at least {g.lower_bound} needed"
-    lines = [f"{counted(len(language.words), 'word')} ({g.method}, {proof}) for {counted(language.tasks['count'], 'task')} "
-             f"of {', '.join(language.robots)}:"]  # fmt: skip
-    for word, states in members.items():
-        rest = len(states) - _STATES_SHOWN
-        size = counted(len(states), "state")
-        other = " and every state not listed" if word == language.default else ""
-        lines.append(f"  {word}: {size}{other}")
-        lines += [f"      {state}" for state in states[:_STATES_SHOWN]]
-        if rest > 0:
-            lines.append(f"      .. and {rest} more")
+    tasks = counted(language.tasks["count"], "task") if language.tasks["count"] else "no recorded task"
+    lines = [f"{counted(len(language.words), 'word')} ({g.method}, {proof}) for {tasks} of {', '.join(spoken.model.robots)}."]
+    if told.in_order:
+        lines.append("The first formula that is true in a state gives its word:")
+    lines.append(telling_text(told, mapped))
+    long = [word for word, formula in told.rules if formula and not formula.fewest]
+    if not mapped.word.size:
+        return "\n".join([*lines, f"No state is mapped: the word is always {language.default}."])
+    lines.append(f"Exact in all {counted(sum(mapped.states), 'mapped state')}. No optimal plan of these tasks leaves them; "
+                 f"elsewhere the word is {language.default}.")  # fmt: skip
+    if long:
+        lines.append(f"Fewer terms may suffice for {', '.join(long)}; for the others it is proved that they do not.")
+    elif told.length > 1:
+        lines.append("It is proved that no formula can do with fewer terms.")
     return "\n".join(lines)
 
 
-def _sentences(task: str, robots: tuple[str, ...], sentences: list[TaskSentence]) -> str:
-    total = sum(s.plans for s in sentences)
-    lines = [f"The task {task}"]
-    lines.append(f"has {counted(total, 'optimal plan')} in {counted(len(sentences), 'sentence')}:")
-    for sentence in sentences[:_SENTENCES_SHOWN]:
-        lines.append(
-            f'  "{" ".join(sentence.words)}" leaves {counted(sentence.plans, "plan")} open:'
-        )
-        for number, step in enumerate(sentence.choices, 1):
-            parts = [f"{robot} {_either(own)}" for robot, own in zip(robots, step, strict=True)]
-            lines.append(f"    step {number}: " + "; ".join(parts))
+def _task(spoken: Spoken, number: int, sentences: list[TaskSentence], asks: list[Asked]) -> str:
+    from coordlang.explain.text import asked_text
+    from coordlang.tasks import describe
+    from planners.plans import Plans
+
+    total = Plans.of(spoken.space, spoken.task).count
+    steps = int(spoken.space.layer[spoken.start])
+    lines = [f"The task {describe(spoken.space, spoken.task)}"]
+    lines.append(f"has {counted(total, 'optimal plan')} of {counted(steps, 'step')} in {counted(number, 'sentence')}.")
+    if asks and spoken.covered:
+        lines.append("Each robot may choose for itself: whatever the others choose, it is an optimal plan.")
+    for place, sentence in enumerate(sentences[:_SENTENCES_SHOWN]):
+        if asks:
+            lines += ["", asked_text(asks[place])]
+        else:
+            lines.append(f'  "{" ".join(sentence.words)}" leaves {counted(sentence.plans, "plan")} open.')
     if len(sentences) > _SENTENCES_SHOWN:
-        lines.append(f"  .. and {len(sentences) - _SENTENCES_SHOWN} more sentences")
+        lines.append(f"  .. and {counted(len(sentences) - _SENTENCES_SHOWN, 'more sentence')}")
     return "\n".join(lines)
-
-
-def _either(choices: tuple[str | None, ...]) -> str:
-    return " or ".join(text or "idles" for text in choices)

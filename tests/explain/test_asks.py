@@ -1,0 +1,200 @@
+"""What a sentence asks, against a list of its plans."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from random import Random
+
+import numpy as np
+import pytest
+
+from coordlang.build import build_language
+from coordlang.explain import word_formulas
+from coordlang.explain.asks import Asked, asked
+from coordlang.explain.text import asked_text
+from coordlang.tasks import all_pairs, from_problems
+from coordlang.use.fitting import fitting
+from coordlang.use.spoken import Spoken, speak_candidates
+from planners.errors import ProvedImpossible
+from planners.pddl import read_domain, read_problem
+from planners.plans import Plan, Plans
+from tests.conftest import DOMAINS, Command
+from tests.coordlang import naive
+from tests.coordlang.random_models import random_model
+from tests.coordlang.test_minimal import shipped
+from tests.explain.test_formulas import language_of, random_language
+
+
+def by_sentence(spoken: Spoken, most: int) -> dict[tuple[int, ...], list[Plan]]:
+    word = spoken.table.of_rows(spoken.space.rows)
+    groups: dict[tuple[int, ...], list[Plan]] = {}
+    for plan in naive.listed(spoken.space, spoken.task, most):
+        said = naive.sentence([int(word[s]) for s in naive.states(spoken.space, spoken.task, plan)])
+        groups.setdefault(said, []).append(plan)
+    return groups
+
+
+def check(spoken: Spoken, words: tuple[int, ...], plans: list[Plan], found: Asked, few: int) -> None:
+    model = spoken.model
+    assert found.sentence == tuple(spoken.table.words[w] for w in words)
+    assert (found.plans, found.steps) == (len(plans), len(plans[0]))
+    for robot, part in enumerate(found.parts):
+        texts = {
+            tuple(model.texts(step)[robot] for step in plan) for plan in plans
+        }  # the texts here still have the robot's name and the parentheses
+        assert part.subplans == len(texts)
+        assert len(part.listed) == (len(texts) if len(texts) <= few else 0)
+        short = {tuple(t and own_text(t, model.robots[robot]) for t in text) for text in texts}
+        assert len(texts) > few or set(part.listed) == short
+        assert [set(own) for own in part.choices] == [set(step) for step in zip(*short, strict=True)]
+    assert [(c.before, c.after) for c in found.changes] == list(zip(found.sentence, found.sentence[1:], strict=False))
+    space = spoken.space
+    word = spoken.table.of_rows(space.rows)
+    steps: list[set[int]] = [set() for _ in found.changes]
+    for plan in plans:
+        said = [int(word[s]) for s in naive.states(space, spoken.task, plan)]
+        for number, step in enumerate(k for k in range(1, len(said)) if said[k] != said[k - 1]):
+            steps[number].add(step)
+    assert [(c.earliest, c.latest) for c in found.changes] == [(min(s), max(s)) for s in steps]
+    assert [set().union(*(when for _, when in c.ways)) for c in found.changes] == steps
+
+
+def own_text(label: str, robot: str) -> str:
+    return label.strip("()").replace(f" {robot} ", " ").removesuffix(f" {robot}")
+
+
+@pytest.mark.parametrize("robots", [2, 3])
+def test_against_listed_plans(robots: int) -> None:
+    seen: Counter[str] = Counter()
+    for seed in range(20):
+        domain, problem, options = random_model(seed, robots)
+        try:
+            candidates = (all_pairs if seed % 3 else from_problems)(domain, [problem], options)
+        except ProvedImpossible:
+            continue
+        if not 0 < candidates.count <= 300:
+            continue
+        language = random_language(Random(seed), candidates)  # RC or not: what is asked is about listed plans
+        formulas = word_formulas(language, candidates.model)
+        for spoken in list(speak_candidates(language, candidates))[:8]:
+            try:
+                groups = by_sentence(spoken, 60)
+            except naive.TooLarge:
+                continue
+            for words, plans in groups.items():
+                few = 2
+                found = asked(fitting(spoken, words), spoken.table, formulas, few)
+                check(spoken, words, plans, found, few)
+                assert asked_text(found)
+                seen["changes"] += len(found.changes) > 0
+                seen["many subplans"] += any((p.subplans or 0) > few for p in found.parts)
+                for change in found.changes:
+                    seen[f"{len(change.robots)} decide"] += 1
+    assert all(seen[case] for case in ("changes", "many subplans", "0 decide", "1 decide", "2 decide")), seen
+
+
+def test_changes_that_may_come_sooner_or_later() -> None:
+    """Three words that say in which third of the grid a robot is."""
+    domain = read_domain(DOMAINS / "grid" / "domain.pddl")
+    candidates = from_problems(domain, [read_problem(DOMAINS / "grid" / "corners-4x4.pddl", domain)])
+    keys = [candidates.model.codec.key(row) for row in candidates.rows]
+    words = {key: f"w{min(2, int(key.split('(at r1 c')[1][0]))}" for key in keys}
+    language = language_of(words, ("w0", "w1", "w2"))
+    formulas = word_formulas(language, candidates.model)
+    (spoken,) = speak_candidates(language, candidates)
+    several = 0
+    for said, plans in by_sentence(spoken, 10_000).items():
+        found = asked(fitting(spoken, said), spoken.table, formulas, 3)
+        check(spoken, said, plans, found, 3)
+        assert all(change.robots == ("r1",) for change in found.changes)
+        several += sum(change.earliest < change.latest for change in found.changes)
+    assert several
+
+
+@pytest.mark.parametrize(("folder", "stem", "every"), [("t-map", "problem", 3), ("grid", "gw2-2x3", 100)])
+def test_who_decides_a_change(folder: str, stem: str, every: int) -> None:
+    """In every state before the change: these robots' subactions settle it, and no smaller set of robots does."""
+    candidates = shipped(folder, stem)
+    language = build_language(candidates, "greedy").language
+    formulas = word_formulas(language, candidates.model)
+    sizes: Counter[int] = Counter()
+    for spoken in list(speak_candidates(language, candidates))[::every]:
+        for words in by_sentence(spoken, 1000):
+            fits = fitting(spoken, words)
+            found = asked(fits, spoken.table, formulas)
+            for number, change in enumerate(found.changes):
+                before = states_before(fits, spoken, number)
+                robots = [spoken.model.robots.index(r) for r in change.robots]
+                assert settled(spoken, before, words[number + 1], robots)
+                for left_out in robots:
+                    assert not settled(spoken, before, words[number + 1], [r for r in robots if r != left_out])
+                sizes[len(robots)] += 1
+    assert sizes[1], sizes
+    assert sizes[2], sizes
+
+
+def states_before(fits: object, spoken: Spoken, number: int) -> set[int]:
+    """The states in which a plan is just before its change of word ``number``, by following all plans."""
+    found = set()
+    word = spoken.table.of_rows(spoken.space.rows)
+    plans = Plans.of(fits)  # type: ignore[arg-type]
+    for plan in plans:
+        states = plans.states(plan)
+        changes = [k for k in range(1, len(states)) if word[states[k]] != word[states[k - 1]]]
+        found.add(states[changes[number] - 1])
+    return found
+
+
+def settled(spoken: Spoken, states: set[int], after: int, robots: list[int]) -> bool:
+    mapped = set(spoken.language.states)
+    for state in states:
+        answer: dict[tuple[int, ...], bool] = {}
+        steps = spoken.model.successors(spoken.space.rows[[state]])
+        for labels, result in zip(steps.labels.tolist(), steps.result, strict=True):
+            if spoken.model.codec.key(result) not in mapped:
+                continue
+            own = tuple(labels[r] for r in robots)
+            makes = int(spoken.table.of_rows(np.array([result]))[0]) == after
+            if answer.setdefault(own, makes) != makes:
+                return False
+    return True
+
+
+def test_the_running_example_in_plain_sentences() -> None:
+    domain = read_domain(DOMAINS / "three-cells" / "domain.pddl")
+    candidates = from_problems(domain, [read_problem(DOMAINS / "three-cells" / "problem.pddl", domain)])
+    language = build_language(candidates, "greedy").language
+    formulas = word_formulas(language, candidates.model)
+    (spoken,) = speak_candidates(language, candidates)
+    found = asked(fitting(spoken, spoken.words_of("w1 w0")), spoken.table, formulas)
+    assert asked_text(found).splitlines() == [
+        '"w1 w0" leaves 2 plans open.',
+        "  r1: move a c, move c b.",
+        "  r2 may choose:",
+        "    wait, move b a",
+        "    move b a, wait",
+        "  w1 -> w0 in step 1: r1 decides it by move a c.",
+    ]
+
+
+def test_command_refusals(coordlang: Command, language: object, t_map: tuple[object, object]) -> None:
+    assert coordlang("explain", language, *t_map, "--sentence", "w0").code == 2
+    wrong = coordlang("explain", language, *t_map, "--task", "--sentence", "w3 w0")
+    assert wrong.code == 1
+    assert "no optimal plan has the sentence" in wrong.err
+    unknown = coordlang("explain", language, *t_map, "--task", "--sentence", "hello")
+    assert unknown.code == 31
+
+
+def test_json(coordlang: Command, language: object, t_map: tuple[object, object]) -> None:
+    data = json.loads(coordlang("explain", language, *t_map, "--task", "--json").out)
+    assert data["told"]["rules"][-1]["text"] is None
+    assert {word: formula["states"] for word, formula in data["formulas"].items()} == data["words"]
+    assert data["formulas"]["w0"]["pddl"] == "(and (not (at r1 c1-1)) (not (at r2 c1-1)))"
+    assert sum(s["plans"] for s in data["sentences"]) == 2
+    for said in data["sentences"]:
+        assert said["sentence"].split() == [said["changes"][0]["from"], *(c["to"] for c in said["changes"])]
+        assert [len(robot["listed"][0]) for robot in said["robots"]] == [said["steps"]] * 2
+    each = coordlang("explain", language, *t_map, "--each").out
+    assert "every other state" not in each
