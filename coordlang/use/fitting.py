@@ -23,12 +23,12 @@ class NoPlanFits(Refuted):
     """
 
     def __init__(self, spoken: Spoken, words: Sequence[int], length: int, following: Sequence[int | None]) -> None:
-        names = [repr(spoken.table.words[w]) if w is not None else "the end" for w in following]
+        names = [f"say {spoken.table.words[w]!r}" if w is not None else "end" for w in following]
         said = f'after "{spoken.text(words[:length])}"' if length else "at the beginning"
-        wrong = repr(spoken.table.words[words[length]]) if length < len(words) else "the end"
+        wrong = f"says {spoken.table.words[words[length]]!r}" if length < len(words) else "ends"
         super().__init__(
-            f'no optimal plan has the sentence "{spoken.text(words)}": {said} no plan says {wrong}',
-            remedy=f"There plans say {' or '.join(names)}.",
+            f'no optimal plan has the sentence "{spoken.text(words)}": {said} no plan {wrong}',
+            remedy=f"There plans {' or '.join(names)}.",
         )
         self.fitting = tuple(words[:length])
         self.next_words = tuple(following)

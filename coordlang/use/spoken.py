@@ -132,7 +132,6 @@ def _literals(goal: Goal) -> frozenset[object]:
 
 def _atoms(language: Language) -> set[str]:
     """All atoms in the state keys, without those of remembered actions."""
-    found: set[str] = set()
-    for key in language.states:
-        found.update(key.replace(") (", ")\0(").split("\0"))
+    keys = [key for key in language.states if key]
+    found = set(" ".join(keys).replace(") (", ")\0(").split("\0"))
     return {atom for atom in found if atom and not atom.startswith("(last ")}

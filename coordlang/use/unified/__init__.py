@@ -1,0 +1,17 @@
+"""coordlang inside unified-planning: an engine that plans for several robots, and under a sentence."""
+
+from __future__ import annotations
+
+from typing import Any
+
+#: The name of the engine in unified-planning's factory.
+NAME = "coordlang"
+
+
+def register(environment: Any = None) -> None:
+    """Add the engine to the factory of a unified-planning environment (default: the global one); twice does no harm."""
+    from unified_planning.environment import get_environment
+
+    factory = get_environment(environment).factory
+    if NAME not in factory.engines:
+        factory.add_engine(NAME, "coordlang.use.unified.engine", "CoordlangEngine")

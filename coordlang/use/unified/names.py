@@ -1,0 +1,39 @@
+"""PDDL names for the names of a unified-planning problem, which may be anything."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Hashable
+
+#: What PDDL or its readers take for something of their own.
+_RESERVED = frozenset(
+    ["and", "or", "not", "imply", "forall", "exists", "when", "either", "object", "increase", "total-cost"]
+)
+
+
+class Names:
+    """Names of one kind (types, predicates, actions or objects): each thing gets a PDDL name of its own.
+
+    What is a PDDL name already, in lower case, is kept if nobody has it.
+    """
+
+    def __init__(self) -> None:
+        self._names: dict[Hashable, str] = {}
+        self._taken: set[str] = set(_RESERVED)
+
+    def of(self, thing: Hashable, text: str) -> str:
+        """The PDDL name of a thing; ``text`` is what it is called."""
+        if thing not in self._names:
+            base = re.sub(r"[^a-z0-9_-]", "_", text.lower()).strip("-") or "x"
+            name, number = base, 1
+            while name in self._taken:
+                number += 1
+                name = f"{base}__{number}"
+            self._taken.add(name)
+            self._names[thing] = name
+        return self._names[thing]
+
+    def keep(self, thing: Hashable, name: str) -> None:
+        """Give a thing exactly this name."""
+        self._names[thing] = name
+        self._taken.add(name)

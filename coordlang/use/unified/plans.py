@@ -1,0 +1,133 @@
+"""Joint plans as unified-planning's plans, and back.
+
+A joint plan is a sequence of steps in each of which several robots act.  A *partial-order plan* says exactly this: every
+action of a step comes before every action of the next one.  Actions that share a step do not interfere, so that each of its
+linearisations is a plan, too.  A *time-triggered plan* says it with times 0, 1, ..  A *sequential plan* forgets which
+actions share a step, and different joint plans may become equal.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+from coordlang.use.unified.translation import Translated
+from planners.joint import JointModel
+from planners.planfile import Texts
+from planners.plans import Plan, Plans
+from planners.robots import Team
+from planners.whole import WholeActions
+
+
+class NoSteps(Exception):
+    """A plan that is no sequence of joint steps: one robot does two things at once."""
+
+
+def to_up(found: Translated, plans: Plans, plan: Plan, kind: Any, environment: Any) -> Any:
+    """A joint plan as a unified-planning plan of ``kind`` (a `PlanKind`)."""
+    from unified_planning.plans import PartialOrderPlan, PlanKind, SequentialPlan, TimeTriggeredPlan
+
+    steps = [[_instance(found, text) for text in step] for step in _actions(plans, plan)]
+    if kind == PlanKind.SEQUENTIAL_PLAN:
+        return SequentialPlan([action for step in steps for action in step], environment)
+    if kind == PlanKind.TIME_TRIGGERED_PLAN:
+        timed = [(Fraction(n), action, None) for n, step in enumerate(steps) for action in step]
+        return TimeTriggeredPlan(timed, environment)
+    after: dict[Any, list[Any]] = {}
+    last: list[Any] = []
+    for step in filter(None, steps):
+        after |= {action: list(step) for action in last}
+        last = step
+    return PartialOrderPlan({**after, **{action: [] for action in last}}, environment)
+
+
+def of_up(found: Translated, model: JointModel, team: Team, plan: Any) -> list[tuple[Texts, tuple[Any, ...]]]:
+    """The joint steps of a unified-planning plan: what each robot does, and the actions that say it.
+
+    A partial-order plan is read layer by layer, each action as early as its predecessors allow.  Raises `NoSteps`.
+    """
+    result = []
+    for actions in _steps(plan):
+        step: list[str | None] = [None] * len(model.robots)
+        for action in actions:
+            text = label(found, action)
+            for robot, part in _parts(model, team, found, text):
+                if step[robot] is not None:
+                    raise NoSteps(f"{model.robots[robot]} does {step[robot]} and {part} in one step")
+                step[robot] = part
+        result.append((tuple(step), tuple(actions)))
+    return result
+
+
+def label(found: Translated, action: Any) -> str:
+    """The ground action that an action instance stands for, as PDDL text.  Raises `KeyError` for a foreign action."""
+    agent = None
+    if action.agent is not None:
+        agent = next(name for name, a in found.agents.items() if a.name == action.agent.name)
+    schema = next(s for s, members in found.schemas.items() if members.get(agent) == action.action)
+    names = {o.name: name for name, o in found.objects.items()}
+    args = [names[value.object().name] for value in action.actual_parameters]
+    return f"({' '.join((schema, *([agent] if agent else []), *args))})"
+
+
+def _actions(plans: Plans, plan: Plan) -> list[list[str]]:
+    """The ground actions of each step; a shared one once, idling left out."""
+    model, space = plans.space.model, plans.space
+    if isinstance(model.stepper, WholeActions):
+        rows = space.rows[plans.states(plan)][:, : model.codec.fact_words]
+        return [[model.stepper.name(row, step)] for row, step in zip(rows, plan, strict=False)]
+    return [[text for text in dict.fromkeys(model.texts(step)) if text is not None] for step in plan]
+
+
+def _instance(found: Translated, text: str) -> Any:
+    from unified_planning.plans import ActionInstance
+
+    schema, *args = text[1:-1].split()
+    members = found.schemas[schema]
+    if None in members:
+        return ActionInstance(members[None], tuple(found.objects[arg] for arg in args))
+    agent, *rest = args
+    return ActionInstance(members[agent], tuple(found.objects[arg] for arg in rest), found.agents[agent])
+
+
+def _steps(plan: Any) -> Sequence[Sequence[Any]]:
+    from unified_planning.plans import PlanKind
+
+    if plan.kind == PlanKind.SEQUENTIAL_PLAN:
+        return [[action] for action in plan.actions]
+    steps: dict[Any, list[Any]] = defaultdict(list)
+    if plan.kind == PlanKind.TIME_TRIGGERED_PLAN:
+        for start, action, _ in plan.timed_actions:
+            steps[start].append(action)
+        return [steps[start] for start in sorted(steps)]
+    following = plan.get_adjacency_list
+    before: dict[Any, int] = dict.fromkeys(following, 0)
+    for actions in following.values():
+        for action in actions:
+            before[action] = before.get(action, 0) + 1
+    layer = [action for action, count in before.items() if not count]
+    layers = []
+    while layer:
+        layers.append(layer)
+        after = []
+        for action in layer:
+            for later in following.get(action, ()):
+                before[later] -= 1
+                if not before[later]:
+                    after.append(later)
+        layer = after
+    return layers
+
+
+def _parts(model: JointModel, team: Team, found: Translated, text: str) -> list[tuple[int, str]]:
+    """Which robots do what in a ground action."""
+    if model.is_joint_action:
+        parts = next((a.parts for a in model.actions if a.label == text), None)
+        if parts is None:
+            return [(robot, text) for robot in range(len(model.robots))]
+        return [(robot, part) for robot, part in enumerate(parts) if part is not None]
+    name, *args = text[1:-1].split()
+    schema = next(s for s in found.domain.schemas if s.name == name)
+    return [(robot, text) for robot in team.owners(schema, tuple(args))]

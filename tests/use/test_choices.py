@@ -1,0 +1,415 @@
+"""A robot's choices against the definition: every combination is optimal, and no subplan is left out."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import replace
+from itertools import combinations, product
+from random import Random
+
+import numpy as np
+import pytest
+
+from coordlang.build import Inseparable, build_language
+from coordlang.language import WordTable
+from coordlang.tasks import Candidates, all_pairs, from_problems
+from coordlang.use.automaton import Automaton, determinise
+from coordlang.use.choices import Choices, RobotChoices, choices
+from coordlang.use.choices_file import monitor
+from coordlang.use.fitting import fitting
+from coordlang.use.own import OwnAtoms
+from coordlang.use.spoken import Spoken, speak_candidates
+from coordlang.verify import verify
+from planners.errors import OutOfMemory, ProvedImpossible
+from planners.optimal import PlanSpace
+from planners.pddl import parse_domain, parse_problem, read_domain, read_problem
+from planners.pddl.sexpr import Source
+from planners.plans import Plans
+from tests.conftest import DOMAINS
+from tests.coordlang import naive
+from tests.coordlang.random_models import random_model
+from tests.use.naive_choices import Listed, accepted, listed
+from tests.use.random_chores import DOMAIN, random_chores
+
+#: Robots -> (plans of one task, combinations of one sentence) that the twin lists at most.
+SIZES = {2: (200, 400), 3: (120, 400)}
+#: (robots, random models): a few always, many with ``-m slow``.
+RUNS = [(2, 20), (3, 16), pytest.param(2, 400, marks=pytest.mark.slow), pytest.param(3, 250, marks=pytest.mark.slow)]
+
+
+class Unsuitable(Exception):
+    """A random model without a solvable task, without a language, or too large to list."""
+
+
+#: Tasks of one model that are looked at.
+_TASKS = 8
+
+
+def candidates_of(seed: int, robots: int) -> Candidates:
+    """A random model with all pairs of its states, or with one task and a partial goal; half of them chores."""
+    chores = seed % 2 == 0
+    domain, problem, options = (random_chores if chores else random_model)(seed, robots)
+    if seed % 5 == 0:
+        options = replace(options, remember_actions=True)
+    make = all_pairs if seed % 3 and not chores else from_problems
+    try:
+        found = make(domain, [problem], options)
+    except ProvedImpossible:
+        raise Unsuitable from None
+    if not 0 < found.count <= 120 or max(map(len, found.spaces)) > (1000 if robots == 2 else 60):
+        raise Unsuitable
+    return found
+
+
+def tasks_of(candidates: Candidates, seed: int) -> list[tuple[PlanSpace, int]]:
+    """Some of the candidate tasks, those with most choices first."""
+    tasks = [(space, task) for space in candidates.spaces for task in range(len(space.starts))]
+    Random(seed).shuffle(tasks)
+    return sorted(tasks, key=lambda t: -int(t[0].layer[t[0].starts[t[1]]]))[:_TASKS]
+
+
+def spoken_in(seed: int, robots: int) -> Iterator[Spoken]:
+    """A built and verified language in some of its candidate tasks; most of them with as few words as merging gives."""
+    candidates = candidates_of(seed, robots)
+    small = len(candidates.rows) <= 8
+    method = ["greedy", "minimal" if small else "greedy", "exhaustive" if small else "greedy"][seed // 7 % 3]
+    try:
+        language = build_language(candidates, method).language
+    except Inseparable:
+        raise Unsuitable from None
+    table = WordTable.of(language, candidates.model)
+    if seed // 11 % 4:
+        table = merged(table, candidates, seed)
+    for space, task in tasks_of(candidates, seed):
+        yield Spoken(language, table, space, task, table.of_rows(space.rows)[space.state], True)
+
+
+def merged(table: WordTable, candidates: Candidates, seed: int) -> WordTable:
+    """Words merged at random as long as it stays a language: sentences then leave more open, and mix more."""
+    words = list(range(len(table.words)))
+    pairs = list(combinations(words, 2))
+    Random(seed).shuffle(pairs)
+    for a, b in pairs[: 40 if len(candidates.model.robots) == 2 else 12]:
+        coarser = replace(table, word=np.where(table.word == b, a, table.word), default=a if table.default == b else table.default)
+        if verify(coarser, candidates.spaces).holds:
+            table = coarser
+    return table
+
+
+def at_random(seed: int, robots: int) -> Iterator[Spoken]:
+    """A partition at random, which may be no language, in some candidate tasks."""
+    candidates = candidates_of(seed, robots)
+    random = Random(seed)
+    size = random.randint(1, 3)
+    word = np.array([random.randrange(size) for _ in candidates.rows])
+    table = WordTable(tuple(f"w{n}" for n in range(size)), candidates.rows, word, 0)
+    for space, task in tasks_of(candidates, seed):
+        yield Spoken(None, table, space, task, word[space.state], True)  # type: ignore[arg-type]
+
+
+def with_twins(make: Callable[[int, int], Iterator[Spoken]], robots: int, models: int) -> Iterator[tuple[int, Spoken, tuple[int, ...], Listed]]:
+    """(seed, task, sentence, what is listed of it) over many random models."""
+    for seed in range(models):
+        with suppress(Unsuitable):
+            for spoken in make(seed, robots):
+                with suppress(naive.TooLarge):
+                    for words, twin in list(listed(spoken, *SIZES[robots])):
+                        yield seed, spoken, words, twin
+
+
+def moves(automaton: Automaton) -> list[dict[int, int]]:
+    return [dict(automaton.moves(state)) for state in range(len(automaton))]
+
+
+def check_automata(found: Choices, twin: Listed) -> None:
+    """Each automaton accepts exactly the robot's own parts, is deterministic, and the least that knows what it knows."""
+    facts = found.spoken.model.codec.facts
+    for own, parts in zip(found.robots, twin.own, strict=True):
+        automaton = own.automaton
+        assert accepted(moves(automaton)) == parts
+        assert automaton.count == len(parts)
+        for state in range(len(automaton)):
+            labels = [label for label, _ in automaton.moves(state)]
+            assert labels == sorted(set(labels))
+        plain = determinise(found.fits, own.robot)
+        assert accepted(moves(plain)) == parts
+        assert len(plain) == twin.least(own.robot)
+        if own.atoms == "exact":
+            known = twin.knows(own.robot)
+            assert len(automaton) == twin.least(own.robot, known)
+        for part in parts:
+            state = 0
+            for step in range(len(part) + 1):
+                assert automaton.step_of(state) == step
+                true, possible = automaton.known[state]
+                said = (
+                    frozenset(f for n, f in enumerate(facts) if true >> n & 1),
+                    frozenset(f for n, f in enumerate(facts) if not possible >> n & 1),
+                )
+                if own.atoms == "exact":
+                    assert said == known[part[:step]]
+                if step < len(part):
+                    state = dict(automaton.moves(state))[part[step]]
+
+
+def check_combinations(found: Choices, twin: Listed) -> None:
+    """Every combination of choices, stepped through all robots' monitors, is an optimal plan; they allow no others."""
+    labels = found.spoken.model.labels
+    robots = found.spoken.model.robots
+    for chosen in product(*(accepted(moves(own.automaton)) for own in found.robots)):
+        monitors = [monitor(found, robot) for robot in robots]
+        for step in zip(*chosen, strict=True):
+            for number, (at, label) in enumerate(zip(monitors, step, strict=True)):
+                text = labels[number][label] if label else None
+                assert text in at.allowed()
+                at.did(text)
+        assert all(at.finished and at.allowed() == () for at in monitors)
+        plan = tuple(zip(*chosen, strict=True))
+        assert plan in twin.optimal, "a combination of choices is no optimal plan"
+
+
+@pytest.mark.parametrize(("robots", "models"), RUNS)
+def test_every_combination_is_optimal(robots: int, models: int) -> None:
+    seen: Counter[str] = Counter()
+    stepped: Counter[int] = Counter()
+    for seed, spoken, words, twin in with_twins(spoken_in, robots, models):
+        found = choices(spoken, words)
+        assert found.guaranteed
+        assert found.mixtures is not None
+        assert found.mixtures.space is not None
+        assert Plans.of(found.mixtures.space).count == twin.combinations
+        assert all(own.atoms == "exact" for own in found.robots)
+        check_automata(found, twin)
+        seen["several for two"] += sum(len(own) > 1 for own in twin.own) > 1
+        seen["several for all"] += all(len(own) > 1 for own in twin.own)
+        seen["another sentence"] += twin.combinations > len(twin.plans)
+        seen["knowledge splits"] += any(
+            len(own.automaton) > len(determinise(found.fits, own.robot)) for own in found.robots
+        )
+        if twin.combinations > 1 and stepped[seed] < 200:
+            check_combinations(found, twin)
+            stepped[seed] += twin.combinations
+            seen["stepped"] += twin.combinations
+    assert seen["several for two"] >= models / 4, seen
+    assert seen["several for all"] >= models // 20, seen
+    assert seen["another sentence"] >= models // 50, seen
+    assert seen["knowledge splits"] >= models / 10, seen
+
+
+@pytest.mark.parametrize(("robots", "models"), RUNS)
+def test_a_broken_language_is_found_out(robots: int, models: int) -> None:
+    """Under any partition the walk agrees with the list; where that says no, the property above fails."""
+    seen: Counter[bool] = Counter()
+    for _, spoken, words, twin in with_twins(at_random, robots, models):
+        found = choices(spoken, words)
+        assert found.mixtures is not None
+        assert found.mixtures.holds == found.guaranteed == twin.mixes
+        seen[twin.mixes] += 1
+        if not twin.mixes:
+            assert all(own.atoms == "own" for own in found.robots)
+            check_violation(found, twin)
+            check_automata(found, twin)
+            with pytest.raises(AssertionError, match="no optimal plan"):
+                check_combinations(found, twin)
+    assert min(seen[True], seen[False]) >= models / 4, seen
+
+
+def check_violation(found: Choices, twin: Listed) -> None:
+    """What is shown: plans with the sentence, whose mixture is no optimal plan, and breaks where it says."""
+    assert found.mixtures is not None
+    shown = found.mixtures.violation
+    assert shown is not None
+    model = found.spoken.model
+    followed = tuple(tuple(model.numbers(step) for step in plan) for plan in shown.plans)
+    assert set(followed) <= set(twin.plans)
+    mixed = naive.mixture(followed)
+    assert mixed not in twin.optimal
+    steps = tuple(model.numbers(step) for step in shown.mixture)
+    assert steps == mixed[: len(steps)]
+    assert not any(plan[: len(steps)] == steps for plan in twin.optimal)
+    assert any(plan[: len(steps) - 1] == steps[:-1] for plan in twin.optimal)
+
+
+@pytest.mark.parametrize(("robots", "models"), RUNS)
+def test_own_atoms_are_known(robots: int, models: int) -> None:
+    """Without all combinations: what the own subactions say is true in every mixture, and nothing else is said."""
+    seen: Counter[str] = Counter()
+    for _, spoken, words, twin in with_twins(at_random, robots, models):
+        if not twin.mixes:
+            continue
+        found = choices(spoken, words, most=0)
+        if len(found.robots[0].automaton.layers) > 1:
+            assert found.mixtures is None
+            check_automata(found, twin)
+            for own in found.robots:
+                assert own.atoms == "own"
+                check_own_atoms(spoken, own, twin, seen)
+    assert min(seen["true"], seen["false"], seen["unknown"]) >= 100, seen
+
+
+def check_own_atoms(spoken: Spoken, own: RobotChoices, twin: Listed, seen: Counter[str]) -> None:
+    known = twin.knows(own.robot)
+    mask = OwnAtoms.of(spoken.model, own.robot).mask
+    facts = spoken.model.codec.facts
+    for part in twin.own[own.robot]:
+        state = 0
+        for step, label in enumerate((*part, None)):
+            true, possible = own.automaton.known[state]
+            for number, fact in enumerate(facts):
+                says = "true" if true >> number & 1 else "unknown" if possible >> number & 1 else "false"
+                seen[says] += 1
+                assert (says == "unknown") == (not mask >> number & 1)
+                assert says == "unknown" or fact in known[part[:step]][says == "false"]
+            if label is not None:
+                state = dict(own.automaton.moves(state))[label]
+
+
+#: Every shipped domain; with three robots where there are some.
+SHIPPED = [
+    ("three-cells", "problem"), ("t-map", "problem"), ("corridor", "problem"), ("grid", "corners-3x3"),
+    ("grid", "three-robots-3x3"), ("grid-joint", "corners-3x3"), ("grid-joint", "t-map"), ("handover", "exchange"),
+    ("handover", "three-rooms"), ("two-arms", "*"), ("push-box", "around"), ("push-box", "three-robots"), ("tray", "*"),
+    ("vans", "*"), ("lock", "let-in"), ("lock", "three-robots"), ("charger", "queue"), ("charger", "three-robots"),
+    ("elevator", "two-calls"), ("elevator", "same-floor"),
+]  # fmt: skip
+
+
+def shipped(folder: str, name: str) -> Iterator[Spoken]:
+    domain = read_domain(DOMAINS / folder / "domain.pddl")
+    for path in sorted((DOMAINS / folder).glob(f"{name}.pddl")):
+        if path.name == "domain.pddl":
+            continue
+        problem = read_problem(path, domain)
+        candidates = from_problems(domain, [problem])
+        try:
+            language = build_language(candidates).language
+        except Inseparable:
+            from planners.model import ModelOptions
+
+            candidates = from_problems(domain, [problem], ModelOptions(remember_actions=True))
+            language = build_language(candidates).language
+        yield from speak_candidates(language, candidates)
+
+
+@pytest.mark.parametrize(("folder", "name"), SHIPPED)
+def test_shipped_domains(folder: str, name: str) -> None:
+    robots = 0
+    for spoken in shipped(folder, name):
+        robots = max(robots, len(spoken.model.robots))
+        try:
+            twins = list(listed(spoken, 2000, 3000))
+        except naive.TooLarge:
+            twins = []
+        for words, twin in twins[:12]:
+            found = choices(spoken, words)
+            assert found.guaranteed
+            assert found.mixtures is not None
+            check_automata(found, twin)
+            if twin.combinations <= 200:
+                check_combinations(found, twin)
+        if not twins:
+            plan = next(iter(Plans.of(spoken.space, spoken.task)))
+            states = Plans(spoken.space, spoken.start, []).states(plan)
+            words = naive.sentence([int(spoken.table.of_rows(spoken.space.rows[[s]])[0]) for s in states])
+            assert choices(spoken, words).guaranteed
+    assert robots == 3 or not name.startswith("three-robots")
+
+
+@pytest.mark.parametrize(("folder", "name"), [("elevator", "*"), ("tray", "*"), ("grid-joint", "gw1-2x2"), ("handover", "exchange")])
+def test_own_atoms_of_shipped_domains(folder: str, name: str) -> None:
+    """Conditional effects, whole joint actions and shared subactions: what is said to be known is known."""
+    seen: Counter[str] = Counter()
+    for spoken in shipped(folder, name):
+        with suppress(naive.TooLarge):
+            for words, twin in list(listed(spoken, 2000, 3000))[:6]:
+                for own in choices(spoken, words, most=0).robots:
+                    assert own.atoms == "own"
+                    check_own_atoms(spoken, own, twin, seen)
+    assert seen["unknown"] >= 10
+
+
+def test_all_tasks_of_the_t_map() -> None:
+    """Every sentence of all 132 tasks, with the smallest language."""
+    domain = read_domain(DOMAINS / "t-map" / "domain.pddl")
+    candidates = all_pairs(domain, [read_problem(DOMAINS / "t-map" / "problem.pddl", domain)])
+    language = build_language(candidates, "minimal").language
+    assert len(language.words) == 3
+    tasks = 0
+    for spoken in speak_candidates(language, candidates):
+        for words, twin in listed(spoken, 1000, 1000):
+            found = choices(spoken, words)
+            check_automata(found, twin)
+            check_combinations(found, twin)
+        tasks += 1
+    assert tasks == 132
+
+
+@pytest.mark.parametrize("robots", [2, 3])
+def test_choices_may_leave_the_sentence(robots: int) -> None:
+    """Each robot has two things to do, in any order, and the word says whether an even number of robots began with the
+    second.  The sentence leaves half of the plans open, and yet each robot both orders: every combination is optimal,
+    and half of them have the other sentence.
+    """
+    names = [f"r{n}" for n in range(robots)]
+    items = [(r, f"{r}{x}") for r in names for x in "ab"]
+    text = (
+        f"(define (problem p) (:domain chores) (:objects {' '.join(names)} - robot {' '.join(f'c{i}' for _, i in items)} - chore "
+        f"{' '.join(f't{i}' for _, i in items)} - thing)\n"
+        f"(:init {' '.join(f'(mine {r} c{i}) (gets c{i} t{i})' for r, i in items)})"
+        f"(:goal (and {' '.join(f'(got t{i})' for _, i in items)})))"
+    )
+    domain = parse_domain(Source("d", DOMAIN))
+    candidates = from_problems(domain, [parse_problem(Source("p", text), domain)])
+    space, codec = candidates.spaces[0], candidates.model.codec
+    begun = [{fact for fact in codec.decode(row) if fact.startswith("(done") and fact.endswith("b)")} for row in space.rows]
+    layer = dict(zip(space.state.tolist(), space.layer.tolist(), strict=True))
+    word = np.array([1 + len(begun[s]) % 2 if layer[s] == 1 else 0 for s in range(len(space.rows))])
+    table = WordTable(("start", "even", "odd"), space.rows, word, 0)
+    assert verify(table, candidates.spaces).holds
+    spoken = Spoken(None, table, space, 0, word[space.state], True)  # type: ignore[arg-type]
+    for words, twin in listed(spoken, 100, 100):
+        found = choices(spoken, words)
+        check_automata(found, twin)
+        check_combinations(found, twin)
+        assert [own.automaton.count for own in found.robots] == [2] * robots
+        assert twin.combinations == 2**robots == 2 * len(twin.plans) == len(twin.optimal)
+
+
+def test_too_many_are_refused_with_an_estimate(monkeypatch: pytest.MonkeyPatch) -> None:
+    spoken = next(shipped("grid", "corners-4x4"))
+    words = spoken.words_of(sentence_of(spoken))
+    fits = fitting(spoken, words)
+    with pytest.raises(OutOfMemory, match=r"after 1 of 6 steps their subsets have 1 members, at this rate about"):
+        determinise(fits, 0, most=0)
+    monkeypatch.setattr("coordlang.use.mixtures._SMALL", 0)
+    monkeypatch.setattr("coordlang.use.mixtures.memory_left", lambda: 0)
+    with pytest.raises(OutOfMemory, match=r"step 1 has \d+ combinations of what the robots may do") as caught:
+        choices(spoken, words, most=None)
+    assert caught.value.exit_code == 22
+    assert choices(spoken, words).mixtures is None
+    assert choices(spoken, words).guaranteed
+
+
+def sentence_of(spoken: Spoken) -> str:
+    plan = next(iter(Plans.of(spoken.space, spoken.task)))
+    states = Plans(spoken.space, spoken.start, []).states(plan)
+    return spoken.text(naive.sentence(spoken.table.of_rows(spoken.space.rows[states]).tolist()))
+
+
+def test_a_task_that_starts_at_its_goal() -> None:
+    domain = read_domain(DOMAINS / "t-map" / "domain.pddl")
+    problem = read_problem(DOMAINS / "t-map" / "problem.pddl", domain)
+    from planners.pddl.lifted import TRUE
+
+    candidates = from_problems(domain, [replace(problem, goal=TRUE)])
+    (spoken,) = speak_candidates(build_language(candidates).language, candidates)
+    found = choices(spoken, (int(spoken.word[spoken.start]),))
+    for own, robot in zip(found.robots, spoken.model.robots, strict=True):
+        assert len(own.automaton) == own.automaton.count == 1
+        at = monitor(found, robot)
+        assert at.finished
+        assert (at.step, at.remaining, at.allowed()) == (0, 1, ())
+        assert at.can(never="(move *)")
+        assert not at.can(do="(move *)")
