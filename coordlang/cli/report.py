@@ -1,0 +1,85 @@
+"""``coordlang report``: a language as a page that opens offline."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from coordlang.cli.app import (
+    GivenOptions,
+    counted,
+    domain_argument,
+    language_argument,
+    limits,
+    model_options,
+    problems_argument,
+    read_files,
+)
+
+if TYPE_CHECKING:
+    from coordlang.report.layout import Point
+
+
+@click.command(name="report")
+@language_argument
+@domain_argument
+@problems_argument
+@click.option("-o", "--output", required=True, metavar="PAGE", help="The HTML file; - for stdout.")
+@click.option("--tasks-shown", type=click.IntRange(1, 500), default=30, show_default=True, metavar="N",
+              help="Show at most this many tasks: those of PROBLEM.., then candidate tasks, drawn.")  # fmt: skip
+@click.option("--coordinates", metavar="FILE", help="Where the places are drawn (default: coordinates.json beside the "
+              "first PROBLEM, else by their names, else laid out).")  # fmt: skip
+@click.option("--seed", type=int, default=0, show_default=True, help="Draws the tasks.")
+@model_options
+@limits
+def command(
+    language: str,
+    domain: str,
+    problems: tuple[str, ...],
+    output: str,
+    tasks_shown: int,
+    coordinates: str | None,
+    seed: int,
+    given: GivenOptions,
+) -> None:
+    """Write a self-contained HTML page that shows LANGUAGE: its words, and its sentences and plans in the tasks of
+    PROBLEM.. and in some of its candidate tasks."""
+    from coordlang.file import check_source, read_language, write_atomically
+    from coordlang.report.page import make_report
+    from planners.errors import Place
+
+    inputs = [f for f in (language, domain, *problems, coordinates) if f is not None and os.path.exists(f)]
+    if output != "-" and os.path.exists(output) and any(os.path.samefile(f, output) for f in inputs):
+        raise click.UsageError(f"-o {output} would overwrite an input file")
+    spoken = read_language(language)
+    lifted, read = read_files(domain, problems)
+    place = Place(language)
+    check_source(spoken, lifted, read, place)
+    report = make_report(
+        spoken,
+        lifted,
+        read,
+        tasks_shown=tasks_shown,
+        seed=seed,
+        options=given.for_language(spoken),
+        coordinates=_coordinates(coordinates, problems[0]),
+        place=place,
+    )
+    if output == "-":
+        click.echo(report.html.decode(), nl=False)
+    else:
+        write_atomically(output, report.html)
+    shown = f"{counted(report.tasks, 'task')} of {report.candidates:,}"
+    click.echo(f"{shown}, {len(report.html):,} bytes, written to {'stdout' if output == '-' else output}", err=output == "-")
+
+
+def _coordinates(given: str | None, problem: str) -> dict[str, Point] | None:
+    from coordlang.report.layout import read_coordinates
+
+    if given is not None:
+        return read_coordinates(given)
+    beside = Path(problem).parent / "coordinates.json"
+    return read_coordinates(beside) if beside.is_file() else None

@@ -1,0 +1,167 @@
+"""A language and tasks -> one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from importlib.resources import files
+from typing import Any
+
+from coordlang.language import Language
+from coordlang.report.data import page_data
+from coordlang.report.layout import Point
+from coordlang.report.shown import select_tasks
+from coordlang.report.task import task_part
+from planners.errors import OutOfMemory, Place
+from planners.model import ModelOptions
+from planners.pddl.lifted import Domain, Problem
+
+#: A page is smaller than this, in bytes.
+LARGEST = 5_000_000
+#: Terms of a word's formula that are seen at once.
+_TERMS_OPEN = 3
+#: With more words than these one term of each.
+_FEW_WORDS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """A page, and how many tasks are shown in it of how many candidate tasks."""
+
+    html: bytes
+    tasks: int
+    candidates: int
+
+
+def make_report(
+    language: Language,
+    domain: Domain,
+    problems: Sequence[Problem],
+    *,
+    tasks_shown: int = 30,
+    seed: int = 0,
+    options: ModelOptions | None = None,
+    coordinates: Mapping[str, Point] | None = None,
+    place: Place | None = None,
+) -> Report:
+    """The report of a language: the same arguments give the same bytes.
+
+    Shows the problems' tasks and candidate tasks drawn with ``seed``, at most ``tasks_shown``, fewer if the page would
+    become larger than 5 MB.  Raises what `coordlang.report.shown.select_tasks` raises.
+    """
+    selection = select_tasks(language, domain, problems, tasks_shown, seed, options, place)
+    parts = [task_part(shown, seed) for shown in selection.tasks]
+    while True:
+        data = page_data(language, selection, parts, coordinates)
+        html = _render(language, domain, problems, data, seed)
+        if len(html) <= LARGEST:
+            return Report(html, len(parts), int(language.tasks.get("count", 0)))
+        if len(parts) == 1:
+            raise OutOfMemory(
+                f"the page of one task would have {len(html):,} bytes, more than {LARGEST:,}",
+                remedy="Give a smaller problem.",
+            )
+        parts = parts[: len(parts) // 2]
+
+
+def _render(
+    language: Language, domain: Domain, problems: Sequence[Problem], data: Mapping[str, Any], seed: int
+) -> bytes:
+    import jinja2
+    from markupsafe import Markup
+
+    here = files("coordlang.report")
+    scripts = sorted(entry.name for entry in (here / "script").iterdir() if entry.name.endswith(".js"))
+    parts = ((here / "script" / name).read_text("utf-8") for name in scripts)
+    js = "\n".join(("'use strict';", "const DATA = JSON.parse(document.getElementById('data').textContent);", *parts))
+    environment = jinja2.Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    template = environment.from_string((here / "template.html").read_text("utf-8"))
+    largest = max((word["size"] for word in data["words"]), default=1) or 1
+    words = [
+        {**word, "number": number, "share": round(100 * word["size"] / largest, 1), "default": number == data["default"]}
+        for number in data["told"]["order"]
+        for word in [data["words"][number]]
+    ]
+    return template.render(
+        version=version("coordlang"),
+        domain=domain.name,
+        subtitle=problems[0].name if len(problems) == 1 and problems[0].name != domain.name else "",
+        robots=_listed(language.robots),
+        words=words,
+        in_order=data["told"]["in_order"],
+        all_listed=language.tasks.get("kind") == "all",
+        terms_open=_TERMS_OPEN if len(words) <= _FEW_WORDS else 1,
+        figures=_figures(language),
+        about=_about(language, domain, problems, data, seed),
+        formula=_formula,
+        counted=_counted,
+        number=_number,
+        css=Markup((here / "page.css").read_text("utf-8")),
+        js=Markup(js),
+        data=Markup(_json(data)),
+    ).encode()
+
+
+def _json(data: Mapping[str, Any]) -> str:
+    """JSON that may stand in a script element."""
+    text = json.dumps(data, separators=(",", ":"), ensure_ascii=False)
+    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
+
+
+def _figures(language: Language) -> list[tuple[str, str, str]]:
+    g = language.guarantee
+    kind = {"all": "all pairs of states", "problems": "of the problems", "file": "of a task file"}
+    return [
+        ("Words", _number(g.size), "proved minimal" if g.proved_minimal else f"at least {g.lower_bound} needed"),
+        ("Tasks", _number(int(language.tasks.get("count", 0))), kind.get(str(language.tasks.get("kind")), "")),
+        ("States", _number(len(language.states)), "on optimal plans of these tasks"),
+        ("Method", g.method, ""),
+    ]
+
+
+def _about(
+    language: Language, domain: Domain, problems: Sequence[Problem], data: Mapping[str, Any], seed: int
+) -> list[tuple[str, str]]:
+    model = language.model
+    checked = [task["verified"] for task in data["tasks"]]
+    return [
+        ("Program", f"coordlang {version('coordlang')}"),
+        ("Problems", ", ".join(problem.name for problem in problems)),
+        ("Optimal means", str(model.get("cost", "makespan"))),
+        ("Domain, SHA-256", str(domain.source.sha256)[:16]),
+        ("Last actions are part of the state", "yes" if model.get("remember_actions") else "no"),
+        ("Tasks of this page verified anew", f"{sum(v is not None for v in checked)} of {len(checked)}"),
+        ("Seed of the drawn tasks", str(seed)),
+    ]
+
+
+def _formula(text: str) -> Any:
+    """A term with its ``and`` and ``not`` set apart."""
+    from markupsafe import Markup, escape
+
+    said = []
+    for piece in str(escape(text)).split(" "):
+        if piece in ("and", "not", "in"):
+            piece = f"<i>{piece}</i>"
+        elif "-" in piece:  # names are not broken at their hyphens
+            piece = f"<span>{piece}</span>"
+        said.append(piece)
+    return Markup(f'<span class="formula">{" ".join(said)}</span>')
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{_number(number)} {noun}{'s' * (number != 1)}"
+
+
+def _number(number: int) -> str:
+    return f"{number:,}"
+
+
+def _listed(names: Sequence[str]) -> str:
+    """``r1``, ``r1 and r2``, ``r1, r2 and r3``."""
+    return " and ".join(part for part in (", ".join(names[:-1]), names[-1]) if part)
+

@@ -1,0 +1,146 @@
+"""Which tasks a report shows: those of the given problems, then candidate tasks of the language, drawn if they are many."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from random import Random
+
+from coordlang.file import recorded_list
+from coordlang.language import Language
+from coordlang.tasks import goal_text, ground_tasks
+from coordlang.use.spoken import Spoken, speak
+from coordlang.witness import Miscoordination, miscoordination
+from planners.errors import OutOfMemory, Place, ProvedImpossible, UsageError
+from planners.joint import FullState, Goal
+from planners.model import ModelOptions, PlanningTask
+from planners.optimal import search
+from planners.pddl.lifted import Domain, Problem
+from planners.states import Rows
+
+#: Tasks looked at for each one shown, so that enough of them require coordination.
+_TRIES = 12
+#: The share of the drawn tasks that should require coordination, if there are such tasks.
+_REQUIRING = 0.75
+
+
+@dataclass(frozen=True, slots=True)
+class ShownTask:
+    """A task that is shown.
+
+    ``name`` is that of its problem, None for a candidate task of the language.  ``witness``: plans that miscoordinate, None
+    if there are none.  ``decided`` is False where the memory did not suffice to find out.
+    """
+
+    name: str | None
+    spoken: Spoken
+    witness: Miscoordination | None
+    decided: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """The tasks shown.  ``looked`` tasks were drawn for it, ``requiring`` of which require coordination; ``complete``: all
+    candidate tasks are shown."""
+
+    tasks: tuple[ShownTask, ...]
+    looked: int
+    requiring: int
+    complete: bool
+
+
+def select_tasks(
+    language: Language,
+    domain: Domain,
+    problems: Sequence[Problem],
+    number: int,
+    seed: int,
+    options: ModelOptions | None = None,
+    place: Place | None = None,
+) -> Selection:
+    """At most ``number`` tasks: the problems' own first, then candidate tasks drawn without repetition.
+
+    Of those drawn, tasks that require coordination are preferred, up to three quarters.  Raises `UsageError` if the
+    problems alone are more, `ProvedImpossible` for an unsolvable one.
+    """
+    if len(problems) > number:
+        raise UsageError(
+            f"{len(problems)} problems are given and {number} tasks are to be shown",
+            remedy="Give fewer problems, or a larger --tasks-shown.",
+        )
+    given = [_looked_at(p.name, speak(language, domain, p, options, place)) for p in problems]
+    known = {_identity(task.spoken) for task in given}
+    room = number - len(given)
+    first = given[0].spoken
+    drawn: tuple[list[ShownTask], list[ShownTask]] = ([], [])
+    wanted = round(room * _REQUIRING)
+    looked, complete = 0, True
+    for spoken in _candidates(first, domain, problems[0], Random(seed), place):
+        if (len(drawn[1]) >= wanted and len(drawn[0]) + len(drawn[1]) >= room) or looked >= _TRIES * room:
+            complete = False
+            break
+        if _identity(spoken) in known:
+            continue
+        known.add(_identity(spoken))
+        looked += 1
+        task = _looked_at(None, spoken)
+        drawn[task.witness is not None].append(task)
+    complete = complete and len(drawn[0]) + len(drawn[1]) <= room
+    kept = [*drawn[1][: max(wanted, room - len(drawn[0]))], *drawn[0]][:room]
+    requiring = len(drawn[1])
+    return Selection((*given, *kept), looked, requiring, complete)
+
+
+def _looked_at(name: str | None, spoken: Spoken) -> ShownTask:
+    try:
+        return ShownTask(name, spoken, miscoordination(spoken.space, spoken.task), True)
+    except OutOfMemory:
+        return ShownTask(name, spoken, None, False)
+
+
+def _identity(spoken: Spoken) -> tuple[str, str]:
+    space = spoken.space
+    init = space.model.codec.key(space.rows[space.state[spoken.start]])
+    return init, goal_text(space.model, space.goals[0])
+
+
+def _candidates(
+    first: Spoken, domain: Domain, problem: Problem, random: Random, place: Place | None
+) -> Iterator[Spoken]:
+    """The language's candidate tasks in random order.  Under ``--tasks all`` endless repetition is cut off."""
+    language = first.language
+    tasks = _pairs(first, random) if language.tasks.get("kind") == "all" else _recorded(
+        first, domain, problem, random, place
+    )
+    for number, (init, goal) in enumerate(tasks):
+        try:
+            space = search(first.model, PlanningTask(f"candidate {number}", init, goal))
+        except ProvedImpossible:
+            continue  # of two states one need not be reachable from the other
+        word = first.table.of_rows(space.rows)[space.state]
+        yield replace(first, space=space, task=0, word=word, covered=True)
+
+
+def _recorded(
+    first: Spoken, domain: Domain, problem: Problem, random: Random, place: Place | None
+) -> Iterator[tuple[Rows, Goal]]:
+    listed = recorded_list(first.language)
+    random.shuffle(listed)
+    for one in listed:
+        ((init, goal),) = ground_tasks(domain, problem, [one], place)
+        yield first.model.state(init), goal
+
+
+def _pairs(first: Spoken, random: Random) -> Iterator[tuple[Rows, Goal]]:
+    """Ordered pairs of different mapped states: under ``--tasks all`` every state of a candidate task is mapped."""
+    codec = first.model.codec
+    rows = first.table.rows
+    rows = rows[(rows[:, codec.fact_words :] == 0).all(axis=1)]
+    number = len(rows)
+    total = number * (number - 1)
+    order = random.sample(range(total), min(total, 100_000))
+    for code in order:
+        a, b = divmod(code, number - 1)
+        b += b >= a
+        yield rows[a], FullState(tuple(int(w) for w in rows[b][: codec.fact_words]))
+

@@ -1,0 +1,125 @@
+"""Coordinates: from names, from files, by graph layout; nodes of layers in an order with few crossings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+
+from coordlang.report.layout import from_names, graph_layout, layer_orders, place_layout, read_coordinates, spread
+from planners.errors import BadInput
+
+
+def test_names_of_grids_tell_rows_and_columns() -> None:
+    layout = place_layout(["c0-1", "c1-0", "c1-1"], [("c0-1", "c1-1"), ("c1-0", "c1-1")])
+    assert layout.is_grid
+    assert layout.points["c0-1"] == (1, 0)
+    assert layout.points["c1-0"] == (0, 1)
+
+
+@pytest.mark.parametrize(
+    ("names", "points"),
+    [
+        (["loc-x2-y3", "loc-x3-y3"], {"loc-x2-y3": (2, 3), "loc-x3-y3": (3, 3)}),
+        (["cell_4_5", "cell_4_6"], {"cell_4_5": (5, 4), "cell_4_6": (6, 4)}),
+        (["f0-0f", "f0-1f"], {"f0-0f": (0, 0), "f0-1f": (1, 0)}),
+        (["box1-2", "box1-3"], {"box1-2": (2, 1), "box1-3": (3, 1)}),
+        (["a1-1", "b1-2"], None),
+        (["p1", "p2"], None),
+        (["c1-1", "c01-1"], None),
+        (["depot", "town"], None),
+    ],
+)
+def test_what_names_tell(names: list[str], points: dict[str, tuple[float, float]] | None) -> None:
+    assert from_names(names, [(names[0], names[1])]) == points
+
+
+def test_names_that_contradict_the_links_are_no_coordinates() -> None:
+    names = ["s1-1", "s1-9", "s5-1", "s9-9"]
+    assert from_names(names, [("s1-1", "s9-9"), ("s1-9", "s5-1")]) is None
+
+
+def test_a_path_is_laid_out_straight_and_a_ring_round() -> None:
+    path = graph_layout(5, [(k, k + 1) for k in range(4)])
+    assert np.allclose(path, [[k, 0] for k in range(5)], atol=0.02)
+    ring = graph_layout(8, [(k, (k + 1) % 8) for k in range(8)])
+    middle = ring.mean(axis=0)
+    away = np.linalg.norm(ring - middle, axis=1)
+    assert away.max() < 1.05 * away.min()
+
+
+def test_a_layout_is_the_same_each_time_and_finite() -> None:
+    random = Random(3)
+    for number in (1, 2, 7, 40):
+        links = [(a, b) for a in range(number) for b in range(a) if random.random() < 0.2]  # often in several parts
+        first, second = graph_layout(number, links), graph_layout(number, links)
+        assert (first == second).all()
+        assert np.isfinite(first).all()
+        assert first.shape == (number, 2)
+
+
+def test_spread_moves_apart_what_is_too_near_and_nothing_else() -> None:
+    random = Random(1)
+    crowd = np.array([[random.random(), random.random()] for _ in range(30)] + [[0.5, 0.5]] * 3)
+    moved = spread(crowd, 0.3)
+    apart = np.linalg.norm(moved[:, None] - moved[None, :], axis=2) + 9 * np.eye(len(moved))
+    assert apart.min() > 0.24
+    far = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    assert (spread(far, 0.3) == far).all()
+
+
+def crossings(orders: list[int], sizes: list[int], edges: list[tuple[int, int]]) -> int:
+    """By definition: pairs of edges between the same layers whose ends lie in opposite orders."""
+    layer = np.repeat(np.arange(len(sizes)), sizes)
+    return sum(
+        (orders[a] - orders[c]) * (orders[b] - orders[d]) < 0
+        for k, (a, b) in enumerate(edges)
+        for c, d in edges[:k]
+        if layer[a] == layer[c]
+    )
+
+
+def test_layers_keep_their_nodes_and_cross_less() -> None:
+    better = 0
+    for seed in range(30):
+        random = Random(seed)
+        sizes = [random.randint(1, 6) for _ in range(4)]
+        bounds = np.cumsum([0, *sizes]).tolist()
+        edges = sorted({
+            (random.randrange(bounds[k], bounds[k + 1]), random.randrange(bounds[k + 1], bounds[k + 2]))
+            for k in range(3) for _ in range(6)
+        })  # fmt: skip
+        orders = layer_orders(sizes, edges)
+        for k, size in enumerate(sizes):
+            assert sorted(orders[bounds[k] : bounds[k + 1]]) == list(range(size))
+        given = [n - bounds[int(np.searchsorted(bounds, n, "right")) - 1] for n in range(bounds[-1])]
+        better += crossings(given, sizes, edges) - crossings(orders, sizes, edges)
+    assert better > 100
+
+
+def test_coordinates_from_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "coordinates.json"
+    path.write_text('{"coordinates": {"A": [1, 0], "b": [0, 2], "c": [2.5, 2]}}')
+    points = read_coordinates(path)
+    assert points == {"a": (1, 0), "b": (0, 2), "c": (2.5, 2)}
+    assert place_layout(["a", "b"], [("a", "b")], points).is_grid
+    assert not place_layout(["a", "c"], [("a", "c")], points).is_grid
+    # A place without coordinates: the file does not fit, and the links are laid out.
+    assert place_layout(["a", "d"], [("a", "d")], points).points["d"] != (0, 0)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "[]", "{}", '{"coordinates": []}', '{"coordinates": {"a": [1]}}', '{"coordinates": {"a": [1, "2"]}}',
+     '{"coordinates": {"a": [1, true]}}', '{"coordinates": {"a": [1, 1e400]}}', '{"coordinates": {"a": [0, 0], "b": [0, 0]}}',
+     '{"coordinates": {"a": [NaN, 0]}}'],
+)  # fmt: skip
+def test_files_that_are_no_coordinates(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "coordinates.json"
+    path.write_text(text)
+    with pytest.raises(BadInput):
+        read_coordinates(path)
+    with pytest.raises(BadInput):
+        read_coordinates(tmp_path / "missing.json")
