@@ -80,3 +80,12 @@ def test_task_file_of_the_page(tmp_path: Path) -> None:
     assert len(read_task_file(path)) == 2
     files = [str(ROOT / "domains" / "three-cells" / name) for name in ("domain.pddl", "problem.pddl")]
     assert run(["build", *files, "--tasks", str(path), "-o", str(tmp_path / "l.json")]) == 0
+
+
+def test_language_by_hand_of_the_page(reader: dict[str, Any], tmp_path: Path) -> None:
+    """The language that docs/formats.md writes by hand is one, also for the plain reader."""
+    path = tmp_path / "by-hand.json"
+    path.write_text([b.text for b in blocks(DOCS / "formats.md") if b.kind == "json"][1])
+    files = [str(ROOT / "domains" / "three-cells" / name) for name in ("domain.pddl", "problem.pddl")]
+    assert run(["verify", str(path), *files, "--tasks", "all"]) == 0
+    assert reader["word"](reader["read_language"](path), ["(at r2 b)", "(at r1 c)"]) == "r2-in-b"
