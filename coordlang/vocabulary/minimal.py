@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from random import Random
 
@@ -20,7 +21,7 @@ from coordlang.symmetry import Symmetry, symmetries
 from coordlang.tuples import EdgeIndex
 from coordlang.vocabulary.job import Evidence, Job, Outcome, Partition
 from coordlang.vocabulary.sat import Colouring, Effort, Undecided, by_demand, close_in, reduce
-from coordlang.vocabulary.separating import filled as separated
+from coordlang.vocabulary.separating import quickly as separated
 from coordlang.warping import Clause, pair, separation_clause
 from planners.errors import OutOfMemory, OutOfTime
 from planners.limits import stop_clock
@@ -86,26 +87,16 @@ class _Search:
             self.best = dict.fromkeys(job.states, 0)
             return
         parts = self._prepare()
-        filled = False
+        self._fill()
+        filled = self.best
+        close_in(lambda: (self.lower, self._upper), lambda size, effort: self._decide(size, parts, effort))
+        if self.best is filled:  # it separates more than a language must: one that does not leaves more open
+            self._decide(self.lower, parts, Effort())
 
-        def decide(size: int, effort: Effort) -> bool:
-            nonlocal filled
-            if size > self.lower and not filled:  # from below it takes long: a better language first
-                filled = True
-                if self._fill():
-                    return True
-            return self._decide(size, parts, effort)
-
-        close_in(lambda: (self.lower, self._upper), decide)
-
-    def _fill(self) -> bool:
-        """A separating partition, if it has fewer words than the best language so far."""
-        before = self._upper
-        try:
+    def _fill(self) -> None:
+        """A separating partition, if one with fewer words is found quickly."""
+        with suppress(OutOfMemory):  # its walk may be larger than ours; we can do without
             self.best = separated(replace(self._job, incumbent=self.best))
-        except OutOfMemory:
-            return False  # its walk is larger than ours; we can do without
-        return self._upper < before
 
     def exceeds(self, size: int) -> bool:
         """Whether every language has more words than ``size``."""

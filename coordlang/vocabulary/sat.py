@@ -148,20 +148,21 @@ def close_in(bounds: Callable[[], tuple[int, int]], decide: Callable[[int, Effor
 class Effort:
     """What may be spent on one number of words: partitions refuted, and conflicts for each of them."""
 
-    rounds: int = 250
-    conflicts: int = 100_000
+    rounds: int = 60
+    conflicts: int = 30_000
 
 
 def reduce(clauses: Iterable[Clause]) -> list[Clause]:
     """The clauses that no other one implies (a subset of its pairs), shortest first."""
     kept: list[Clause] = []
+    # A kept clause stands under one of its pairs: what it implies has that pair as well.
     by_pair: dict[Pair, list[Clause]] = {}
     for clause in sorted(set(clauses), key=lambda c: (len(c), sorted(c))):
         if any(other <= clause for p in clause for other in by_pair.get(p, ())):
             continue
         kept.append(clause)
-        for p in clause:
-            by_pair.setdefault(p, []).append(clause)
+        rarest = min(sorted(clause), key=lambda p: len(by_pair.get(p, ())))
+        by_pair.setdefault(rarest, []).append(clause)
     return kept
 
 

@@ -22,6 +22,8 @@ from planners.limits import stop_clock
 
 #: Partitions filled greedily, for a first upper bound, before SAT takes over.
 _FILLED = 20
+#: What a short search may spend on one number of words.
+_SHORT = Effort(20, 2_000)
 
 
 def separating(job: Job) -> Outcome:
@@ -43,10 +45,12 @@ def separating(job: Job) -> Outcome:
     return Outcome(search.best, job.lower_bound, search.figures(), stopped)
 
 
-def filled(job: Job) -> Partition | None:
-    """The job's incumbent, or a separating partition with fewer words that greedy filling finds under alpha or beta."""
+def quickly(job: Job) -> Partition | None:
+    """The job's incumbent, or a separating partition with fewer words, as far as a short search finds one."""
     search = _AlphaOrBeta(job)
     search.prepare()
+    while search.lower < search.upper and search.decide(search.lower, _SHORT):
+        pass
     return search.best
 
 
@@ -63,7 +67,7 @@ class _Search:
         self._first: list[int] = []
 
     @property
-    def _upper(self) -> int:
+    def upper(self) -> int:
         return len(set(self.best.values())) if self.best is not None else len(self._job.states) + 1
 
     def run(self) -> None:
@@ -71,7 +75,7 @@ class _Search:
             self.best = dict.fromkeys(self._job.states, 0)
             return
         self.prepare()
-        close_in(lambda: (self.lower, self._upper), self._decide)
+        close_in(lambda: (self.lower, self.upper), self.decide)
 
     def prepare(self) -> None:
         raise NotImplementedError
@@ -80,7 +84,7 @@ class _Search:
         """Constraints that a partition breaks, none of them known yet; empty: it is separating."""
         raise NotImplementedError
 
-    def _decide(self, size: int, effort: Effort) -> bool:
+    def decide(self, size: int, effort: Effort) -> bool:
         """Find a separating partition with ``size`` words, or prove that there is none; False: not with this effort."""
         order = by_demand(self._job.states, (s.pairs for c in self._constraints for s in c))
         colouring = Colouring([*self._first, *(s for s in order if s not in set(self._first))], size)
@@ -91,7 +95,7 @@ class _Search:
                 partition = colouring.solve(effort.conflicts)
                 self._rounds += 1
                 self._job.progress(
-                    f"trying {size} words, {self.lower} to {self._upper} needed: round {self._rounds}, "
+                    f"trying {size} words, {self.lower} to {self.upper} needed: round {self._rounds}, "
                     f"{len(self._constraints):,} constraints"
                 )
                 if partition is None:
@@ -131,7 +135,7 @@ class _AlphaOnly(_Search):
             coloured = _dsatur(self._job.states, edges)
         else:
             coloured = fill(by_demand(self._job.states, [frozenset(edges)]), self._constraints)
-        if len(set(coloured.values())) < self._upper:
+        if len(set(coloured.values())) < self.upper:
             self._job.check(coloured)
             self.best = coloured
 
@@ -158,7 +162,7 @@ class _AlphaOrBeta(_Search):
             filled = fill(by_demand(job.states, (s.pairs for c in self._constraints for s in c)), self._constraints)
             fresh = list(self._broken(filled))
             if not fresh:
-                if len(set(filled.values())) < self._upper:
+                if len(set(filled.values())) < self.upper:
                     job.check(filled)
                     self.best = filled
                 return
