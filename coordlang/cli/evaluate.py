@@ -1,0 +1,129 @@
+"""``coordlang evaluate``: the paper's tables and figures, run again."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import click
+
+from coordlang.cli.app import EXIT_UNPROVED, counted, limits
+
+if TYPE_CHECKING:
+    from coordlang.evaluation.recipe import Record, Section
+    from coordlang.evaluation.runner import Progress
+
+
+@click.command(name="evaluate")
+@click.argument("names", nargs=-1, required=True, metavar="NAME...")
+@click.option("--results", metavar="DIR", help="Where results are kept (default: evaluation; with --quick "
+              "evaluation/quick).")  # fmt: skip
+@click.option("--page", metavar="FILE", help="The page that tells them (default: evaluation.md in DIR).")
+@click.option("--seed", type=int, default=0, show_default=True)
+@click.option("--jobs", type=click.IntRange(min=1), help="Processes (default: one for each core).")
+@click.option("--samples", type=click.IntRange(min=1), default=100, show_default=True,
+              help="Random runs; a hundred times as many where intervals are wanted.")  # fmt: skip
+@click.option("--quick", is_flag=True, help="The smallest rows and sizes only, 10 samples.")
+@click.option("--unit-limit", type=click.FloatRange(min=0, min_open=True), default=180.0, show_default=True,
+              metavar="SECONDS", help="For each piece of work; then it is left out.")  # fmt: skip
+@click.option("--domains", metavar="DIR", help="The shipped domains (default: domains here, or those of the checkout).")
+@click.option("--json", "as_json", is_flag=True, help="Print all results as one JSON object.")
+@limits
+def command(
+    names: tuple[str, ...],
+    results: str | None,
+    page: str | None,
+    seed: int,
+    jobs: int | None,
+    samples: int,
+    quick: bool,
+    unit_limit: float,
+    domains: str | None,
+    as_json: bool,
+) -> int:
+    """Run experiments of the paper and set their results beside the paper's own.
+
+    NAME is table1, communication, flexibility, planning_cost, navigation, game, scenario, or all.  A run that was stopped or
+    killed goes on where it was when it is started again.
+    """
+    from coordlang.evaluation.experiments import RECIPES
+    from coordlang.evaluation.page import sections, write_page
+    from coordlang.evaluation.recipe import Settings
+    from coordlang.evaluation.results import Results
+    from coordlang.evaluation.runner import run
+    from coordlang.evaluation.suite import find_domains
+    from planners.errors import OutOfTime
+
+    for name in names:
+        if name != "all" and name not in RECIPES:
+            raise click.UsageError(f"there is no experiment {name!r}; there are {', '.join(RECIPES)}, all")
+    if page is not None and not Path(page).parent.is_dir():  # said before all the work, not after it
+        raise click.UsageError(f"--page {page}: there is no folder {Path(page).parent}")
+    chosen = [recipe for name, recipe in RECIPES.items() if name in names or "all" in names]
+    given = click.get_current_context().get_parameter_source("samples")
+    if quick and given is click.core.ParameterSource.DEFAULT:
+        samples = 10
+    folder = Path(results or ("evaluation/quick" if quick else "evaluation"))
+    settings = Settings(find_domains(domains), folder / "cache", seed, samples, quick, unit_limit)
+    kept = Results(folder)
+    begin = perf_counter()
+    try:
+        found = run(chosen, settings, kept, jobs or len(os.sched_getaffinity(0)), show_progress)
+    except (KeyboardInterrupt, OutOfTime):
+        clear_progress()
+        click.echo("coordlang: what is done is kept; the same command goes on from there", err=True)
+        raise
+    clear_progress()
+    written = write_page(kept, Path(page) if page else folder / "evaluation.md")
+    seconds = perf_counter() - begin
+    if as_json:
+        click.echo(json.dumps({
+            "results": {name: [as_data(record) for record in records] for name, records in found.items()},
+            "files": [str(path) for path in written],
+            "seconds": round(seconds, 3),
+        }))  # fmt: skip
+    else:
+        for name, section in sections(found).items():
+            click.echo(f"# {RECIPES[name].title}\n")
+            click.echo(as_text(section))
+    unfinished = [f"{name}/{r.unit.key}" for name, records in found.items() for r in records if r.status != "done"]
+    done = sum(map(len, found.values()))
+    told = f"{counted(done, 'piece')} of work in {seconds:.1f} s; results in {folder}, page {written[0]}"
+    click.echo(told, err=True)
+    if unfinished:
+        click.echo(f"coordlang: met their limit: {', '.join(unfinished)}", err=True)
+        return EXIT_UNPROVED
+    return 0
+
+
+def as_data(record: Record) -> dict[str, object]:
+    """A record as JSON data."""
+    return {
+        "key": record.unit.key,
+        "status": record.status,
+        "seconds": round(record.seconds, 3),
+        "cpu": round(record.cpu, 3),
+        "result": record.result,
+    }
+
+
+def as_text(section: Section) -> str:
+    """A section for the terminal: its text and tables, and the names of its figures."""
+    parts = [block if isinstance(block, str) else f"[figure {block.name}.svg: {block.alt}]" for block in section.blocks]
+    return "\n\n".join([*parts, *(f"- {difference}" for difference in section.differences)]) + "\n"
+
+
+def show_progress(progress: Progress) -> None:
+    """One line about what is being done, on a terminal only."""
+    if sys.stderr.isatty():
+        running = ", ".join(f"{unit.experiment}/{unit.key}" for unit in progress.running)
+        click.echo(f"\r\033[K{progress.done} of {progress.all} ({progress.known} known) {running} ..", nl=False, err=True)
+
+
+def clear_progress() -> None:
+    if sys.stderr.isatty():
+        click.echo("\r\033[K", nl=False, err=True)

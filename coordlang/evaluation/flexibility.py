@@ -1,0 +1,176 @@
+"""How many plans a listener may still choose from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from statistics import fmean
+from typing import Any
+
+from coordlang.evaluation.languages import COMPARED, TITLES, language_for
+from coordlang.evaluation.orders import NATURAL, greedy_in_orders
+from coordlang.evaluation.paper import OPEN_ALL, OPEN_SEVERAL, SEVERAL
+from coordlang.evaluation.plots import Panel, histograms
+from coordlang.evaluation.recipe import Figure, Headline, Recipe, Record, Result, Section, Settings, Unit, done, table
+from coordlang.evaluation.said import Said, said_in
+from coordlang.evaluation.suite import OTHERS, WORLDS
+from coordlang.flexibility import flexibility
+
+#: The row of Table 1 that the paper measures on.
+ROW = "GWB7"
+QUICK_ROW = "GWB5"
+#: Random orders of the states for the greedy method.
+ORDERS = 100
+#: Tasks whose own numbers are kept in the results.
+MOST_LISTED = 1000
+
+
+def units(settings: Settings) -> list[Unit]:
+    row = QUICK_ROW if settings.quick else ROW
+    found = []
+    for name in (row, *(world.name for world in OTHERS[: 1 if settings.quick else None])):
+        for method in COMPARED[:3] if settings.quick else COMPARED:
+            effort = 60.0 if method == "flexible" else 2.0
+            parameters = {"world": name, "method": method}
+            found.append(Unit("flexibility", f"{name}/{method}", parameters, WORLDS[name].files, effort))
+    orders = {"world": row, "orders": 10 if settings.quick else ORDERS}
+    return [*found, Unit("flexibility", f"{row}/orders", orders, WORLDS[row].files, 3.0)]
+
+
+def run(unit: Unit, settings: Settings) -> Result:
+    world = WORLDS[unit.parameters["world"]]
+    if "orders" in unit.parameters:
+        candidates = world.candidates(settings.domains)
+        found = {}
+        for name, words in greedy_in_orders(candidates, unit.parameters["orders"], unit.random(settings.seed)):
+            measured = flexibility(candidates.spaces, [words[space.state] for space in candidates.spaces])
+            found[name] = [round(float(measured.first.mean()), 3), round(float(measured.expected.mean()), 3)]
+        return {"open_and_expected": found}
+    candidates, language = language_for(world, unit.parameters["method"], settings)
+    return {"words": len(language.words), **measures(list(said_in(candidates, language)))}
+
+
+def measures(tasks: Sequence[Said]) -> Result:
+    """Plans left open by the sentence of each task's first plan, and in expectation over all its plans.
+
+    ``several``: tasks in which the first plan's sentence leaves more than one plan open.
+    """
+    first = [task.plans[task.first] for task in tasks]
+    several = [number for number in first if number > 1]
+    return {
+        "tasks": len(tasks),
+        "plans": _mean([task.count for task in tasks]),
+        "open": _mean(first),
+        "several": len(several),
+        "open_several": _mean(several),
+        "open_last": _mean([task.plans[task.last] for task in tasks]),
+        "expected": _mean([float(task.expected_open) for task in tasks]),
+        "first": first[:MOST_LISTED],
+    }
+
+
+def _mean(values: Sequence[float]) -> float:
+    return round(fmean(values), 4) if values else 0.0
+
+
+def section(records: Sequence[Record]) -> Section:
+    row = records[-1].unit.parameters["world"]
+    mine = [r for r in done(records) if r.unit.parameters["world"] == row and "method" in r.unit.parameters]
+    orders = [r for r in done(records) if "orders" in r.unit.parameters]
+    others = [r for r in done(records) if r.unit.parameters["world"] != row]
+    blocks: list[str | Figure] = [_DEFINITION.format(row=row), _table(mine)]
+    if mine:
+        blocks.append(
+            Figure(
+                "flexibility",
+                f"Distribution over the tasks of {row} of the number of plans open after the first plan's sentence",
+                lambda: _open(mine),
+            )
+        )
+    if orders:
+        blocks.append(_told_orders(orders[0]))
+    if others:
+        blocks += ["Worlds that are no grids, all tasks:", _table(others, world=True)]
+    return Section(tuple(blocks), _differences(row, mine, orders), _headlines(row, mine))
+
+
+def _headlines(row: str, records: Sequence[Record]) -> tuple[Headline, ...]:
+    of = {record.unit.parameters["method"]: record.result for record in records}
+    if row != ROW or not {"greedy", "minimal"} <= of.keys():
+        return ()
+    greedy, least, there = of["greedy"], of["minimal"], "open_several"
+    return (
+        (f"{row}: plans open, all tasks", f"{OPEN_ALL}", f"{greedy['open']:.1f}", f"{least['open']:.1f}"),
+        (f"{row}: plans open where several", f"{OPEN_SEVERAL}", f"{greedy[there]:.1f}", f"{least[there]:.1f}"),
+        (f"{row}: tasks with several", f"{SEVERAL}", f"{greedy['several']}", f"{least['several']}"),
+    )
+
+
+_DEFINITION = """\
+*Open* are the optimal plans that have the sentence of the first plan found, as in the paper; *several* counts the tasks
+where these are more than one. *Any plan* is the expectation when the speaker draws one of the N optimal plans uniformly,
+`sum of n_s^2 / N` over the sentences s with n_s plans each: it does not depend on the order in which plans are found.
+Measured on {row}; *optimal plans* is what no language can exceed."""
+
+
+def _table(records: Sequence[Record], world: bool = False) -> str:
+    rows: list[list[object]] = []
+    for record in records:
+        r = record.result
+        name = TITLES[record.unit.parameters["method"]]
+        rows.append([
+            f"{record.unit.parameters['world']}, {name}" if world else name,
+            r["words"],
+            f"{r['open']:.1f}",
+            f"{r['several']:,} of {r['tasks']:,}",
+            f"{r['open_several']:.1f}" if r["several"] else None,
+            f"{r['open_last']:.1f}",
+            f"{r['expected']:.1f}",
+            f"{r['plans']:.1f}",
+        ])  # fmt: skip
+    if not world and records and records[0].unit.parameters["world"] == ROW:
+        rows.insert(0, ["paper", 4, OPEN_ALL, f"{SEVERAL} of 956", OPEN_SEVERAL, None, None, None])
+    head = ("language", "words", "open", "several", "open there", "last plan", "any plan", "optimal plans")
+    return table(head, rows)
+
+
+def _told_orders(record: Record) -> str:
+    found: dict[str, list[float]] = record.result["open_and_expected"]
+    random = [pair for name, pair in found.items() if name not in NATURAL]
+    first, expected = (sorted(column) for column in zip(*random, strict=True))
+    middle = len(random) // 2
+    named = ", ".join(f"{name} {found[name][0]:.1f}" for name in NATURAL)
+    return (
+        f"With its states in {len(random)} random orders, the greedy method leaves {first[0]:.1f} to {first[-1]:.1f} plans "
+        f"open (median {first[middle]:.1f}), in expectation {expected[0]:.1f} to {expected[-1]:.1f} (median "
+        f"{expected[middle]:.1f}); in orders that an implementation may well have, {named}."
+    )
+
+
+def _open(records: Sequence[Record]) -> Any:
+    panels = []
+    for record in records:
+        r, method = record.result, record.unit.parameters["method"]
+        paper = OPEN_ALL if record.unit.parameters["world"] == ROW else None
+        panels.append(Panel(method, f"{TITLES[method]} ({r['words']} words)", r["first"], r["open"], paper))
+    most = max(max(r.result["first"]) for r in records)
+    width = max(1, -(-most // 20))
+    bounds = [0.5 + width * k for k in range(-(-most // width) + 1)]
+    return histograms(panels, bounds, "plans open to the listener", "tasks", 1)
+
+
+def _differences(row: str, records: Sequence[Record], orders: Sequence[Record]) -> tuple[str, ...]:
+    greedy = next((r.result for r in records if r.unit.parameters["method"] == "greedy"), None)
+    if row != ROW or greedy is None:
+        return ()
+    spread = ""
+    if orders:
+        first = [pair[0] for pair in orders[0].result["open_and_expected"].values()]
+        spread = f" The order of the states decides: {len(first)} orders give {min(first):.1f} to {max(first):.1f}."
+    return (
+        f"**Flexibility.** The paper leaves {OPEN_ALL} plans open on average over all tasks of {ROW} and {OPEN_SEVERAL} over "
+        f"{SEVERAL}, our greedy language {greedy['open']:.1f} and {greedy['open_several']:.1f} over {greedy['several']}."
+        f"{spread}",
+    )
+
+
+RECIPE = Recipe("flexibility", "Flexibility: plans left to the listener", units, run, section)

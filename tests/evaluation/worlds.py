@@ -1,0 +1,42 @@
+"""Small worlds for the measures: the running example with the language of the paper, and others with built ones."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from coordlang.build import build_language
+from coordlang.language import Guarantee, Language
+from coordlang.tasks import Candidates, all_pairs, from_problems
+from coordlang.use.spoken import Spoken, speak_candidates
+from planners.pddl import read_domain, read_problem
+from tests.conftest import DOMAINS
+
+
+def shipped(folder: str, stem: str = "problem", everything: bool = True) -> Candidates:
+    domain = read_domain(DOMAINS / folder / "domain.pddl")
+    problems = [read_problem(DOMAINS / folder / f"{stem}.pddl", domain)]
+    return all_pairs(domain, problems) if everything else from_problems(domain, problems)
+
+
+def where_r2_is(candidates: Candidates) -> Language:
+    """The paper's language of the running example: a word for each place of robot 2."""
+    words, states = ("in-a", "in-b", "in-c"), {}
+    for row in candidates.rows:
+        key = candidates.model.codec.key(row)
+        states[key] = f"in-{key.partition('(at r2 ')[2][0]}"
+    guarantee = Guarantee("by hand", 3, 1, False)
+    return Language(words, states, "in-a", candidates.model.robots, guarantee, {}, {}, {}, {})
+
+
+@cache
+def three_cells() -> Spoken:
+    """r1 and r2 trade a and b on three adjacent cells, a joint step being three states: four optimal plans."""
+    candidates = shipped("three-cells", everything=False)
+    return next(iter(speak_candidates(where_r2_is(candidates), candidates)))
+
+
+@cache
+def spoken(folder: str, stem: str, method: str = "minimal", everything: bool = True) -> tuple[Spoken, ...]:
+    """Every candidate task with a language that a method makes."""
+    candidates = shipped(folder, stem, everything)
+    return tuple(speak_candidates(build_language(candidates, method).language, candidates))
