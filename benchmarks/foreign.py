@@ -263,17 +263,21 @@ def build(language: Language, seconds: float) -> dict[str, object]:
 
 
 def refused() -> int:
-    """Run everything in ``refuse/``; how many runs did not end with exit code 34."""
+    """Run everything in ``refuse/``; how many runs ended otherwise than expected.
+
+    ``numeric`` holds no numeric feature (`tests/foreign` goes through its words), so it is read, told who the robots are.
+    """
     place = SHARED / "refuse"
-    accepted = 0
+    wrong = 0
     for folder in sorted(path for path in place.iterdir() if path.is_dir()):
         domain = next(iter(sorted(folder.glob("domain*.pddl"))))
         problem = next(iter(sorted(set(folder.glob("*.pddl")) - {domain})), domain)
-        done = coordlang("plans", str(domain), str(problem), "--count", "--json")
-        message = done.errors.strip().splitlines()[0].replace(str(place) + "/", "") if done.errors.strip() else ""
-        print(f"{folder.name:<16} exit {done.code}  {message or done.data}")
-        accepted += done.code != 34
-    return accepted
+        robots = ("--robots", "driver,truck") if folder.name == "numeric" else ()
+        done = coordlang("plans", str(domain), str(problem), "--count", "--json", *robots)
+        said = done.errors.strip().splitlines()[0].replace(str(place) + "/", "") if done.errors.strip() else done.data
+        print(f"{folder.name:<16} exit {done.code}  {said}")
+        wrong += done.code != (0 if robots else 34)
+    return wrong
 
 
 def main() -> int:
@@ -298,8 +302,7 @@ def main() -> int:
     if given.numbers:
         return int(numbers(rows, oracles=given.oracles) > 0)
     if given.refused:
-        refused()
-        return 0
+        return int(refused() > 0)
     if given.one:
         print(json.dumps(build(LANGUAGE_BY_NAME[given.one], given.time_limit)))
         return 0

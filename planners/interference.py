@@ -104,43 +104,52 @@ def compatible(
     """Table: may robot ``i`` do ``left[a]`` while robot ``j`` does ``right[b]``?  None is idling.
 
     A shared subaction of both goes only with itself; one that only names other robots goes with idling too.
-    Bit rows make it O(|left| |right| facts / 64).
+    O(pairs that touch one atom) beside the table itself.
     """
-    universe: dict[Atom, int] = {}
     prints = [[footprint(a) if a else None for a in side] for side in (left, right)]
-    for side in prints:
-        for one in side:
-            for atoms in (one.requires_true, one.requires_false, one.adds, one.deletes) if one else ():
-                for atom in atoms:
-                    universe.setdefault(atom, len(universe))
-    fields = ("requires_true", "requires_false", "adds", "deletes")
-    (t1, f1, a1, d1), (t2, f2, a2, d2) = (
-        [_bit_table(universe, [getattr(p, f) if p else () for p in side]) for f in fields] for side in prints
-    )
-    table = np.ones((len(left), len(right)), np.bool_)
+    hard, soft = ([("adds", "deletes")], [("requires_true", "deletes"), ("requires_false", "adds")])
+    table = ~_meeting(prints[0], prints[1], soft)
     numbers = {StepAtom(b.schema, b.args): n for n, b in enumerate(right) if b}
-    backwards: list[set[int]] = [set() for _ in left]  # columns whose action names this row
-    forbidden: list[set[int]] = [set() for _ in left]
     rows = {StepAtom(a.schema, a.args): n for n, a in enumerate(left) if a}
-    for column, other in enumerate(prints[1]):
-        for partner in other.partners if other else ():
-            if partner in rows:
-                backwards[rows[partner]].add(column)
-        for excluded in other.excluded if other else ():
+    named = [
+        *((row, numbers[p]) for row, one in enumerate(prints[0]) for p in (one.partners if one else ()) if p in numbers),
+        *((rows[p], column) for column, one in enumerate(prints[1]) for p in (one.partners if one else ()) if p in rows),
+    ]
+    for row, column in named:  # linked: meant to be done together
+        table[row, column] = True
+    table &= ~_meeting(prints[0], prints[1], hard)
+    for row, one in enumerate(prints[0]):
+        for excluded in one.excluded if one else ():
+            if excluded in numbers:
+                table[row, numbers[excluded]] = False
+    for column, one in enumerate(prints[1]):
+        for excluded in one.excluded if one else ():
             if excluded in rows:
-                forbidden[rows[excluded]].add(column)
-    for number, (action, one) in enumerate(zip(left, prints[0], strict=True)):
-        if action is None or one is None:
-            continue
-        hard = ((d1[number] & a2) | (a1[number] & d2)).any(axis=1)
-        soft = (d1[number] & t2 | t1[number] & d2 | a1[number] & f2 | f1[number] & a2).any(axis=1)
-        linked = backwards[number] | {numbers[p] for p in one.partners if p in numbers}
-        soft[sorted(linked)] = False
-        table[number] = ~(hard | soft)
-        out = forbidden[number] | {numbers[p] for p in one.excluded if p in numbers}
-        table[number, sorted(out)] = False
+                table[rows[excluded], column] = False
     _share(table, left, right, i, j)
     return table
+
+
+def _meeting(
+    left: Sequence[Footprint | None], right: Sequence[Footprint | None], kinds: Sequence[tuple[str, str]]
+) -> NDArray[np.bool_]:
+    """Table: does an atom stand in one field of the one and in the other field of the other, either way round?"""
+    table = np.zeros((len(left), len(right)), np.bool_)
+    for first, second in (*kinds, *((b, a) for a, b in kinds)):
+        columns = _where(right, second)
+        for atom, rows in _where(left, first).items():
+            if atom in columns:
+                table[np.ix_(rows, columns[atom])] = True
+    return table
+
+
+def _where(side: Sequence[Footprint | None], field: str) -> dict[Atom, list[int]]:
+    """In which footprints' field each atom stands."""
+    places: dict[Atom, list[int]] = {}
+    for number, one in enumerate(side):
+        for atom in getattr(one, field) if one else ():
+            places.setdefault(atom, []).append(number)
+    return places
 
 
 def _share(
@@ -158,12 +167,3 @@ def _share(
         if action and j in action.owners:
             table[row, :] = False
             table[row, columns[action.schema, action.args]] = True
-
-
-def _bit_table(universe: dict[Atom, int], sets: Sequence[Iterable[Atom]]) -> NDArray[np.uint64]:
-    table = np.zeros((len(sets), max(1, -(-len(universe) // 64))), np.uint64)
-    for row, atoms in enumerate(sets):
-        for atom in atoms:
-            number = universe[atom]
-            table[row, number // 64] |= np.uint64(1 << number % 64)
-    return table

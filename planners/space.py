@@ -71,7 +71,7 @@ def explore(model: JointModel, inits: Rows) -> Space:
             f"{len(layer):,} states are new in the last step"
         )
 
-    with reaching(so_far, "fewer objects or robots (and no --tasks: then only states nearer than a goal are searched)"):
+    with reaching(so_far, "fewer objects or robots"):
         while len(layer):
             fresh: list[Rows] = []
             for start, steps in blocks(model, layer):
@@ -83,6 +83,28 @@ def explore(model: JointModel, inits: Rows) -> Space:
             seen, _ = unique_rows(np.concatenate((seen, layer)))
             depth += 1
         return _joined(model, seen, sources, found)
+
+
+def count(model: JointModel, inits: Rows) -> tuple[int, int]:
+    """How many states `explore` finds, and how many joint steps between them, in the memory that the states take."""
+    layer, _ = unique_rows(inits)
+    seen = layer
+    steps_counted = depth = 0
+
+    def so_far() -> str:
+        return f"{len(seen):,} states within {depth} steps of the initial states, {steps_counted:,} joint steps"
+
+    with reaching(so_far, "fewer objects or robots"):
+        while len(layer):
+            fresh = seen[:0]
+            for _, steps in blocks(model, layer):
+                steps_counted += len(steps)
+                new, _ = unique_rows(steps.result)
+                fresh, _ = unique_rows(np.concatenate((fresh, new[find_rows(seen, new) < 0])))
+            layer = fresh
+            seen, _ = unique_rows(np.concatenate((seen, layer)))
+            depth += 1
+    return len(seen), steps_counted
 
 
 def _joined(model: JointModel, seen: Rows, sources: list[Rows], found: list[Steps]) -> Space:

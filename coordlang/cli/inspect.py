@@ -31,10 +31,10 @@ def command(count_states: bool, as_json: bool, load: Callable[[], Loaded]) -> No
     found = inspect(loaded)
     space = None
     if count_states:
-        from planners.space import explore
+        from planners.space import count
 
-        explored = explore(loaded.model, loaded.tasks[0].init[None, :])
-        space = {"states": len(explored), "joint_steps": len(explored.target)}
+        states, steps = count(loaded.model, loaded.tasks[0].init[None, :])
+        space = {"states": states, "joint_steps": steps}
     if as_json:
         data: dict[str, Any] = asdict(found)
         click.echo(json.dumps(data | (space or {})))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -122,7 +122,12 @@ class _Grounder:
         self._schemas = {schema.name: schema for schema in domain.schemas}
         self._named = {atom.action for schema in domain.schemas for atom in _step_atoms(schema)}
         self._named |= {name for constraint in domain.constraints for name, _ in constraint.actions}
-        self._members: dict[tuple[str, ...], tuple[str, ...]] = {}
+        self._members: dict[tuple[str, ...], dict[str, int]] = {}
+        self._facts: dict[tuple[str, int, str], list[tuple[str, ...]]] = {}
+        for fact in self._statics:
+            for position, arg in enumerate(fact.args):
+                self._facts.setdefault((fact.predicate, position, arg), []).append(fact.args)
+        self._guards: dict[int, tuple[Formula, tuple[Atom, ...]]] = {}  # by identity; the formula stays alive here
         self._atoms: dict[tuple[str, tuple[str, ...]], Atom] = {}
 
     def action(self, schema: Schema, args: tuple[str, ...], costs: bool) -> GroundAction | None:
@@ -177,7 +182,10 @@ class _Grounder:
                 ground = (self.formula(part, binding, positive, acting) for part in parts)
                 return _join(ground, conjunction=isinstance(f, And) == positive)
             case Forall(variables, part) | Exists(variables, part):
-                ground = (self.formula(part, inner, positive, acting) for inner in self._bindings(variables, binding))
+                guards = self._guards_of(f)
+                ground = (
+                    self.formula(part, inner, positive, acting) for inner in self._bindings(variables, binding, guards)
+                )
                 return _join(ground, conjunction=isinstance(f, Forall) == positive)
         raise AssertionError(f)
 
@@ -198,7 +206,8 @@ class _Grounder:
         return atom if positive else Not(atom)
 
     def _effect(self, effect: Effect, binding: Binding) -> Iterator[GroundEffect]:
-        for inner in self._bindings(effect.variables, binding):
+        guards = self._static_atoms(effect.condition) if effect.variables else ()
+        for inner in self._bindings(effect.variables, binding, guards):
             condition = self.formula(effect.condition, inner, True)
             if condition != FALSE:
                 atom = self._atom(effect.atom.predicate, effect.atom.args, inner)
@@ -211,17 +220,80 @@ class _Grounder:
             atom = self._atoms[key] = Atom(*key)
         return atom
 
-    def _bindings(self, variables: tuple[Variable, ...], binding: Binding) -> Iterator[Binding]:
+    def _guards_of(self, f: Forall | Exists) -> tuple[Atom, ...]:
+        """Static atoms without which an instance of the quantified part is no matter: false under ``exists``, true under
+        ``forall``."""
+        if id(f) not in self._guards:
+            part = f.part if isinstance(f, Exists) else _negated(f.part)
+            self._guards[id(f)] = f, self._static_atoms(part)
+        return self._guards[id(f)][1]
+
+    def _static_atoms(self, f: Formula) -> tuple[Atom, ...]:
+        """The static atoms among the parts that must all hold."""
+        match f:
+            case Atom(predicate, args) if args and predicate not in self._fluents:
+                return (f,)
+            case And(parts):
+                return tuple(atom for part in parts for atom in self._static_atoms(part))
+        return ()
+
+    def _bindings(
+        self, variables: tuple[Variable, ...], binding: Binding, guards: tuple[Atom, ...] = ()
+    ) -> Iterator[Binding]:
+        """Values for the variables, in the order of the objects; without such as make one of the guards false.
+
+        The first guard that leaves the fewest facts is looked up; the others are left to the formula.
+        """
         if not variables:
             yield binding
             return
         names = [v.name for v in variables]
-        for values in product(*(self._objects(v.types) for v in variables)):
+        members = [self._objects(v.types) for v in variables]
+        outer = {name: value for name, value in binding.items() if name not in names}
+        known = [one for guard in guards if (one := self._facts_of(guard, outer, names)) is not None]
+        rows: Iterable[tuple[str, ...]] = product(*members)
+        if known:
+            rows = self._unified(*min(known, key=lambda one: len(one[1])), outer, names, members)
+        for values in rows:
             yield {**binding, **dict(zip(names, values, strict=True))}
 
-    def _objects(self, types: tuple[str, ...]) -> tuple[str, ...]:
+    def _facts_of(
+        self, guard: Atom, outer: Binding, names: Sequence[str]
+    ) -> tuple[Atom, list[tuple[str, ...]]] | None:
+        """A guard with the facts that may match it, if an argument is known by which to look them up."""
+        known = [(n, outer.get(arg, arg)) for n, arg in enumerate(guard.args) if arg not in names]
+        lists = [self._facts.get((guard.predicate, n, value), []) for n, value in known]
+        return (guard, min(lists, key=len)) if lists else None
+
+    @staticmethod
+    def _unified(
+        guard: Atom,
+        facts: Iterable[tuple[str, ...]],
+        outer: Binding,
+        names: Sequence[str],
+        members: Sequence[dict[str, int]],
+    ) -> list[tuple[str, ...]]:
+        """All values under which the guard is one of the facts, in the order of the objects."""
+        rows: set[tuple[str, ...]] = set()
+        for fact in facts:
+            if len(fact) != len(guard.args):
+                continue
+            values: Binding = {}
+            for arg, value in zip(guard.args, fact, strict=True):
+                wanted = values.setdefault(arg, value) if arg in names else outer.get(arg, arg)
+                if wanted != value:
+                    break
+            else:
+                options = [(values[n],) if n in values else tuple(own) for n, own in zip(names, members, strict=True)]
+                rows.update(product(*options))
+        typed = (row for row in rows if all(value in own for value, own in zip(row, members, strict=True)))
+        return sorted(typed, key=lambda row: [own[value] for value, own in zip(row, members, strict=True)])
+
+    def _objects(self, types: tuple[str, ...]) -> dict[str, int]:
+        """The objects of some types, numbered in their order."""
         if types not in self._members:
-            self._members[types] = objects_of(self._domain, self._problem, types)
+            found = objects_of(self._domain, self._problem, types)
+            self._members[types] = {name: number for number, name in enumerate(found)}
         return self._members[types]
 
     def _parts(self, schema: Schema, binding: Binding) -> tuple[str | None, ...]:
@@ -246,6 +318,16 @@ class _Grounder:
                 remedy="Give it a value in (:init ..), or leave out --cost makespan+cost.",
             )
         return int(value)
+
+
+def _negated(f: Formula) -> Formula:
+    """The negation, as far as a conjunction comes of it."""
+    match f:
+        case Not(part):
+            return part
+        case Or(parts):
+            return And(tuple(map(_negated, parts)))
+    return Not(f)
 
 
 def _join(parts: Iterable[Formula], *, conjunction: bool) -> Formula:

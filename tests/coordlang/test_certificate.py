@@ -160,7 +160,7 @@ def test_random_models(robots: int, number: int) -> None:
         if any(inseparable(space) is not None for space in candidates.spaces):
             continue
         built = build_language(candidates, "minimal")
-        if built.language.guarantee.size == 1 and seed % 5:
+        if built.language.guarantee.size == 1 and seed % 50:
             continue
         certificate = certificate_of(built)
         assert check(certificate, candidates).lower_bound == built.language.guarantee.size
@@ -169,7 +169,7 @@ def test_random_models(robots: int, number: int) -> None:
         bounds.append(built.language.guarantee.size)
         if len(bounds) == number:
             break
-    assert len(set(bounds)) > 2
+    assert max(bounds) > 2
 
 
 def test_command_line(coordlang: Command, tmp_path: Path) -> None:

@@ -30,6 +30,7 @@ BY_HAND = {
     "grid-joint/domain.pddl",
     "t-map/t-map.map",
     "corridor/corridor.map",
+    "corridor/rooms.tasks.json",
     *(f"{folder}/README.md" for folder in ("grid", "grid-joint", "three-cells", "t-map", "corridor")),
 }
 

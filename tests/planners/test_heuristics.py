@@ -6,8 +6,6 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from planners.errors import UsageError
 from planners.heuristics import FAR, HEURISTICS, heuristic
@@ -52,13 +50,9 @@ def of(loaded: Loaded) -> tuple[JointModel, Goal, Space]:
 def test_random_models(name: str) -> None:
     seen: Counter[int] = Counter()
 
-    @settings(max_examples=60, deadline=None, derandomize=True)
-    @given(seed=st.integers(0, 10**6), robots=st.sampled_from([2, 3]))
-    def compare(seed: int, robots: int) -> None:
-        domain, problem, options = random_model(seed, robots)
+    for seed in range(120):
+        domain, problem, options = random_model(seed, 2 + seed % 2)
         seen.update(check(name, *of(build(domain, [problem], options))))
-
-    compare()
     assert seen[1] > 5
     assert name == "blind" or seen[-1] > 5, "no dead end was found"
 

@@ -20,7 +20,7 @@ from planners.joint import Stepper, Steps
 from planners.limits import reaching, time_left, time_limit
 from planners.model import Loaded, load
 from planners.optimal import PlanSpace, TaskGroup, plan_spaces, search
-from planners.space import explore
+from planners.space import count, explore
 from planners.states import Rows
 
 DOMAINS = Path(__file__).parents[2] / "domains"
@@ -220,6 +220,7 @@ def test_work_in_pieces_is_the_same_work(problem: str, monkeypatch: pytest.Monke
         pieces = search(loaded.model, loaded.tasks[0])
         for name in ("rows", "state", "layer", "first", "target", "labels", "cost", "starts"):
             assert (getattr(pieces, name) == getattr(whole, name)).all(), name
+    assert count(loaded.model, init) == (len(space), len(space.target))
     again = explore(loaded.model, init)
     for name in ("rows", "first", "target", "labels", "cost"):
         assert (getattr(again, name) == getattr(space, name)).all(), name
