@@ -186,10 +186,10 @@ def _seconds(names: Sequence[str], of: dict[str, dict[str, Record]]) -> str:
     for name in names:
         found = [of[name].get(column) for column in columns]
         brute = of[name].get("exhaustive")
-        told = f"{brute.cpu:.1f}" if brute and brute.result["words"] else brute.result["why"] if brute else None
+        told = f"{brute.cpu:.2f}" if brute and brute.result["words"] else brute.result["why"] if brute else None
         paper = TABLE_1[name]
         theirs = f"{paper.seconds:,.1f}" + (f" (exact {paper.exact_seconds})" if paper.exact_seconds else "")
-        rows.append([name, theirs, *(f"{r.cpu:.1f}" if r else None for r in found), told])
+        rows.append([name, theirs, *(f"{r.cpu:.2f}" if r else None for r in found), told])
     return table(("row", "paper", *columns, "exhaustive"), rows)
 
 
