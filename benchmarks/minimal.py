@@ -3,8 +3,8 @@
     python benchmarks/minimal.py [ROW ..] [--time-limit SECONDS] [--methods greedy,alpha,separating,minimal]
 
 For each method its words, with the proved bound where that is smaller (7..8: between 7 and 8), and seconds: *greedy*;
-*alpha*: least under the alpha part of Theorem 3; *separating*: least under alpha or beta; *minimal*: least of all languages,
-with its rounds, counterexamples and clauses and the symmetries of the model.  Where the paper gives an exact value (GW1: 3) it
+*alpha*: least under the alpha part of Theorem 3; *separating*: under alpha or beta; *minimal*: least of all languages,
+with its rounds, counterexamples, clauses and the symmetries of the model.  Where the paper has an exact value (GW1: 3), it
 is the one in brackets.  The time limit is for each method and row.
 """
 
@@ -26,7 +26,7 @@ from planners.pddl import read_domain, read_problem
 DOMAINS = Path(__file__).parents[1] / "domains"
 PAPER_EXACT = {"GW1": " (3)"}
 METHODS = ("greedy", "alpha", "separating", "minimal")
-HEADER = ("row", "paper", "greedy", "alpha", "s", "separating", "s", "minimal", "s", "rounds", "counter", "clauses", "symm.")
+HEADER = ("row", "paper", "greedy", "alpha", "s", "separating", "s", "minimal", "s", "rounds", "counter", "clauses", "sym")
 WIDTHS = (12, 7, 7, 9, 6, 10, 7, 8, 7, 7, 10, 8, 6)
 
 
