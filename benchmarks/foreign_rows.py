@@ -131,7 +131,8 @@ LANGUAGES = (
     ),
     Language(
         "storage", "storage", ("(at hoist0 ?)", "(at hoist1 ?)", "(clear ?)"), ("(in crate0 ?)", "(in crate1 ?)"),
-        who("go-out", "lift", "drop"), exactly, "which hoists go out to the container and fetch the crates",
+        who("go-out", "lift", "drop"), exactly,
+        "which hoists go out and fetch the crates, where both could; else mostly which crate, and where to",
     ),
     Language(
         "blocks-arms", "blocks-arms", (), ("(on ? a)", "(on ? b)", "(on ? c)"),
@@ -144,7 +145,7 @@ LANGUAGES = (
     ),
     Language(
         "gripper-3", "gripper", ("(at-robby ?)",), ("(at ball1 ?)", "(at ball2 ?)", "(at ball3 ?)"),
-        who_does_what("pick", "drop"), exactly, "which hand takes which ball, and on which of the two ways",
+        who_does_what("pick", "drop"), exactly, "which hand takes which ball",
     ),
 )  # fmt: skip
 LANGUAGE_BY_NAME = {language.name: language for language in LANGUAGES}

@@ -30,6 +30,8 @@ from planners.optimal import PlanSpace
 
 #: Tasks are searched for counterexamples in parts, one after another: at least so many, of at most so many tasks.
 _PARTS, _TASKS = 8, 1_500
+#: Edges of the composition walk up to which separating words are looked for first.
+_WALKED = 500_000
 #: Counterexamples taken from one part.
 _MOST = 200
 
@@ -95,6 +97,8 @@ class _Search:
 
     def _fill(self) -> None:
         """A separating partition, if one with fewer words is found quickly."""
+        if self._job.alphas.edges > _WALKED:
+            return
         with suppress(OutOfMemory):  # its walk may be larger than ours; we can do without
             self.best = separated(replace(self._job, incumbent=self.best))
 
