@@ -16,9 +16,11 @@ from types import FrameType
 
 from planners.errors import OutOfMemory, OutOfTime
 
-#: The alarm rings again, should nobody have caught it (an exception inside a finalizer is lost); not too soon, so that
-#: whoever caught it can save his work and stop the clock.
+#: The alarm rings again, should nobody have caught it (libraries in C may lose an exception); not too soon, so that whoever
+#: caught it can save his work and stop the clock.
 _AGAIN = 5.0
+#: And very soon where Python itself lost it: an exception cannot leave a finalizer or the callback of a weak reference.
+_SOON = 0.01
 #: Seconds that no timer counts to the end (some cannot be set to more).
 _FOR_EVER = 1e9
 _LONGER = "Use a larger --time-limit."
@@ -34,13 +36,21 @@ def time_limit(seconds: float | None) -> Iterator[None]:
     def ring(_signal: int, _frame: FrameType | None) -> None:
         raise OutOfTime(f"the time limit of {seconds:g} s is over", remedy=_LONGER)
 
+    def lost(unraisable: sys.UnraisableHookArgs) -> None:
+        if isinstance(unraisable.exc_value, OutOfTime):
+            signal.setitimer(signal.ITIMER_REAL, _SOON, _AGAIN)
+        else:
+            lost_before(unraisable)
+
     before = signal.signal(signal.SIGALRM, ring)
+    lost_before, sys.unraisablehook = sys.unraisablehook, lost
     signal.setitimer(signal.ITIMER_REAL, seconds, _AGAIN)
     try:
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
+        sys.unraisablehook = lost_before
 
 
 def stop_clock() -> None:

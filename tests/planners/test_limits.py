@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+import sys
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -66,6 +69,47 @@ def test_an_estimate_keeps_its_own_remedy() -> None:
 def test_other_errors_pass() -> None:
     with pytest.raises(KeyError), reaching(lambda: "half of it", "fewer parts"):
         raise KeyError
+
+
+class Finalized:
+    """Its end lasts until the alarm rings, and loses what the alarm raises."""
+
+    lost = False
+
+    def __del__(self) -> None:
+        try:
+            while True:
+                pass
+        except OutOfTime:
+            Finalized.lost = True
+            raise
+
+
+def test_an_alarm_lost_in_a_finalizer_rings_again() -> None:
+    def work() -> None:
+        Finalized()
+        assert Finalized.lost
+        for _ in range(200):  # without the second alarm this ends, and nothing is raised
+            time.sleep(0.01)
+
+    hook = sys.unraisablehook
+    with pytest.raises(OutOfTime), time_limit(0.05):
+        work()
+    assert sys.unraisablehook is hook
+
+
+def test_other_lost_errors_are_told_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[object] = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda unraisable: told.append(unraisable.exc_type))
+
+    class Broken:
+        def __del__(self) -> None:
+            raise KeyError
+
+    with time_limit(100):
+        Broken()
+        gc.collect()
+    assert told == [KeyError]
 
 
 def test_time_left() -> None:
