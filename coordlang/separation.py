@@ -1,4 +1,4 @@
-"""Theorem 3 in full, lazily: plans that introduce RC must be separated where they first part or where they last meet.
+"""Theorem 3 in full: plans that introduce RC must be separated where they first part or where they last meet.
 
 Each tuple of plans that introduce RC has a *first difference* ``alpha = (p; s_1 .. s_n)``, the last shared state and the
 next ones, and a *last difference* ``beta = (t_1 .. t_n; q)``, or ends in different goal states.  A partition is a
@@ -6,15 +6,15 @@ coordination language if for every such tuple some two different ``s_i, s_j`` an
 some two different ``t_i, t_j`` and ``q`` do, or two of the different goal states lie in different words
 (docs/concepts.md).
 
-The relation of all alphas with all betas is never written down: the composition walk is kept, and asked for pairs that
-a partition leaves unseparated.
+The relation of all alphas with all betas is written down only where it is small (`SeparationWalk.every`).  Else the
+composition walk is kept, and asked for pairs that a partition leaves unseparated.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,9 @@ Bools = NDArray[np.bool_]
 
 #: At least one of these must hold.
 Constraint = tuple[Separation, ...]
+
+#: Links of a walk up to which all constraints may be written down.
+_LINKS = 1_000_000
 
 
 @dataclass(slots=True)
@@ -107,6 +110,52 @@ class SeparationWalk:
             ending = np.full(len(layer.x), -1)
             ending[source[order]] = value[order]
 
+    def every(self, most: int) -> set[Constraint] | None:
+        """All constraints of these tasks: each first difference with each last difference that can follow.
+
+        None if there may be more than ``most``.  O(links x last differences / word size).
+        """
+        if self.edges > _LINKS:
+            return None
+        firsts, lasts = self._differences()
+        if sum(ends.bit_count() for ends in firsts.values()) > most:
+            return None
+        known = [alternatives(shared, others) for shared, *others in lasts]
+        found = set()
+        for (shared, *others), ends in firsts.items():
+            alpha = alternatives(shared, others)
+            found |= {ordered({*alpha, *known[number]}) for number in _ones(ends)}
+        return found
+
+    def _differences(self) -> tuple[dict[tuple[int, ...], int], list[tuple[int, ...]]]:
+        """First differences with the last ones that can follow, as a set of bits: their numbers in the second list.
+
+        A difference is the shared state (-1: none) and then the different ones, sorted.
+        """
+        state = self._space.state
+        number: dict[tuple[int, ...], int] = {}
+        firsts: dict[tuple[int, ...], int] = {}
+        x = state[self._layers[0].x]
+        following = [
+            1 << number.setdefault((-1, *sorted(row)), len(number)) if len(set(row)) > 1 else 0 for row in x.tolist()
+        ]
+        for below, layer in pairwise(self._layers):
+            here, after = state[layer.x[layer.source]], state[below.x[layer.child]]
+            meets = layer.meets & below.tail[layer.child]
+            ends = [0] * len(layer.x)
+            links = zip(layer.source.tolist(), layer.child.tolist(), layer.parts.tolist(), meets.tolist(), strict=True)
+            for link, (source, child, parts, meet) in enumerate(links):
+                more = following[child]
+                if parts and more:
+                    first = (int(here[link, 0]), *sorted(after[link].tolist()))
+                    firsts[first] = firsts.get(first, 0) | more
+                if meet:
+                    last = (int(after[link, 0]), *sorted(here[link].tolist()))
+                    more |= 1 << number.setdefault(last, len(number))
+                ends[source] |= more
+            following = ends
+        return firsts, list(number)
+
     def _constraints(
         self, shared: Ints, following: Ints, endings: Sequence[Ints], ending: Ints
     ) -> Iterator[Constraint]:
@@ -121,6 +170,13 @@ class SeparationWalk:
             alpha = alternatives(row[0], row[1 : self._robots + 1])
             beta = alternatives(row[self._robots + 1], row[self._robots + 2 :])
             yield ordered({*alpha, *beta})
+
+
+def _ones(bits: int) -> Iterator[int]:
+    """The positions of the bits that are set."""
+    for position, bit in enumerate(reversed(f"{bits:b}")):
+        if bit == "1":
+            yield position
 
 
 def ordered(alternatives: Iterable[Separation]) -> Constraint:

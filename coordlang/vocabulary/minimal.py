@@ -20,7 +20,7 @@ from coordlang.counterexamples import counterexamples
 from coordlang.symmetry import Symmetry, symmetries
 from coordlang.tuples import EdgeIndex
 from coordlang.vocabulary.job import Evidence, Job, Outcome, Partition
-from coordlang.vocabulary.sat import Colouring, Effort, Undecided, by_demand, close_in, reduce
+from coordlang.vocabulary.sat import Colouring, Effort, Problems, Undecided, by_demand, close_in, reduce
 from coordlang.vocabulary.separating import quickly as separated
 from coordlang.warping import Clause, pair, separation_clause
 from planners.errors import OutOfMemory, OutOfTime
@@ -51,6 +51,8 @@ def minimal(job: Job) -> Outcome:
             raise
         # Without its traceback, which holds on to all that the search had in memory.
         return Outcome(search.best, search.lower, search.figures(), error.with_traceback(None), search.evidence)
+    finally:
+        search.close()
     assert search.best is not None
     return Outcome(search.best, search.lower, search.figures(), evidence=search.evidence)
 
@@ -61,8 +63,11 @@ def refute(job: Job, size: int) -> Mapping[Clause, Evidence]:
     Raises `ValueError` if there is a language with so few words.
     """
     search = _Search(replace(job, incumbent=None))
-    if not search.exceeds(size):
-        raise ValueError(f"there is a language with {size} words")
+    try:
+        if not search.exceeds(size):
+            raise ValueError(f"there is a language with {size} words")
+    finally:
+        search.close()
     return search.evidence
 
 
@@ -76,6 +81,7 @@ class _Search:
         self._rounds = 0
         self._found = 0
         self._clauses: list[Clause] = []
+        self._problems = Problems(self._start, Colouring.add)
         self.evidence: dict[Clause, Evidence] = {}
         self._symmetries: list[tuple[Symmetry, list[int]]] = []
 
@@ -106,22 +112,21 @@ class _Search:
         """Whether every language has more words than ``size``."""
         return self._decide(size, self._prepare(), Effort(sys.maxsize, sys.maxsize)) and self.lower > size
 
+    def close(self) -> None:
+        """Give back what the solvers hold."""
+        self._problems.drop_all()
+
     def _prepare(self) -> list[_Part]:
         self._symmetries = [(s, s.states.tolist()) for s in symmetries(self._job.candidates)]
         return _parts(self._job.candidates.spaces, Random(self._job.seed))
 
     def _decide(self, size: int, parts: Sequence[_Part], effort: Effort) -> bool:
         """Find a language with ``size`` words or prove that there is none; False if the effort was not enough."""
-        self._clauses = reduce(self._clauses)
-        colouring = Colouring(by_demand(self._job.states, self._clauses), size)
         try:
-            for clause in self._clauses:
-                colouring.add(clause)
-            partition = self._refine(colouring, parts, effort)
+            partition = self._refine(size, parts, effort)
         except Undecided:
             return False
-        finally:
-            colouring.delete()
+        self._problems.drop(size)
         if partition is None:
             self.lower = size + 1
         else:
@@ -129,9 +134,16 @@ class _Search:
             self.best = partition
         return True
 
-    def _refine(self, colouring: Colouring, parts: Sequence[_Part], effort: Effort) -> Partition | None:
+    def _start(self, size: int, known: Sequence[Clause]) -> Colouring:
+        clauses = reduce(known)
+        colouring = Colouring(by_demand(self._job.states, clauses), size)
+        for clause in clauses:
+            colouring.add(clause)
+        return colouring
+
+    def _refine(self, size: int, parts: Sequence[_Part], effort: Effort) -> Partition | None:
         """The loop for one number of words: a language, or None if there is none."""
-        partition = colouring.solve(effort.conflicts)
+        partition = self._problems.of(size, self._clauses).solve(effort.conflicts)
         clean = position = rounds = 0
         word = np.zeros(len(self._job.candidates.rows), np.int64)
         while partition is not None and clean < len(parts):
@@ -142,7 +154,7 @@ class _Search:
             fresh = parts[position].clauses(word)
             position = (position + 1) % len(parts)
             self._job.progress(
-                f"trying {colouring.size} words, {self.lower} to {self._upper} needed: "
+                f"trying {size} words, {self.lower} to {self._upper} needed: "
                 f"round {self._rounds}, {len(self._clauses):,} clauses"
             )
             if not fresh:
@@ -151,10 +163,8 @@ class _Search:
             clean = 0
             rounds += 1
             self._found += len(fresh)
-            for clause in self._images(fresh):
-                self._clauses.append(clause)
-                colouring.add(clause)
-            partition = colouring.solve(effort.conflicts)
+            self._clauses += self._images(fresh)
+            partition = self._problems.of(size, self._clauses).solve(effort.conflicts)
         return partition
 
     def figures(self) -> dict[str, float]:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from coordlang.warping import Clause, Pair
 
+Requirement = TypeVar("Requirement")
+
 #: Conflicts after which the solver comes back.
 _SLICE = 2_000
+#: A problem starts afresh when it has so many times the requirements that it started with.
+_GROWN = 2
 
 
 class Colouring:
@@ -102,6 +106,50 @@ class Colouring:
                 self._solver.add_clause([now, -own[word]])
                 after.append(now)
             used = after
+
+
+class Problems(Generic[Requirement]):
+    """The colouring problem of each number of words, kept as long as it is undecided: a solver goes on where it stopped.
+
+    ``start`` makes a problem with all requirements that are known; ``require`` adds one.
+    """
+
+    def __init__(
+        self,
+        start: Callable[[int, Sequence[Requirement]], Colouring],
+        require: Callable[[Colouring, Requirement], None],
+    ) -> None:
+        self._start, self._require = start, require
+        self._kept: dict[int, _Kept] = {}
+
+    def of(self, size: int, known: Sequence[Requirement]) -> Colouring:
+        """The problem with ``size`` words under all ``known`` requirements, a list that only grows.
+
+        When it has grown much, the problem starts afresh: the order of its states was that of few requirements.
+        """
+        kept = self._kept.get(size)
+        if kept is None or len(known) > _GROWN * kept.first:
+            self.drop(size)
+            kept = self._kept[size] = _Kept(self._start(size, known), len(known), len(known))
+        for requirement in known[kept.given :]:
+            self._require(kept.colouring, requirement)
+        kept.given = len(known)
+        return kept.colouring
+
+    def drop(self, size: int) -> None:
+        if (kept := self._kept.pop(size, None)) is not None:
+            kept.colouring.delete()
+
+    def drop_all(self) -> None:
+        for size in list(self._kept):
+            self.drop(size)
+
+
+@dataclass(slots=True)
+class _Kept:
+    colouring: Colouring
+    first: int
+    given: int
 
 
 class Undecided(Exception):

@@ -15,13 +15,15 @@ from coordlang.separation import Constraint, SeparationWalk, ordered
 from coordlang.symmetry import state_symmetries
 from coordlang.vocabulary.greedy import fill
 from coordlang.vocabulary.job import Job, Outcome, Partition
-from coordlang.vocabulary.sat import Colouring, Effort, Undecided, by_demand, close_in
+from coordlang.vocabulary.sat import Colouring, Effort, Problems, Undecided, by_demand, close_in
 from coordlang.warping import Pair, pair
 from planners.errors import OutOfMemory, OutOfTime
 from planners.limits import stop_clock
 
 #: Partitions filled greedily, for a first upper bound, before SAT takes over.
 _FILLED = 20
+#: Constraints of one walk up to which all are written down.
+_WRITTEN = 200_000
 #: What a short search may spend on one number of words.
 _SHORT = Effort(20, 2_000)
 
@@ -41,6 +43,8 @@ def separating(job: Job) -> Outcome:
         if search.best is None:
             raise
         stopped = error.with_traceback(None)
+    finally:
+        search.close()
     assert search.best is not None
     return Outcome(search.best, job.lower_bound, search.figures(), stopped)
 
@@ -48,9 +52,12 @@ def separating(job: Job) -> Outcome:
 def quickly(job: Job) -> Partition | None:
     """The job's incumbent, or a separating partition with fewer words, as far as a short search finds one."""
     search = _AlphaOrBeta(job)
-    search.prepare()
-    while search.lower < search.upper and search.decide(search.lower, _SHORT):
-        pass
+    try:
+        search.prepare()
+        while search.lower < search.upper and search.decide(search.lower, _SHORT):
+            pass
+    finally:
+        search.close()
     return search.best
 
 
@@ -62,6 +69,7 @@ class _Search:
         self.lower = job.lower_bound
         self.best: Partition | None = job.incumbent
         self._constraints: list[Constraint] = []
+        self._problems = Problems(self._start, _require)
         self._rounds = 0
         #: States that need words of their own; naming these first leaves fewest symmetries to search.
         self._first: list[int] = []
@@ -86,34 +94,39 @@ class _Search:
 
     def decide(self, size: int, effort: Effort) -> bool:
         """Find a separating partition with ``size`` words, or prove that there is none; False: not with this effort."""
-        order = by_demand(self._job.states, (s.pairs for c in self._constraints for s in c))
-        colouring = Colouring([*self._first, *(s for s in order if s not in set(self._first))], size)
-        try:
-            for constraint in self._constraints:
-                colouring.choose([s.pairs for s in constraint])
-            for _ in range(effort.rounds):
-                partition = colouring.solve(effort.conflicts)
-                self._rounds += 1
-                self._job.progress(
-                    f"trying {size} words, {self.lower} to {self.upper} needed: round {self._rounds}, "
-                    f"{len(self._constraints):,} constraints"
-                )
-                if partition is None:
-                    self.lower = size + 1
-                    return True
-                fresh = list(self._broken(partition))
-                if not fresh:
-                    self._job.check(partition)
-                    self.best = partition
-                    return True
-                for constraint in fresh:
-                    self._constraints.append(constraint)
-                    colouring.choose([s.pairs for s in constraint])
-        except Undecided:
-            return False
-        finally:
-            colouring.delete()
+        for _ in range(effort.rounds):
+            self._job.progress(
+                f"trying {size} words, {self.lower} to {self.upper} needed: round {self._rounds}, "
+                f"{len(self._constraints):,} constraints"
+            )
+            try:
+                partition = self._problems.of(size, self._constraints).solve(effort.conflicts)
+            except Undecided:
+                return False
+            self._rounds += 1
+            if partition is None:
+                self._problems.drop(size)
+                self.lower = size + 1
+                return True
+            fresh = list(self._broken(partition))
+            if not fresh:
+                self._problems.drop(size)
+                self._job.check(partition)
+                self.best = partition
+                return True
+            self._constraints += fresh
         return False
+
+    def _start(self, size: int, known: Sequence[Constraint]) -> Colouring:
+        order = by_demand(self._job.states, (s.pairs for c in known for s in c))
+        colouring = Colouring([*self._first, *(s for s in order if s not in set(self._first))], size)
+        for constraint in known:
+            _require(colouring, constraint)
+        return colouring
+
+    def close(self) -> None:
+        """Give back what the solvers hold."""
+        self._problems.drop_all()
 
     def figures(self) -> dict[str, float]:
         return {
@@ -144,15 +157,18 @@ class _AlphaOnly(_Search):
 
 
 class _AlphaOrBeta(_Search):
-    """Constraints are asked of the composition walks, with their images under the model's symmetries."""
+    """All constraints where they are few: the more the solver knows, the shorter its proofs.  Else they are asked of the
+    composition walks, with their images under the model's symmetries."""
 
     def prepare(self) -> None:
         job = self._job
-        self._known: set[Constraint] = set()
         self._random = np.random.default_rng(job.seed)
         self._symmetries = [p.tolist() for p in state_symmetries(job.candidates)]
         job.progress("walking to the last differences")
         self._walks = [SeparationWalk(space) for space in job.candidates.spaces]
+        every = [walk.every(_WRITTEN) for walk in self._walks]
+        self._known: set[Constraint] = set().union(*(few for few in every if few is not None))
+        self._constraints = sorted(self._known, key=lambda c: [sorted(s.pairs) for s in c])
         self.fill()
 
     def fill(self) -> None:
@@ -184,6 +200,10 @@ class _AlphaOrBeta(_Search):
             "walk_nodes": sum(walk.nodes for walk in walks),
             "walk_edges": sum(walk.edges for walk in walks),
         }
+
+
+def _require(colouring: Colouring, constraint: Constraint) -> None:
+    colouring.choose([s.pairs for s in constraint])
 
 
 def _image(constraint: Constraint, permutation: Sequence[int]) -> Constraint:

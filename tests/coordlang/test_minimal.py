@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 
 import pytest
@@ -11,8 +12,8 @@ from hypothesis import strategies as st
 from coordlang.build import build_language
 from coordlang.language import sentence
 from coordlang.tasks import Candidates, all_pairs, from_problems
-from coordlang.vocabulary.sat import Colouring, reduce
-from coordlang.warping import pair, separation_clause, warping_clause
+from coordlang.vocabulary.sat import Colouring, Problems, reduce
+from coordlang.warping import Clause, pair, separation_clause, warping_clause
 from coordlang.witness import inseparable
 from planners.errors import ProvedImpossible
 from planners.optimal import PlanSpace
@@ -91,6 +92,37 @@ def test_colouring_against_trying_all(size: int, drawn: list[set[tuple[int, int]
 
     assert (found is not None) == any(holds(word) for word in product(range(size), repeat=5))
     assert found is None or holds(found)
+
+
+def test_problems_are_kept_and_learn_what_is_new() -> None:
+    started: list[int] = []
+
+    def start(size: int, known: Sequence[Clause]) -> Colouring:
+        started.append(len(known))
+        colouring = Colouring([0, 1, 2], size)
+        for clause in known:
+            colouring.add(clause)
+        return colouring
+
+    problems = Problems(start, Colouring.add)
+    known: list[Clause] = [frozenset({(0, 1)}), frozenset({(0, 1), (1, 2)})]
+    first = problems.of(2, known)
+    assert first.solve() is not None
+    known.append(frozenset({(1, 2)}))
+    assert problems.of(2, known) is first
+    assert (found := first.solve()) is not None
+    assert found[0] == found[2] != found[1]
+    known.append(frozenset({(0, 2)}))
+    assert problems.of(2, known) is first
+    assert first.solve() is None
+    known.append(frozenset({(0, 2), (1, 2)}))
+    assert problems.of(2, known) is not first, "more than twice what it started with: afresh"
+    assert problems.of(3, known).solve() is not None
+    assert started == [2, 5, 5]
+    problems.drop_all()
+    assert problems.of(2, known).solve() is None
+    assert started == [2, 5, 5, 5]
+    problems.drop_all()
 
 
 def test_reduce_drops_what_is_implied() -> None:

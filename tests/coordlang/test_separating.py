@@ -92,13 +92,21 @@ def small_models(robots: int, most: int, number: int) -> Iterator[tuple[int, Can
             return
 
 
+@pytest.mark.parametrize("written", [True, False])
 @pytest.mark.parametrize(
     ("robots", "most", "number"),
     [(2, 40, 12), (3, 14, 6), pytest.param(2, 40, 200, marks=pytest.mark.slow),
      pytest.param(3, 14, 100, marks=pytest.mark.slow)],
 )  # fmt: skip
-def test_against_the_theorem(robots: int, most: int, number: int) -> None:
-    """Least sizes with and without beta, and the order of the four methods; `minimal` equals `exhaustive`."""
+def test_against_the_theorem(
+    robots: int, most: int, number: int, written: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Least sizes with and without beta, and the order of the four methods; `minimal` equals `exhaustive`.
+
+    With all constraints written down, and with constraints asked of the walk.
+    """
+    if not written:
+        monkeypatch.setattr(SeparationWalk, "every", lambda *_: None)
     seen: Counter[tuple[int, ...]] = Counter()
     for seed, candidates in small_models(robots, most, number):
         both, alpha = (demands(candidates, most, beta=b) for b in (True, False))
@@ -148,6 +156,32 @@ def test_different_ends_need_one_pair_only() -> None:
     (only,) = alternatives(-1, [4, 7, 4])
     assert only.pairs == {(4, 7)}
     assert [sorted(s.pairs) for s in alternatives(2, [5, 3])] == [[(2, 3), (2, 5), (3, 5)]]
+
+
+@pytest.mark.parametrize(("robots", "most", "number"), [(2, 40, 14), (3, 14, 8), pytest.param(2, 40, 100, marks=pytest.mark.slow),
+     pytest.param(3, 14, 50, marks=pytest.mark.slow)])
+def test_every_constraint_and_no_other(robots: int, most: int, number: int) -> None:
+    """What is written down are the demands of the failing tuples, all listed."""
+    for _, candidates in small_models(robots, most, number):
+        found = [SeparationWalk(space).every(10**6) for space in candidates.spaces]
+        every = {
+            tuple(sorted((frozenset(frozenset(p) for p in s.pairs) for s in constraint), key=sorted_pairs))
+            for constraints in found
+            if constraints is not None
+            for constraint in constraints
+        }
+        assert None not in found
+        assert every == demands(candidates, most, beta=True)
+
+
+def test_too_many_constraints_are_not_written_down() -> None:
+    (space,) = shipped("three-cells").spaces
+    walk_of = SeparationWalk(space)
+    every = walk_of.every(10**6)
+    assert every is not None
+    assert len(every) == 12
+    assert walk_of.every(24) == every, "each constraint is met in two ways: the domain is symmetric"
+    assert walk_of.every(11) is None
 
 
 def test_walk_keeps_only_what_fails() -> None:
