@@ -13,7 +13,8 @@ from time import process_time
 
 from coordlang.build import build_language
 from coordlang.sentences import task_sentences
-from coordlang.tasks import from_listed, read_task_file
+from coordlang.task_file import read_task_file
+from coordlang.tasks import from_listed
 from coordlang.tuples import EdgeIndex
 from coordlang.use.choices import choices
 from coordlang.use.choices_file import to_bytes

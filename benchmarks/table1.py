@@ -14,7 +14,8 @@ from pathlib import Path
 from time import perf_counter
 
 from coordlang.build import build_language
-from coordlang.tasks import Candidates, all_pairs, from_listed, read_task_file
+from coordlang.task_file import read_task_file
+from coordlang.tasks import Candidates, all_pairs, from_listed
 from planners.pddl import read_domain, read_problem
 
 GRID = Path(__file__).parent.parent / "domains" / "grid"

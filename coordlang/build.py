@@ -21,21 +21,10 @@ from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Evidence, Partition
 from coordlang.vocabulary.minimal import refute
 from coordlang.warping import Clause
-from coordlang.witness import Miscoordination, inseparable
-from planners.errors import OutOfMemory, OutOfTime, ProvedImpossible
+from coordlang.witness import Inseparable as Inseparable
+from coordlang.witness import inseparable
+from planners.errors import OutOfMemory, OutOfTime
 from planners.limits import stop_clock
-
-
-class Inseparable(ProvedImpossible):
-    """Two plans introduce RC but pass through the same states: no state-based language can tell them apart."""
-
-    def __init__(self, witness: Miscoordination) -> None:
-        super().__init__(
-            f"two optimal plans of task {witness.task} introduce required coordination but pass through the "
-            "same states: no language over states can tell them apart",
-            remedy="Build with --remember-actions: the state then also holds each robot's last subaction.",
-        )
-        self.witness = witness
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +109,11 @@ def build_language(
     language = signed(replace(best.language, guarantee=guarantee), candidates, {"program": "coordlang"})
     if overlap and outcome.stopped is None:
         progress("enlarging words")
-        language, outcome = _overlapping(candidates, language, outcome)
+        try:
+            language, outcome = _overlapping(candidates, language, outcome)
+        except (OutOfTime, OutOfMemory, MemoryError, KeyboardInterrupt) as error:
+            stop_clock()  # the words as they were are a verified language
+            outcome = replace(outcome, stopped=error.with_traceback(None))
         clock.note("overlap")
     return Built(
         language, found, len(job.states), best.verdict, outcome.figures, clock.seconds, outcome.stopped, job, outcome.evidence
@@ -153,9 +146,10 @@ def _overlapping(candidates: Candidates, language: Language, outcome: Outcome) -
 
 
 def certificate_of(built: Built) -> Certificate:
-    """Why no language has fewer words than the proved lower bound, for others to check.
+    """Why no partition with fewer words than the proved lower bound is a language, for others to check.
 
-    Uses what the method met on its way; for a method that meets nothing the search of `minimal` finds reasons.
+    Uses what the method met on its way; for a method that meets nothing the search of `minimal` finds reasons.  As long as
+    that takes: not anytime.
     """
     refuted = built.language.guarantee.lower_bound - 1
     evidence = built.evidence or (refute(built.job, refuted) if refuted else {})

@@ -21,7 +21,8 @@ from msgspec import UNSET
 from coordlang.duplicate_keys import duplicate_key
 from coordlang.language import Guarantee, Language
 from coordlang.record import FORMAT, VERSION, LanguageRecord, TasksRecord
-from coordlang.tasks import Candidates, ListedTask, all_pairs, from_listed, from_problems, from_recorded, task_data
+from coordlang.task_file import ListedTask, task_data
+from coordlang.tasks import Candidates, all_pairs, from_listed, from_problems, from_recorded
 from planners.errors import BadInput, Place, UsageError
 from planners.joint import show
 from planners.model import ModelOptions

@@ -7,7 +7,7 @@ away, N where one sentence holds all of them.
 *Communication saving* of a plan: ``1 - len(sentence) / len(state sequence)``, the share of its states that need no word.  The
 paper's figures on GWB7, 33.3 % over the 784 plans whose sentence is shorter and 27.3 % over all 956, agree with each other
 only if a plan whose sentence is not shorter saves nothing (33.3 % * 784 / 956 = 27.3 %).  Measured against the joint
-*actions* of the plan, one fewer than its states, such a plan would save less than nothing; that form is given beside.
+*actions* of the plan, one fewer than its states, such a plan would save less than nothing.
 """
 
 from __future__ import annotations
@@ -64,11 +64,6 @@ class Flexibility:
         """Communication saving of each task's first plan, against its states."""
         return 1 - self.first_words / (self.steps + 1)
 
-    @property
-    def action_saving(self) -> Floats:
-        """Communication saving against the joint actions of a plan, in expectation; 0 for a plan without actions."""
-        return np.where(self.steps > 0, 1 - self.words / np.maximum(self.steps, 1), 0.0)
-
 
 def flexibility(spaces: Sequence[PlanSpace], words: Sequence[Ints]) -> Flexibility:
     """Measure a partition; ``words[k]`` holds the word number of each node of ``spaces[k]``.
@@ -106,7 +101,6 @@ class _Sentences:
     def __init__(self) -> None:
         self._number: dict[tuple[int, int], int] = {}
         self._length = [0]
-        self._grown = np.zeros(1, np.int64)
 
     def front(self, word: Ints, rest: Ints) -> Ints:
         """The numbers of the sentences ``word`` + ``rest``."""

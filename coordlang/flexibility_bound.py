@@ -9,7 +9,7 @@ average of m(x) over the plans of the task, whatever the language and its number
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from coordlang.coordination import Bools
 from coordlang.flexibility import MANY, Floats
 from planners.optimal import PlanSpace
 from planners.plans import Plan, Plans, counts
+from planners.states import bits
 
 #: Tasks with more plans than this are bounded by their number of plans.
 MOST_PLANS = 3_000
@@ -71,7 +72,7 @@ def _box_sizes(plans: Sequence[Plan], robot: int) -> list[int]:
     for size, columns in sorted(boxes, reverse=True):
         for number, row in enumerate(rows):
             if row & columns == columns:
-                for column in _bits(left[number] & columns):
+                for column in bits(left[number] & columns):
                     sizes[cells[number, column]] = size
                 left[number] &= ~columns
     return sizes
@@ -94,9 +95,3 @@ def _shared(rows: Sequence[int], cells: Mapping[tuple[int, int], int]) -> list[i
     for (row, column), number in cells.items():
         sizes[number] = sum((rows[row] & other).bit_count() for other in rows if other >> column & 1)
     return sizes
-
-
-def _bits(number: int) -> Iterator[int]:
-    while number:
-        yield (number & -number).bit_length() - 1
-        number &= number - 1

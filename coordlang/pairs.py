@@ -22,6 +22,7 @@ from coordlang.counterexamples import counterexamples
 from coordlang.tuples import EdgeIndex
 from coordlang.vocabulary.sat import Colouring, by_demand, reduce
 from coordlang.warping import Clause, separation_clause
+from coordlang.witness import Inseparable, inseparable, separable
 from planners.optimal import PlanSpace
 
 #: Counterexamples taken at a time.
@@ -79,10 +80,17 @@ def pair_languages(spaces: Sequence[PlanSpace]) -> list[PairLanguage]:
 
 
 def language_for(spaces: Sequence[PlanSpace], pairs: Sequence[tuple[int, int]]) -> PairLanguage:
-    """A smallest partition that is a language for all these pairs of robots at once."""
+    """A smallest partition that is a language for all these pairs of robots at once.
+
+    Raises `Inseparable` (with the two plans) when there is none.
+    """
     robots = spaces[0].labels.shape[1]
     divisions = sorted({_named(side, robots) for i, j in pairs for side in sides(robots, i, j)})
     views = [divided(space, side) for space in spaces for side in divisions]
+    for view, space in zip(views, [space for space in spaces for _ in divisions], strict=True):
+        # Plans of two robots are plans of all: what is wrong with the former is wrong with the latter.
+        if not separable(view) and (witness := inseparable(space)) is not None:
+            raise Inseparable(witness)
     walks = [walk(view) for view in views]
     nodes, edges = sum(w.nodes for w in walks), sum(w.edges for w in walks)
     states = sorted({int(s) for space in spaces for s in space.state})
@@ -123,12 +131,12 @@ def _words(
 
 
 def _violated(searched: Sequence[tuple[PlanSpace, EdgeIndex, np.ndarray]], word: np.ndarray) -> list[Clause]:
-    found = {
-        clause
-        for view, index, starts in searched
-        for example in counterexamples(view, index, word[view.state], _MOST, starts)
-        if (clause := separation_clause(example.states, word.tolist()))
-    }
+    found = set()
+    for view, index, starts in searched:
+        for example in counterexamples(view, index, word[view.state], _MOST, starts):
+            clause = separation_clause(example.states, word.tolist())
+            assert clause, "the plans have one sentence, and none of them is the other"
+            found.add(clause)
     return reduce(found)
 
 

@@ -72,7 +72,10 @@ class GuaranteeRecord(msgspec.Struct):
     size: Annotated[int, Meta(description="The number of words.", extra_json_schema=_SIZE)]
     lower_bound: Annotated[
         int,
-        Meta(description="A proved lower bound on the words of any language for these tasks.", extra_json_schema=_SIZE),
+        Meta(
+            description="A proved lower bound on the words of any language for these tasks that gives each state one word.",
+            extra_json_schema=_SIZE,
+        ),
     ]
     proved_minimal: Annotated[bool, Meta(description="Whether the size equals that bound.")]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from coordlang.language import WordTable
@@ -33,7 +34,7 @@ def task_sentences(space: PlanSpace, task: int, table: WordTable) -> list[TaskSe
     """
     word = table.of_rows(space.rows)[space.state].tolist()
     start = int(space.starts[task])
-    below = _counts_below(space, start, word)
+    below = sentence_counts(space, start, word, _MOST)
     result = [
         TaskSentence(tuple(table.words[w] for w in words), plans, _choices(space, start, word, below, words))
         for words, plans in below[start].items()
@@ -41,8 +42,15 @@ def task_sentences(space: PlanSpace, task: int, table: WordTable) -> list[TaskSe
     return sorted(result, key=lambda s: (-s.plans, s.words))
 
 
-def _counts_below(space: PlanSpace, start: int, word: list[int]) -> dict[int, Counter[tuple[int, ...]]]:
-    """For each node on the task's plans: sentence of the rest, from the node's own word on -> number of plans."""
+def sentence_counts(
+    space: PlanSpace, start: int, word: Sequence[int], most: int
+) -> dict[int, Counter[tuple[int, ...]]]:
+    """For each node on the plans from ``start``: sentence (word numbers) of the rest, the node's own word first -> number of
+    plans.
+
+    ``word`` is the word number of each node.  O(edges * sentences).  Raises `OutOfMemory` when a node has more than ``most``
+    sentences.
+    """
     counts: dict[int, Counter[tuple[int, ...]]] = {}
     for node in sorted(_nodes_from(space, start)):
         if space.layer[node] == 0:
@@ -52,8 +60,8 @@ def _counts_below(space: PlanSpace, start: int, word: list[int]) -> dict[int, Co
         for target in space.target[space.first[node] : space.first[node + 1]].tolist():
             for rest, number in counts[target].items():
                 total[rest if rest[0] == word[node] else (word[node], *rest)] += number
-        if len(total) > _MOST:
-            raise OutOfMemory(f"a task has more than {_MOST:,} sentences: too many to list")
+        if len(total) > most:
+            raise OutOfMemory(f"a task has more than {most:,} sentences: too many to list")
         counts[node] = total
     return counts
 

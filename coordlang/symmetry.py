@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -25,8 +26,9 @@ Renaming = Mapping[str, str]
 
 #: More symmetries than this are not used: each multiplies the clauses.
 MOST = 64
-#: Assignments of one object to another that are tried before giving up on finding more.
+#: Assignments of one object to another, and renamings, that are tried before giving up on finding more.
 _TRIED = 200_000
+_RENAMED = 2_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +70,8 @@ def symmetries(candidates: Candidates) -> list[Symmetry]:
     tasks = _tasks(candidates.spaces)
     found: list[Symmetry] = []
     seen = {tuple(range(len(candidates.rows)))}
-    for renaming in _renamings(candidates.loaded.domain, candidates.loaded.problems[0]):
+    proposed = _renamings(candidates.loaded.domain, candidates.loaded.problems[0], _used(model))
+    for renaming in islice(proposed, _RENAMED):
         if len(found) >= MOST:
             break
         if not _keeps_actions(model, renaming):
@@ -82,16 +85,31 @@ def symmetries(candidates: Candidates) -> list[Symmetry]:
     return found
 
 
-def _renamings(domain: Domain, problem: Problem) -> Iterator[Renaming]:
-    """Permutations of the objects that keep types, static facts and the domain's constants.
+def closed(permutations: Sequence[Ints]) -> bool:
+    """Whether the permutations and the identity are a group: one after another is one of them again."""
+    known = {tuple(p.tolist()) for p in permutations}
+    identity = tuple(range(len(permutations[0]))) if permutations else ()
+    return all(tuple(a[b].tolist()) in known or tuple(a[b].tolist()) == identity for a in permutations for b in permutations)
+
+
+def _used(model: JointModel) -> set[str]:
+    """The objects of ground actions and facts: what happens to the others changes nothing."""
+    named = {arg for action in model.actions for arg in action.args} | set(model.robots)
+    return named | {arg for fact in model.codec.facts for arg in fact[1:-1].split(" ")[1:]}
+
+
+def _renamings(domain: Domain, problem: Problem, used: set[str]) -> Iterator[Renaming]:
+    """Permutations of the ``used`` objects that keep types, the static facts about them and the domain's constants.
 
     Backtracking over objects in the order in which facts join them, each among those that look alike; it gives up after
     `_TRIED` assignments.
     """
     fluents = fluent_predicates(domain)
-    statics = {(a.predicate, *a.args) for a in problem.init if a.predicate not in fluents}
-    looks = _looks(domain, problem, statics)
-    order = _joined_order(problem.objects, statics)
+    statics = {
+        (a.predicate, *a.args) for a in problem.init if a.predicate not in fluents and used.issuperset(a.args)
+    }
+    looks = _looks(domain, problem, statics, used)
+    order = _joined_order(looks, statics)
     position = {name: n for n, name in enumerate(order)}
     # The facts that are complete once the object at a position is assigned.
     complete: list[list[tuple[str, ...]]] = [[] for _ in order]
@@ -126,11 +144,12 @@ def _alike(name: str, looks: dict[str, int], image: dict[str, str]) -> list[str]
     return [other for other in looks if looks[other] == looks[name] and other not in taken]
 
 
-def _looks(domain: Domain, problem: Problem, statics: set[tuple[str, ...]]) -> dict[str, int]:
+def _looks(domain: Domain, problem: Problem, statics: set[tuple[str, ...]], used: set[str]) -> dict[str, int]:
     """A number for each object, equal for those that types and static facts cannot tell apart (colour refinement)."""
     start = {
         name: (name if name in domain.constants else "", tuple(sorted(types)))
         for name, types in problem.objects.items()
+        if name in used
     }
     looks = _numbered(start)
     while True:

@@ -8,7 +8,6 @@ in which the goal can be reached and does not hold already.
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Sequence
 from itertools import product
@@ -16,7 +15,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from coordlang.tasks import FORMAT, VERSION, ListedTask, goal_atoms, task_data
+from coordlang.task_file import ListedTask, goal_atoms
 from planners.errors import ProvedImpossible, UsageError
 from planners.matching import Ints
 from planners.model import Loaded
@@ -35,7 +34,7 @@ def varied_tasks(loaded: Loaded, starts: Sequence[str], goals: Sequence[str]) ->
     """
     model = loaded.model
     space = explore(model, loaded.tasks[0].init[None, :])
-    facts = _truth(space)
+    facts = model.codec.truth(space.rows)
     here = _starts(space, facts, loaded.tasks[0].init, starts)
     wanted = _goals(space, facts, goals) if goals else []
     keys = [tuple(model.codec.facts[f] for f in np.flatnonzero(facts[state])) for state in here]
@@ -55,19 +54,6 @@ def varied_tasks(loaded: Loaded, starts: Sequence[str], goals: Sequence[str]) ->
             f"there is no such task: none of {len(here):,} starts reaches one of {len(texts):,} goals that it is not at"
         )
     return tuple(sorted((ListedTask(keys[s], texts[g]) for s, g in pairs), key=lambda task: (task.init, task.goal)))
-
-
-def tasks_text(tasks: Sequence[ListedTask]) -> str:
-    """A task file, one task a line."""
-    lines = ",\n".join(f"  {json.dumps(task)}" for task in task_data(tasks)["tasks"])
-    return f'{{"format": "{FORMAT}", "version": {VERSION},\n "tasks": [\n{lines}]}}\n'
-
-
-def _truth(space: Space) -> NDArray[np.bool_]:
-    """(states, facts): which facts are true in which state."""
-    words = np.ascontiguousarray(space.rows[:, : space.model.codec.fact_words], "<u8")
-    bits = np.unpackbits(words.view(np.uint8), axis=1, bitorder="little")
-    return bits[:, : len(space.model.codec.facts)].astype(np.bool_)
 
 
 def _starts(space: Space, facts: NDArray[np.bool_], init: NDArray[np.uint64], patterns: Sequence[str]) -> Ints:

@@ -41,18 +41,38 @@ class Miscoordination:
 
 def miscoordination(space: PlanSpace, task: int) -> Miscoordination | None:
     """The plans of a task whose mixture breaks earliest, or None if the task requires no coordination."""
-    return _first_failure(space, np.array([space.starts[task]]), together=False)
+    trail = _trail(space, np.array([space.starts[task]]), together=False)
+    return describe_failure(space, trail) if trail is not None else None
+
+
+class Inseparable(ProvedImpossible):
+    """Two plans introduce RC but pass through the same states: no state-based language can tell them apart."""
+
+    def __init__(self, witness: Miscoordination) -> None:
+        super().__init__(
+            f"two optimal plans of task {witness.task} introduce required coordination but pass through the "
+            "same states: no language over states can tell them apart",
+            remedy="Build with --remember-actions: the state then also holds each robot's last subaction.",
+        )
+        self.witness = witness
 
 
 def inseparable(space: PlanSpace) -> Miscoordination | None:
-    """Plans of some task that pass through the same states and yet introduce RC, or None.
+    """Plans of some task that pass through the same states and yet introduce RC, or None."""
+    trail = _inseparable(space)
+    return describe_failure(space, trail) if trail is not None else None
 
-    There are none where no two edges join the same two nodes.
-    """
+
+def separable(space: PlanSpace) -> bool:
+    """Whether plans that introduce RC always pass through different states."""
+    return _inseparable(space) is None
+
+
+def _inseparable(space: PlanSpace) -> Trail | None:
     ends = np.column_stack((space.sources, space.target))
     if len(ends) == len(unique_tuples(ends, [len(space)] * 2)[0]):
-        return None
-    return _first_failure(space, np.unique(space.starts), together=True)
+        return None  # no two edges join the same two nodes
+    return _trail(space, np.unique(space.starts), together=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,13 +81,6 @@ class Trail:
 
     start: int
     edges: tuple[tuple[int, ...], ...]
-
-
-def _first_failure(space: PlanSpace, starts: Ints, *, together: bool) -> Miscoordination | None:
-    trail = _trail(space, starts, together=together)
-    if trail is None:
-        return None
-    return describe_failure(space, trail)
 
 
 def _trail(space: PlanSpace, starts: Ints, *, together: bool) -> Trail | None:

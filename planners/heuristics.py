@@ -10,7 +10,6 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planners.composition import split
 from planners.errors import UsageError
@@ -56,7 +55,7 @@ def relaxed(model: JointModel, goal: Goal) -> Heuristic:
     made, first_way = np.unique(fact, return_index=True)
 
     def value(rows: Rows) -> Ints:
-        true = _facts(model, rows)
+        true = model.codec.truth(rows)
         result = np.where(true[:, wanted].all(axis=1), 0, FAR)
         todo = np.flatnonzero(result)
         layer = 0
@@ -108,7 +107,7 @@ def manhattan(model: JointModel, goal: Goal) -> Heuristic:
         )
 
     def value(rows: Rows) -> Ints:
-        true = _facts(model, rows)
+        true = model.codec.truth(rows)
         result = np.zeros(len(rows), np.int64)
         for members, steps in bounds:
             result = np.maximum(result, np.where(true[:, members], steps, FAR).min(axis=1))
@@ -177,7 +176,7 @@ def _goal_facts(model: JointModel, goal: Goal) -> set[int]:
     """The facts that must be true in every goal state, as far as single literals say."""
     if isinstance(goal, FullState):
         row = np.array([goal.words], np.uint64)
-        return set(np.flatnonzero(_facts(model, row)[0]).tolist())
+        return set(np.flatnonzero(model.codec.truth(row)[0]).tolist())
     return {model.evaluator.facts[atom] for atom in _atoms(goal) if atom in model.evaluator.facts}
 
 
@@ -188,10 +187,3 @@ def _atoms(goal: Formula) -> Iterable[Atom]:
             yield from _atoms(part)
         elif isinstance(part, Atom):
             yield part
-
-
-def _facts(model: JointModel, rows: Rows) -> NDArray[np.bool_]:
-    """A table of states as truth values, (states, facts)."""
-    number = np.arange(len(model.codec.facts))
-    words = rows[:, number // 64]
-    return (words >> (number % 64).astype(np.uint64) & np.uint64(1)).astype(np.bool_)

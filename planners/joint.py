@@ -129,3 +129,14 @@ class JointModel:
 def show(atom: Atom | StepAtom) -> str:
     """PDDL syntax of a ground atom."""
     return label(atom.predicate if isinstance(atom, Atom) else atom.action, atom.args)
+
+
+def own_text(text: str, robot: str) -> str:
+    """A subaction's text as the robot says it of itself: ``(pass r1 r2 ball)`` of r1 is ``pass r2 ball``.
+
+    Without the parentheses and the first of its arguments that is the robot's name; a further one is what it acts on.
+    """
+    name, *args = text.strip("()").split()
+    if robot in args:
+        args.remove(robot)
+    return " ".join((name, *args))

@@ -10,6 +10,7 @@ import math
 import resource
 import signal
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -28,8 +29,11 @@ _LONGER = "Use a larger --time-limit."
 
 @contextmanager
 def time_limit(seconds: float | None) -> Iterator[None]:
-    """Raise `OutOfTime` in the block when ``seconds`` of wall time are over (main thread only)."""
-    if seconds is None or seconds > _FOR_EVER:
+    """Raise `OutOfTime` in the block when ``seconds`` of wall time are over (main thread only).
+
+    Blocks may be nested; the limit that is over first rings, and it names its own seconds.
+    """
+    if seconds is None or seconds > _FOR_EVER or time_left() < seconds:
         yield
         return
 
@@ -44,13 +48,17 @@ def time_limit(seconds: float | None) -> Iterator[None]:
 
     before = signal.signal(signal.SIGALRM, ring)
     lost_before, sys.unraisablehook = sys.unraisablehook, lost
-    signal.setitimer(signal.ITIMER_REAL, seconds, _AGAIN)
+    begin = time.monotonic()
+    outer, again = signal.getitimer(signal.ITIMER_REAL)
     try:
+        signal.setitimer(signal.ITIMER_REAL, seconds, _AGAIN)  # inside: it may ring at once
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
         sys.unraisablehook = lost_before
+        if outer:  # the block around this one goes on with its own time
+            signal.setitimer(signal.ITIMER_REAL, max(_SOON, outer - (time.monotonic() - begin)), again)
 
 
 def stop_clock() -> None:
@@ -59,7 +67,7 @@ def stop_clock() -> None:
 
 
 def time_left() -> float:
-    """Seconds until the alarm of the innermost `time_limit` rings; infinite without one."""
+    """Seconds until the alarm of a `time_limit` rings; infinite without one."""
     left, _ = signal.getitimer(signal.ITIMER_REAL)
     return left if left > 0 else math.inf
 
@@ -135,4 +143,5 @@ def _used() -> int:
         with open("/proc/self/statm") as text:
             return int(text.read().split()[0]) * resource.getpagesize()
     except OSError:
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+        unit = 1 if sys.platform == "darwin" else 1024
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit

@@ -36,6 +36,9 @@ class NoSuchAction(BadInput):
         self.step = step
 
 
+#: The comments with which a plan of `coordlang plans`, or of another planner, begins and ends.
+_BEGIN = re.compile(r"\s*;\s*(?:sampled )?plan \d+\b", re.IGNORECASE)
+_END = re.compile(r"\s*;\s*(?:makespan|cost) = \d", re.IGNORECASE)
 _LINE = re.compile(r"(?:(?P<step>\d+)\s*:)?\s*(?P<action>\([^()]*\))\s*(?:\[\s*[\d.]+\s*\])?$")
 
 
@@ -94,6 +97,31 @@ def read_plans(path: str | Path, model: JointModel) -> list[tuple[Texts, ...]]:
     return [_from_ipc(text, model, str(path))]
 
 
+def only_one_plan(text: str, place: Place) -> None:
+    """Raise `BadInput`, with the line, where a second plan begins in IPC text.
+
+    It begins with its comment, after the closing comment of the plan before it, or with step numbers that start again.
+    """
+    first = last = -1  # step numbers
+    begun = ended = actions = False
+    for number, raw in enumerate(text.splitlines(), 1):
+        line, _, _ = raw.partition(";")
+        step = re.match(r"\s*(\d{1,8})(?:\.\d+)?\s*:", line)
+        now = int(step[1]) if step else last
+        title = bool(_BEGIN.match(raw))
+        again = bool(line.strip()) and (ended or now == first < last)
+        if again or (title and (begun or actions)):
+            raise BadInput(
+                "this file holds several plans: a second one begins here",
+                place=Place(place.file, number, 1),
+                remedy="Write one plan a file (`coordlang plans --max 1`), or use the JSON form.",
+            )
+        begun, ended = begun or title, ended or (actions and bool(_END.match(raw)))
+        if line.strip():
+            actions, last = True, now
+            first = now if first < 0 else first
+
+
 def _from_json(text: str, model: JointModel, place: Place) -> list[tuple[Texts, ...]]:
     try:
         entries = json.loads(text)["plans"]
@@ -110,6 +138,7 @@ def _from_json(text: str, model: JointModel, place: Place) -> list[tuple[Texts, 
 
 
 def _from_ipc(text: str, model: JointModel, name: str) -> tuple[Texts, ...]:
+    only_one_plan(text, Place(name))
     steps: dict[int, list[str | None]] = {}
     for number, raw in enumerate(text.splitlines(), 1):
         line = raw.split(";")[0].strip().lower()

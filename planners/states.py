@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -71,7 +71,7 @@ class StateCodec:
     def decode(self, row: Rows) -> list[str]:
         """The true atoms of a state, sorted."""
         atoms = [
-            self.facts[word * _WORD_BITS + bit] for word in range(self.fact_words) for bit in _bits(int(row[word]))
+            self.facts[word * _WORD_BITS + bit] for word in range(self.fact_words) for bit in bits(int(row[word]))
         ]
         if self.memory is not None:
             for robot, labels, last in zip(self.robots, self.memory, row[self.fact_words :], strict=True):
@@ -79,6 +79,12 @@ class StateCodec:
                 atoms.append(f"(last {robot} {name})")
             atoms.sort()
         return atoms
+
+    def truth(self, rows: Rows) -> NDArray[np.bool_]:
+        """A table of states as truth values, (states, facts); remembered actions are left out."""
+        words = np.ascontiguousarray(rows[:, : self.fact_words], "<u8")
+        true = np.unpackbits(words.view(np.uint8), axis=1, bitorder="little")
+        return true[:, : len(self.facts)].astype(np.bool_)
 
     def key(self, row: Rows) -> str:
         """The state's key in a language file: its true fluents, sorted, joined by one space."""
@@ -128,11 +134,12 @@ def split_atoms(text: str) -> list[str]:
     return parts
 
 
-def _bits(word: int) -> Iterable[int]:
-    while word:
-        low = word & -word
+def bits(number: int) -> Iterator[int]:
+    """The set bits of a number that is not negative, the lowest (0) first."""
+    while number:
+        low = number & -number
         yield low.bit_length() - 1
-        word ^= low
+        number ^= low
 
 
 def test_bits(rows: Rows, which: NDArray[np.int64], facts: NDArray[np.int64]) -> NDArray[np.bool_]:

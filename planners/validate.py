@@ -8,12 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from planners.errors import Refuted
 from planners.pddl.lifted import Atom, Domain, Formula, Problem
 from planners.robots import Team
 from planners.rules import Instance, Labels, Moment, Rules, State
 
-__all__ = ["Instance", "Labels", "Moment", "Rules", "State", "Verdict", "apply_step", "step_problem", "validate"]
+__all__ = ["Instance", "Labels", "Moment", "Rules", "State", "Verdict", "validate"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,27 +65,3 @@ def validate(
         reason = f"the goal does not hold at the end: {rules.why_not(wanted, {}, True, Moment(state))}"
         return Verdict(False, len(plan), len(plan), reason)
     return Verdict(True, len(plan), None, "every step is a joint step and the goal holds at the end")
-
-
-def step_problem(
-    domain: Domain,
-    problem: Problem,
-    team: Team,
-    state: State,
-    labels: Labels,
-    allow_idle: Sequence[bool] | None = None,
-) -> str | None:
-    """The first rule that a joint step breaks in a state, in words; None for a legal step.
-
-    For many steps make a `Rules` once and ask `Rules.broken_rule`.
-    """
-    return Rules.of(domain, problem, team, allow_idle).broken_rule(state, labels)
-
-
-def apply_step(domain: Domain, problem: Problem, team: Team, state: State, labels: Labels) -> State:
-    """The state after a legal joint step; raises `Refuted` if it is not legal (everybody may idle)."""
-    rules = Rules.of(domain, problem, team)
-    reason = rules.broken_rule(state, labels)
-    if reason is not None:
-        raise Refuted(reason)
-    return rules.result(state, labels)

@@ -14,7 +14,8 @@ import numpy as np
 
 from coordlang.certificate.encoding import Cnf, encode
 from coordlang.certificate.file import Certificate, PlanTexts, Reason
-from coordlang.tasks import Candidates, goal_text
+from coordlang.task_file import goal_text
+from coordlang.tasks import Candidates
 from coordlang.warping import Clause, pair
 from planners.errors import BadInput, Refuted
 from planners.joint import JointModel
@@ -25,7 +26,8 @@ from planners.states import find_rows, split_atoms
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """A certificate that holds: every language for the tasks has at least ``lower_bound`` words.
+    """A certificate that holds: every partition that is a language for the tasks has at least
+    ``lower_bound`` words.
 
     ``cnf`` is the formula that was refuted, ``names`` are the keys of the states in it.
     """

@@ -8,9 +8,13 @@ from itertools import combinations
 
 import numpy as np
 
-from coordlang.vocabulary.sat import Colouring, by_demand, solved
+from coordlang.vocabulary.sat import Colouring, Undecided, by_demand, reduce, solved
 from coordlang.warping import Clause, Pair
 
+#: Conflicts after which the checking solver comes back.
+_SLICE = 10_000
+#: Conflicts, of one partition on the way to a core and of its last reduction, after which it is taken as it is.
+_EASY, _CONFLICTS = 5_000, 50_000
 #: Clauses that a core takes in for each partition that breaks them.
 _AT_ONCE = 50
 
@@ -39,12 +43,16 @@ class Cnf:
         lines += [" ".join(map(str, (*clause, 0))) for clause in self.clauses]
         return "\n".join(lines) + "\n"
 
-    def refuted(self, solver: str = "glucose4") -> bool:
-        """Whether the formula is unsatisfiable, by a solver that the builders do not use."""
+    def refuted(self, solver: str = "maplechrono") -> bool:
+        """Whether the formula is unsatisfiable, by a solver and a loop that the builders do not use."""
         from pysat.solvers import Solver
 
         with Solver(name=solver, bootstrap_with=self.clauses) as sat:
-            return not solved(sat)
+            answer = None
+            while answer is None:  # in slices: no signal is heard inside of the solver
+                sat.conf_budget(_SLICE)
+                answer = sat.solve_limited()
+            return answer is False
 
 
 def encode(clauses: Sequence[Clause], size: int) -> Cnf:
@@ -88,11 +96,19 @@ def _words_in_order(words: Sequence[Sequence[int]], size: int, counter: Iterable
 
 
 def core(clauses: Iterable[Clause], size: int) -> list[Clause]:
-    """A part of the clauses that still refutes ``size`` words, small but not least.
+    """A part of the clauses that still refutes ``size`` words, small but not least; all of them where that takes long.
 
-    Raises `ValueError` if they do not refute it.
+    Raises `ValueError` if it finds that they do not refute it.
     """
-    return _used(_in_the_way(sorted(clauses, key=lambda c: (len(c), sorted(c))), size), size)
+    every = reduce(clauses)
+    try:
+        small = _in_the_way(every, size)
+    except Undecided:
+        return every
+    try:
+        return _used(small, size)
+    except Undecided:
+        return small
 
 
 def _in_the_way(clauses: Sequence[Clause], size: int) -> list[Clause]:
@@ -104,7 +120,7 @@ def _in_the_way(clauses: Sequence[Clause], size: int) -> list[Clause]:
     kept: list[Clause] = []
     colouring = Colouring(states, size)
     try:
-        while (partition := colouring.solve()) is not None:
+        while (partition := colouring.solve(_EASY)) is not None:
             words[list(partition)] = list(partition.values())
             apart = words[pairs[:, 0]] != words[pairs[:, 1]]
             broken = np.flatnonzero(~np.logical_or.reduceat(apart, bounds)) if len(clauses) else bounds
@@ -128,7 +144,7 @@ def _used(clauses: Sequence[Clause], size: int) -> list[Clause]:
         select = [cnf.variables + 1 + n for n in range(len(clauses))]
         for variable, clause in zip(select, asked, strict=True):
             sat.add_clause([*clause, -variable])
-        if solved(sat, select):
+        if solved(sat, select, _CONFLICTS):
             raise AssertionError("a subset of the clauses refuted the words a moment ago")
         needed = set(sat.get_core() or ())
     return [clause for clause, variable in zip(clauses, select, strict=True) if variable in needed]

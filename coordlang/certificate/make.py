@@ -8,7 +8,8 @@ import numpy as np
 
 from coordlang.certificate.encoding import core
 from coordlang.certificate.file import Certificate, PlanTexts, Reason, WarpingPath
-from coordlang.tasks import Candidates, goal_text
+from coordlang.task_file import goal_text
+from coordlang.tasks import Candidates
 from coordlang.vocabulary.job import Evidence
 from coordlang.warping import Clause, pair, warping_path
 from planners.optimal import PlanSpace

@@ -13,7 +13,7 @@ from typing import NoReturn
 
 import click
 
-from coordlang.cli.app import EXIT_BROKEN_PIPE, EXIT_INTERRUPTED, cli
+from coordlang.cli.app import EXIT_BROKEN_PIPE, EXIT_INTERRUPTED, clear_progress, cli
 from planners.errors import CoordlangError, OutOfMemory
 
 
@@ -67,5 +67,6 @@ def _internal(error: Exception, debug: bool) -> int:
 
 
 def _fail(message: str, code: int) -> int:
+    clear_progress()
     print(f"coordlang: {message}", file=sys.stderr)
     return code

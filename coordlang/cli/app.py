@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import errno
 import functools
 import importlib
 import math
+import os
 import re
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 if TYPE_CHECKING:
+    from coordlang.tasks import Candidates
     from planners.model import Loaded, ModelOptions
 
 EXIT_UNPROVED = 3
@@ -125,7 +130,7 @@ def limits(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def model_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """How the PDDL files are understood; the command gets one `ModelOptions` as ``options``."""
+    """How the PDDL files are understood; the command gets `GivenOptions` as ``given``."""
 
     @click.option("--robots", metavar="R1,R2", help="The robots, where the domain does not say.")
     @click.option("--robot-type", metavar="TYPE", help="The type (or unary predicate) of the robots.")
@@ -204,6 +209,85 @@ def read_files(domain: str, problems: tuple[str, ...]) -> tuple[Any, list[Any]]:
 
     lifted = read_domain(domain)
     return lifted, [read_problem(path, lifted) for path in problems]
+
+
+def make_candidates(
+    lifted: Any, read: list[Any], tasks: str | None, options: ModelOptions, *, skip_unsolvable: bool = False
+) -> Candidates:
+    """The candidate tasks that ``--tasks`` asks for; without it the problems' own."""
+    from coordlang.task_file import read_task_file
+    from coordlang.tasks import all_pairs, from_listed, from_problems
+    from planners.errors import Place
+
+    if tasks is None:
+        return from_problems(lifted, read, options, skip_unsolvable=skip_unsolvable)
+    if tasks == "all":
+        return all_pairs(lifted, read, options)
+    listed = read_task_file(tasks)
+    return from_listed(lifted, read, listed, options, Place(tasks), skip_unsolvable=skip_unsolvable)
+
+
+def check_outputs(
+    outputs: Sequence[tuple[str, str | None]], inputs: Iterable[str | None], *, makes_folder: bool = False
+) -> None:
+    """Refuse outputs that cannot be written, overwrite an input file or one another: before the work, not after it.
+
+    ``outputs`` are pairs (option, path).  None is no file, ``-`` is stdout or stdin and not looked at.  ``makes_folder``:
+    the command makes the folder itself where it is missing.  Raises `UsageError`.
+    """
+    from planners.errors import UsageError
+
+    read = [path for path in inputs if path is not None and path != "-" and os.path.isfile(path)]
+    written: dict[str, str] = {}
+    for option, path in outputs:
+        if path is None or path == "-":
+            continue
+        if reason := _unwritable(path, makes_folder):
+            what = f"{option} {path} cannot be written: {reason}"
+            raise UsageError(what, remedy="Name a file in a folder that you may write to.")
+        if os.path.exists(path) and not os.path.isfile(path):
+            continue  # a device or a pipe: written to, and never replaced
+        if any(os.path.samefile(path, other) for other in read if os.path.exists(path)):
+            raise UsageError(f"{option} {path} would overwrite an input file", remedy="Give the output another name.")
+        other = written.setdefault(os.path.realpath(path), option)
+        if other != option:
+            raise UsageError(f"{other} and {option} name the same file: {path}", remedy="Give each a file of its own.")
+
+
+def _unwritable(path: str, makes_folder: bool) -> str | None:
+    """Why no file can be written there, or None."""
+    if os.path.isdir(path):
+        return os.strerror(errno.EISDIR)
+    if os.path.exists(path) and not os.path.isfile(path):
+        return None if os.access(path, os.W_OK) else os.strerror(errno.EACCES)
+    folder = Path(os.path.realpath(path)).parent
+    while makes_folder and not folder.exists():
+        folder = folder.parent
+    if makes_folder and not folder.is_dir():
+        return f"the folder {Path(path).parent} cannot be made: {os.strerror(errno.ENOTDIR)}"
+    if not folder.is_dir():
+        return f"there is no folder {Path(path).parent}"
+    return None if os.access(folder, os.W_OK | os.X_OK) else os.strerror(errno.EACCES)
+
+
+def never_stdout(option: str, path: str | None) -> None:
+    """Refuse ``-`` for a second output."""
+    from planners.errors import UsageError
+
+    if path == "-":
+        raise UsageError(f"{option} -: this cannot go to stdout", remedy="Name a file.")
+
+
+def progress(message: str) -> None:
+    """A line about what is being done, on a terminal only."""
+    if sys.stderr.isatty():
+        click.echo(f"\r\033[K{message} ..", nl=False, err=True)
+
+
+def clear_progress() -> None:
+    """Wipe that line, before anything else is said."""
+    if sys.stderr is not None and sys.stderr.isatty():
+        click.echo("\r\033[K", nl=False, err=True)
 
 
 def counted(number: int, noun: str) -> str:

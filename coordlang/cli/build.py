@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 from dataclasses import replace
 from importlib.metadata import version
@@ -16,19 +15,23 @@ from coordlang.cli.app import (
     EXIT_INTERRUPTED,
     EXIT_UNPROVED,
     GivenOptions,
+    check_outputs,
+    clear_progress,
     counted,
     domain_argument,
     limits,
+    make_candidates,
     model_options,
+    never_stdout,
     note_single_robot,
     problems_argument,
+    progress,
     read_files,
 )
 
 if TYPE_CHECKING:
     from coordlang.build import Built
     from coordlang.tasks import Candidates
-    from planners.model import ModelOptions
 
 
 @click.command(name="build")
@@ -73,15 +76,14 @@ def command(
 
     Exit 0: written, with the proof that the method promises.  3: written without it (a limit was hit).
     """
-    from coordlang.build import Inseparable, build_language, certificate_of
-    from coordlang.certificate import write_certificate
-    from coordlang.cli.coordination import show
+    from coordlang.build import Inseparable, build_language
+    from coordlang.cli.miscoordination import show
     from coordlang.file import to_bytes, write_language
-    from planners.limits import stop_clock
+    from planners.limits import stop_clock, time_left
 
-    if output != "-" and any(os.path.exists(f) and os.path.samefile(f, output) for f in (domain, *problems)
-                             if os.path.exists(output)):  # fmt: skip
-        raise click.UsageError(f"-o {output} would overwrite an input file")
+    never_stdout("--certificate", certificate)
+    listed = tasks if tasks != "all" else None
+    check_outputs([("-o", output), ("--certificate", certificate)], [domain, *problems, listed])
     if alpha_only and method != "separating":
         raise click.UsageError("--alpha-only belongs to --method separating")
     exact = method in ("minimal", "exhaustive")
@@ -99,11 +101,13 @@ def command(
             candidates, method, seed=seed, alpha_only=alpha_only, prefer=prefer, overlap=overlap, progress=progress
         )
     except Inseparable as error:
+        clear_progress()
         click.echo(show(error.witness), err=True)
         raise
-    proved = built.language.guarantee.proved_minimal
-    proof = certificate_of(built) if certificate and (built.stopped is None or proved) else None
+    left = time_left()
     stop_clock()  # the work is done; from here on it is saved
+    clear_progress()
+    proved = built.language.guarantee.proved_minimal
     seconds |= built.seconds
     producer = {
         "program": "coordlang",
@@ -118,8 +122,9 @@ def command(
         click.echo(to_bytes(language).decode(), nl=False)
     else:
         write_language(language, output)
-    if proof is not None and certificate is not None:
-        write_certificate(proof, certificate)
+    stopped = built.stopped
+    if certificate and (stopped is None or proved):
+        stopped = _certify(built, certificate, left) or stopped
     elif certificate:
         click.echo("coordlang: no certificate is written: the search was stopped", err=True)
     figures = _figures(candidates, built, seconds)
@@ -127,36 +132,36 @@ def command(
         click.echo(json.dumps(figures))
     else:
         click.echo(_summary(figures, output), err=output == "-")
-    if isinstance(built.stopped, KeyboardInterrupt):
+    if isinstance(stopped, KeyboardInterrupt):
         click.echo("coordlang: interrupted; the best language so far is written", err=True)
         return EXIT_INTERRUPTED
-    if built.stopped is not None:
-        reason = str(built.stopped).splitlines()[0] if str(built.stopped) else "out of memory"
+    if stopped is not None:
+        reason = str(stopped).splitlines()[0] if str(stopped) else "out of memory"
         short_of = "" if proved and exact else ", without proof"
         click.echo(f"coordlang: {reason}; the best language so far is written{short_of}", err=True)
-    unproved = not proved if exact else built.stopped is not None
+    unproved = not proved or stopped is not built.stopped if exact else stopped is not None
     return EXIT_UNPROVED if unproved else 0
 
 
-def make_candidates(
-    lifted: Any, read: list[Any], tasks: str | None, options: ModelOptions, *, skip_unsolvable: bool = False
-) -> Candidates:
-    """The candidate tasks that ``--tasks`` asks for; without it the problems' own."""
-    from coordlang.tasks import all_pairs, from_listed, from_problems, read_task_file
-    from planners.errors import Place
+def _certify(built: Built, path: str, seconds: float) -> BaseException | None:
+    """Write the certificate, within ``seconds``; the error that ended it early, or None."""
+    from coordlang.build import certificate_of
+    from coordlang.certificate import write_certificate
+    from planners.errors import OutOfMemory, OutOfTime
+    from planners.limits import stop_clock, time_limit
 
-    if tasks is None:
-        return from_problems(lifted, read, options, skip_unsolvable=skip_unsolvable)
-    if tasks == "all":
-        return all_pairs(lifted, read, options)
-    listed = read_task_file(tasks)
-    return from_listed(lifted, read, listed, options, Place(tasks), skip_unsolvable=skip_unsolvable)
-
-
-def progress(message: str) -> None:
-    """A line about what is being done, on a terminal only."""
-    if sys.stderr.isatty():
-        click.echo(f"\r\033[K{message} ..", nl=False, err=True)
+    try:
+        with time_limit(seconds):
+            progress("writing down why fewer words do not suffice")
+            proof = certificate_of(built)
+            stop_clock()
+            clear_progress()
+            write_certificate(proof, path)
+    except (OutOfTime, OutOfMemory, MemoryError, KeyboardInterrupt) as error:
+        clear_progress()
+        click.echo("coordlang: no certificate is written: there was no time or memory left for it", err=True)
+        return error
+    return None
 
 
 def _figures(candidates: Candidates, built: Built, seconds: dict[str, float]) -> dict[str, Any]:
@@ -180,8 +185,6 @@ def _figures(candidates: Candidates, built: Built, seconds: dict[str, float]) ->
 
 
 def _summary(figures: dict[str, Any], output: str) -> str:
-    if sys.stderr.isatty():
-        click.echo("\r\033[K", nl=False, err=True)
     words, total = figures["words"], sum(figures["seconds"].values())
     proof = "proved minimal, " if figures["proved_minimal"] else f"at least {figures['lower_bound']} needed, "
     flexible = (

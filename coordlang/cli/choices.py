@@ -9,6 +9,7 @@ import click
 
 from coordlang.cli.app import (
     GivenOptions,
+    check_outputs,
     counted,
     domain_argument,
     language_argument,
@@ -68,6 +69,7 @@ def command(
     from coordlang.use.choices_file import to_bytes
 
     form = "json" if as_json else form
+    check_outputs([("-o", output)], [language, domain, problem])
     spoken = read_spoken(language, domain, problem, given)
     chosen = _numbers(spoken.model.robots, whose)
     found = choices(spoken, spoken.words_of(sentence), most=None if check else MOST)
@@ -93,7 +95,7 @@ def _numbers(known: tuple[str, ...], whose: tuple[str, ...]) -> list[int]:
 
 def _judged(found: Choices, check: bool) -> int:
     """What is guaranteed, said on stderr where it is not everything; the exit code."""
-    from coordlang.cli.coordination import show
+    from coordlang.cli.miscoordination import show
     from coordlang.cli.speaking import covered
 
     walked = found.mixtures
@@ -128,7 +130,7 @@ def _text(found: Choices, chosen: list[int], check: bool) -> str:
 
 def _table(found: Choices, own: RobotChoices) -> list[str]:
     """The automaton state by state: what may be done there, where it leads, what is known there."""
-    from coordlang.use.choices_dot import telling
+    from coordlang.use.choices_dot import distinguishing
 
     model, automaton = found.spoken.model, own.automaton
     subplans = counted(automaton.count, "subplan")
@@ -138,7 +140,7 @@ def _table(found: Choices, own: RobotChoices) -> list[str]:
     for step, states in enumerate(automaton.layers[:-1], 1):
         if states.start >= _STATES_SHOWN:
             break
-        for state, atoms in zip(states, telling(found, own, states), strict=True):
+        for state, atoms in zip(states, distinguishing(found, own, states), strict=True):
             moves = [
                 f"{model.labels[own.robot][label] if label else 'idle'} -> {to}" for label, to in automaton.moves(state)
             ]

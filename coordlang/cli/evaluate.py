@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from coordlang.cli.app import EXIT_UNPROVED, counted, limits
+from coordlang.cli.app import EXIT_UNPROVED, check_outputs, clear_progress, counted, limits
 
 if TYPE_CHECKING:
     from coordlang.evaluation.recipe import Record, Section
@@ -61,8 +61,7 @@ def command(
     for name in names:
         if name != "all" and name not in RECIPES:
             raise click.UsageError(f"there is no experiment {name!r}; there are {', '.join(RECIPES)}, all")
-    if page is not None and not Path(page).parent.is_dir():  # said before all the work, not after it
-        raise click.UsageError(f"--page {page}: there is no folder {Path(page).parent}")
+    check_outputs([("--page", page)], [])
     chosen = [recipe for name, recipe in RECIPES.items() if name in names or "all" in names]
     given = click.get_current_context().get_parameter_source("samples")
     if quick and given is click.core.ParameterSource.DEFAULT:
@@ -122,8 +121,3 @@ def show_progress(progress: Progress) -> None:
     if sys.stderr.isatty():
         running = ", ".join(f"{unit.experiment}/{unit.key}" for unit in progress.running)
         click.echo(f"\r\033[K{progress.done} of {progress.all} ({progress.known} known) {running} ..", nl=False, err=True)
-
-
-def clear_progress() -> None:
-    if sys.stderr.isatty():
-        click.echo("\r\033[K", nl=False, err=True)

@@ -12,6 +12,7 @@ import click
 
 from coordlang.cli.app import (
     GivenOptions,
+    check_outputs,
     counted,
     domain_argument,
     language_argument,
@@ -65,6 +66,12 @@ def command(
 
     if back is not None and target != "pddl":
         raise click.UsageError("--back translates plans of the exported PDDL: leave out --to ltlf")
+    inputs = [language, domain, problem, back]
+    if output is not None and output != "-" and target == "pddl" and back is None and not as_json:
+        written = [("-o", os.path.join(output, name)) for name in ("domain.pddl", "problem.pddl")]
+        check_outputs(written, inputs, makes_folder=True)
+    else:
+        check_outputs([("-o", output)], inputs)
     spoken = read_spoken(language, domain, problem, given)
     words = spoken.words_of(sentence)
     if target == "ltlf":
@@ -140,15 +147,17 @@ def _write_plan(
     from coordlang.use.export.pddl import plan_names
     from coordlang.use.fitting import fitting
     from planners.errors import BadInput, Place, Refuted
-    from planners.planfile import to_ipc, to_json
+    from planners.planfile import only_one_plan, to_ipc, to_json
     from planners.plans import Plans
 
     place = Place(back)
     try:
         text = sys.stdin.read() if back == "-" else Path(back).read_text()
-        plan = exported.joint_plan(plan_names(text))
     except (OSError, UnicodeDecodeError) as error:
         raise BadInput(f"cannot be read: {getattr(error, 'strerror', error)}", place=place) from None
+    only_one_plan(text, place)
+    try:
+        plan = exported.joint_plan(plan_names(text))
     except BadInput as error:
         raise BadInput(error.what, place=place, remedy=error.remedy) from None
     plans = Plans.of(fitting(spoken, words))

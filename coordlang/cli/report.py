@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +9,7 @@ import click
 
 from coordlang.cli.app import (
     GivenOptions,
+    check_outputs,
     counted,
     domain_argument,
     language_argument,
@@ -51,9 +51,8 @@ def command(
     from coordlang.report.page import make_report
     from planners.errors import Place
 
-    inputs = [f for f in (language, domain, *problems, coordinates) if f is not None and os.path.exists(f)]
-    if output != "-" and os.path.exists(output) and any(os.path.samefile(f, output) for f in inputs):
-        raise click.UsageError(f"-o {output} would overwrite an input file")
+    places = coordinates if coordinates is not None else str(_beside(problems[0]))
+    check_outputs([("-o", output)], [language, domain, *problems, places])
     spoken = read_language(language)
     lifted, read = read_files(domain, problems)
     place = Place(language)
@@ -76,10 +75,14 @@ def command(
     click.echo(f"{shown}, {len(report.html):,} bytes, written to {'stdout' if output == '-' else output}", err=output == "-")
 
 
+def _beside(problem: str) -> Path:
+    return Path(problem).parent / "coordinates.json"
+
+
 def _coordinates(given: str | None, problem: str) -> dict[str, Point] | None:
     from coordlang.report.layout import read_coordinates
 
     if given is not None:
         return read_coordinates(given)
-    beside = Path(problem).parent / "coordinates.json"
+    beside = _beside(problem)
     return read_coordinates(beside) if beside.is_file() else None

@@ -9,6 +9,7 @@ import click
 
 from coordlang.cli.app import (
     GivenOptions,
+    check_outputs,
     counted,
     domain_argument,
     limits,
@@ -43,9 +44,11 @@ def command(
     In a PATTERN ? stands for any one name.
     """
     from coordlang.file import write_atomically
-    from coordlang.variation import tasks_text, varied_tasks
+    from coordlang.task_file import tasks_text
+    from coordlang.variation import varied_tasks
     from planners.model import build
 
+    check_outputs([("-o", output)], [domain, problem])
     lifted, read = read_files(domain, (problem,))
     options = replace(given.options(), remember_actions=False)  # tasks start with nothing to remember
     tasks = varied_tasks(build(lifted, read, options), starts, goals)

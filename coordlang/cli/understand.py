@@ -10,6 +10,7 @@ import click
 
 from coordlang.cli.app import (
     GivenOptions,
+    check_outputs,
     domain_argument,
     language_argument,
     limits,
@@ -76,6 +77,7 @@ def command(
         raise click.UsageError("--count prints a number only: leave out --max and --sample")
     if form in ("dot", "svg") and (only_count or most is not None or sample is not None):
         raise click.UsageError(f"--format {form} draws the DAG of all plans: leave out --count, --max and --sample")
+    check_outputs([("-o", output)], [language, domain, problem])
     spoken = read_spoken(language, domain, problem, given)
     understood = understand(spoken, spoken.words_of(sentence))
     if form in ("dot", "svg"):

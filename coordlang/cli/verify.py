@@ -8,12 +8,17 @@ import click
 
 from coordlang.cli.app import (
     GivenOptions,
+    check_outputs,
+    clear_progress,
     counted,
     domain_argument,
     language_argument,
     limits,
+    make_candidates,
     model_options,
+    never_stdout,
     problems_argument,
+    progress,
     read_files,
 )
 
@@ -45,8 +50,7 @@ def command(
     Exit 0: it is.  1: it is not, and two plans that miscoordinate are shown.
     """
     from coordlang.certificate import check, read_certificate
-    from coordlang.cli.build import make_candidates, progress
-    from coordlang.cli.coordination import show, witness_data
+    from coordlang.cli.miscoordination import show, witness_data
     from coordlang.file import check_source, read_language, recorded_candidates, write_atomically
     from coordlang.language import WordTable, words_of_states
     from coordlang.verify import verify
@@ -55,6 +59,9 @@ def command(
 
     if dimacs and not certificate:
         raise click.UsageError("--dimacs belongs to --lower-bound")
+    never_stdout("--dimacs", dimacs)
+    listed = tasks if tasks != "all" else None
+    check_outputs([("--dimacs", dimacs)], [language, domain, *problems, listed, certificate])
     spoken = read_language(language)
     proof = read_certificate(certificate) if certificate else None
     lifted, read = read_files(domain, problems)
@@ -69,6 +76,7 @@ def command(
         words = words_of_states(spoken, candidates.model, candidates.rows)
         verdict = verify_overlapping(spoken.words, words, candidates.spaces)
     bound = check(proof, candidates, progress) if proof and verdict.holds else None
+    clear_progress()
     if as_json:
         click.echo(json.dumps({
             "holds": verdict.holds, "tasks": verdict.tasks, "words": len(spoken.words), "nodes": verdict.nodes,

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from statistics import fmean
 from typing import Any
 
 from coordlang.evaluation.languages import COMPARED, TITLES, language_for
-from coordlang.evaluation.orders import NATURAL, greedy_in_orders
+from coordlang.evaluation.orders import NATURAL, ORDERS, greedy_in_orders
 from coordlang.evaluation.paper import DIFFERING, SAVING_ALL, SAVING_DIFFERING
 from coordlang.evaluation.plots import Panel, Series, histograms, per_task
 from coordlang.evaluation.recipe import (
@@ -23,15 +22,10 @@ from coordlang.evaluation.recipe import (
     percent,
     table,
 )
-from coordlang.evaluation.said import Said, said_in
-from coordlang.evaluation.suite import OTHERS, WORLDS
+from coordlang.evaluation.said import MOST_LISTED, Said, mean, said_in
+from coordlang.evaluation.suite import OTHERS, QUICK_ROW, ROW, WORLDS
 from coordlang.flexibility import flexibility
 
-#: The row of Table 1 that the paper measures on.
-ROW = "GWB7"
-QUICK_ROW = "GWB5"
-#: Random orders of the states for the greedy method.
-ORDERS = 100
 #: Tasks that the paper's figure shows.
 SHOWN = 100
 
@@ -73,23 +67,15 @@ def measures(tasks: Sequence[Said]) -> Result:
     return {
         "tasks": len(tasks),
         "differing": len(shorter),
-        "saving_differing": _mean(shorter),
-        "saving": _mean(first),
-        "saving_last": _mean([task.saving(len(task.last)) for task in tasks]),
-        "saving_expected": _mean([task.saving(task.expected_words) for task in tasks]),
-        "saving_most": _mean([task.saving(task.fewest_words) for task in tasks]),
-        "saving_of_actions": _mean([1 - len(task.first) / task.steps for task in tasks if task.steps]),
+        "saving_differing": mean(shorter, 6),
+        "saving": mean(first, 6),
+        "saving_last": mean([task.saving(len(task.last)) for task in tasks], 6),
+        "saving_expected": mean([task.saving(task.expected_words) for task in tasks], 6),
+        "saving_most": mean([task.saving(task.fewest_words) for task in tasks], 6),
+        "saving_of_actions": mean([1 - len(task.first) / task.steps for task in tasks if task.steps], 6),
         "states": [task.steps + 1 for task in tasks][:MOST_LISTED],
         "first_words": [len(task.first) for task in tasks][:MOST_LISTED],
     }
-
-
-#: Tasks whose own lengths are kept in the results.
-MOST_LISTED = 1000
-
-
-def _mean(values: Sequence[float]) -> float:
-    return round(fmean(values), 6) if values else 0.0
 
 
 def section(records: Sequence[Record]) -> Section:

@@ -3,25 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from statistics import fmean
 from typing import Any
 
 from coordlang.evaluation.languages import COMPARED, TITLES, language_for
-from coordlang.evaluation.orders import NATURAL, greedy_in_orders
+from coordlang.evaluation.orders import NATURAL, ORDERS, greedy_in_orders
 from coordlang.evaluation.paper import OPEN_ALL, OPEN_SEVERAL, SEVERAL
 from coordlang.evaluation.plots import Panel, histograms
 from coordlang.evaluation.recipe import Figure, Headline, Recipe, Record, Result, Section, Settings, Unit, done, table
-from coordlang.evaluation.said import Said, said_in
-from coordlang.evaluation.suite import OTHERS, WORLDS
+from coordlang.evaluation.said import MOST_LISTED, Said, mean, said_in
+from coordlang.evaluation.suite import OTHERS, QUICK_ROW, ROW, WORLDS
 from coordlang.flexibility import flexibility
-
-#: The row of Table 1 that the paper measures on.
-ROW = "GWB7"
-QUICK_ROW = "GWB5"
-#: Random orders of the states for the greedy method.
-ORDERS = 100
-#: Tasks whose own numbers are kept in the results.
-MOST_LISTED = 1000
 
 
 def units(settings: Settings) -> list[Unit]:
@@ -58,18 +49,14 @@ def measures(tasks: Sequence[Said]) -> Result:
     several = [number for number in first if number > 1]
     return {
         "tasks": len(tasks),
-        "plans": _mean([task.count for task in tasks]),
-        "open": _mean(first),
+        "plans": mean([task.count for task in tasks], 4),
+        "open": mean(first, 4),
         "several": len(several),
-        "open_several": _mean(several),
-        "open_last": _mean([task.plans[task.last] for task in tasks]),
-        "expected": _mean([float(task.expected_open) for task in tasks]),
+        "open_several": mean(several, 4),
+        "open_last": mean([task.plans[task.last] for task in tasks], 4),
+        "expected": mean([float(task.expected_open) for task in tasks], 4),
         "first": first[:MOST_LISTED],
     }
-
-
-def _mean(values: Sequence[float]) -> float:
-    return round(fmean(values), 4) if values else 0.0
 
 
 def section(records: Sequence[Record]) -> Section:

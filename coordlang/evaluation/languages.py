@@ -12,7 +12,8 @@ from coordlang.evaluation.recipe import Settings
 from coordlang.evaluation.suite import World
 from coordlang.file import read_language, write_language
 from coordlang.language import Language
-from coordlang.tasks import Candidates, ListedTask
+from coordlang.task_file import ListedTask
+from coordlang.tasks import Candidates
 
 #: The methods that experiments compare, in the order of tables.
 COMPARED = ("greedy", "separating", "minimal", "flexible")

@@ -13,6 +13,8 @@ from coordlang.vocabulary.greedy import fill
 from planners.matching import Ints
 from planners.states import find_rows
 
+#: Random orders of the states that experiments try.
+ORDERS = 100
 #: What orders that are not random are called.
 NATURAL = ("by number", "by number, reversed", "by name", "breadth first", "depth first")
 

@@ -11,14 +11,11 @@ from coordlang.evaluation.languages import TITLES, language_for
 from coordlang.evaluation.paper import PLANNING_RATIO
 from coordlang.evaluation.plots import Series, by_category
 from coordlang.evaluation.recipe import Figure, Headline, Recipe, Record, Result, Section, Settings, Unit, done, table
-from coordlang.evaluation.suite import OTHERS, WORLDS
+from coordlang.evaluation.suite import OTHERS, QUICK_ROW, ROW, WORLDS
 from coordlang.language import WordTable
 from coordlang.use.guided import Terrain, guided
 from coordlang.use.spoken import Spoken, speak_candidates
 
-#: The row of Table 1 that the paper measures on.
-ROW = "GWB7"
-QUICK_ROW = "GWB5"
 METHODS = ("greedy", "separating", "minimal")
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from statistics import fmean
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,9 @@ from planners.optimal import PlanSpace
 
 #: A sentence as word numbers.
 Words = tuple[int, ...]
+
+#: Tasks whose own numbers are kept in the results.
+MOST_LISTED = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,3 +121,8 @@ def _ends(space: PlanSpace, word: Ints, which: int) -> list[Words]:
 
 def _in_front(word: int, rest: Words) -> Words:
     return rest if rest[0] == word else (word, *rest)
+
+
+def mean(values: Sequence[float], digits: int) -> float:
+    """The mean as it is written into results; 0 of nothing."""
+    return round(fmean(values), digits) if values else 0.0

@@ -18,7 +18,7 @@ from coordlang.evaluation.maps import Path, draw_map, place_of
 from coordlang.evaluation.plots import drawing
 from coordlang.evaluation.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit, done, percent, table
 from coordlang.evaluation.suite import OTHERS, WORLDS, World
-from coordlang.tasks import ListedTask
+from coordlang.task_file import ListedTask
 from coordlang.use.automaton import Automaton
 from coordlang.use.spoken import Spoken, speak_candidates
 from planners.joint import JointModel

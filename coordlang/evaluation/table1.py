@@ -7,7 +7,7 @@ from statistics import median
 from typing import Any
 
 from coordlang.build import build_language
-from coordlang.evaluation.orders import greedy_in_orders
+from coordlang.evaluation.orders import ORDERS, greedy_in_orders
 from coordlang.evaluation.paper import TABLE_1
 from coordlang.evaluation.plots import Series, by_category
 from coordlang.evaluation.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit, done, table
@@ -26,8 +26,6 @@ METHODS = (
     ("exhaustive", "exhaustive", False),
 )
 QUICK = ("GW1", "GW2", "GWB5", "tray")
-#: Random orders of the states for the greedy method.
-ORDERS = 100
 #: Brute force, which mixes all pairs of plans, is begun up to so many of them, and ended after so many seconds.
 MOST_PAIRS, BRUTE_SECONDS = 500_000, 10.0
 #: Seconds that the slow rows take with SAT, roughly; the others are done in a second or two.

@@ -13,7 +13,7 @@ from itertools import permutations, product
 
 from coordlang.evaluation.hazards import Hazard
 from coordlang.evaluation.suite import World
-from coordlang.tasks import ListedTask
+from coordlang.task_file import ListedTask
 from planners.joint import JointModel
 
 #: Warehouses: open maps and rings (border cells only), with their rows and columns.

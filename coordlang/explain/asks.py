@@ -11,6 +11,7 @@ import numpy as np
 
 from coordlang.explain.cover import Cover
 from coordlang.language import WordTable
+from planners.joint import own_text
 from planners.matching import Ints, ranges
 from planners.optimal import PlanSpace
 from planners.plans import counts
@@ -114,7 +115,7 @@ def _part(space: PlanSpace, robot: int, few: int) -> RobotPart:
     """Walk over the sets of nodes that one sequence of the robot's own subactions leaves possible."""
     labels = space.model.labels[robot]
     choices = tuple(
-        tuple(_own(labels[n], space.model.robots[robot]) if n else None for n in np.unique(space.labels[edges, robot]))
+        tuple(own_text(labels[n], space.model.robots[robot]) if n else None for n in np.unique(space.labels[edges, robot]))
         for edges in _edges_by_step(space)
     )
     sets: dict[tuple[int, ...], int] = {(int(space.starts[0]),): 1}
@@ -133,7 +134,7 @@ def _part(space: PlanSpace, robot: int, few: int) -> RobotPart:
     total = sum(sets.values())
     listed = sorted(text for texts in sequences.values() for text in texts) if total <= few else []
     name = space.model.robots[robot]
-    return RobotPart(name, total, tuple(tuple(_own(labels[n], name) if n else None for n in s) for s in listed), choices)
+    return RobotPart(name, total, tuple(tuple(own_text(labels[n], name) if n else None for n in s) for s in listed), choices)
 
 
 def _moves(space: PlanSpace, robot: int, nodes: Sequence[int]) -> Iterator[tuple[int, tuple[int, ...]]]:
@@ -143,12 +144,6 @@ def _moves(space: PlanSpace, robot: int, nodes: Sequence[int]) -> Iterator[tuple
     label = space.labels[edges, robot]
     for own in np.unique(label).tolist():
         yield own, tuple(np.unique(space.target[edges[label == own]]).tolist())
-
-
-def _own(label: str, robot: str) -> str:
-    """``(move r1 a b)`` as robot r1's own: ``move a b``."""
-    words = label[1:-1].split(" ")
-    return " ".join([words[0], *(w for w in words[1:] if w != robot)])
 
 
 def _spoken_of(space: PlanSpace, formula: Cover) -> list[int]:
@@ -169,7 +164,7 @@ def _change(
     ways: dict[Subplan, set[int]] = defaultdict(set)
     for when, labels in zip(step.tolist(), space.labels[edges].tolist(), strict=True):
         model = space.model
-        does = tuple(_own(model.labels[r][labels[r]], model.robots[r]) if labels[r] else None for r in robots)
+        does = tuple(own_text(model.labels[r][labels[r]], model.robots[r]) if labels[r] else None for r in robots)
         ways[does].add(when)
     return WordChange(
         before=table.words[pair[0]],

@@ -87,7 +87,8 @@ class Cover:
     def conditions(self) -> list[tuple[str, ...]]:
         """The same as a disjunction of conjunctions of ground atoms and negated atoms, as PDDL text.
 
-        ``[()]`` is true, ``[]`` false.  Exact wherever the variables' invariants hold, so in all reachable states.
+        ``[()]`` is true, ``[]`` false.  Exact wherever the variables' invariants hold, so in all mapped states, and in
+        reachable ones as far as looked at (`coordlang.explain.variables`).
         """
         found: dict[tuple[str, ...], None] = {}
         for term in self.terms:

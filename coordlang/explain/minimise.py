@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coordlang.explain.boxes import Bits, Points, conflicting, expand
+from coordlang.vocabulary.sat import Undecided, solved
 
 #: Array elements looked at in expansions; decides how many passes are made.
 _WORK = 300_000_000
@@ -167,9 +168,9 @@ def _fewer(points: Points, number: int, needed: Sequence[int]) -> Bits | None:
             solver.add_clause([first + t * len(on) + i + 1 for t in range(number)])
         for t, i in enumerate(needed):
             solver.add_clause([first + t * len(on) + i + 1])
-        solver.conf_budget(_CONFLICTS)
-        answer = solver.solve_limited()
-        if answer is None:
+        try:
+            answer = solved(solver, conflicts=_CONFLICTS)
+        except Undecided:
             return None
         if not answer:
             return np.zeros((0, width), np.bool_)

@@ -84,7 +84,7 @@ def telling_text(told: Telling, mapped: Mapped) -> str:
     lines = []
     states = dict(zip(mapped.words, mapped.states, strict=True))
     for word, formula in told.rules:
-        head = f"  {word} ({_counted(states[word], 'state')}):"
+        head = f"  {word} ({counted(states[word], 'state')}):"
         terms = formula.terms if formula else ()
         if formula is None:
             lines.append(f"{head} every other state")
@@ -102,7 +102,7 @@ def telling_text(told: Telling, mapped: Mapped) -> str:
 
 def asked_text(asked: Asked) -> str:
     """What a sentence asks, in plain sentences."""
-    lines = [f'"{" ".join(asked.sentence)}" leaves {_counted(asked.plans, "plan")} open.']
+    lines = [f'"{" ".join(asked.sentence)}" leaves {counted(asked.plans, "plan")} open.']
     lines += [line for part in asked.parts for line in _part_lines(part, asked.steps)]
     lines += [f"  {change.before} -> {change.after} {_when(change)}: {_cause(change)}." for change in asked.changes]
     return "\n".join(lines)
@@ -161,11 +161,12 @@ def _cause(change: WordChange) -> str:
     together = [" and ".join(f"{robot} {own or 'wait'}" for robot, own in zip(change.robots, does, strict=True))
                 for does, _ in change.ways]  # fmt: skip
     rest = len(together) - _ALTERNATIVES
-    more = f"; or in {_counted(rest, 'other way')}" if rest > 0 else ""
+    more = f"; or in {counted(rest, 'other way')}" if rest > 0 else ""
     return f"{' and '.join(change.robots)} decide it together: {'; or '.join(together[:_ALTERNATIVES])}{more}"
 
 
-def _counted(number: int, noun: str) -> str:
+def counted(number: int, noun: str) -> str:
+    """``1 state``, ``1,200 states``."""
     return f"{number:,} {noun}{'s' * (number != 1)}"
 
 

@@ -1,7 +1,8 @@
 """PDDL fluents -> multi-valued variables: ``at(r2) = c3`` in the place of one truth value for each atom.
 
-A group of atoms of which at most one is true in every reachable state is one variable.  Groups are those atoms that agree
-in some arguments, the *key*: ``(at r2 a), (at r2 b), ..`` have the key ``r2`` and the values ``a, b, ..``.
+A group of atoms of which at most one is true in every state is one variable: in the mapped states, and in those that can be
+reached from them as far as looked at.  Groups are those atoms that agree in some arguments, the *key*: ``(at r2 a),
+(at r2 b), ..`` have the key ``r2`` and the values ``a, b, ..``.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from planners.joint import JointModel
 from planners.matching import Ints
-from planners.states import Rows, find_rows, test_bits, unique_rows
+from planners.states import Rows, find_rows, unique_rows
 
 #: States and joint steps looked at to find out what holds in all reachable states.
 _STATES = 20_000
@@ -84,8 +85,7 @@ def truth(model: JointModel, rows: Rows) -> tuple[tuple[str, ...], NDArray[np.bo
     """All atoms of the model, remembered actions too, and which are true in each state: (atoms, (states, atoms))."""
     codec = model.codec
     atoms = list(codec.facts)
-    everything = np.arange(len(atoms))
-    holds = [test_bits(rows, np.arange(len(rows))[:, None], everything[None, :])]
+    holds = [codec.truth(rows)]
     if codec.memory is not None:
         for robot, labels, last in zip(codec.robots, codec.memory, rows[:, codec.fact_words :].T, strict=True):
             atoms += [f"(last {robot} {label})" for label in ("none", *labels)]

@@ -20,7 +20,7 @@ from coordlang.report.shown import Selection
 from coordlang.report.task import Tables, TaskPart, task_data, told
 from coordlang.report.world import World, find_world
 from coordlang.use.spoken import Spoken
-from planners.joint import JointModel
+from planners.joint import JointModel, own_text
 from planners.states import find_rows, split_atoms
 
 #: States of the language beyond which their graph is not drawn, they are not listed, formulas are not sought.
@@ -131,7 +131,7 @@ def _role(fact: str, world: World) -> list[Any]:
     """The role of an atom with things and places as numbers."""
     if fact.startswith("(last "):
         robot, _, action = fact[len("(last ") : -1].partition(" ")
-        return ["about", world.things.index(robot), f"last did {short_label(robot, action)}"]
+        return ["about", world.things.index(robot), f"last did {own_text(action, robot)}"]
     kind, *rest = world.roles.get(fact, ("other",))
     things, places = world.things, world.places
     match kind, rest:
@@ -153,7 +153,7 @@ def _label(model: JointModel, world: World, robot: int, text: str | None) -> dic
     moves = world.moves(model, robot, model.labels[robot].index(text)) if known else ()
     return {
         "text": text,
-        "short": short_label(model.robots[robot], text),
+        "short": own_text(text, model.robots[robot]),
         "moves": [[world.things.index(thing), world.places.index(place)] for thing, place in moves],
     }
 
@@ -180,11 +180,3 @@ def _state_graph(spoken: Spoken) -> dict[str, Any] | None:
         "links": [[a, b] for a, b in drawn],
         "steps": len(links),
     }
-
-
-def short_label(robot: str, text: str) -> str:
-    """``(move r1 a b)`` as robot r1 says it: ``move a b``."""
-    words = text.strip("()").split()
-    if robot in words[1:]:
-        words.remove(robot)
-    return " ".join(words)

@@ -9,6 +9,7 @@ import numpy as np
 
 from coordlang.language import sentence
 from coordlang.report.layout import layer_orders
+from coordlang.sentences import sentence_counts
 from coordlang.use.automaton import determinise
 from coordlang.use.fitting import fitting
 from coordlang.use.spoken import Spoken
@@ -116,22 +117,11 @@ def shown_sentences(spoken: Spoken, graph: Graph, seed: int) -> ShownSentences:
 
 
 def _count_sentences(spoken: Spoken) -> dict[tuple[int, ...], int] | None:
-    """Sentence -> number of plans; None if a node has too many.  O(edges * sentences)."""
-    space, word = spoken.space, spoken.word.tolist()
-    below: list[dict[tuple[int, ...], int]] = []
-    for node in range(len(space)):
-        if space.layer[node] == 0:
-            below.append({(word[node],): 1})
-            continue
-        total: dict[tuple[int, ...], int] = {}
-        for target in space.target[space.first[node] : space.first[node + 1]].tolist():
-            for rest, number in below[target].items():
-                words = rest if rest[0] == word[node] else (word[node], *rest)
-                total[words] = total.get(words, 0) + number
-        if len(total) > _ALL_SENTENCES:
-            return None
-        below.append(total)
-    return below[spoken.start]
+    """Sentence -> number of plans; None if a node has too many."""
+    try:
+        return sentence_counts(spoken.space, spoken.start, spoken.word.tolist(), _ALL_SENTENCES)[spoken.start]
+    except OutOfMemory:
+        return None
 
 
 def _drawn_sentences(spoken: Spoken, graph: Graph, seed: int) -> list[tuple[int, ...]]:

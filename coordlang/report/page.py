@@ -9,6 +9,7 @@ from importlib.metadata import version
 from importlib.resources import files
 from typing import Any
 
+from coordlang.explain.text import counted
 from coordlang.language import Language
 from coordlang.report.data import page_data
 from coordlang.report.layout import Point
@@ -98,7 +99,7 @@ def _render(
         figures=_figures(language),
         about=_about(language, domain, problems, data, seed),
         formula=_formula,
-        counted=_counted,
+        counted=counted,
         number=_number,
         css=Markup((here / "page.css").read_text("utf-8")),
         js=Markup(js),
@@ -151,10 +152,6 @@ def _formula(text: str) -> Any:
             piece = f"<span>{piece}</span>"
         said.append(piece)
     return Markup(f'<span class="formula">{" ".join(said)}</span>')
-
-
-def _counted(number: int, noun: str) -> str:
-    return f"{_number(number)} {noun}{'s' * (number != 1)}"
 
 
 def _number(number: int) -> str:

@@ -8,7 +8,7 @@ from random import Random
 
 from coordlang.file import recorded_list
 from coordlang.language import Language
-from coordlang.tasks import goal_text, ground_tasks
+from coordlang.task_file import goal_text, ground_tasks
 from coordlang.use.spoken import Spoken, speak
 from coordlang.witness import Miscoordination, miscoordination
 from planners.errors import OutOfMemory, Place, ProvedImpossible, UsageError

@@ -13,7 +13,7 @@ from coordlang.report.graph import Graph, ShownSentences, plan_graph, shown_sent
 from coordlang.report.played import Played, play
 from coordlang.report.shown import ShownTask
 from coordlang.report.world import World
-from coordlang.tasks import goal_text
+from coordlang.task_file import goal_text
 from coordlang.use.spoken import Spoken
 from coordlang.verify import verify
 from coordlang.witness import Miscoordination

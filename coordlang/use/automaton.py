@@ -96,10 +96,10 @@ def determinise(
         moves.append(here)
         subsets = list(following)
         _check(space, robot, members, most, depth, len(layers) - 1)
-    return minimal(moves, outputs)
+    return minimised(moves, outputs)
 
 
-def minimal(moves: Sequence[Sequence[Mapping[int, int]]], known: Sequence[Sequence[Knowledge]]) -> Automaton:
+def minimised(moves: Sequence[Sequence[Mapping[int, int]]], known: Sequence[Sequence[Knowledge]]) -> Automaton:
     """The least automaton of a deterministic one given in layers: states are merged that agree on everything to come.
 
     ``moves[k][s]`` leads from state s of layer k by a label to a state of layer k + 1; layer 0 has one state.

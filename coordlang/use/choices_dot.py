@@ -7,6 +7,7 @@ from functools import reduce
 from operator import and_
 
 from coordlang.use.choices import Choices, RobotChoices
+from coordlang.use.drawing import quoted
 from planners.joint import IDLE
 
 
@@ -23,7 +24,7 @@ def to_dot(choices: Choices, robots: Sequence[int] | None = None) -> str:
     return "\n".join([*lines, "}"]) + "\n"
 
 
-def telling(choices: Choices, own: RobotChoices, states: range) -> list[list[str]]:
+def distinguishing(choices: Choices, own: RobotChoices, states: range) -> list[list[str]]:
     """For each state of one step the atoms known to be true there, without those known to be true in all of them."""
     known = own.automaton.known[states.start : states.stop]
     everywhere = reduce(and_, (true for true, _ in known))
@@ -35,19 +36,15 @@ def _cluster(choices: Choices, own: RobotChoices) -> list[str]:
     model, automaton = choices.spoken.model, own.automaton
     name, labels = model.robots[own.robot], model.labels[own.robot]
     title = f"{name}: {automaton.count:,} subplan{'s' * (automaton.count != 1)}"
-    lines = [f"  subgraph cluster_{own.robot} {{", f"    label={_quoted(title)};"]
+    lines = [f"  subgraph cluster_{own.robot} {{", f"    label={quoted(title)};"]
     for step, states in enumerate(automaton.layers):
-        for state, atoms in zip(states, telling(choices, own, states), strict=True):
+        for state, atoms in zip(states, distinguishing(choices, own, states), strict=True):
             text = "\n".join([f"{state}: {automaton.left[state]:,} left", *atoms])
             final = ", peripheries=2" if step == len(automaton.layers) - 1 else ""
-            lines.append(f"    r{own.robot}s{state} [label={_quoted(text)}{final}];")
+            lines.append(f"    r{own.robot}s{state} [label={quoted(text)}{final}];")
         lines.append("    {rank=same; " + " ".join(f"r{own.robot}s{state};" for state in states) + "}")
     for state in range(len(automaton)):
         for label, to in automaton.moves(state):
             text = labels[label] if label else IDLE
-            lines.append(f"    r{own.robot}s{state} -> r{own.robot}s{to} [label={_quoted(text)}];")
+            lines.append(f"    r{own.robot}s{state} -> r{own.robot}s{to} [label={quoted(text)}];")
     return [*lines, "  }"]
-
-
-def _quoted(text: str) -> str:
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n") + '"'

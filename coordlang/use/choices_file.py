@@ -1,4 +1,4 @@
-"""Choices files: robots' choices as JSON (docs/formats.md), and as pictures in Graphviz' language."""
+"""Choices files: robots' choices as JSON (docs/formats.md)."""
 
 from __future__ import annotations
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from coordlang.use.understanding import Dag, DagEdge, DagNode
+from planners.joint import own_text
 from planners.states import split_atoms
 
 #: Colours that people of every colour vision tell apart (Okabe and Ito 2008).  Words carry their names as well.
@@ -53,7 +54,8 @@ def edge_lines(dag: Dag, edge: DagEdge) -> list[str]:
     for action in edge.actions[:_ACTIONS_SHOWN]:
         if lines:
             lines.append("or")
-        lines += [_clipped(_own(robot, text)) for robot, text in zip(dag.robots, action, strict=True)]
+        for robot, text in zip(dag.robots, action, strict=True):
+            lines.append(_clipped(f"{robot} {own_text(text or '(idles)', robot)}"))
     rest = len(edge.actions) - _ACTIONS_SHOWN
     return [*lines, f"or {rest:,} more"] if rest > 0 else lines
 
@@ -89,7 +91,7 @@ def to_dot(dag: Dag) -> str:
         "  rankdir=LR;",
         '  node [shape=box, style="filled,rounded", fontname="monospace", fontsize=10];',
         '  edge [fontname="monospace", fontsize=9];',
-        f"  labelloc=t; label={_quoted(title)};",
+        f"  labelloc=t; label={quoted(title)};",
     ]
     for layer in dag.layers:
         out.append(f"  subgraph step{dag.nodes[layer.start].step} {{ rank=same;")
@@ -97,7 +99,7 @@ def to_dot(dag: Dag) -> str:
         out.append("  }")
     for edge in dag.edges:
         merged = dag.nodes[edge.source].merged or dag.nodes[edge.target].merged
-        look = "style=dashed" if merged else f"label={_quoted(chr(10).join(edge_lines(dag, edge)))}"
+        look = "style=dashed" if merged else f"label={quoted(chr(10).join(edge_lines(dag, edge)))}"
         out.append(f"  n{edge.source} -> n{edge.target} [{look}];")
     return "\n".join([*out, "}"]) + "\n"
 
@@ -105,22 +107,15 @@ def to_dot(dag: Dag) -> str:
 def _dot_node(node: DagNode, lines: list[str], ink: dict[str, Ink]) -> str:
     text = "\n".join([*([] if node.merged else [node.word]), *lines, plans_text(node.plans)])
     if node.merged:
-        return f'label={_quoted(text)}, style="dashed,rounded"'
+        return f'label={quoted(text)}, style="dashed,rounded"'
     own = ink[node.word]
     look = f'fillcolor="{own.fill}", fontcolor="{own.text}"' + (", peripheries=2" if own.again else "")
-    return f"label={_quoted(text)}, tooltip={_quoted(node.key)}, {look}"
+    return f"label={quoted(text)}, tooltip={quoted(node.key)}, {look}"
 
 
-def _quoted(text: str) -> str:
+def quoted(text: str) -> str:
+    """A string of Graphviz' language."""
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n") + '"'
-
-
-def _own(robot: str, text: str | None) -> str:
-    """``r1 move a b``: a robot and its subaction, without its name among the arguments."""
-    name, *args = (text or "(idles)")[1:-1].split(" ")
-    if robot in args:
-        args.remove(robot)
-    return " ".join((robot, name, *args))
 
 
 def _plain(atom: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 
@@ -14,7 +14,7 @@ from coordlang.use.spoken import Spoken
 from planners.heuristics import FAR, Heuristic, heuristic
 from planners.joint import Goal, JointModel
 from planners.plans import Plan
-from planners.states import Rows
+from planners.states import Rows, bits
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,11 +132,11 @@ def astar(
     expanded, generated = 0, 1
     while queue:
         *_, state = heappop(queue)
-        bits = waiting[state]
-        if not bits:
+        here = waiting[state]
+        if not here:
             continue
         waiting[state] = 0
-        if known.reached[state] and bits >> last & 1:
+        if known.reached[state] and here >> last & 1:
             plan, states = _way(before, (state, last))
             said = sentence(terrain.word[s] for s in states)
             return Search(plan, said, best[state], expanded, len(looked), generated)
@@ -147,14 +147,14 @@ def astar(
         depth, second = best[state]
         for order, (target, labels, cost) in enumerate(steps):
             goes_on = words is not None and terrain.word[target] != terrain.word[state]
-            fresh = bits << 1 & places.get(terrain.word[target], 0) if goes_on else bits
+            fresh = here << 1 & places.get(terrain.word[target], 0) if goes_on else here
             reached = (depth + 1, second + cost)
             if not fresh or known.height[target] >= FAR or (target in best and best[target] < reached):
                 continue
             if target not in best or reached < best[target]:
                 best[target], met[target], waiting[target] = reached, 0, 0
             fresh &= ~met[target]
-            for place in _places(fresh):
+            for place in bits(fresh):
                 before[target, place] = ((state, place - goes_on), labels)
             if fresh > waiting[target]:  # a place further on than those that wait
                 left = last + 1 - fresh.bit_length()
@@ -182,13 +182,6 @@ class _Heights:
             rows = np.stack([self.terrain.rows[state] for state in fresh])
             self.height.update(zip(fresh, self.bound(rows).tolist(), strict=True))
             self.reached.update(zip(fresh, self.terrain.model.holds(self.goal, rows).tolist(), strict=True))
-
-
-def _places(bits: int) -> Iterator[int]:
-    while bits:
-        low = bits & -bits
-        yield low.bit_length() - 1
-        bits ^= low
 
 
 def _way(

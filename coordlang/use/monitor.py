@@ -18,7 +18,7 @@ FORMAT = "coordlang/choices"
 VERSION = 1
 IDLE = "idle"
 
-#: Where a monitor is: a state of the automaton, and which of the wishes are fulfilled already (bits).
+#: Where a monitor is: a state of the automaton, and which parts of the detour are made already (bits).
 Position = tuple[int, int]
 
 #: One text or several; None is idling.
@@ -44,7 +44,7 @@ class NotPossible(MonitorError):
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class Detour:
     """What a robot wants of its remaining steps; all of it at once.
 
     ``visit``: atoms, each known to be true in the present or in some later state.  ``avoid``: atoms known to be false in the
@@ -63,17 +63,17 @@ class Wish:
             object.__setattr__(self, field.name, _texts(getattr(self, field.name)))
 
     @classmethod
-    def of(cls, **wanted: Texts) -> Wish:
-        """Each wish as one text or several; None stands for idling."""
+    def of(cls, **wanted: Texts) -> Detour:
+        """Each field as one text or several; None stands for idling."""
         return cls(**{name: _texts(value) for name, value in wanted.items()})
 
-    def __and__(self, other: Wish) -> Wish:
-        return Wish(*((*getattr(self, f.name), *getattr(other, f.name)) for f in fields(self)))
+    def __and__(self, other: Detour) -> Detour:
+        return Detour(*((*getattr(self, f.name), *getattr(other, f.name)) for f in fields(self)))
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Whether a wish can still be fulfilled: ``subplan`` is one way to do it (the first in order), ``subplans`` their number.
+    """Whether a detour is still possible: ``subplan`` is one way to do it (the first in order), ``subplans`` their number.
 
     True in a condition iff it is possible.
     """
@@ -127,9 +127,9 @@ class Monitor:
         self._true: list[frozenset[int]] = [frozenset(state["true"]) for state in states]
         self._unknown: list[frozenset[int]] = [frozenset(state["unknown"]) for state in states]
         self._history: tuple[str | None, ...] = ()
-        self._wish = Wish()
+        self._promised = Detour()
         self._position: Position = (0, 0)
-        self._left = self._counts(self._wish, self._position)
+        self._left = self._counts(self._promised, self._position)
 
     @classmethod
     def read(cls, path: str, robot: str | None = None) -> Monitor:
@@ -166,13 +166,13 @@ class Monitor:
         return self._left[self._position]
 
     @property
-    def promised(self) -> Wish:
+    def promised(self) -> Detour:
         """Everything that `commit` was called with."""
-        return self._wish
+        return self._promised
 
     def allowed(self) -> tuple[str | None, ...]:
         """What the robot may do next (None: idle), sorted, idling first; nothing when it has finished."""
-        return tuple(text for text, _ in self._moves(self._wish, self._left, self._position))
+        return tuple(text for text, _ in self._moves(self._promised, self._left, self._position))
 
     def did(self, subaction: str | None) -> None:
         """Tell what the robot did in this step, as ``(move r1 a b)``; None or ``idle`` for idling.
@@ -180,7 +180,7 @@ class Monitor:
         Raises `NotAllowed`, and is then as it was before.
         """
         text = _subaction(subaction)
-        for own, after in self._moves(self._wish, self._left, self._position):
+        for own, after in self._moves(self._promised, self._left, self._position):
             if own == text:
                 self._position = after
                 self._history = (*self._history, text)
@@ -198,12 +198,12 @@ class Monitor:
             return None
         return fact in self._true[state]
 
-    def can(self, wish: Wish | None = None, /, **wanted: Texts) -> Answer:
-        """Can all this still be had at once, promises kept?  ``can(visit="(at r1 c)", never="idle")``; see `Wish`.
+    def can(self, detour: Detour | None = None, /, **wanted: Texts) -> Answer:
+        """Can all this still be had at once, promises kept?  ``can(visit="(at r1 c)", never="idle")``; see `Detour`.
 
         O(automaton * 2^(visits and dos)).
         """
-        whole = self._wish & (wish or Wish()) & Wish.of(**wanted)
+        whole = self._promised & (detour or Detour()) & Detour.of(**wanted)
         self._check_atoms(whole)
         position = self._enter(whole, *self._position)
         left = self._counts(whole, position) if position else {}
@@ -215,50 +215,50 @@ class Monitor:
             subplan.append(text)
         return Answer(tuple(subplan), left[start])
 
-    def commit(self, wish: Wish | None = None, /, **wanted: Texts) -> None:
+    def commit(self, detour: Detour | None = None, /, **wanted: Texts) -> None:
         """Promise it: from now on only what keeps the promise is allowed.
 
         Raises `NotPossible`, and is then as it was before.
         """
-        if not self.can(wish, **wanted):
-            kept = " together with what was promised before" if self._wish != Wish() else ""
+        if not self.can(detour, **wanted):
+            kept = " together with what was promised before" if self._promised != Detour() else ""
             raise NotPossible(f"step {self.step + 1}: {self.robot} has no subplan left for this{kept}")
-        self._wish = self._wish & (wish or Wish()) & Wish.of(**wanted)
-        position = self._enter(self._wish, *self._position)
+        self._promised = self._promised & (detour or Detour()) & Detour.of(**wanted)
+        position = self._enter(self._promised, *self._position)
         assert position is not None
         self._position = position
-        self._left = self._counts(self._wish, position)
+        self._left = self._counts(self._promised, position)
 
-    def _enter(self, wish: Wish, state: int, kept: int) -> Position | None:
+    def _enter(self, detour: Detour, state: int, kept: int) -> Position | None:
         """The position in a state; None if it is one to be avoided."""
         true, unknown = self._true[state], self._unknown[state]
-        for atom in wish.avoid:
+        for atom in detour.avoid:
             fact = self._facts.get(atom)
             if fact is None or fact in true or fact in unknown:
                 return None
-        for bit, atom in enumerate(wish.visit):
+        for bit, atom in enumerate(detour.visit):
             if self._facts.get(atom) in true:
                 kept |= 1 << 2 * bit
         return state, kept
 
-    def _after(self, wish: Wish, position: Position, text: str | None) -> Position | None:
-        """The position after one subaction; None if the wish forbids it."""
+    def _after(self, detour: Detour, position: Position, text: str | None) -> Position | None:
+        """The position after one subaction; None if the detour forbids it."""
         state, kept = position
-        if any(_matches(pattern, text) for pattern in wish.never):
+        if any(_matches(pattern, text) for pattern in detour.never):
             return None
-        for bit, pattern in enumerate(wish.do):
+        for bit, pattern in enumerate(detour.do):
             if _matches(pattern, text):
                 kept |= 2 << 2 * bit
-        return self._enter(wish, self._next[state][text], kept)
+        return self._enter(detour, self._next[state][text], kept)
 
-    def _counts(self, wish: Wish, start: Position) -> dict[Position, int]:
-        """How many subplans from each position fulfil the wish, for all positions from ``start`` on."""
-        whole = sum(1 << 2 * bit for bit in range(len(wish.visit))) + sum(2 << 2 * bit for bit in range(len(wish.do)))
+    def _counts(self, detour: Detour, start: Position) -> dict[Position, int]:
+        """How many subplans from each position make the detour, for all positions from ``start`` on."""
+        whole = sum(1 << 2 * bit for bit in range(len(detour.visit))) + sum(2 << 2 * bit for bit in range(len(detour.do)))
         after: dict[Position, list[Position]] = {}
         layer = [start]
         while layer:
             for position in layer:
-                moves = (self._after(wish, position, text) for text in self._next[position[0]])
+                moves = (self._after(detour, position, text) for text in self._next[position[0]])
                 after[position] = [to for to in moves if to is not None]
             layer = list(dict.fromkeys(to for position in layer for to in after[position]))
         left: dict[Position, int] = {}
@@ -268,18 +268,18 @@ class Monitor:
         return left
 
     def _moves(
-        self, wish: Wish, left: Mapping[Position, int], position: Position
+        self, detour: Detour, left: Mapping[Position, int], position: Position
     ) -> list[tuple[str | None, Position]]:
         """The subactions that still lead to the end, with the position after each."""
         found = []
         for text in self._next[position[0]]:
-            after = self._after(wish, position, text)
+            after = self._after(detour, position, text)
             if after is not None and left[after]:
                 found.append((text, after))
         return found
 
-    def _check_atoms(self, wish: Wish) -> None:
-        for atom in (*wish.visit, *wish.avoid):
+    def _check_atoms(self, detour: Detour) -> None:
+        for atom in (*detour.visit, *detour.avoid):
             if atom not in self._facts and atom not in self._others:
                 raise MonitorError(f"{atom} is no atom that can change: {self._similar(atom)}")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from coordlang.use.automaton import Automaton, Knowledge, minimal
+from coordlang.use.automaton import Automaton, Knowledge, minimised
 from planners.grounding import GroundEffect
 from planners.joint import JointModel, show
 from planners.pddl.lifted import TRUE
@@ -76,7 +76,7 @@ def know_own(automaton: Automaton, own: OwnAtoms, start: int) -> Automaton:
         moves.append(here)
         known.append([(true, true | own.others) for _, true in layer])
         layer = list(following)
-    return minimal(moves, known)
+    return minimised(moves, known)
 
 
 def _changes(model: JointModel, effects: Sequence[GroundEffect]) -> tuple[dict[int, Change], int]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from coordlang.language import sentence
-from coordlang.tasks import formula_text
+from coordlang.task_file import formula_text
 from coordlang.use.spoken import Spoken
 from planners.errors import BadInput, Place, Refuted
 from planners.joint import IDLE, FullState, JointModel

@@ -9,7 +9,8 @@ import numpy as np
 
 from coordlang.file import check_source, options_of, recorded_list
 from coordlang.language import Language, WordTable
-from coordlang.tasks import Candidates, ListedTask, ground_tasks
+from coordlang.task_file import ListedTask, ground_tasks
+from coordlang.tasks import Candidates
 from planners.errors import BadInput, Place
 from planners.joint import Goal, JointModel
 from planners.matching import Ints

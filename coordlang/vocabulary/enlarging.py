@@ -17,6 +17,7 @@ import numpy as np
 from coordlang.coordination import Bools
 from coordlang.flexibility import Floats
 from coordlang.overlapping import Overlap, Readings, Sentence, TooManySentences, readings
+from coordlang.vocabulary.objective import nodes_above
 from planners.errors import OutOfMemory, OutOfTime
 from planners.limits import stop_clock
 from planners.optimal import PlanSpace
@@ -132,7 +133,7 @@ class _Search:
         """Give a state a further word if that is a language and leaves more plans open on average."""
         self.tried += 1
         old = self.words[state]
-        above = [_above(space, state) for space in self._spaces]
+        above = [nodes_above(space, state) for space in self._spaces]
         affected = [n for n, (which, node, _) in enumerate(self._tasks) if above[which][node]]
         kept: list[dict[int, dict[int, int]]] = []
         after = self.expected.copy()
@@ -162,16 +163,6 @@ class _Search:
                     for n, own in classes.items():
                         read.classes[n] = own
         return better
-
-
-def _above(space: PlanSpace, state: int) -> Bools:
-    """The nodes from which a plan passes through a state."""
-    above: Bools = space.state == state
-    source = space.sources
-    for span in space.layers:
-        low, high = int(space.first[span.start]), int(space.first[span.stop])
-        above[source[low:high][above[space.target[low:high]]]] = True
-    return above
 
 
 def _states_from(space: PlanSpace, node: int) -> set[int]:

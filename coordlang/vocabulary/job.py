@@ -53,9 +53,9 @@ class Evidence:
 class Outcome:
     """A partition with what is proved of it.
 
-    ``lower_bound``: no coordination language has fewer words.  ``figures`` are the work done.  ``stopped`` is the error
-    that ended the search early, None if it came to its end.  ``evidence`` are the necessary clauses that were met, of
-    which no partition into ``lower_bound - 1`` words satisfies all (nothing for methods that meet none).
+    ``lower_bound``: no partition with fewer words is a coordination language.  ``figures`` are the work done.  ``stopped``
+    is the error that ended the search early, None if it came to its end.  ``evidence`` are the necessary clauses that were
+    met, of which no partition into ``lower_bound - 1`` words satisfies all (nothing for methods that meet none).
     """
 
     partition: Partition

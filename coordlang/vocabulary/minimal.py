@@ -17,10 +17,10 @@ from random import Random
 import numpy as np
 
 from coordlang.counterexamples import counterexamples
-from coordlang.symmetry import Symmetry, symmetries
+from coordlang.symmetry import Symmetry, closed, symmetries
 from coordlang.tuples import EdgeIndex
 from coordlang.vocabulary.job import Evidence, Job, Outcome, Partition
-from coordlang.vocabulary.sat import Colouring, Effort, Problems, Undecided, by_demand, close_in, reduce
+from coordlang.vocabulary.sat import Colouring, Effort, Problems, Undecided, by_demand, close_in, most_asked, reduce
 from coordlang.vocabulary.separating import quickly as separated
 from coordlang.warping import Clause, pair, separation_clause
 from planners.errors import OutOfMemory, OutOfTime
@@ -32,6 +32,10 @@ from planners.optimal import PlanSpace
 _PARTS, _TASKS = 8, 1_500
 #: Edges of the composition walk up to which separating words are looked for first.
 _WALKED = 500_000
+#: Conflicts within which most partitions are found; after so many the solver is likely on the way to a proof.
+_EASY = 5_000
+#: Pairs of states by which one of symmetric partitions is told: enough to tell most apart.
+_LEADING = 20
 #: Counterexamples taken from one part.
 _MOST = 200
 
@@ -82,8 +86,11 @@ class _Search:
         self._found = 0
         self._clauses: list[Clause] = []
         self._problems = Problems(self._start, Colouring.add)
+        #: Of symmetric partitions these allow one: proofs are ten times shorter, but partitions harder to find.
+        self._led = Problems(self._start_led, Colouring.add)
         self.evidence: dict[Clause, Evidence] = {}
         self._symmetries: list[tuple[Symmetry, list[int]]] = []
+        self._group: list[list[int]] = []
 
     @property
     def _upper(self) -> int:
@@ -105,19 +112,26 @@ class _Search:
         """A separating partition, if one with fewer words is found quickly."""
         if self._job.alphas.edges > _WALKED:
             return
-        with suppress(OutOfMemory):  # its walk may be larger than ours; we can do without
-            self.best = separated(replace(self._job, incumbent=self.best))
+        found = separated(replace(self._job, incumbent=self.best))
+        self.best = found.partition
+        if found.stopped is not None and not isinstance(found.stopped, OutOfMemory):
+            raise found.stopped  # its walk may be larger than ours, that we can do without; but not time
 
     def exceeds(self, size: int) -> bool:
-        """Whether every language has more words than ``size``."""
+        """Whether every partition that is a language has more words than ``size``."""
         return self._decide(size, self._prepare(), Effort(sys.maxsize, sys.maxsize)) and self.lower > size
 
     def close(self) -> None:
         """Give back what the solvers hold."""
-        self._problems.drop_all()
+        for problems in (self._problems, self._led):
+            problems.drop_all()
 
     def _prepare(self) -> list[_Part]:
         self._symmetries = [(s, s.states.tolist()) for s in symmetries(self._job.candidates)]
+        # A group only: then the clauses, which have all their images, contradict each other without the preference too,
+        # and a certificate can do without it.
+        if closed([s.states for s, _ in self._symmetries]):
+            self._group = [states for _, states in self._symmetries]
         return _parts(self._job.candidates.spaces, Random(self._job.seed))
 
     def _decide(self, size: int, parts: Sequence[_Part], effort: Effort) -> bool:
@@ -126,7 +140,7 @@ class _Search:
             partition = self._refine(size, parts, effort)
         except Undecided:
             return False
-        self._problems.drop(size)
+        self._drop(size)
         if partition is None:
             self.lower = size + 1
         else:
@@ -134,16 +148,31 @@ class _Search:
             self.best = partition
         return True
 
-    def _start(self, size: int, known: Sequence[Clause]) -> Colouring:
+    def _start(self, size: int, known: Sequence[Clause], solver: str = "cadical153") -> Colouring:
         clauses = reduce(known)
-        colouring = Colouring(by_demand(self._job.states, clauses), size)
+        colouring = Colouring(by_demand(self._job.states, clauses), size, solver)
         for clause in clauses:
             colouring.add(clause)
         return colouring
 
+    def _start_led(self, size: int, known: Sequence[Clause]) -> Colouring:
+        colouring = self._start(size, known, "glucose4")
+        colouring.prefer_one_of_each(self._group, most_asked(known, _LEADING))
+        return colouring
+
+    def _partition(self, size: int, conflicts: int) -> dict[int, int] | None:
+        """A partition that satisfies all clauses, or None if there is none."""
+        with suppress(Undecided):
+            return self._problems.of(size, self._clauses).solve(_EASY)
+        return self._led.of(size, self._clauses).solve(conflicts)
+
+    def _drop(self, size: int) -> None:
+        for problems in (self._problems, self._led):
+            problems.drop(size)
+
     def _refine(self, size: int, parts: Sequence[_Part], effort: Effort) -> Partition | None:
         """The loop for one number of words: a language, or None if there is none."""
-        partition = self._problems.of(size, self._clauses).solve(effort.conflicts)
+        partition = self._partition(size, effort.conflicts)
         clean = position = rounds = 0
         word = np.zeros(len(self._job.candidates.rows), np.int64)
         while partition is not None and clean < len(parts):
@@ -164,7 +193,7 @@ class _Search:
             rounds += 1
             self._found += len(fresh)
             self._clauses += self._images(fresh)
-            partition = self._problems.of(size, self._clauses).solve(effort.conflicts)
+            partition = self._partition(size, effort.conflicts)
         return partition
 
     def figures(self) -> dict[str, float]:

@@ -142,6 +142,16 @@ class Objective:
         return self._of_state[state]
 
 
+def nodes_above(space: PlanSpace, state: int) -> NDArray[np.bool_]:
+    """The nodes from which a plan passes through a state, their own state included.  O(edges)."""
+    above: NDArray[np.bool_] = space.state == state
+    source = space.sources
+    for span in space.layers:
+        low, high = int(space.first[span.start]), int(space.first[span.stop])
+        above[source[low:high][above[space.target[low:high]]]] = True
+    return above
+
+
 class _Measured:
     """A plan space with the numbers of plans that measuring needs."""
 
@@ -156,12 +166,7 @@ class _Measured:
 
     def passing(self, state: int) -> NDArray[np.bool_]:
         """Which tasks have plans through a state."""
-        space = self.space
-        above = space.state == state
-        for span in self._spans:
-            low, high = int(space.first[span.start]), int(space.first[span.stop])
-            above[self._source[low:high][above[space.target[low:high]]]] = True
-        passing: NDArray[np.bool_] = above[space.starts]
+        passing: NDArray[np.bool_] = nodes_above(self.space, state)[self.space.starts]
         return passing
 
     def part(self, wanted: NDArray[np.bool_]) -> _Part:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-from coordlang.warping import Clause, Pair
+from coordlang.warping import Clause, Pair, pair
 
 Requirement = TypeVar("Requirement")
 
@@ -32,6 +33,7 @@ class Colouring:
         self._solver = Solver(name=solver)
         self._word = {s: [self._new() for _ in range(size)] for s in self._states}
         self._separated: dict[Pair, int] = {}
+        self._defined: set[Pair] = set()
         self._all: dict[Clause, int] = {}
         for state in self._states:
             self._one_word(self._word[state])
@@ -48,6 +50,25 @@ class Colouring:
                 self.add([states])
             return
         self._solver.add_clause([self._all_separate(pairs) for pairs in alternatives])
+
+    def prefer_one_of_each(self, symmetries: Sequence[Sequence[int]], pairs: Sequence[Pair]) -> None:
+        """Of partitions that are images of each other, allow the one that separates the first of ``pairs`` (and of such
+        the one that separates the second, ..): a lex-leader constraint over so many pairs.
+
+        ``symmetries`` map states to states.  No proof is lost if every requirement's images are required as well.
+        """
+        for symmetry in symmetries:
+            equal = 0  # a variable that holds if a partition and its image agree on all pairs so far; 0: there is none
+            for states in pairs:
+                image = pair(*(symmetry[s] for s in states))
+                if image == states:
+                    continue
+                here, there = self._differ(states), self._differ(image)
+                before = [-equal] if equal else []
+                self._solver.add_clause([*before, here, -there])
+                equal = self._new()
+                self._solver.add_clause([*before, here, there, equal])
+                self._solver.add_clause([*before, -here, -there, equal])
 
     def solve(self, conflicts: int | None = None) -> dict[int, int] | None:
         """A partition (state -> word), or None if there is none: a proof that ``size`` words do not suffice.
@@ -78,6 +99,16 @@ class Colouring:
             for a, b in zip(*(self._word[s] for s in states), strict=True):
                 self._solver.add_clause([-variable, -a, -b])
         return self._separated[states]
+
+    def _differ(self, states: Pair) -> int:
+        """As `_separate`, but the variable is false too if both states have one word."""
+        variable = self._separate(states)
+        if states not in self._defined:
+            self._defined.add(states)
+            for a, b in zip(*(self._word[s] for s in states), strict=True):
+                self._solver.add_clause([variable, -a, b])
+                self._solver.add_clause([variable, a, -b])
+        return variable
 
     def _all_separate(self, pairs: Clause) -> int:
         if pairs not in self._all:
@@ -212,6 +243,12 @@ def reduce(clauses: Iterable[Clause]) -> list[Clause]:
         rarest = min(sorted(clause), key=lambda p: len(by_pair.get(p, ())))
         by_pair.setdefault(rarest, []).append(clause)
     return kept
+
+
+def most_asked(clauses: Iterable[Clause], most: int) -> list[Pair]:
+    """The pairs that most clauses name, the most frequent first."""
+    asked = Counter(states for clause in clauses for states in clause)
+    return sorted(asked, key=lambda p: (-asked[p], p))[:most]
 
 
 def by_demand(states: Iterable[int], clauses: Iterable[Clause]) -> list[int]:

@@ -6,7 +6,7 @@ apart where they part or where they meet, so a sentence can be understood withou
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -34,12 +34,27 @@ def separating(job: Job) -> Outcome:
     ``figures["separating_lower_bound"]`` is the proved bound on separating partitions; other languages may have fewer
     words.  Anytime, like `minimal`.
     """
-    search = _AlphaOnly(job) if job.alpha_only else _AlphaOrBeta(job)
+    return _searched(job, _AlphaOnly(job) if job.alpha_only else _AlphaOrBeta(job), _Search.run)
+
+
+def quickly(job: Job) -> Outcome:
+    """A separating partition with fewer words than the job's incumbent, as far as a short search finds one; else that."""
+    return _searched(job, _AlphaOrBeta(job), _short)
+
+
+def _short(search: _Search) -> None:
+    search.prepare()
+    while search.lower < search.upper and search.decide(search.lower, _SHORT):
+        pass
+
+
+def _searched(job: Job, search: _Search, run: Callable[[_Search], None]) -> Outcome:
     stopped: BaseException | None = None
     try:
-        search.run()
+        run(search)
     except (OutOfTime, OutOfMemory, MemoryError, KeyboardInterrupt) as error:
-        stop_clock()
+        if not isinstance(error, OutOfMemory):  # a walk was too large to keep: there may be other work to do, in time
+            stop_clock()
         if search.best is None:
             raise
         stopped = error.with_traceback(None)
@@ -47,18 +62,6 @@ def separating(job: Job) -> Outcome:
         search.close()
     assert search.best is not None
     return Outcome(search.best, job.lower_bound, search.figures(), stopped)
-
-
-def quickly(job: Job) -> Partition | None:
-    """The job's incumbent, or a separating partition with fewer words, as far as a short search finds one."""
-    search = _AlphaOrBeta(job)
-    try:
-        search.prepare()
-        while search.lower < search.upper and search.decide(search.lower, _SHORT):
-            pass
-    finally:
-        search.close()
-    return search.best
 
 
 class _Search:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations, product
 
+from planners.errors import BadInput
 from planners.grounding.instantiate import GroundAction
 from planners.pddl.lifted import TRUE, And, Constraint, Domain, Formula, Not, Or, Problem, StepAtom
 from planners.robots import objects_of
@@ -22,6 +23,8 @@ def apply_network(domain: Domain, problem: Problem, actions: Sequence[GroundActi
     """
     if not domain.constraints:
         return tuple(actions)
+    for constraint in domain.constraints:
+        _check_types(domain, problem, constraint)
     by_name = {c.name: c for c in domain.constraints}
     groups: _Groups = {}
     keys: dict[GroundAction, list[tuple[str, tuple[str, ...]]]] = {}
@@ -33,6 +36,27 @@ def apply_network(domain: Domain, problem: Problem, actions: Sequence[GroundActi
     return tuple(
         _bound(domain, by_name, groups, action, keys[action]) if action in keys else action for action in actions
     )
+
+
+def _check_types(domain: Domain, problem: Problem, constraint: Constraint) -> None:
+    """Raise `BadInput` for a position whose type excludes the parameter's: the constraint would never match."""
+    schemas = {schema.name: schema for schema in domain.schemas}
+    types = {"object", *domain.types}
+    for (name, positions), offset in zip(constraint.actions, constraint.offsets, strict=True):
+        for parameter, position in zip(constraint.parameters, positions, strict=True):
+            argument = schemas[name].parameters[position]
+            asked = {*parameter.types}, {*argument.types}
+            common = any(all("object" in a or a & domain.supertypes(t) for a in asked) for t in types)
+            if common or set(objects_of(domain, problem, parameter.types)) & {
+                *objects_of(domain, problem, argument.types)
+            }:  # an object of two types
+                continue
+            raise BadInput(
+                f"argument {position} of {name} is {argument.name} - {' or '.join(argument.types)}, which is never "
+                f"{parameter.name} - {' or '.join(parameter.types)}: the constraint {constraint.name!r} would never match",
+                place=domain.source.place(offset),
+                remedy="Positions count from 0; if the action has an :agent, it is argument 0.",
+            )
 
 
 def _bindings(
@@ -96,12 +120,16 @@ def _by_robot(group: Sequence[GroundAction], action: GroundAction) -> list[list[
 
 def _some(others: Sequence[list[StepAtom]], number: int) -> Formula:
     """At least ``number`` robots among the others do one of these."""
+    if number > len(others):  # may be any number, too large for `combinations`
+        return Or(())
     ways = [chosen for robots in combinations(others, number) for chosen in product(*robots)]
     return Or(tuple(chosen[0] if number == 1 else And(chosen) for chosen in ways))
 
 
 def _not_more(others: Sequence[list[StepAtom]], high: int) -> list[Formula]:
     """No ``high`` robots among the others do one of these (the action itself is one more)."""
+    if high > len(others):
+        return []
     ways = [chosen for robots in combinations(others, high) for chosen in product(*robots)]
     if high == 1:
         return [Not(chosen[0]) for chosen in ways]

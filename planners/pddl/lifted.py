@@ -127,7 +127,7 @@ class Constraint:
 
     For each binding of ``parameters``, the subactions of a joint step that match it are none, or at least ``low`` and at
     most ``high`` (None: no bound).  ``actions`` lists each action with the positions of its arguments (the agent is
-    argument 0) that the parameters bind.
+    argument 0) that the parameters bind; ``offsets`` are the places of its entries in the text.
     """
 
     name: str
@@ -135,6 +135,7 @@ class Constraint:
     low: int
     high: int | None
     actions: tuple[tuple[str, tuple[int, ...]], ...]
+    offsets: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from planners.pddl.lifted import Constraint, Schema
 from planners.pddl.names import Names, group, known, word
 from planners.pddl.sexpr import Expression, Group, Word
+
+
+#: More robots than there ever are: larger numbers mean the same.
+_MANY = 1_000_000_000
 
 
 def read_network(
@@ -54,7 +59,7 @@ def _constraint(names: Names, arities: dict[str, int], section: Group) -> Constr
         )
     parameters = names.read_variables(group(document, fields[":parameters"], "a list of variables").items)
     low, high = _bounds(names, group(document, fields[":bounds"], "'(LOW HIGH)'"))
-    actions = []
+    actions, offsets = [], []
     for item in group(document, fields[":actions"], "a list of actions").items:
         entry = group(document, item, "'(action POSITION ..)'")
         if entry.head not in arities:
@@ -66,7 +71,8 @@ def _constraint(names: Names, arities: dict[str, int], section: Group) -> Constr
                 entry,
             )
         actions.append((entry.head, positions))
-    return Constraint(name, parameters, low, high, tuple(actions))
+        offsets.append(entry.offset)
+    return Constraint(name, parameters, low, high, tuple(actions), tuple(offsets))
 
 
 def _bounds(names: Names, item: Group) -> tuple[int, int | None]:
@@ -78,12 +84,15 @@ def _bounds(names: Names, item: Group) -> tuple[int, int | None]:
         return low, None
     most = _number(names, high)
     if most < low or most == 0:
-        raise names.document.fail(f"nobody can meet the bounds ({low} {most})", item)
+        raise names.document.fail(
+            f"nobody can meet the bounds ({low} {most})", item, "HIGH is at least 1 and at least LOW; inf is no upper bound."
+        )
     return low, most
 
 
 def _number(names: Names, item: Expression) -> int:
     text = word(names.document, item, "a number").text
-    if not text.isdigit():
+    if not re.fullmatch(r"[0-9]+", text):
         raise names.document.fail(f"expected a number from 0, found {text!r}", item)
-    return int(text)
+    digits = text.lstrip("0") or "0"
+    return int(digits) if len(digits) <= len(str(_MANY)) else _MANY

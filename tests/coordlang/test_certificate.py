@@ -13,7 +13,8 @@ from coordlang.build import Built, build_language, certificate_of
 from coordlang.certificate import Certificate, Reason, check, encode, read_certificate, write_certificate
 from coordlang.certificate.encoding import core
 from coordlang.certificate.file import WarpingPath
-from coordlang.tasks import all_pairs, from_listed, from_problems, read_task_file
+from coordlang.task_file import read_task_file
+from coordlang.tasks import all_pairs, from_listed, from_problems
 from coordlang.vocabulary.minimal import refute
 from coordlang.witness import inseparable
 from planners.errors import BadInput, ProvedImpossible, Refuted

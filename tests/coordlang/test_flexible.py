@@ -18,7 +18,8 @@ from coordlang.coordination import walk
 from coordlang.flexibility import flexibility
 from coordlang.flexibility_bound import flexibility_bounds
 from coordlang.pairs import divided
-from coordlang.tasks import Candidates, ListedTask, all_pairs, from_listed, from_problems, read_task_file
+from coordlang.task_file import ListedTask, read_task_file
+from coordlang.tasks import Candidates, all_pairs, from_listed, from_problems
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Outcome, Partition
 from coordlang.vocabulary.objective import Objective

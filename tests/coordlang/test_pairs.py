@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import combinations, product
+from pathlib import Path
 from random import Random
 
 import pytest
@@ -12,7 +13,7 @@ from coordlang.language import WordTable
 from coordlang.pairs import language_for, pair_languages, together, unsafe_pair
 from coordlang.tasks import Candidates, from_problems
 from coordlang.verify import verify
-from coordlang.witness import inseparable
+from coordlang.witness import Inseparable, inseparable
 from planners.pddl import read_domain, read_problem
 from planners.plans import Plan
 from planners.states import split_atoms, unique_rows
@@ -116,6 +117,20 @@ def test_two_robots_are_one_pair() -> None:
         assert language.size == build_language(candidates, "minimal").language.guarantee.size
         compared += language.size > 1
     assert compared >= 2
+
+
+@pytest.mark.parametrize("robots", ["r1 r2", "r1 r2 r3"])
+def test_inseparable_plans_have_no_language(robots: str, tmp_path: Path) -> None:
+    """Any robot may press, but not two of them: plans through the same two states."""
+    (tmp_path / "d.pddl").write_text("""(define (domain lamps) (:types robot) (:predicates (lit))
+      (:action press :agent ?r - robot :parameters ()
+        :precondition (and (not (lit)) (forall (?o - robot) (not (press ?o)))) :effect (lit)))""")
+    (tmp_path / "p.pddl").write_text(f"(define (problem p) (:domain lamps) (:objects {robots} - robot) (:goal (lit)))")
+    domain = read_domain(tmp_path / "d.pddl")
+    candidates = from_problems(domain, [read_problem(tmp_path / "p.pddl", domain)])
+    with pytest.raises(Inseparable) as caught:
+        pair_languages(candidates.spaces)
+    assert len(caught.value.witness.plans) == len(robots.split())
 
 
 def colours(key: str) -> str:

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from coordlang.cli import run
-from coordlang.tasks import ListedTask, from_listed, read_task_file
+from coordlang.task_file import ListedTask, read_task_file
+from coordlang.tasks import from_listed
 from coordlang.variation import varied_tasks
 from planners.errors import ProvedImpossible, UsageError
 from planners.model import Loaded, load

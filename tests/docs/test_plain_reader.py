@@ -13,7 +13,8 @@ import pytest
 from coordlang.cli import run
 from coordlang.file import options_of, read_language
 from coordlang.language import WordTable, sentence
-from coordlang.tasks import all_pairs, read_task_file
+from coordlang.task_file import read_task_file
+from coordlang.tasks import all_pairs
 from planners.pddl import read_domain, read_problem
 from planners.plans import Plans, counts
 from tests.docs.pages import DOCS, ROOT, blocks

@@ -16,8 +16,6 @@ from tests.docs.pages import DOCS, PAGES, ROOT, anchor, blocks, code, links, pro
 
 CLI = DOCS / "cli.md"
 SHARED = {"model options": "Model options", "limits": "Limits"}
-#: Options whose choices need not all be described yet.
-OPEN: set[tuple[str, str]] = set()
 
 
 @cache
@@ -63,7 +61,7 @@ def test_choices_and_defaults(name: str) -> None:
             listed = {word for inline in code(cells[0]) for word in inline.split() if not word.startswith("-")}
             real = set(option.type.choices)
             assert listed <= real, f"{name} {spelling}"
-            assert listed == real or (name, spelling) in OPEN, f"{name} {spelling}"
+            assert listed == real, f"{name} {spelling}"
         if option.show_default:
             default = f"default: {option.default}"
             assert default in cells[1].replace("`", ""), f"{name} {spelling}: {default}"

@@ -13,7 +13,8 @@ import pytest
 
 from coordlang.build import Inseparable, build_language
 from coordlang.language import WordTable
-from coordlang.tasks import Candidates, all_pairs, from_listed, from_problems, read_task_file
+from coordlang.task_file import read_task_file
+from coordlang.tasks import Candidates, all_pairs, from_listed, from_problems
 from coordlang.verify import verify
 from coordlang.witness import miscoordination
 from planners.fast_downward import optimal_cost

@@ -17,6 +17,7 @@ from random_pddl import KINDS, Kind, RandomModel, random_model
 from planners.errors import BadInput, ProvedImpossible
 from planners.grounding import instantiate
 from planners.grounding.reachability import reachable_arguments
+from planners.joint import own_text
 from planners.model import Loaded, ModelOptions, build, task_of
 from planners.optimal import TaskGroup, plan_spaces, search
 from planners.pddl import parse_domain, parse_problem
@@ -285,3 +286,20 @@ def test_an_effect_on_every_object() -> None:
         ),
         note=lambda _: None,
     )
+
+
+@pytest.mark.parametrize(
+    ("text", "robot", "own"),
+    [
+        ("(move r1 a b)", "r1", "move a b"),
+        ("(pass r1 r2 ball)", "r1", "pass r2 ball"),
+        ("(pass r1 r2 ball)", "r2", "pass r1 ball"),
+        ("(move a b)", "r1", "move a b"),
+        ("(point r1 r1)", "r1", "point r1"),
+        ("(r1 r1 a)", "r1", "r1 a"),
+        ("(wait)", "r1", "wait"),
+        ("none", "r1", "none"),
+    ],
+)
+def test_a_label_without_the_robots_name(text: str, robot: str, own: str) -> None:
+    assert own_text(text, robot) == own

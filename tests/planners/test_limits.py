@@ -119,6 +119,28 @@ def test_time_left() -> None:
     assert time_left() == float("inf")
 
 
+def test_limits_within_limits() -> None:
+    """The one that is over first rings; leaving the inner block gives the outer its time back."""
+    with time_limit(100):
+        with time_limit(50):
+            assert 25 < time_left() <= 50
+        assert 75 < time_left() <= 100
+        with time_limit(200):
+            assert 75 < time_left() <= 100
+        assert 75 < time_left() <= 100
+    assert time_left() == float("inf")
+    with pytest.raises(OutOfTime, match=r"limit of 0\.05 s"), time_limit(0.05), time_limit(10):
+        time.sleep(2)
+
+    def inner_then_outer() -> None:
+        with pytest.raises(OutOfTime, match=r"limit of 0\.05 s"), time_limit(0.05):
+            time.sleep(2)
+        time.sleep(2)
+
+    with pytest.raises(OutOfTime, match=r"limit of 0\.3 s"), time_limit(0.3):
+        inner_then_outer()
+
+
 @dataclass(frozen=True)
 class Stopping:
     """A stepper that a limit stops after some tables of states."""

@@ -51,10 +51,25 @@ def constraint(name: str, bounds: str, action: str) -> str:
 
 @pytest.mark.parametrize(
     ("bounds", "numbers"),
-    [("(1 1)", {0, 1}), ("(2 2)", {0, 2}), ("(2 inf)", {0, 2, 3}), ("(1 2)", {0, 1, 2}), ("(3 3)", {0, 3}), ("(4 4)", {0})],
+    [("(1 1)", {0, 1}), ("(2 2)", {0, 2}), ("(2 inf)", {0, 2, 3}), ("(1 2)", {0, 1, 2}), ("(3 3)", {0, 3}), ("(4 4)", {0}),
+     (f"(2 {10**20})", {0, 2, 3}), (f"(2 {'9' * 5000})", {0, 2, 3}), (f"({10**20} {10**30})", {0}), ("(02 003)", {0, 2, 3})],
 )
 def test_bounds(bounds: str, numbers: set[int]) -> None:
     assert rowers(constraint("v", bounds, "row")) == numbers
+
+
+@pytest.mark.parametrize("parameter", ["?b", "?b - object", "?b - (either boat place)", "?b - vessel", "?b - tub"])
+def test_types_that_some_object_may_share(parameter: str) -> None:
+    network = constraint("v", "(2 2)", "row").replace("?b - boat", parameter)
+    text = ROWING.replace("robot boat place", "robot place tub - boat boat - vessel").replace("NETWORK", network)
+    domain = parse_domain(Source("rowing", text))
+    build(domain, [parse_problem(Source("crew", CREW), domain)])
+
+
+def test_an_object_of_two_types_matches() -> None:
+    network = constraint("v", "(2 2)", "row").replace("?b - boat", "?b - place")
+    domain = parse_domain(Source("rowing", ROWING.replace("NETWORK", network)))
+    build(domain, [parse_problem(Source("crew", CREW.replace("b - boat", "b - (either boat place)")), domain)])
 
 
 def test_without_a_network_anybody_rows() -> None:
@@ -78,6 +93,10 @@ def test_dependence_is_needed_by_the_second_only() -> None:
         (constraint("v", "(2 1)", "row"), "nobody can meet the bounds (2 1)"),
         (constraint("v", "(1)", "row"), "expected '(LOW HIGH)'"),
         (constraint("v", "(x 1)", "row"), "expected a number from 0, found 'x'"),
+        (constraint("v", "(1 ²)", "row"), "expected a number from 0, found '²'"),
+        (constraint("v", "(1 1)", "row").replace("(row 1)", "(row 0)"),
+         "argument 0 of row is ?r - robot, which is never ?b - boat: the constraint 'v' would never match"),
+        (constraint("v", "(1 1)", "row").replace("boat", "place"), "argument 1 of row is ?b - boat, which is never ?b - place"),
         (constraint("v", "(1 1)", "row").replace("(row 1)", "(row 9)"), "expected 1 argument positions below 3"),
         ("(:concurrency-constraint v :bounds (1 1))", "missing: :actions, :parameters"),
         ("(:positive-dependence v w)", "unknown constraint 'v'"),

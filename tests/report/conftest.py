@@ -16,7 +16,8 @@ from coordlang.build import build_language
 from coordlang.file import signed
 from coordlang.language import Language
 from coordlang.report.page import Report, make_report
-from coordlang.tasks import all_pairs, from_listed, from_problems, read_task_file
+from coordlang.task_file import read_task_file
+from coordlang.tasks import all_pairs, from_listed, from_problems
 from planners.model import ModelOptions
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Domain, Problem

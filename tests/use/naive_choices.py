@@ -9,7 +9,7 @@ from functools import cached_property
 from itertools import product
 from math import prod
 
-from coordlang.use.monitor import Wish
+from coordlang.use.monitor import Detour
 from coordlang.use.spoken import Spoken
 from planners.plans import Plan, Plans
 from tests.coordlang import naive
@@ -94,18 +94,18 @@ class Listed:
             if own[:here] == history
         )
 
-    def fulfilling(self, robot: int, history: Own, wish: Wish, known: dict[Own, Known]) -> set[Own]:
-        """The own parts that begin with ``history`` and fulfil a wish from then on."""
-        return {own for own in self.own[robot] if own[: len(history)] == history and self._fulfils(robot, own, len(history), wish, known)}
+    def fulfilling(self, robot: int, history: Own, detour: Detour, known: dict[Own, Known]) -> set[Own]:
+        """The own parts that begin with ``history`` and make a detour from then on."""
+        return {own for own in self.own[robot] if own[: len(history)] == history and self._makes(robot, own, len(history), detour, known)}
 
-    def _fulfils(self, robot: int, own: Own, here: int, wish: Wish, known: dict[Own, Known]) -> bool:
+    def _makes(self, robot: int, own: Own, here: int, detour: Detour, known: dict[Own, Known]) -> bool:
         ahead = [known[own[:step]] for step in range(here, len(own) + 1)]
         texts = [self.spoken.model.labels[robot][label] if label else "idle" for label in own[here:]]
         return (
-            all(any(atom in true for true, _ in ahead) for atom in wish.visit)
-            and all(all(atom in false for _, false in ahead) for atom in wish.avoid)
-            and all(any(like(pattern, text) for text in texts) for pattern in wish.do)
-            and not any(like(pattern, text) for text in texts for pattern in wish.never)
+            all(any(atom in true for true, _ in ahead) for atom in detour.visit)
+            and all(all(atom in false for _, false in ahead) for atom in detour.avoid)
+            and all(any(like(pattern, text) for text in texts) for pattern in detour.do)
+            and not any(like(pattern, text) for text in texts for pattern in detour.never)
         )
 
 

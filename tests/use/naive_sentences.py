@@ -9,7 +9,8 @@ from hypothesis import assume
 
 from coordlang.build import Inseparable, build_language
 from coordlang.language import Guarantee, Language, WordTable, name_words
-from coordlang.tasks import Candidates, ListedTask, from_listed, from_problems
+from coordlang.task_file import ListedTask
+from coordlang.tasks import Candidates, from_listed, from_problems
 from coordlang.use.spoken import Spoken
 from planners.errors import ProvedImpossible
 from planners.model import ModelOptions, build

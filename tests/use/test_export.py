@@ -374,6 +374,7 @@ def test_the_command_as_json(coordlang: Command, t_map: tuple[Path, Path], minim
         ((SENTENCE, "--back", "missing"), 31, "cannot be read"),
         ((SENTENCE, "--back", "other"), 31, "none of the exported problem"),
         ((SENTENCE, "--back", "empty"), 1, "no optimal plan"),
+        ((SENTENCE, "--back", "two"), 31, "two:3:1: this file holds several plans"),
         ((SENTENCE, "--to", "ltlf", "--back", "empty"), 2, "leave out --to ltlf"),
         ((SENTENCE, "-o", "other"), 2, "the folder other cannot be made"),
         ((SENTENCE, "-o", "missing/x", "--to", "ltlf"), 2, "cannot be written"),
@@ -393,6 +394,7 @@ def test_wrong_arguments(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    Path("two").write_text("(fly)\n; cost = 1 (unit cost)\n(fly)\n; cost = 1 (unit cost)\n")
     Path("other").write_text("(fly)\n")
     Path("empty").write_text("; nothing\n")
     done = coordlang("export", minimal, *t_map, *arguments)

@@ -19,7 +19,7 @@ from coordlang.tasks import from_problems
 from coordlang.use import monitor as monitor_module
 from coordlang.use.choices import Choices, choices
 from coordlang.use.choices_file import monitor, to_bytes, to_data
-from coordlang.use.monitor import Monitor, MonitorError, NotAllowed, NotPossible, Wish
+from coordlang.use.monitor import Detour, Monitor, MonitorError, NotAllowed, NotPossible
 from coordlang.use.spoken import Spoken, speak_candidates
 from planners.pddl import read_domain, read_problem
 from tests.conftest import DOMAINS
@@ -49,7 +49,7 @@ def texts(spoken: Spoken, robot: int, own: Own) -> list[str | None]:
     return [spoken.model.labels[robot][label] if label else None for label in own]
 
 
-def random_wish(random: Random, spoken: Spoken, robot: int, left: set[Own], known: dict[Own, Known]) -> Wish:
+def random_detour(random: Random, spoken: Spoken, robot: int, left: set[Own], known: dict[Own, Known]) -> Detour:
     """What tells two of the subplans that are left apart, or anything else; each kind not at all, once or twice."""
     one, other = random.choice(sorted(left)), random.choice(sorted(left))
 
@@ -72,8 +72,8 @@ def random_wish(random: Random, spoken: Spoken, robot: int, left: set[Own], know
 
     anything = set(spoken.model.codec.facts)
     if random.random() < 0.3:  # also what is never known
-        return Wish(some(anything, set()), some(anything, set()))
-    return Wish(
+        return Detour(some(anything, set()), some(anything, set()))
+    return Detour(
         some(visited(one), visited(other)),
         some(avoided(one), avoided(other)),
         some(done(one), done(other)),
@@ -99,7 +99,7 @@ def stepped(at: Monitor, text: str | None) -> Monitor:
 
 @pytest.mark.parametrize(("robots", "models"), RUNS)
 def test_detours_against_the_definition(robots: int, models: int) -> None:
-    """After a random beginning, two random wishes one after the other: asked, then promised, then walked."""
+    """After a random beginning, two random detours one after the other: asked, then promised, then walked."""
     seen: Counter[str] = Counter()
     for seed, spoken, words, twin in with_twins(spoken_in, robots, models):
         random = Random(seed)
@@ -127,9 +127,9 @@ def check_detours(
         for number, fact in enumerate(spoken.model.codec.facts):
             true, false = known[chosen[:here]]
             assert at.known(fact) == (True if fact in true else False if fact in false else None), number
-        wish = random_wish(random, spoken, robot, left, known)
-        expected = twin.fulfilling(robot, chosen[:here], wish, known) & left
-        answer = at.can(wish)
+        detour = random_detour(random, spoken, robot, left, known)
+        expected = twin.fulfilling(robot, chosen[:here], detour, known) & left
+        answer = at.can(detour)
         assert bool(answer) == bool(expected)
         assert answer.subplans == len(expected)
         seen["possible" if expected else "impossible"] += 1
@@ -137,11 +137,11 @@ def check_detours(
         if not expected:
             assert answer.subplan is None
             with pytest.raises(NotPossible):
-                at.commit(wish)
+                at.commit(detour)
             assert (at.allowed(), at.remaining, at.step, at.promised) == before
             continue
         assert answer.subplan in {tuple(texts(spoken, robot, own[here:])) for own in expected}
-        at.commit(wish)
+        at.commit(detour)
         assert at.remaining == len(expected)
         assert subplans(at) == {tuple(texts(spoken, robot, own)) for own in expected}
         seen["less is left"] += len(expected) < len(left)

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from coordlang.tasks import Candidates, ground_tasks
+from coordlang.task_file import ground_tasks
+from coordlang.tasks import Candidates
 from coordlang.use.fitting import NoPlanFits
 from coordlang.use.guided import Terrain, astar, guided
 from coordlang.use.spoken import Spoken

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -13,13 +14,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordlang.tasks import Candidates, ground_tasks
+from coordlang.task_file import ground_tasks
+from coordlang.tasks import Candidates
 from coordlang.use.saying import NotAPlan, NotOptimal, say
 from coordlang.use.spoken import Spoken
-from planners.errors import ProvedImpossible
+from planners.errors import BadInput, Place, ProvedImpossible
 from planners.model import PlanningTask
 from planners.optimal import search
-from planners.planfile import Texts, texts
+from planners.planfile import Texts, only_one_plan, texts
 from planners.plans import Plan, Plans
 from planners.validate import validate
 from tests.conftest import Command
@@ -219,6 +221,42 @@ def test_which_plan_of_a_file_is_wrong(coordlang: Command, files: tuple[Path, ..
     assert "in step 1, r2 has no subaction (move r1 c0-1 c1-1)" in coordlang("say", *files, path).err
     path.write_bytes(b"\xff\xfe0: (move")
     assert coordlang("say", *files, path).code == 31
+
+
+SEVERAL = {
+    "as plans writes them": ("{0}\n{1}", 9),
+    "without comments": ("{2}\n{3}", 8),
+    "without numbers": ("{4}; cost = 4 (unit cost)\n{5}", 8),
+}
+
+
+@pytest.mark.parametrize("case", SEVERAL)
+def test_several_plans_in_one_text(
+    case: str, coordlang: Command, files: tuple[Path, ...], t_map: tuple[Path, Path], tmp_path: Path
+) -> None:
+    """They were one plan once, and the answer was about that one."""
+    both = coordlang("plans", *t_map).out.split("\n\n")
+    bare = ["".join(f"{line}\n" for line in text.splitlines() if ";" not in line) for text in both]
+    unnumbered = [re.sub(r"(?m)^\d+: ", "", text) for text in bare]
+    form, line = SEVERAL[case]
+    path = tmp_path / "plans.txt"
+    path.write_text(form.format(*both[:2], *bare[:2], *unnumbered[:2]))
+    outcome = coordlang("say", *files, path)
+    assert (outcome.code, outcome.out) == (31, "")
+    assert f"plans.txt:{line}:1: this file holds several plans" in outcome.err
+    assert "--max 1" in outcome.err
+
+
+def test_two_plans_of_one_step() -> None:
+    text = "; plan {} of 2\n0: (go r{})\n; makespan = 1\n\n"
+    only_one_plan(text.format(1, 1), Place("p"))
+    with pytest.raises(BadInput, match="p:5:1: this file holds several plans"):
+        only_one_plan(text.format(1, 1) + text.format(2, 2), Place("p"))
+
+
+@pytest.mark.parametrize("text", ["1: (a)\n0: (b)\n", "0.0: (a) [1]\n0.1: (b) [1]\n", "(a)\n(b)\n; cost = 2\n; done\n", "", "; x\n"])
+def test_one_plan_is_one(text: str) -> None:
+    only_one_plan(text, Place("p"))
 
 
 def test_spelling_is_free(coordlang: Command, files: tuple[Path, ...], t_map: tuple[Path, Path], tmp_path: Path) -> None:
