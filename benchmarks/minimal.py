@@ -6,11 +6,16 @@ For each method its words, with the proved bound where that is smaller (7..8: be
 *alpha*: least under the alpha part of Theorem 3; *separating*: under alpha or beta; *minimal*: least of all languages,
 with its rounds, counterexamples, clauses and the symmetries of the model.  Where the paper has an exact value (GW1: 3), it
 is the one in brackets.  The time limit is for each method and row.
+
+Further rows on demand: ``open-RxC`` and ``ring-RxC``, two robots on an open grid or on its border, all pairs of states:
+
+    python benchmarks/minimal.py open-2x5 open-2x6 open-3x4 open-3x5 ring-4x4 ring-4x5 --methods minimal --time-limit 600
 """
 
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,9 +26,14 @@ from table1 import ROWS, candidates_of
 from coordlang.build import Built, build_language
 from coordlang.tasks import Candidates, all_pairs
 from planners.limits import time_limit
-from planners.pddl import read_domain, read_problem
+from planners.pddl import parse_problem, read_domain, read_problem
+from planners.pddl.sexpr import Source
 
 DOMAINS = Path(__file__).parents[1] / "domains"
+sys.path.insert(0, str(DOMAINS))
+from generate import problem_text, scenario  # noqa: E402
+from gridmap import open_grid, ring  # noqa: E402
+
 PAPER_EXACT = {"GW1": " (3)"}
 METHODS = ("greedy", "alpha", "separating", "minimal")
 HEADER = ("row", "paper", "greedy", "alpha", "s", "separating", "s", "minimal", "s", "rounds", "counter", "clauses", "sym")
@@ -71,6 +81,12 @@ def inputs(wanted: list[str]) -> Iterator[tuple[str, str, Candidates]]:
     for row in ROWS:
         if not wanted or row.name in wanted:
             yield row.name, f"{row.words}{PAPER_EXACT.get(row.name, '')}", candidates_of(row)
+    for name in wanted:
+        if match := re.fullmatch(r"(open|ring)-(\d+)x(\d+)", name):
+            make = {"open": open_grid, "ring": ring}[match[1]]
+            domain = read_domain(DOMAINS / "grid" / "domain.pddl")
+            text = problem_text(scenario(name, make(int(match[2]), int(match[3]))), "grid")
+            yield name, "-", all_pairs(domain, [parse_problem(Source(name, text), domain)])
 
 
 def bound_of(built: Built, method: str) -> int:

@@ -149,7 +149,7 @@ class _Search:
         return True
 
     def _start(self, size: int, known: Sequence[Clause], solver: str = "cadical153") -> Colouring:
-        clauses = reduce(known)
+        clauses = sorted(known, key=len)  # not reduced: the solver takes them faster than we find what is implied
         colouring = Colouring(by_demand(self._job.states, clauses), size, solver)
         for clause in clauses:
             colouring.add(clause)

@@ -12,14 +12,18 @@ from pathlib import Path
 
 import pytest
 
+import coordlang.build
+from coordlang.build import build_language
 from coordlang.file import read_language
 from coordlang.vocabulary.sat import Colouring
-from planners.errors import OutOfTime
+from planners.errors import OutOfMemory, OutOfTime
 from planners.limits import time_limit
-from tests.conftest import DOMAINS
+from tests.conftest import DOMAINS, Command
+from tests.coordlang.test_minimal import shipped
 
-GRID = DOMAINS / "grid"
-HARD = [str(GRID / "domain.pddl"), str(GRID / "gw4-3x3.pddl"), "--tasks", "all", "--method", "minimal"]
+HANDOVER = DOMAINS / "handover"
+#: Three words are found soon; whether two suffice is open after minutes.
+HARD = [str(HANDOVER / "domain.pddl"), str(HANDOVER / "exchange.pddl"), "--tasks", "all", "--method", "minimal"]
 
 
 def start(*arguments: str) -> subprocess.Popen[str]:
@@ -41,10 +45,10 @@ def check_file(path: Path) -> None:
 
 def test_a_time_limit_writes_the_best_language(tmp_path: Path) -> None:
     path = tmp_path / "language.json"
-    process = start("-o", str(path), "--time-limit", "6", "--json")
+    process = start("-o", str(path), "--time-limit", "4", "--json")
     out, err = process.communicate(timeout=60)
     assert process.returncode == 3, err
-    assert "the time limit of 6 s is over; the best language so far is written, without proof" in err
+    assert "the time limit of 4 s is over; the best language so far is written, without proof" in err
     assert json.loads(out)["proved_minimal"] is False
     check_file(path)
 
@@ -52,12 +56,54 @@ def test_a_time_limit_writes_the_best_language(tmp_path: Path) -> None:
 def test_an_interrupt_writes_the_best_language(tmp_path: Path) -> None:
     path = tmp_path / "language.json"
     process = start("-o", str(path))
-    time.sleep(6)
+    time.sleep(4)
     os.kill(process.pid, signal.SIGINT)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130, err
     assert "interrupted; the best language so far is written" in err
     check_file(path)
+
+
+@pytest.mark.parametrize("error", [OutOfTime("late"), OutOfMemory("full"), MemoryError(), KeyboardInterrupt()])
+def test_words_are_kept_when_enlarging_them_is_stopped(error: BaseException, monkeypatch: pytest.MonkeyPatch) -> None:
+    def stop(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(coordlang.build, "verify_overlapping", stop)
+    built = build_language(shipped("grid", "gw1-2x2"), "minimal", overlap=True)
+    assert built.stopped is error
+    assert built.language.also == {}
+    assert len(built.language.words) == 3
+    assert built.language.guarantee.proved_minimal
+
+
+def test_a_better_partition_found_on_the_way_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Time is over while separating words are looked for, after some were found: `minimal` returns them."""
+
+    def late(*_: object) -> bool:
+        raise OutOfTime("late")
+
+    monkeypatch.setattr(sys.modules["coordlang.vocabulary.separating"]._AlphaOrBeta, "decide", late)
+    built = build_language(shipped("grid", "gw2-2x3"), "minimal")
+    assert isinstance(built.stopped, OutOfTime)
+    assert len(built.language.words) < build_language(shipped("grid", "gw2-2x3"), "greedy").language.guarantee.size
+
+
+@pytest.mark.parametrize(("error", "code"), [(OutOfTime("the time limit is over"), 3), (KeyboardInterrupt(), 130)])
+def test_the_language_is_written_without_its_certificate(
+    error: BaseException, code: int, coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(_: object) -> None:
+        raise error
+
+    monkeypatch.setattr("coordlang.build.certificate_of", stop)
+    path, proof = tmp_path / "l.json", tmp_path / "c.json"
+    files = [DOMAINS / "three-cells" / name for name in ("domain.pddl", "problem.pddl")]
+    outcome = coordlang("build", *files, "--method", "minimal", "-o", path, "--certificate", proof)
+    assert outcome.code == code
+    assert "no certificate is written" in outcome.err
+    assert read_language(path).guarantee.proved_minimal
+    assert [p.name for p in tmp_path.iterdir()] == ["l.json"]
 
 
 def test_the_solver_hears_the_clock() -> None:

@@ -5,19 +5,20 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from coordlang.build import build_language
 from coordlang.file import read_language, to_bytes, write_atomically
 from coordlang.language import WordTable
-from coordlang.symmetry import state_symmetries
+from coordlang.symmetry import closed, state_symmetries
 from coordlang.tasks import Candidates, all_pairs, from_problems
 from coordlang.verify import verify
 from planners.errors import BadInput
-from planners.pddl import parse_domain, parse_problem
+from planners.pddl import parse_domain, parse_problem, read_domain
 from planners.pddl.sexpr import Source
 from planners.plans import Plans, counts
-from tests.conftest import Command
+from tests.conftest import DOMAINS, Command
 from tests.coordlang import naive
 from tests.coordlang.test_minimal import shipped
 
@@ -147,6 +148,29 @@ def test_symmetries_map_plans_to_plans(candidates: Candidates) -> None:
         assert sorted(permutation.tolist()) == list(range(len(candidates.rows)))
         image = {frozenset(tuple(int(permutation[s]) for s in states) for states in plans) for plans in lists}
         assert image == lists
+
+
+def test_objects_that_nothing_reaches_cost_no_symmetries() -> None:
+    """A hundred cells without a door: the same symmetries, and not a hundred factorial of them to try."""
+    text = (DOMAINS / "grid" / "gw1-2x2.pddl").read_text()
+    extra = " ".join(f"far{n}" for n in range(100))
+    domain = read_domain(DOMAINS / "grid" / "domain.pddl")
+    plain = all_pairs(domain, [parse_problem(Source("p", text), domain)])
+    more = all_pairs(domain, [parse_problem(Source("p", text.replace(" - cell", f" {extra} - cell")), domain)])
+    assert more.count == plain.count
+    found = [s.tolist() for s in state_symmetries(plain)]
+    assert len(found) == 15
+    assert [s.tolist() for s in state_symmetries(more)] == found
+    assert closed(state_symmetries(plain))
+
+
+def test_what_is_closed() -> None:
+    turn, back, swap = np.array([1, 2, 0]), np.array([2, 0, 1]), np.array([1, 0, 2])
+    assert closed([])
+    assert closed([swap])
+    assert closed([turn, back])
+    assert not closed([turn])
+    assert not closed([turn, back, swap])
 
 
 @pytest.mark.parametrize(("folder", "stem"), [("three-cells", "problem"), ("t-map", "problem"), ("grid", "gw1-2x2")])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import product
+from itertools import combinations, permutations, product
 
 import pytest
 from hypothesis import assume, given, settings
@@ -92,6 +92,40 @@ def test_colouring_against_trying_all(size: int, drawn: list[set[tuple[int, int]
 
     assert (found is not None) == any(holds(word) for word in product(range(size), repeat=5))
     assert found is None or holds(found)
+
+
+GROUPS = (
+    [],
+    [[0, 1, 2, 4, 3]],
+    [[1, 2, 3, 4, 0], [2, 3, 4, 0, 1], [3, 4, 0, 1, 2], [4, 0, 1, 2, 3]],
+    [list(p) for p in permutations(range(5)) if p != (0, 1, 2, 3, 4)],
+)
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.integers(1, 3),
+    st.sampled_from(GROUPS),
+    st.lists(st.sets(st.tuples(st.integers(0, 4), st.integers(0, 4)), min_size=1), max_size=4),
+    st.permutations(list(combinations(range(5), 2))),
+)
+def test_one_of_symmetric_partitions(
+    size: int, group: list[list[int]], drawn: list[set[tuple[int, int]]], pairs: list[tuple[int, int]]
+) -> None:
+    """Where all images of a clause are clauses, a partition is left if there was one, and it is the first of its images."""
+    clauses = {frozenset(pair(s[a], s[b]) for a, b in clause if a != b) for clause in drawn for s in [range(5), *group]}
+    plain, led = Colouring(range(5), size), Colouring(range(5), size)
+    for colouring in (plain, led):
+        for clause in sorted(clauses, key=sorted):
+            colouring.add(clause)
+    led.prefer_one_of_each(group, pairs)
+    found = led.solve()
+    assert (found is None) == (plain.solve() is None)
+    for colouring in (plain, led):
+        colouring.delete()
+    if found is not None:
+        images = [[found[s[a]] != found[s[b]] for a, b in pairs] for s in [range(5), *group]]
+        assert images[0] == max(images)
 
 
 def test_problems_are_kept_and_learn_what_is_new() -> None:
