@@ -115,7 +115,9 @@ def write_atomically(path: str | Path, data: bytes) -> None:
                 os.unlink(beside)
             raise
     except OSError as error:
-        raise UsageError(f"{path} cannot be written: {error.strerror}") from None
+        raise UsageError(
+            f"{path} cannot be written: {error.strerror}", remedy="Name a file in a folder that you may write to."
+        ) from None
 
 
 def _umask() -> int:
@@ -248,10 +250,15 @@ def options_of(
     for flag, value in given.items():
         if value is not None and value != recorded[flag]:
             said = flag if value is True else f"{flag} {value}"
-            raise UsageError(f"{said} contradicts the language file, which was built with {recorded[flag]}")
+            told = f"without {flag}" if recorded[flag] is False else f"with {flag} {recorded[flag]}"
+            raise UsageError(
+                f"{said} contradicts the language file, which was built {told}", remedy=f"Leave out {flag}."
+            )
     own = tuple(r for r in language.robots or robots if r != ENVIRONMENT or recorded["--unowned"] != "environment")
     if robots and set(robots) != set(own):
-        raise UsageError(f"--robots contradicts the language file: its robots are {', '.join(own)}")
+        raise UsageError(
+            f"--robots contradicts the language file: its robots are {', '.join(own)}", remedy="Leave out --robots."
+        )
     idle = model.get("idle")
     return ModelOptions(
         RobotChoice(own, None, recorded["--unowned"]),
@@ -297,10 +304,11 @@ def recorded_candidates(
         if kind == "all":
             candidates = all_pairs(domain, problems, options)
             if candidates.count != language.tasks["count"]:
+                have = f"{problems[0].source.name} has" if len(problems) == 1 else f"these {len(problems)} problems have"
                 raise BadInput(
-                    f"the language records {language.tasks['count']:,} tasks, but {problems[0].source.name} has "
-                    f"{candidates.count:,} pairs of states",
-                    remedy="Give the problem that the language was built for, or say --tasks all to check these.",
+                    f"the language records {language.tasks['count']:,} tasks, but {have} {candidates.count:,} pairs of "
+                    "reachable states",
+                    remedy="Give the problems that the language was built for, or say --tasks all to check these.",
                 )
             return candidates
         listed = recorded_list(language)

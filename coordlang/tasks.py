@@ -10,7 +10,7 @@ import numpy as np
 
 from coordlang.task_file import ListedTask, goal_atoms, goal_text, ground_tasks
 from planners.errors import BadInput, Place, ProvedImpossible
-from planners.joint import FullState, Goal, JointModel, show
+from planners.joint import NO_FACT, FullState, Goal, JointModel, show
 from planners.model import Loaded, ModelOptions, PlanningTask, build
 from planners.optimal import PlanSpace, TaskGroup, joined, plan_spaces, search, search_each, solvable
 from planners.pddl.lifted import Domain, Problem
@@ -146,7 +146,7 @@ def from_listed(
         row = model.state(init)
         if find_rows(reached, row[None, : model.codec.fact_words])[0] < 0:
             raise BadInput(
-                f"task {number}: the state {model.codec.key(row)} cannot be reached from the initial "
+                f"task {number}: the state {model.state_text(row)} cannot be reached from the initial "
                 f"state of {problems[0].source.name}",
                 place=place,
                 remedy="Is a fluent missing or one too many?  List all fluents that are true.",
@@ -158,16 +158,36 @@ def from_listed(
     else:
         states = len(space)
     grouped = [TaskGroup(goal, np.stack(rows)) for goal, rows in groups.items()]
+
+    def solved(kept: Sequence[TaskGroup]) -> list[bool]:
+        served = {(g.goal, tuple(row.tolist())) for g in kept if g.inits is not None for row in g.inits}
+        return [(goal, tuple(model.state(init).tolist())) in served for init, goal in ground]
+
     skipped: list[str] = []
     if skip_unsolvable and (kept := solvable(space, grouped)):
-        served = {(g.goal, tuple(row.tolist())) for g in kept if g.inits is not None for row in g.inits}
-        good = [(goal, tuple(model.state(init).tolist())) in served for init, goal in ground]
-        skipped = [f"task {n} ({' '.join(t.init)} -> {' '.join(t.goal)})"
+        good = solved(kept)
+        skipped = [f"task {n} ({_init_text(t)} -> {_goal_text(t)})"
                    for n, (t, ok) in enumerate(zip(listed, good, strict=True), 1) if not ok]  # fmt: skip
         listed = [task for task, ok in zip(listed, good, strict=True) if ok]
         grouped = kept
-    spaces = plan_spaces(space, grouped)
-    return Candidates("file", loaded, tuple(listed), tuple(spaces), states, tuple(skipped))
+    try:
+        spaces = tuple(plan_spaces(space, grouped))
+    except ProvedImpossible as error:
+        number = solved(solvable(space, grouped)).index(False)
+        raise ProvedImpossible(
+            f"task {number + 1}: the goal {_goal_text(listed[number])} cannot be reached from {_init_text(listed[number])}",
+            place=place,
+            remedy=error.remedy,
+        ) from None
+    return Candidates("file", loaded, tuple(listed), spaces, states, tuple(skipped))
+
+
+def _init_text(task: ListedTask) -> str:
+    return " ".join(task.init) or NO_FACT
+
+
+def _goal_text(task: ListedTask) -> str:
+    return " ".join(task.goal) or "(and)"
 
 
 def from_recorded(
@@ -187,8 +207,10 @@ def from_recorded(
 def describe(space: PlanSpace, task: int) -> str:
     """``INIT -> GOAL`` in words of the model."""
     node = space.starts[task]
-    init = space.model.codec.key(space.rows[space.state[node]])
-    return f"{init} -> {goal_text(space.model, space.goals[space.goal[node]])}"
+    init = space.model.state_text(space.rows[space.state[node]])
+    goal = space.goals[space.goal[node]]
+    empty = NO_FACT if isinstance(goal, FullState) else "(and)"
+    return f"{init} -> {goal_text(space.model, goal) or empty}"
 
 
 def _as_listed(domain: Domain, problem: Problem, task: PlanningTask) -> ListedTask:

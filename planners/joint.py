@@ -23,6 +23,8 @@ Cost = Literal["makespan", "makespan+actions", "makespan+cost"]
 
 #: The text of label 0.
 IDLE = "idle"
+#: A state in which nothing is true, for people; its key is empty.
+NO_FACT = "(no fact holds)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +113,10 @@ class JointModel:
     def why_not(self, row: Rows, labels: Sequence[int]) -> str:
         """Why these labels are no joint step in a state, in words."""
         return self.stepper.why_not(row[: self.codec.fact_words], labels)
+
+    def state_text(self, row: Rows) -> str:
+        """A state for people: its key, if it is not empty."""
+        return self.codec.key(row) or NO_FACT
 
     def texts(self, labels: Sequence[int]) -> tuple[str | None, ...]:
         """Label numbers as text; None is idling."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from planners.composition import Composition
 from planners.conditions import Evaluator
-from planners.errors import BadInput, UsageError
+from planners.errors import BadInput, Place, UsageError
 from planners.grounding import FEWER, GroundAction, ground_actions, ground_goal
 from planners.grounding.networks import apply_network
 from planners.joint import IDLE, Cost, Goal, JointModel, show
@@ -43,11 +43,12 @@ class ModelOptions:
 
 @dataclass(frozen=True, slots=True)
 class PlanningTask:
-    """A task ``(I, G)`` of a joint model: an initial row and a goal."""
+    """A task ``(I, G)`` of a joint model: an initial row and a goal; ``place`` is the file that it is from."""
 
     name: str
     init: Rows
     goal: Goal
+    place: Place | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +107,7 @@ def build(
 def task_of(model: JointModel, domain: Domain, problem: Problem) -> PlanningTask:
     """The planning task of a problem."""
     goal = ground_goal(domain, problem, problem.goal)
-    return PlanningTask(problem.name, model.state(problem.init), goal)
+    return PlanningTask(problem.name, model.state(problem.init), goal, Place(problem.source.name))
 
 
 def _check_same_world(domain: Domain, first: Problem, other: Problem) -> None:

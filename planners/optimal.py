@@ -117,11 +117,16 @@ def _forward(model: JointModel, task: PlanningTask, layers: list[Rows], kept: li
         if not len(layer):
             raise ProvedImpossible(
                 f"task {task.name}: the goal cannot be reached",
-                remedy=f"All {len(seen)} reachable states were searched.",
+                place=task.place,
+                remedy=_searched(len(seen)),
             )
         seen, _ = unique_rows(np.concatenate((seen, layer)))
         layers.append(layer)
         kept.append(steps_here)
+
+
+def _searched(states: int) -> str:
+    return f"All {states:,} reachable states were searched." if states > 1 else "No other state can be reached."
 
 
 def _backward(
@@ -265,8 +270,8 @@ def _batch(space: Space, groups: Sequence[TaskGroup]) -> PlanSpace:
         bad = np.flatnonzero((found < 0) | (distance[number, found] < 0))
         if len(bad):
             raise ProvedImpossible(
-                f"the goal cannot be reached from {space.model.codec.key(group.inits[bad[0]])}",
-                remedy=f"All {len(space)} reachable states were searched.",
+                f"the goal cannot be reached from {space.model.state_text(group.inits[bad[0]])}",
+                remedy=_searched(len(space)),
             )
         states.append(found)
     second, graph = _second_costs(space, distance)

@@ -108,7 +108,7 @@ def find_team(domain: Domain, problem: Problem, choice: RobotChoice) -> Team:
         robots, by = _of_kind(domain, problem, choice.type), f"--robot-type {choice.type}"
         if not robots:
             raise UsageError(f"--robot-type: nothing has type or predicate {choice.type!r}",
-                             remedy=f"Candidates: {', '.join(_candidates(domain, problem)) or 'none'}.")  # fmt: skip
+                             remedy=f"Candidates: {', '.join(_kinds(domain, problem)) or 'none'}.")  # fmt: skip
     else:
         robots, by = _detect(domain, problem)
     if not robots:
@@ -184,6 +184,19 @@ def _detect(domain: Domain, problem: Problem) -> tuple[tuple[str, ...], str]:
         remedy="Say --robot-type TYPE or --robots NAME,NAME."
         + (f" Candidates: {', '.join(candidates)}." if candidates else ""),
     )
+
+
+def _kinds(domain: Domain, problem: Problem) -> list[str]:
+    """What can be given as ``--robot-type``: the likely types, else all that some action takes, else unary predicates."""
+    taken = [p.types for schema in domain.schemas for p in schema.parameters]
+    every = [
+        kind
+        for kind in sorted(domain.types)
+        if objects_of(domain, problem, (kind,)) and any(kind in domain.supertypes(t) for own in taken for t in own)
+    ]
+    unary = sorted({atom.predicate for atom in static_atoms(domain, problem) if len(atom.args) == 1})
+    likely = [kind for kind in ("agent", "robot") if _of_kind(domain, problem, kind)]
+    return likely or _candidates(domain, problem) or every or unary
 
 
 def _candidates(domain: Domain, problem: Problem) -> list[str]:

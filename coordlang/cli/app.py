@@ -175,6 +175,8 @@ class GivenOptions:
     ) -> None:
         if robots is not None and not robots.replace(",", "").strip():
             raise click.UsageError("--robots: expected names, as in --robots r1,r2")
+        if robots and robot_type:
+            raise click.UsageError("--robots and --robot-type both say who the robots are: give one of them")
         self.robots = tuple(r.strip().lower() for r in robots.split(",") if r.strip()) if robots else ()
         self.robot_type = robot_type.lower() if robot_type else None
         self.unowned: Any = unowned
@@ -201,6 +203,28 @@ class GivenOptions:
             cost=self.cost,
             remember_actions=self.remember_actions,
         )
+
+
+def was_given(name: str) -> bool:
+    """Whether the user gave this parameter of the command himself."""
+    return click.get_current_context().get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
+
+
+def form_of(form: str, as_json: bool) -> str:
+    """``--format``, for which ``--json`` may stand."""
+    if as_json and form != "json" and was_given("form"):
+        raise click.UsageError(f"--json is short for --format json: leave out --format {form}")
+    return "json" if as_json else form
+
+
+def check_listing(only_count: bool, most: int | None, sample: int | None) -> None:
+    """Refuse options about which plans are listed that contradict each other."""
+    if only_count and (most is not None or sample is not None):
+        raise click.UsageError("--count prints a number only: leave out --max and --sample")
+    if most is not None and sample is not None:
+        raise click.UsageError("--sample N draws N plans: leave out --max")
+    if sample is None and was_given("seed"):
+        raise click.UsageError("--seed belongs to --sample")
 
 
 def read_files(domain: str, problems: tuple[str, ...]) -> tuple[Any, list[Any]]:
@@ -301,25 +325,59 @@ def note_single_robot(robots: tuple[str, ...]) -> None:
         click.echo(f"coordlang: note: {robots[0]} is the only robot: there is nothing to coordinate", err=True)
 
 
+class PlanningFiles:
+    """DOMAIN PROBLEM.., or ``--factored DIR`` in their place."""
+
+    def __init__(self, files: tuple[str, ...], factored: str | None) -> None:
+        self.files = files
+        self.factored = factored
+
+    @property
+    def paths(self) -> list[str]:
+        """All files that are read."""
+        return [str(path) for path in Path(self.factored).glob("*-*.pddl")] if self.factored else list(self.files)
+
+    def read(self) -> tuple[Any, list[Any]]:
+        """The domain and its problems."""
+        from planners.pddl.factored import read_factored
+
+        if not self.factored:
+            return read_files(self.files[0], self.files[1:])
+        domain, problem = read_factored(self.factored)
+        return domain, [problem]
+
+
+def planning_files(metavar: str, most: int | None = None) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """DOMAIN and at most so many problems, or ``--factored DIR``; the command gets `PlanningFiles` as ``pddl``."""
+
+    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
+        @click.argument("files", nargs=-1, metavar=metavar)
+        @click.option(
+            "--factored", metavar="DIR", help="Read domain-ROBOT.pddl and problem-ROBOT.pddl of every robot here."
+        )
+        @functools.wraps(function)
+        def wrapped(files: tuple[str, ...], factored: str | None, **arguments: Any) -> Any:
+            enough = not files if factored else 2 <= len(files) <= 1 + (most or len(files))
+            if not enough:
+                raise click.UsageError(f"expected {metavar}, or --factored DIR without them")
+            return function(pddl=PlanningFiles(files, factored), **arguments)
+
+        return wrapped
+
+    return decorate
+
+
 def task_files(function: Callable[..., Any]) -> Callable[..., Any]:
     """DOMAIN PROBLEM, or ``--factored DIR`` in their place; the command gets a `Loaded` maker as ``load``."""
 
-    @click.argument("files", nargs=-1, metavar="DOMAIN PROBLEM")
-    @click.option("--factored", metavar="DIR", help="Read domain-ROBOT.pddl and problem-ROBOT.pddl of every robot here.")
+    @planning_files("DOMAIN PROBLEM", most=1)
     @functools.wraps(function)
-    def wrapped(files: tuple[str, ...], factored: str | None, given: GivenOptions, **arguments: Any) -> Any:
-        if len(files) != (0 if factored else 2):
-            raise click.UsageError("expected DOMAIN PROBLEM, or --factored DIR without them")
-
+    def wrapped(pddl: PlanningFiles, given: GivenOptions, **arguments: Any) -> Any:
         def load() -> Loaded:
             from planners.model import build
-            from planners.pddl.factored import read_factored
 
-            if factored:
-                domain, problem = read_factored(factored)
-            else:
-                domain, (problem,) = read_files(files[0], files[1:])
-            return build(domain, [problem], given.options())
+            domain, problems = pddl.read()
+            return build(domain, problems, given.options())
 
         return function(load=load, **arguments)
 

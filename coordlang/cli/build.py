@@ -15,18 +15,17 @@ from coordlang.cli.app import (
     EXIT_INTERRUPTED,
     EXIT_UNPROVED,
     GivenOptions,
+    PlanningFiles,
     check_outputs,
     clear_progress,
     counted,
-    domain_argument,
     limits,
     make_candidates,
     model_options,
     never_stdout,
     note_single_robot,
-    problems_argument,
+    planning_files,
     progress,
-    read_files,
 )
 
 if TYPE_CHECKING:
@@ -35,8 +34,7 @@ if TYPE_CHECKING:
 
 
 @click.command(name="build")
-@domain_argument
-@problems_argument
+@planning_files("DOMAIN PROBLEMS...")
 @click.option("--tasks", metavar="all|FILE", help="Candidate tasks: every pair of reachable states, or a task file "
               "(default: the problems' own).")  # fmt: skip
 @click.option("--method", type=click.Choice(["greedy", "separating", "minimal", "exhaustive"]), default="greedy",
@@ -58,8 +56,7 @@ if TYPE_CHECKING:
 @model_options
 @limits
 def command(
-    domain: str,
-    problems: tuple[str, ...],
+    pddl: PlanningFiles,
     tasks: str | None,
     method: str,
     alpha_only: bool,
@@ -79,19 +76,25 @@ def command(
     from coordlang.build import Inseparable, build_language
     from coordlang.cli.miscoordination import show
     from coordlang.file import to_bytes, write_language
+    from planners.errors import ProvedImpossible
     from planners.limits import stop_clock, time_left
 
     never_stdout("--certificate", certificate)
     listed = tasks if tasks != "all" else None
-    check_outputs([("-o", output), ("--certificate", certificate)], [domain, *problems, listed])
+    check_outputs([("-o", output), ("--certificate", certificate)], [*pddl.paths, listed])
     if alpha_only and method != "separating":
         raise click.UsageError("--alpha-only belongs to --method separating")
     exact = method in ("minimal", "exhaustive")
     if prefer and not exact:
         raise click.UsageError(f"--prefer {prefer} belongs to --method minimal or exhaustive")
     start = perf_counter()
-    lifted, read = read_files(domain, problems)
-    candidates = make_candidates(lifted, read, tasks, given.options(), skip_unsolvable=unsolvable == "skip")
+    lifted, read = pddl.read()
+    try:
+        candidates = make_candidates(lifted, read, tasks, given.options(), skip_unsolvable=unsolvable == "skip")
+    except ProvedImpossible as error:
+        if unsolvable == "fail":
+            error.remedy = "\n  ".join(filter(None, (error.remedy, "--unsolvable skip leaves out such tasks.")))
+        raise
     for name in candidates.skipped:
         click.echo(f"coordlang: left out, it has no plan: {name}", err=True)
     note_single_robot(candidates.model.robots)

@@ -12,6 +12,7 @@ from coordlang.cli.app import (
     check_outputs,
     counted,
     domain_argument,
+    form_of,
     language_argument,
     limits,
     model_options,
@@ -68,7 +69,7 @@ def command(
     from coordlang.use.choices_dot import to_dot
     from coordlang.use.choices_file import to_bytes
 
-    form = "json" if as_json else form
+    form = form_of(form, as_json)
     check_outputs([("-o", output)], [language, domain, problem])
     spoken = read_spoken(language, domain, problem, given)
     chosen = _numbers(spoken.model.robots, whose)

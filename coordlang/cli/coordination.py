@@ -9,13 +9,12 @@ import click
 
 from coordlang.cli.app import (
     GivenOptions,
+    PlanningFiles,
     counted,
-    domain_argument,
     limits,
     model_options,
     note_single_robot,
-    problems_argument,
-    read_files,
+    planning_files,
 )
 
 if TYPE_CHECKING:
@@ -23,19 +22,18 @@ if TYPE_CHECKING:
 
 
 @click.command(name="coordination")
-@domain_argument
-@problems_argument
+@planning_files("DOMAIN PROBLEMS...")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
 @model_options
 @limits
-def command(domain: str, problems: tuple[str, ...], as_json: bool, given: GivenOptions) -> None:
+def command(pddl: PlanningFiles, as_json: bool, given: GivenOptions) -> None:
     """Say which tasks require coordination, and show how robots that follow different optimal plans miscoordinate."""
     from coordlang.cli.miscoordination import show
     from coordlang.tasks import from_problems
     from coordlang.witness import miscoordination
     from planners.plans import counts
 
-    lifted, read = read_files(domain, problems)
+    lifted, read = pddl.read()
     candidates = from_problems(lifted, read, given.options())
     note_single_robot(candidates.model.robots)
     space = candidates.spaces[0]
@@ -49,8 +47,10 @@ def command(domain: str, problems: tuple[str, ...], as_json: bool, given: GivenO
         click.echo(json.dumps({"tasks": [_data(*entry) for entry in entries]}))
         return
     for name, makespan, plans, witness in entries:
-        answer = "is required" if witness else "is not required: any mixture of them is optimal"
-        click.echo(f"{name}: {counted(plans, 'optimal plan')} of {makespan} steps; coordination {answer}")
+        answer = "is required" if witness else "is not required"
+        if not witness and plans > 1:
+            answer += ": any mixture of them is optimal"
+        click.echo(f"{name}: {counted(plans, 'optimal plan')} of {counted(makespan, 'step')}; coordination {answer}")
         if witness:
             click.echo()
             click.echo(show(witness))

@@ -19,6 +19,7 @@ from coordlang.cli.app import (
     limits,
     model_options,
     problem_argument,
+    was_given,
 )
 
 if TYPE_CHECKING:
@@ -66,6 +67,8 @@ def command(
 
     if back is not None and target != "pddl":
         raise click.UsageError("--back translates plans of the exported PDDL: leave out --to ltlf")
+    if target == "ltlf" and was_given("limit"):
+        raise click.UsageError("--limit belongs to --to pddl")
     inputs = [language, domain, problem, back]
     if output is not None and output != "-" and target == "pddl" and back is None and not as_json:
         written = [("-o", os.path.join(output, name)) for name in ("domain.pddl", "problem.pddl")]

@@ -41,7 +41,8 @@ def command(count_states: bool, as_json: bool, load: Callable[[], Loaded]) -> No
         return
     click.echo(_text(found))
     if space:
-        click.echo(f"reachable       {space['states']:,} joint states, {space['joint_steps']:,} joint steps")
+        number = counted(space["states"], "joint state")
+        click.echo(f"reachable       {number}, {counted(space['joint_steps'], 'joint step')}")
 
 
 def _text(found: Inspection) -> str:
@@ -52,8 +53,8 @@ def _text(found: Inspection) -> str:
         ("robots", f"{', '.join(found.robots)} (by {found.robots_by})"),
     ]
     for robot, schemas in found.subactions.items():
-        total = sum(schemas.values())
-        lines.append((f"  {robot}", f"{counted(total, 'subaction')}: {_counts(schemas)}; {found.idle[robot]}"))
+        listed = f": {_counts(schemas)}" if schemas else ""
+        lines.append((f"  {robot}", f"{counted(sum(schemas.values()), 'subaction')}{listed}; {found.idle[robot]}"))
     lines += [
         ("shared", _counts(found.shared) or "none"),
         ("no robot named", {"error": "not allowed (--unowned)"}.get(found.unowned, f"--unowned {found.unowned}")),
@@ -62,8 +63,8 @@ def _text(found: Inspection) -> str:
         ("never possible", ", ".join(found.impossible) or "none"),
         ("no effects", ", ".join(found.without_effects) or "none"),
         ("action costs", found.costs),
-        ("interference", f"{found.interfering:,} pairs" + _example(found)),
-        ("fluents", f"{found.facts} facts: {_counts(found.fluents)}"),
+        ("interference", counted(found.interfering, "pair") + _example(found)),
+        ("fluents", f"{counted(found.facts, 'fact')}: {_counts(found.fluents)}" if found.facts else "none"),
         ("at the start", _counts(found.start) or "none is true"),
         ("statics", _counts(found.statics) or "none"),
         ("never true", ", ".join(found.never) or "none"),

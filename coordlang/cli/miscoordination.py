@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from planners.joint import NO_FACT
+
 if TYPE_CHECKING:
     from coordlang.witness import Miscoordination
 
@@ -35,7 +37,7 @@ def show(witness: Miscoordination) -> str:
     lines.append("  together they do:")
     for number, (step, state) in enumerate(zip(witness.mixture, witness.mixed_states, strict=True)):
         mark = "  <-- breaks here" if number == witness.step else ""
-        lines.append(f"    {state}")
+        lines.append(f"    {state or NO_FACT}")
         lines.append(f"    {number + 1:>3}  " + "".join(f"{_does(r, t):<{width + 6}}" for r, t in zip(
             witness.robots, step, strict=True)).rstrip() + mark)  # fmt: skip
     lines.append(f"  step {witness.step + 1} breaks: {witness.reason}")
@@ -49,7 +51,7 @@ def _table(
     for number, step in enumerate(plan, 1):
         texts = "".join(f"{_does(r, t):<{width + 6}}" for r, t in zip(robots, step, strict=True)).rstrip()
         lines.append(f"    {number:>3}  {texts}")
-    lines.append(f"         reaches {states[-1]}")
+    lines.append(f"         reaches {states[-1] or NO_FACT}")
     return lines
 
 

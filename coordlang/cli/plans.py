@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from coordlang.cli.app import limits, model_options, note_single_robot, task_files
+from coordlang.cli.app import check_listing, form_of, limits, model_options, note_single_robot, task_files
 
 if TYPE_CHECKING:
     from planners.model import Loaded
@@ -48,17 +48,17 @@ def command(
     from planners.planfile import to_ipc, to_json
     from planners.plans import Plans
 
-    if only_count and (most is not None or sample is not None):
-        raise click.UsageError("--count prints a number only: leave out --max and --sample")
+    check_listing(only_count, most, sample)
+    form = form_of(form, as_json)
     loaded = load()
     note_single_robot(loaded.model.robots)
     plans = Plans.of(search(loaded.model, loaded.tasks[0]))
-    if only_count and not (as_json or form == "json"):
+    if only_count and form != "json":
         click.echo(plans.count)
         return
     limit = 0 if only_count else most if most is not None else _DEFAULT_MAX
     listed = list(plans.sample(sample, seed) if sample else islice(plans, limit))
-    if as_json or form == "json":
+    if form == "json":
         data = to_json(plans, listed)
         if sample:
             data["complete"] = False

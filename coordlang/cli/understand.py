@@ -10,8 +10,10 @@ import click
 
 from coordlang.cli.app import (
     GivenOptions,
+    check_listing,
     check_outputs,
     domain_argument,
+    form_of,
     language_argument,
     limits,
     model_options,
@@ -72,11 +74,12 @@ def command(
     from coordlang.cli.speaking import covered, read_spoken, write
     from coordlang.use.understanding import understand
 
-    form = "json" if as_json else form
-    if only_count and (most is not None or sample is not None):
-        raise click.UsageError("--count prints a number only: leave out --max and --sample")
+    form = form_of(form, as_json)
+    check_listing(only_count, most, sample)
     if form in ("dot", "svg") and (only_count or most is not None or sample is not None):
         raise click.UsageError(f"--format {form} draws the DAG of all plans: leave out --count, --max and --sample")
+    if nodes is not None and (form == "ipc" or only_count):
+        raise click.UsageError("--nodes cuts the DAG: it belongs to --format dot, svg or json, without --count")
     check_outputs([("-o", output)], [language, domain, problem])
     spoken = read_spoken(language, domain, problem, given)
     understood = understand(spoken, spoken.words_of(sentence))

@@ -8,25 +8,23 @@ import click
 
 from coordlang.cli.app import (
     GivenOptions,
+    PlanningFiles,
     check_outputs,
     clear_progress,
     counted,
-    domain_argument,
     language_argument,
     limits,
     make_candidates,
     model_options,
     never_stdout,
-    problems_argument,
+    planning_files,
     progress,
-    read_files,
 )
 
 
 @click.command(name="verify")
 @language_argument
-@domain_argument
-@problems_argument
+@planning_files("DOMAIN PROBLEMS...")
 @click.option("--tasks", metavar="all|FILE", help="Check these tasks (default: those that the language file records).")
 @click.option("--lower-bound", "certificate", metavar="CERTIFICATE", help="Also check why fewer words do not suffice "
               "(a file of `build --certificate`).")
@@ -37,8 +35,7 @@ from coordlang.cli.app import (
 @limits
 def command(
     language: str,
-    domain: str,
-    problems: tuple[str, ...],
+    pddl: PlanningFiles,
     tasks: str | None,
     certificate: str | None,
     dimacs: str | None,
@@ -61,10 +58,10 @@ def command(
         raise click.UsageError("--dimacs belongs to --lower-bound")
     never_stdout("--dimacs", dimacs)
     listed = tasks if tasks != "all" else None
-    check_outputs([("--dimacs", dimacs)], [language, domain, *problems, listed, certificate])
+    check_outputs([("--dimacs", dimacs)], [language, *pddl.paths, listed, certificate])
     spoken = read_language(language)
     proof = read_certificate(certificate) if certificate else None
-    lifted, read = read_files(domain, problems)
+    lifted, read = pddl.read()
     check_source(spoken, lifted, read, Place(language))
     options = given.for_language(spoken)
     if tasks is None:
@@ -106,8 +103,11 @@ def command(
             f"{language} says that {counted(claimed, 'word')} are needed; the certificate proves {bound.lower_bound} only"
         )
     if not as_json:
-        click.echo(
-            f"lower bound {bound.lower_bound}: {counted(bound.reasons, 'reason')} checked, and with "
-            f"{bound.lower_bound - 1} words they contradict each other ({len(bound.cnf.clauses):,} clauses)"
-        )
+        why = "every language has a word"
+        if bound.lower_bound > 1:
+            why = (
+                f"{counted(bound.reasons, 'reason')} checked, and with {counted(bound.lower_bound - 1, 'word')} they "
+                f"contradict each other ({counted(len(bound.cnf.clauses), 'clause')})"
+            )
+        click.echo(f"lower bound {bound.lower_bound}: {why}")
     return 0

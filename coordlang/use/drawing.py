@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from coordlang.use.understanding import Dag, DagEdge, DagNode
-from planners.joint import own_text
+from planners.joint import NO_FACT, own_text
 from planners.states import split_atoms
 
 #: Colours that people of every colour vision tell apart (Okabe and Ito 2008).  Words carry their names as well.
@@ -43,6 +43,7 @@ def node_lines(dag: Dag) -> list[list[str]]:
     always = set.intersection(*states) if len(states) > 1 else set()
     return [
         [f"{node.merged:,} more states"] if node.merged
+        else [NO_FACT] if not own
         else _shortened([_plain(a) for a in own if a not in always], _ATOMS_SHOWN, "atoms")
         for node, own in zip(dag.nodes, atoms, strict=True)
     ]  # fmt: skip

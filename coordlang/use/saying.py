@@ -73,7 +73,7 @@ def follow(spoken: Spoken, plan: Sequence[Texts]) -> tuple[Plan, list[Rows], int
         if not len(found):
             raise NotAPlan(
                 number, f"step {number + 1} cannot be taken: {model.why_not(rows[-1], labels)}",
-                remedy=f"The state before it is {model.codec.key(rows[-1])}.",
+                remedy=f"The state before it is {model.state_text(rows[-1])}.",
             )  # fmt: skip
         rows.append(steps.result[found[0]])
         second += int(steps.cost[found[0]])
@@ -149,7 +149,7 @@ def _leaves(spoken: Spoken, step: Texts, row: Rows, number: int, excess: tuple[i
     if number == makespan:
         return f"{wrong}: the goal holds before step {number + 1} already"
     doing = ", ".join(f"{r} {t or 'idles'}" for r, t in zip(model.robots, step, strict=True))
-    return f"{wrong}; with step {number + 1} ({doing}) it leaves all optimal plans, at {model.codec.key(row)}"
+    return f"{wrong}; with step {number + 1} ({doing}) it leaves all optimal plans, at {model.state_text(row)}"
 
 
 def _steps(number: int) -> str:

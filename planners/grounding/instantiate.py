@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 
-from planners.errors import BadInput
+from planners.errors import BadInput, Unsupported
 from planners.grounding.reachability import reachable_arguments
 from planners.limits import reaching
 from planners.pddl.formulas import MAX_COST
@@ -307,6 +307,12 @@ class _Grounder:
 
     def _cost(self, schema: Schema, binding: Binding) -> int:
         if schema.cost is None or isinstance(schema.cost, int):
+            if (schema.cost or 0) > MAX_COST:
+                raise Unsupported(
+                    f"an action cost above {MAX_COST} (of {schema.name}) is not supported",
+                    place=self._domain.source.place(schema.offset),
+                    remedy="Write costs in a larger unit, or leave out --cost makespan+cost.",
+                )
             return schema.cost or 0
         atom = self._atom(schema.cost.predicate, schema.cost.args, binding)
         value = self._problem.values.get(atom)

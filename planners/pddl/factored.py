@@ -22,6 +22,9 @@ def read_factored(directory: str | Path) -> tuple[Domain, Problem]:
     Raises `BadInput` where a file has no partner, an action differs between files or has no parameter for its robot.
     """
     folder = Path(directory)
+    if not folder.is_dir():
+        what = "this is a file, not a folder" if folder.exists() else "there is no such folder"
+        raise BadInput(what, place=Place(str(directory)), remedy="Name the folder of the robots' files.")
     domains = {path.stem.partition("-")[2].lower(): path for path in sorted(folder.glob("domain-*.pddl"))}
     problems = {path.stem.partition("-")[2].lower(): path for path in sorted(folder.glob("problem-*.pddl"))}
     if not domains or set(domains) != set(problems):
@@ -29,6 +32,7 @@ def read_factored(directory: str | Path) -> tuple[Domain, Problem]:
         raise BadInput(
             f"expected domain-ROBOT.pddl and problem-ROBOT.pddl for every robot; without a partner: {odd}",
             place=Place(str(directory)),
+            remedy="Unfactored files are given as DOMAIN PROBLEM, without --factored.",
         )
     views: list[tuple[Domain, Problem]] = []
     for robot, path in domains.items():
@@ -87,7 +91,13 @@ def _join_domains(domains: list[Domain], name: str) -> Domain:
         predicates=_union([domain.predicates for domain in domains]),
         functions=_union([domain.functions for domain in domains]),
         schemas=tuple(schemas.values()),
-        constraints=tuple(dict.fromkeys(c for domain in domains for c in domain.constraints)),
+        constraints=tuple(
+            dict.fromkeys(
+                replace(c, offsets=tuple(source.offset(domain.source, at) for at in c.offsets))
+                for domain in domains
+                for c in domain.constraints
+            )
+        ),
         dependences=tuple(dict.fromkeys(d for domain in domains for d in domain.dependences)),
     )
 

@@ -24,7 +24,7 @@ from planners.pddl.sexpr import Expression, Group, Word
 
 #: How PDDL writes a number.
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)$")
-#: Costs are summed as 64-bit integers.
+#: The largest action cost: they are summed as 64-bit integers.
 MAX_COST = 2**31
 _NUMERIC_TESTS = frozenset({"<", "<=", ">", ">="})
 _NUMERIC_EFFECTS = frozenset({"assign", "increase", "decrease", "scale-up", "scale-down"})
@@ -156,8 +156,8 @@ def _cost(names: Names, item: Group, *, conditional: bool) -> int | Atom:
     if isinstance(amount, Word):
         if not NUMBER.match(amount.text):
             raise document.fail(f"expected a number, found {amount.text!r}", amount)
-        value = float(amount.text)
-        if not 0 <= value <= MAX_COST or value != int(value):
+        value = min(float(amount.text), 2.0 * MAX_COST)  # too large ones are refused where costs are used
+        if value < 0 or value % 1 != 0:
             raise _unsupported(names, f"action cost {amount.text} (whole numbers from 0 only)", item)
         return int(value)
     if amount.head not in names.functions:

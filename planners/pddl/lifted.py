@@ -135,7 +135,7 @@ class Constraint:
     low: int
     high: int | None
     actions: tuple[tuple[str, tuple[int, ...]], ...]
-    offsets: tuple[int, ...]
+    offsets: tuple[int, ...] = field(default=(), compare=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -148,11 +148,11 @@ class Names:
                     known(self.variables, item.text, "variable"),
                 )
         elif item.text not in self.objects:
-            raise self.document.fail(
-                f"object {item.text!r} is not declared",
-                item,
-                known(self.objects, item.text, "object"),
-            )
+            remedy = known(self.objects, item.text, "object")
+            title = self.document.root.items[1:2]
+            if title and isinstance(title[0], Group) and title[0].head == "domain":
+                remedy += " An object that a domain names belongs in its (:constants ..)."
+            raise self.document.fail(f"object {item.text!r} is not declared", item, remedy)
         return item.text
 
     def arity(self, item: Group, name: str, arities: Iterable[int], what: str) -> BadInput | None:

@@ -9,7 +9,6 @@ from planners.pddl.lifted import Constraint, Schema
 from planners.pddl.names import Names, group, known, word
 from planners.pddl.sexpr import Expression, Group, Word
 
-
 #: More robots than there ever are: larger numbers mean the same.
 _MANY = 1_000_000_000
 

@@ -51,7 +51,14 @@ def parse_problem(source: Source, domain: Domain) -> Problem:
 def _read_goal(names: Names, document: Document, sections: dict[str, list[Group]]) -> Formula:
     goals = sections.get(":goal", [])
     if len(goals) != 1 or len(goals[0]) != 2:
-        raise document.fail("expected one '(:goal FORMULA)'", goals[0] if goals else document.root)
+        found = "found none" if not goals else "this one has no formula, or several"
+        if len(goals) > 1:
+            found = f"found {len(goals)}"
+        raise document.fail(
+            f"expected one '(:goal FORMULA)', {found}",
+            goals[-1] if goals else document.root,
+            "Write (:goal (and ..)) with all that must hold at the end, once; (:goal (and)) asks for nothing.",
+        )
     return read_formula(names, goals[0].items[1])
 
 

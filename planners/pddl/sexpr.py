@@ -187,5 +187,9 @@ def parse(source: Source) -> Document:
             remedy=f"Expected {len(open_groups)} more ')' before the end of the file.",
         )
     if root is None:
-        raise BadInput("expected '(define ...', found an empty file", place=Place(source.name))
+        raise BadInput(
+            "expected '(define ...', found an empty file",
+            place=Place(source.name),
+            remedy="Give a PDDL file: DOMAIN first, then PROBLEM.",
+        )
     return Document(source, root, tuple(comments))

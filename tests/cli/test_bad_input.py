@@ -65,7 +65,12 @@ WRONG_DOMAINS = {
     "unknown keyword": (DOMAIN.replace(":effect", ":effects"), "unknown keyword ':effects' in an action"),
     "no action": ("(define (domain hall))", "this domain has no action"),
     "double action": (DOMAIN.rstrip()[:-1] + "(:action go :parameters () :effect ()))", "action 'go' is declared twice"),
-    "empty": ("", "expected '(define ...', found an empty file"),
+    "empty": ("", "expected '(define ...', found an empty file\n  Give a PDDL file"),
+    "object of the problem": (
+        DOMAIN.replace("(at ?r ?x) (door", "(at r1 ?x) (door"),
+        "d.pddl:6:28: object 'r1' is not declared\n  No object is declared. An object that a domain names belongs in its "
+        "(:constants ..).",
+    ),
     "deep": ("(" * 10_000, "nested more than 200 deep"),
     "a problem instead": (PROBLEM, "This is a problem file: the order is DOMAIN PROBLEM."),
 }
@@ -80,7 +85,9 @@ def test_wrong_domain(case: str, coordlang: Command, files: Files) -> None:
 
 
 WRONG_PROBLEMS = {
-    "unknown object in the goal": (PROBLEM.replace("(at r2 a))))", "(at r2 c))))"), "p.pddl:4:32: object 'c' is not declared"),
+    "unknown object in the goal": (
+        PROBLEM.replace("(at r2 a))))", "(at r2 c))))"), "p.pddl:4:32: object 'c' is not declared\n  Declared objects: a, b, r1, r2.\n",
+    ),
     "object of no type": (PROBLEM.replace("a b - room", "a b -"), "p.pddl:2:31: expected a type after '-'"),
     "object of an unknown type": (PROBLEM.replace("- robot a", "- rbot a"), "type 'rbot' of 'r1' is not declared"),
     "another domain": (PROBLEM.replace("hall", "house"), "p.pddl:1:23: this is a problem for domain 'house', not for 'hall'"),
@@ -88,7 +95,9 @@ WRONG_PROBLEMS = {
         PROBLEM.replace("r1 r2 - robot", "").replace("(at r1 a) (at r2 b)", "").replace("(at r1 b) (at r2 a)", ""),
         "there is no robot in this problem",
     ),
-    "no goal": (PROBLEM.replace("(:goal (and (at r1 b) (at r2 a))))", ")"), "expected one '(:goal FORMULA)'"),
+    "no goal": (PROBLEM.replace("(:goal (and (at r1 b) (at r2 a))))", ")"), "expected one '(:goal FORMULA)', found none\n  Write"),
+    "two goals": (PROBLEM.rstrip()[:-1] + "(:goal (at r1 a)))", "p.pddl:4:36: expected one '(:goal FORMULA)', found 2\n  Write"),
+    "half a goal": (PROBLEM.replace("(and (at r1 b) (at r2 a))", ""), "'(:goal FORMULA)', this one has no formula"),
 }
 
 
@@ -115,6 +124,93 @@ def test_unsupported(insert: str, message: str, coordlang: Command, files: Files
     assert outcome.code == 34
     assert message in outcome.err
     assert "d.pddl:7:" in outcome.err
+
+
+COSTLY = DOMAIN.replace(":effect (and", ":effect (and (increase (total-cost) COST)")
+
+
+@pytest.mark.parametrize(
+    ("cost", "code", "message"),
+    [("2147483648", 0, ""), ("4e", 31, "expected a number"),
+     *((much, 34, "d.pddl:5:3: an action cost above 2147483648 (of go) is not supported\n  Write costs in a larger unit, or leave "
+        "out --cost") for much in ("2147483649", "4000000000", "4000000000.0", "9" * 5000))],
+)  # fmt: skip
+def test_large_costs(cost: str, code: int, message: str, coordlang: Command, files: Files) -> None:
+    """The limit is one of sums: it is no matter where costs are ignored."""
+    both = files.write(domain=COSTLY.replace("COST", cost))
+    outcome = coordlang("plans", *both, "--count", "--cost", "makespan+cost")
+    assert outcome.code == code
+    assert message in outcome.err
+    if code != 31:
+        assert coordlang("plans", *both, "--count").out == "1\n"
+
+
+CANDIDATES = """(define (domain en) (:types robot hall) (:predicates (q ?r - robot) (open) (busy ?r))
+ (:action go :parameters (?r - robot) :precondition (open) :effect (q ?r))
+ (:action door :parameters () :effect (open)))"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "listed"),
+    [("", "", "robot"), ("robot", "man", "man"), (" - robot", "", "busy"), ("hall", "hall", "robot")],
+)
+def test_what_may_be_the_robots(old: str, new: str, listed: str, coordlang: Command, files: Files) -> None:
+    problem = "(define (problem p) (:domain en) (:objects a b - robot) (:init (busy a) (busy b)) (:goal (and (q a) (q b))))"
+    both = files.write(CANDIDATES.replace(old, new), problem.replace(old, new))
+    outcome = coordlang("plans", *both, "--robot-type", "nix", "--unowned", "shared")
+    assert outcome.code == 2, outcome.err
+    assert f"Candidates: {listed}.\n" in outcome.err
+    assert coordlang("plans", *both, "--robot-type", listed, "--unowned", "shared").code == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [("no", "no: there is no such folder\n  "), ("d.pddl", "d.pddl: this is a file, not a folder\n  "),
+     (".", "without a partner: no such files\n  ")],
+)  # fmt: skip
+@pytest.mark.parametrize("command", ["plans", "inspect", "check", "coordination"])
+def test_a_folder_without_factored_files(
+    command: str, name: str, message: str, coordlang: Command, files: Files, tmp_path: Path
+) -> None:
+    outcome = coordlang(command, "--factored", tmp_path / name)
+    assert (outcome.code, message in outcome.err) == (31, True)
+
+
+def factored(folder: Path) -> Path:
+    """The hall as a file for each robot, which has a type of its own."""
+    folder.mkdir()
+    for robot in ("r1", "r2"):
+        domain = DOMAIN.replace("(:types robot room)", f"(:types {robot}kind - robot robot room)").replace(
+            "(:action go :agent ?r - robot :parameters (?x", f"(:action go-{robot} :parameters (?r - {robot}kind ?x"
+        )
+        (folder / f"domain-{robot}.pddl").write_text(domain)
+        problem = PROBLEM.replace("r1 r2 - robot", f"{robot} - {robot}kind")
+        facts = [f"(at {other} {room})" for other, room in (("r1", "a"), ("r2", "b"), ("r1", "b"), ("r2", "a")) if other != robot]
+        for fact in facts:
+            problem = problem.replace(fact, "")
+        (folder / f"problem-{robot}.pddl").write_text(problem)
+    return folder
+
+
+def test_factored_files_all_the_way(coordlang: Command, tmp_path: Path) -> None:
+    folder, language = factored(tmp_path / "hall"), tmp_path / "l.json"
+    outcome = coordlang("coordination", "--factored", folder)
+    assert (outcome.code, outcome.out) == (
+        0, f"{folder}: 1 optimal plan of 1 step; coordination is not required\n",
+    )  # fmt: skip
+    assert coordlang("build", "--factored", folder, "--tasks", "all", "-o", language).code == 0
+    outcome = coordlang("verify", language, "--factored", folder)
+    assert (outcome.code, "12 tasks" in outcome.out) == (0, True)
+    file = folder / "domain-r1.pddl"
+    assert f"-o {file} would overwrite an input file" in coordlang("build", "--factored", folder, "-o", file).err
+
+
+@pytest.mark.parametrize("command", [("coordination",), ("build", "-o", "-"), ("verify", "l.json")])
+@pytest.mark.parametrize("files", [(), ("d",), ("d", "p", "--factored", "x")])
+def test_files_or_a_folder(command: tuple[str, ...], files: tuple[str, ...], coordlang: Command) -> None:
+    outcome = coordlang(*command, *files)
+    assert outcome.code == 2
+    assert "expected DOMAIN PROBLEMS..., or --factored DIR without them" in outcome.err
 
 
 def test_one_robot_is_noted(coordlang: Command, files: Files) -> None:
@@ -177,7 +273,53 @@ def test_unsolvable_task_in_a_file(coordlang: Command, files: Files, tmp_path: P
     tasks = [{"init": ["(at r1 a)", "(at r2 b)"], "goal": ["(at r1 a)", "(at r1 b)"]}]
     outcome = coordlang("build", *files.write(), "--tasks", task_file(tmp_path, tasks), "-o", tmp_path / "l.json")
     assert outcome.code == 11
-    assert "the goal cannot be reached from (at r1 a) (at r2 b)" in outcome.err
+    assert "tasks.json: task 1: the goal (at r1 a) (at r1 b) cannot be reached from (at r1 a) (at r2 b)\n" in outcome.err
+    assert "--unsolvable skip leaves out such tasks" in outcome.err
+
+
+EMPTY = """(define (domain e) (:types robot) (:predicates (p) (q ?r - robot))
+  (:action a :agent ?r - robot :effect (q ?r)) (:action b :agent ?r - robot :precondition (q ?r) :effect (not (q ?r))))"""
+
+
+def test_an_unsolvable_problem_is_named(coordlang: Command, files: Files, tmp_path: Path) -> None:
+    """By its file: several problems may have one name."""
+    goal = "(define (problem x) (:domain e) (:objects r1 r2 - robot) (:init) (:goal {}))"
+    files.write(EMPTY, goal.format("(and (q r1) (q r2))"))
+    other = tmp_path / "u.pddl"
+    other.write_text(goal.format("(p)"))
+    outcome = coordlang("coordination", files.domain, files.problem, other)
+    assert (outcome.code, outcome.out) == (11, "")
+    assert "u.pddl: task x: the goal cannot be reached\n" in outcome.err
+    assert "--unsolvable" not in outcome.err
+    build = ("build", files.domain, files.problem, other, "-o", tmp_path / "l.json")
+    assert "u.pddl: task x: the goal cannot be reached" in (err := coordlang(*build).err)
+    assert "--unsolvable skip leaves out such tasks" in err
+    assert "left out, it has no plan: " + str(other) in coordlang(*build, "--unsolvable", "skip").err
+    assert "--unsolvable skip" not in coordlang("build", files.domain, other, "-o", "-", "--unsolvable", "skip").err
+
+
+def test_unsolvable_tasks_of_a_file_are_named(coordlang: Command, files: Files, tmp_path: Path) -> None:
+    text = "(define (problem x) (:domain e) (:objects r1 r2 - robot) (:init) (:goal (q r1)))"
+    tasks = [{"init": ["(q r1)"], "goal": ["(q r2)"]}, {"init": [], "goal": ["(p)"]}, {"init": [], "goal": []}]
+    build = ("build", *files.write(EMPTY, text), "--tasks", task_file(tmp_path, tasks), "-o", tmp_path / "l.json")
+    assert "task 2: the goal (p) cannot be reached from (no fact holds)\n" in coordlang(*build).err
+    assert "left out, it has no plan: task 2 ((no fact holds) -> (p))" in coordlang(*build, "--unsolvable", "skip").err
+
+
+def test_a_state_in_which_nothing_is_true(coordlang: Command, files: Files, tmp_path: Path) -> None:
+    text = "(define (problem x) (:domain e) (:objects r1 r2 - robot) (:init) (:goal (and (q r1) {})))"
+    domain = EMPTY.replace(":effect (q ?r)", ":precondition (not (q ?r)) :effect (q ?r)").replace(
+        "(:action a", "(:action only :agent ?r - robot :parameters (?o - robot) :precondition (not (q ?o)) :effect (q ?r))"
+        "(:action a"
+    )  # fmt: skip
+    files.write(domain, text.format("(not (q r2))"))
+    language = tmp_path / "l.json"
+    assert coordlang("build", files.domain, files.problem, "--tasks", "all", "-o", language).code == 0
+    assert "The task (no fact holds) -> (q r1)" in coordlang("choices", language, files.domain, files.problem, "w0 w1").out + \
+        coordlang("explain", language, files.domain, files.problem, "--task").out
+    plan = tmp_path / "plan"
+    plan.write_text("0: (b r1)\n")
+    assert "The state before it is (no fact holds)." in coordlang("say", language, files.domain, files.problem, plan).err
 
 
 def test_a_good_language_survives_a_failing_build(
@@ -250,7 +392,9 @@ def test_language_of_another_world(coordlang: Command, language: Path, t_map: tu
 def test_contradicting_flag(coordlang: Command, language: Path, t_map: tuple[Path, Path]) -> None:
     outcome = coordlang("verify", language, *t_map, "--cost", "makespan+actions")
     assert outcome.code == 2
-    assert "--cost makespan+actions contradicts the language file" in outcome.err
+    assert "--cost makespan+actions contradicts the language file, which was built with --cost makespan\n  Leave out" in outcome.err
+    for option in (["--unowned", "environment"], ["--robots", "r1"], ["--remember-actions"]):
+        assert f"Leave out {option[0]}.\n" in coordlang("verify", language, *t_map, *option).err
 
 
 def test_output_that_cannot_be_written(coordlang: Command, t_map: tuple[Path, Path], tmp_path: Path) -> None:
@@ -262,6 +406,36 @@ def test_output_that_cannot_be_written(coordlang: Command, t_map: tuple[Path, Pa
 @pytest.mark.parametrize("arguments", [["nonsense"], ["plans"], ["plans", "a", "b", "--max", "x"], ["build", "a", "b"]])
 def test_usage(arguments: list[str], coordlang: Command) -> None:
     assert coordlang(*arguments).code == 2
+
+
+PLANS, UNDERSTAND = ("plans", "d", "p"), ("understand", "l", "d", "p", "w0")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((*PLANS, "--max", "1", "--sample", "2"), "--sample N draws N plans: leave out --max"),
+        ((*UNDERSTAND, "--max", "1", "--sample", "2"), "--sample N draws N plans: leave out --max"),
+        ((*PLANS, "--seed", "0"), "--seed belongs to --sample"),
+        ((*UNDERSTAND, "--seed", "1"), "--seed belongs to --sample"),
+        ((*PLANS, "--format", "ipc", "--json"), "leave out --format ipc"),
+        ((*UNDERSTAND, "--format", "svg", "--json"), "leave out --format svg"),
+        (("choices", "l", "d", "p", "w0", "--format", "dot", "--json"), "leave out --format dot"),
+        ((*UNDERSTAND, "--nodes", "3"), "--nodes cuts the DAG"),
+        ((*UNDERSTAND, "--nodes", "3", "--json", "--count"), "--nodes cuts the DAG"),
+        (("export", "l", "d", "p", "w0", "--to", "ltlf", "--limit", "2000"), "--limit belongs to --to pddl"),
+        ((*PLANS, "--robots", "r1", "--robot-type", "robot"), "give one of them"),
+    ],
+)
+def test_options_without_effect(arguments: tuple[str, ...], message: str, coordlang: Command) -> None:
+    outcome = coordlang(*arguments)
+    assert (outcome.code, outcome.out) == (2, "")
+    assert message in outcome.err
+
+
+def test_options_with_effect(coordlang: Command, files: Files) -> None:
+    for options in (["--format", "json", "--json"], ["--sample", "1", "--seed", "3"], ["--count", "--json"]):
+        assert coordlang("plans", *files.write(), *options).code == 0
 
 
 def test_problems_of_different_worlds(coordlang: Command, files: Files, tmp_path: Path) -> None:

@@ -215,7 +215,9 @@ ONCE_WRONG = {
         COSTLY_PROBLEM, (" 3)", f" {10**20})")), ("--cost", "makespan+cost")),
     "a cost of 400 digits": Case((31, "cost"), COSTLY, change(
         COSTLY_PROBLEM, (" 3)", f" {'9' * 400})")), ("--cost", "makespan+cost")),
-    "a constant cost of 400 digits": Case((34, "d.pddl"), change(COSTLY, ("(far ?x ?y)))", f"{'9' * 400}))"))),
+    "a constant cost of 400 digits": Case((34, "d.pddl"), change(
+        COSTLY, ("(far ?x ?y)))", f"{'9' * 400}))")), options=("--cost", "makespan+cost")),
+    "a constant cost of 400 digits that is ignored": Case(2, change(COSTLY, ("(far ?x ?y)))", f"{'9' * 400}))"))),
     "a superscript as a name": Case(2, problem=problem(("r1", "\u00b2"))),
     "a name of 5000 digits": Case(2, problem=problem(("r1", "9" * 5000))),
     "--robots without a name": Case((2, "--robots"), options=("--robots", ",")),
