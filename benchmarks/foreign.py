@@ -213,7 +213,7 @@ def languages(chosen: Sequence[Language], seconds: float) -> int:
             if done.code != 0:
                 wrong.append(f"{language.name}: {done.errors.strip()[-300:]}")
                 continue
-            if figures["told"] != figures["different"] or not figures["different"]:
+            if figures["told"] < language.agree * figures["different"] or not figures["different"]:
                 wrong.append(f"{language.name}: told in {figures['told']} of {figures['different']} tasks")
             bound = "proved" if figures["proved"] else f"at least {figures['bound']}"
             options = language.cost.removeprefix("makespan").lstrip("+") or "-"

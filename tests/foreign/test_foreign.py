@@ -144,8 +144,8 @@ def test_a_language_for_varied_tasks(name: str) -> None:
     assert figures["proved"]
     assert (figures["tasks"], figures["requiring"], figures["words"]) == (tasks, requiring, words)
     assert figures["greedy"] >= words  # type: ignore[operator]
-    # What the words are said to mean: all plans of every sentence agree on it.
-    assert figures["told"] == figures["different"] > 0  # type: ignore[operator]
+    # What the words are said to mean: all plans of every sentence agree on it (of mapf in nine of ten tasks).
+    assert figures["told"] >= LANGUAGE_BY_NAME[name].agree * figures["different"] > 0  # type: ignore[operator]
 
 
 @pytest.mark.slow
