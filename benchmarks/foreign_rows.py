@@ -67,8 +67,8 @@ BY_NAME = {row.name: row for row in ROWS}
 class Language:
     """Varied tasks of a row (`coordlang.variation`), and what the words say there.
 
-    ``told``: what a sentence says of a plan; all plans of a sentence agree on it, in at least the share ``agree`` of the tasks
-    whose plans differ in it.  ``means`` says the same for people.  ``left`` is what a sentence mostly leaves open.
+    ``told``: what a sentence says of a plan; all plans of a sentence agree on it, in at least the share ``agree`` of
+    the tasks whose plans differ in it.  ``means`` says the same for people.  ``left`` is what a sentence mostly leaves open.
     """
 
     name: str

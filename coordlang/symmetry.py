@@ -87,9 +87,10 @@ def symmetries(candidates: Candidates) -> list[Symmetry]:
 
 def closed(permutations: Sequence[Ints]) -> bool:
     """Whether the permutations and the identity are a group: one after another is one of them again."""
-    known = {tuple(p.tolist()) for p in permutations}
-    identity = tuple(range(len(permutations[0]))) if permutations else ()
-    return all(tuple(a[b].tolist()) in known or tuple(a[b].tolist()) == identity for a in permutations for b in permutations)
+    if not permutations:
+        return True
+    known = {p.tobytes() for p in (np.arange(len(permutations[0])), *permutations)}
+    return all(a[b].tobytes() in known for a in permutations for b in permutations)
 
 
 def _used(model: JointModel) -> set[str]:
