@@ -34,6 +34,8 @@ _PARTS, _TASKS = 8, 1_500
 _WALKED = 500_000
 #: Conflicts within which most partitions are found; after so many the solver is likely on the way to a proof.
 _EASY = 5_000
+#: Comparisons of clauses to find which are implied, a second's work: of the others the solver finds it.
+_COMPARED = 5_000_000
 #: Pairs of states by which one of symmetric partitions is told: enough to tell most apart.
 _LEADING = 20
 #: Counterexamples taken from one part.
@@ -149,7 +151,7 @@ class _Search:
         return True
 
     def _start(self, size: int, known: Sequence[Clause], solver: str = "cadical153") -> Colouring:
-        clauses = sorted(known, key=len)  # not reduced: the solver takes them faster than we find what is implied
+        clauses = reduce(known, _COMPARED)
         colouring = Colouring(by_demand(self._job.states, clauses), size, solver)
         for clause in clauses:
             colouring.add(clause)

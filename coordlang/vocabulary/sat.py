@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -231,14 +232,21 @@ class Effort:
     conflicts: int = 30_000
 
 
-def reduce(clauses: Iterable[Clause]) -> list[Clause]:
-    """The clauses that no other one implies (a subset of its pairs), shortest first."""
+def reduce(clauses: Iterable[Clause], most: int = sys.maxsize) -> list[Clause]:
+    """The clauses that no other one implies (a subset of its pairs), shortest first.
+
+    After ``most`` comparisons of clauses the longer ones are left as they are.
+    """
     kept: list[Clause] = []
+    compared = 0
     # A kept clause stands under one of its pairs: what it implies has that pair as well.
     by_pair: dict[Pair, list[Clause]] = {}
     for clause in sorted(set(clauses), key=lambda c: (len(c), sorted(c))):
-        if any(other <= clause for p in clause for other in by_pair.get(p, ())):
-            continue
+        if compared < most:
+            others = [other for p in clause for other in by_pair.get(p, ())]
+            compared += len(others)
+            if any(other <= clause for other in others):
+                continue
         kept.append(clause)
         rarest = min(sorted(clause), key=lambda p: len(by_pair.get(p, ())))
         by_pair.setdefault(rarest, []).append(clause)

@@ -162,6 +162,8 @@ def test_problems_are_kept_and_learn_what_is_new() -> None:
 def test_reduce_drops_what_is_implied() -> None:
     short, long, other = frozenset({(0, 1)}), frozenset({(0, 1), (1, 2)}), frozenset({(1, 2), (2, 3)})
     assert reduce([long, short, other, short]) == [short, other]
+    assert reduce([long, short, other], 1) == [short, other], "short ones first"
+    assert reduce([long, short, other], 0) == [short, long, other]
 
 
 def states_of(spaces: tuple[PlanSpace, ...]) -> int:
