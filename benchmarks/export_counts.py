@@ -22,13 +22,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from coordlang.build import Inseparable, build_language
+from coordlang.build import build_language
 from coordlang.language import sentence
 from coordlang.sentences import task_sentences
 from coordlang.tasks import from_problems
 from coordlang.use.export.pddl import Exported, export_pddl
 from coordlang.use.fitting import fitting
 from coordlang.use.spoken import Spoken, speak_candidates
+from coordlang.witness import Inseparable
 from planners.errors import CoordlangError, OutOfMemory
 from planners.model import ModelOptions
 from planners.pddl import read_domain, read_problem

@@ -21,10 +21,8 @@ from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Evidence, Partition
 from coordlang.vocabulary.minimal import refute
 from coordlang.warping import Clause
-from coordlang.witness import Inseparable as Inseparable
-from coordlang.witness import inseparable
-from planners.errors import OutOfMemory, OutOfTime
-from planners.limits import stop_clock
+from coordlang.witness import Inseparable, inseparable
+from planners.limits import STOPPING, stop_clock
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +95,7 @@ def build_language(
         if not any(known.partition is outcome.partition for known in checked):
             progress("verifying by definition")
             check(outcome.partition)
-    except (OutOfTime, OutOfMemory, MemoryError, KeyboardInterrupt) as error:
+    except STOPPING as error:
         stop_clock()
         if not checked:
             raise
@@ -111,7 +109,7 @@ def build_language(
         progress("enlarging words")
         try:
             language, outcome = _overlapping(candidates, language, outcome)
-        except (OutOfTime, OutOfMemory, MemoryError, KeyboardInterrupt) as error:
+        except STOPPING as error:
             stop_clock()  # the words as they were are a verified language
             outcome = replace(outcome, stopped=error.with_traceback(None))
         clock.note("overlap")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,14 +64,16 @@ def separations(divergences: Divergences) -> list[tuple[Separation, ...]]:
     With two robots there is one: all three pairs of ``alpha*``.  With n robots any two of the different next states will
     do, together with the last shared state.
     """
-    result = []
-    for last, row in zip(divergences.last.tolist(), divergences.following.tolist(), strict=True):
-        states = [s for s in row if s >= 0]
-        result.append(
-            tuple(
-                Separation(frozenset({pair(last, a), pair(last, b), pair(a, b)}))
-                for n, b in enumerate(states)
-                for a in states[:n]
-            )
-        )
-    return result
+    rows = zip(divergences.last.tolist(), divergences.following.tolist(), strict=True)
+    return [alternatives(last, [s for s in row if s >= 0]) for last, row in rows]
+
+
+def alternatives(shared: int, others: Iterable[int]) -> tuple[Separation, ...]:
+    """The ways to separate plans at a difference: any two of the different states ``others``, with the shared state
+    (-1: there is none, the plans end in different states)."""
+    states = sorted(set(others))
+    return tuple(
+        Separation(frozenset({pair(a, b)} if shared < 0 else {pair(shared, a), pair(shared, b), pair(a, b)}))
+        for n, b in enumerate(states)
+        for a in states[:n]
+    )

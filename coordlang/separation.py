@@ -17,18 +17,15 @@ from dataclasses import dataclass
 from itertools import combinations, pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from coordlang.coordination import FAILED, moves
-from coordlang.divergence import Separation
+from coordlang.coordination import FAILED, Bools, moves
+from coordlang.divergence import Separation, alternatives
 from coordlang.tuples import EdgeIndex, unique_tuples
-from coordlang.warping import pair
 from planners.errors import OutOfMemory
 from planners.limits import memory_left
 from planners.matching import Ints
 from planners.optimal import PlanSpace
-
-Bools = NDArray[np.bool_]
+from planners.states import bits
 
 #: At least one of these must hold.
 Constraint = tuple[Separation, ...]
@@ -124,7 +121,7 @@ class SeparationWalk:
         found = set()
         for (shared, *others), ends in firsts.items():
             alpha = alternatives(shared, others)
-            found |= {ordered({*alpha, *known[number]}) for number in _ones(ends)}
+            found |= {ordered({*alpha, *known[number]}) for number in bits(ends)}
         return found
 
     def _differences(self) -> tuple[dict[tuple[int, ...], int], list[tuple[int, ...]]]:
@@ -172,27 +169,9 @@ class SeparationWalk:
             yield ordered({*alpha, *beta})
 
 
-def _ones(bits: int) -> Iterator[int]:
-    """The positions of the bits that are set."""
-    for position, bit in enumerate(reversed(f"{bits:b}")):
-        if bit == "1":
-            yield position
-
-
 def ordered(alternatives: Iterable[Separation]) -> Constraint:
     """Alternatives in one order, so that equal constraints are equal."""
     return tuple(sorted(alternatives, key=lambda s: sorted(s.pairs)))
-
-
-def alternatives(shared: int, others: Sequence[int]) -> tuple[Separation, ...]:
-    """The ways to separate plans at a difference: any two of the different states ``others``, with the shared state
-    (-1: there is none, the plans end in different states)."""
-    different = sorted(set(others))
-    if shared < 0:
-        return tuple(Separation(frozenset({pair(a, b)})) for a, b in combinations(different, 2))
-    return tuple(
-        Separation(frozenset({pair(shared, a), pair(shared, b), pair(a, b)})) for a, b in combinations(different, 2)
-    )
 
 
 def _separated(word: Ints, shared: Ints, others: Ints) -> Bools:

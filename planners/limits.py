@@ -24,6 +24,8 @@ _AGAIN = 5.0
 _SOON = 0.01
 #: Seconds that no timer counts to the end (some cannot be set to more).
 _FOR_EVER = 1e9
+#: What ends work early, so that an anytime method returns what it has.
+STOPPING = (OutOfTime, OutOfMemory, MemoryError, KeyboardInterrupt)
 _LONGER = "Use a larger --time-limit."
 
 

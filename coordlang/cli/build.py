@@ -73,9 +73,10 @@ def command(
 
     Exit 0: written, with the proof that the method promises.  3: written without it (a limit was hit).
     """
-    from coordlang.build import Inseparable, build_language
+    from coordlang.build import build_language
     from coordlang.cli.miscoordination import show
     from coordlang.file import to_bytes, write_language
+    from coordlang.witness import Inseparable
     from planners.errors import ProvedImpossible
     from planners.limits import stop_clock, time_left
 
@@ -125,11 +126,12 @@ def command(
         click.echo(to_bytes(language).decode(), nl=False)
     else:
         write_language(language, output)
-    stopped = built.stopped
-    if certificate and (stopped is None or proved):
-        stopped = _certify(built, certificate, left) or stopped
+    no_certificate: BaseException | None = None
+    if certificate and (built.stopped is None or proved):
+        no_certificate = _certify(built, certificate, left)
     elif certificate:
         click.echo("coordlang: no certificate is written: the search was stopped", err=True)
+    stopped = no_certificate or built.stopped
     figures = _figures(candidates, built, seconds)
     if as_json and output != "-":
         click.echo(json.dumps(figures))
@@ -142,7 +144,7 @@ def command(
         reason = str(stopped).splitlines()[0] if str(stopped) else "out of memory"
         short_of = "" if proved and exact else ", without proof"
         click.echo(f"coordlang: {reason}; the best language so far is written{short_of}", err=True)
-    unproved = not proved or stopped is not built.stopped if exact else stopped is not None
+    unproved = not proved or no_certificate is not None if exact else stopped is not None
     return EXIT_UNPROVED if unproved else 0
 
 
@@ -150,8 +152,7 @@ def _certify(built: Built, path: str, seconds: float) -> BaseException | None:
     """Write the certificate, within ``seconds``; the error that ended it early, or None."""
     from coordlang.build import certificate_of
     from coordlang.certificate import write_certificate
-    from planners.errors import OutOfMemory, OutOfTime
-    from planners.limits import stop_clock, time_limit
+    from planners.limits import STOPPING, stop_clock, time_limit
 
     try:
         with time_limit(seconds):
@@ -160,7 +161,7 @@ def _certify(built: Built, path: str, seconds: float) -> BaseException | None:
             stop_clock()
             clear_progress()
             write_certificate(proof, path)
-    except (OutOfTime, OutOfMemory, MemoryError, KeyboardInterrupt) as error:
+    except STOPPING as error:
         clear_progress()
         click.echo("coordlang: no certificate is written: there was no time or memory left for it", err=True)
         return error

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from coordlang.evaluation.languages import COMPARED, TITLES, language_for
-from coordlang.evaluation.orders import NATURAL, ORDERS, greedy_in_orders
+from coordlang.evaluation.compared import Compared, compared_units
+from coordlang.evaluation.languages import TITLES, language_for
+from coordlang.evaluation.orders import NATURAL, greedy_in_orders
 from coordlang.evaluation.paper import DIFFERING, SAVING_ALL, SAVING_DIFFERING
 from coordlang.evaluation.plots import Panel, Series, histograms, per_task
 from coordlang.evaluation.recipe import (
@@ -18,12 +19,11 @@ from coordlang.evaluation.recipe import (
     Section,
     Settings,
     Unit,
-    done,
     percent,
     table,
 )
 from coordlang.evaluation.said import MOST_LISTED, Said, mean, said_in
-from coordlang.evaluation.suite import OTHERS, QUICK_ROW, ROW, WORLDS
+from coordlang.evaluation.suite import ROW, WORLDS
 from coordlang.flexibility import flexibility
 
 #: Tasks that the paper's figure shows.
@@ -31,16 +31,8 @@ SHOWN = 100
 
 
 def units(settings: Settings) -> list[Unit]:
-    row = QUICK_ROW if settings.quick else ROW
-    found = []
-    for name in (row, *(world.name for world in OTHERS[: 1 if settings.quick else None])):
-        methods = COMPARED[:3] if settings.quick else COMPARED
-        for method in methods:
-            parameters = {"world": name, "method": method}
-            # The most flexible language takes long, and is kept: `flexibility`, which starts sooner, builds it.
-            found.append(Unit("communication", f"{name}/{method}", parameters, WORLDS[name].files, 1.5))
-    orders = {"world": row, "orders": 10 if settings.quick else ORDERS}
-    return [*found, Unit("communication", f"{row}/orders", orders, WORLDS[row].files, 3.0)]
+    # The most flexible language takes long, and is kept: `flexibility`, which starts sooner, builds it.
+    return compared_units("communication", settings, effort=1.5, flexible=1.5)
 
 
 def run(unit: Unit, settings: Settings) -> Result:
@@ -79,10 +71,8 @@ def measures(tasks: Sequence[Said]) -> Result:
 
 
 def section(records: Sequence[Record]) -> Section:
-    row = records[-1].unit.parameters["world"]
-    mine = [r for r in done(records) if r.unit.parameters["world"] == row and "method" in r.unit.parameters]
-    orders = [r for r in done(records) if "orders" in r.unit.parameters]
-    others = [r for r in done(records) if r.unit.parameters["world"] != row]
+    found = Compared.of(records)
+    row, mine = found.row, found.languages
     blocks: list[str | Figure] = [f"{_DEFINITION}{row}.", _table(mine)]
     if mine:
         blocks += [
@@ -99,18 +89,19 @@ def section(records: Sequence[Record]) -> Section:
                 lambda: _savings(mine),
             ),
         ]
-    if orders:
-        blocks.append(_told_orders(orders[0]))
-    if others:
-        blocks += ["Worlds that are no grids, all tasks:", _table(others, world=True)]
-    return Section(tuple(blocks), _differences(row, mine, orders), _headlines(row, mine))
+    if found.orders:
+        blocks.append(_told_orders(found.orders[0]))
+    if found.others:
+        blocks += ["Worlds that are no grids, all tasks:", _table(found.others, world=True)]
+    return Section(tuple(blocks), _differences(row, mine, found.orders), _headlines(found))
 
 
-def _headlines(row: str, records: Sequence[Record]) -> tuple[Headline, ...]:
-    of = {record.unit.parameters["method"]: record.result for record in records}
-    if row != ROW or not {"greedy", "minimal"} <= of.keys():
+def _headlines(found: Compared) -> tuple[Headline, ...]:
+    results = found.greedy_and_minimal()
+    if results is None:
         return ()
-    greedy, least = of["greedy"], of["minimal"]
+    row = found.row
+    greedy, least = results
     there = "saving_differing"
     return (
         (f"{row}: saving, all tasks", percent(SAVING_ALL), percent(greedy["saving"]), percent(least["saving"])),

@@ -5,26 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from coordlang.evaluation.languages import COMPARED, TITLES, language_for
-from coordlang.evaluation.orders import NATURAL, ORDERS, greedy_in_orders
+from coordlang.evaluation.compared import Compared, compared_units
+from coordlang.evaluation.languages import TITLES, language_for
+from coordlang.evaluation.orders import NATURAL, greedy_in_orders
 from coordlang.evaluation.paper import OPEN_ALL, OPEN_SEVERAL, SEVERAL
 from coordlang.evaluation.plots import Panel, histograms
-from coordlang.evaluation.recipe import Figure, Headline, Recipe, Record, Result, Section, Settings, Unit, done, table
+from coordlang.evaluation.recipe import Figure, Headline, Recipe, Record, Result, Section, Settings, Unit, table
 from coordlang.evaluation.said import MOST_LISTED, Said, mean, said_in
-from coordlang.evaluation.suite import OTHERS, QUICK_ROW, ROW, WORLDS
+from coordlang.evaluation.suite import ROW, WORLDS
 from coordlang.flexibility import flexibility
 
 
 def units(settings: Settings) -> list[Unit]:
-    row = QUICK_ROW if settings.quick else ROW
-    found = []
-    for name in (row, *(world.name for world in OTHERS[: 1 if settings.quick else None])):
-        for method in COMPARED[:3] if settings.quick else COMPARED:
-            effort = 60.0 if method == "flexible" else 2.0
-            parameters = {"world": name, "method": method}
-            found.append(Unit("flexibility", f"{name}/{method}", parameters, WORLDS[name].files, effort))
-    orders = {"world": row, "orders": 10 if settings.quick else ORDERS}
-    return [*found, Unit("flexibility", f"{row}/orders", orders, WORLDS[row].files, 3.0)]
+    return compared_units("flexibility", settings, effort=2.0, flexible=60.0)
 
 
 def run(unit: Unit, settings: Settings) -> Result:
@@ -60,10 +53,8 @@ def measures(tasks: Sequence[Said]) -> Result:
 
 
 def section(records: Sequence[Record]) -> Section:
-    row = records[-1].unit.parameters["world"]
-    mine = [r for r in done(records) if r.unit.parameters["world"] == row and "method" in r.unit.parameters]
-    orders = [r for r in done(records) if "orders" in r.unit.parameters]
-    others = [r for r in done(records) if r.unit.parameters["world"] != row]
+    found = Compared.of(records)
+    row, mine = found.row, found.languages
     blocks: list[str | Figure] = [_DEFINITION.format(row=row), _table(mine)]
     if mine:
         blocks.append(
@@ -73,18 +64,20 @@ def section(records: Sequence[Record]) -> Section:
                 lambda: _open(mine),
             )
         )
-    if orders:
-        blocks.append(_told_orders(orders[0]))
-    if others:
-        blocks += ["Worlds that are no grids, all tasks:", _table(others, world=True)]
-    return Section(tuple(blocks), _differences(row, mine, orders), _headlines(row, mine))
+    if found.orders:
+        blocks.append(_told_orders(found.orders[0]))
+    if found.others:
+        blocks += ["Worlds that are no grids, all tasks:", _table(found.others, world=True)]
+    return Section(tuple(blocks), _differences(row, mine, found.orders), _headlines(found))
 
 
-def _headlines(row: str, records: Sequence[Record]) -> tuple[Headline, ...]:
-    of = {record.unit.parameters["method"]: record.result for record in records}
-    if row != ROW or not {"greedy", "minimal"} <= of.keys():
+def _headlines(found: Compared) -> tuple[Headline, ...]:
+    results = found.greedy_and_minimal()
+    if results is None:
         return ()
-    greedy, least, there = of["greedy"], of["minimal"], "open_several"
+    row = found.row
+    greedy, least = results
+    there = "open_several"
     return (
         (f"{row}: plans open, all tasks", f"{OPEN_ALL}", f"{greedy['open']:.1f}", f"{least['open']:.1f}"),
         (f"{row}: plans open where several", f"{OPEN_SEVERAL}", f"{greedy[there]:.1f}", f"{least[there]:.1f}"),

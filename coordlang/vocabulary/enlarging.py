@@ -18,8 +18,7 @@ from coordlang.coordination import Bools
 from coordlang.flexibility import Floats
 from coordlang.overlapping import Overlap, Readings, Sentence, TooManySentences, readings
 from coordlang.vocabulary.objective import nodes_above
-from planners.errors import OutOfMemory, OutOfTime
-from planners.limits import stop_clock
+from planners.limits import STOPPING, stop_clock
 from planners.optimal import PlanSpace
 from planners.plans import Plans, counts
 
@@ -57,7 +56,7 @@ def enlarge(spaces: Sequence[PlanSpace], requires: Sequence[Bools], partition: M
     stopped: BaseException | None = None
     try:
         search.run()
-    except (OutOfTime, OutOfMemory, MemoryError, KeyboardInterrupt) as error:
+    except STOPPING as error:
         stop_clock()
         stopped = error.with_traceback(None)
     return Enlarged(search.words, search.expected, before, search.tried, stopped)

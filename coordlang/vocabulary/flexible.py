@@ -24,8 +24,8 @@ from coordlang.vocabulary.job import Job, Outcome, Partition
 from coordlang.vocabulary.objective import Objective
 from coordlang.vocabulary.sat import reduce
 from coordlang.warping import Clause, pair, separation_clause
-from planners.errors import OutOfMemory, OutOfTime
-from planners.limits import stop_clock
+from planners.errors import OutOfMemory
+from planners.limits import STOPPING, stop_clock
 from planners.matching import Ints
 from planners.optimal import PlanSpace
 
@@ -58,7 +58,7 @@ def flexible(job: Job, found: Outcome) -> Outcome:
     stopped: BaseException | None = None
     try:
         search.run()
-    except (OutOfTime, OutOfMemory, MemoryError, KeyboardInterrupt) as error:
+    except STOPPING as error:
         stop_clock()
         stopped = error.with_traceback(None)
     return search.outcome(stopped)

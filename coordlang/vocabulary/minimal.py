@@ -23,8 +23,8 @@ from coordlang.vocabulary.job import Evidence, Job, Outcome, Partition
 from coordlang.vocabulary.sat import Colouring, Effort, Problems, Undecided, by_demand, close_in, most_asked, reduce
 from coordlang.vocabulary.separating import quickly as separated
 from coordlang.warping import Clause, pair, separation_clause
-from planners.errors import OutOfMemory, OutOfTime
-from planners.limits import stop_clock
+from planners.errors import OutOfMemory
+from planners.limits import STOPPING, stop_clock
 from planners.matching import Ints
 from planners.optimal import PlanSpace
 
@@ -51,7 +51,7 @@ def minimal(job: Job) -> Outcome:
     search = _Search(job)
     try:
         search.run()
-    except (OutOfTime, OutOfMemory, MemoryError, KeyboardInterrupt) as error:
+    except STOPPING as error:
         stop_clock()
         if search.best is None:
             raise

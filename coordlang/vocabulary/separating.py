@@ -17,8 +17,8 @@ from coordlang.vocabulary.greedy import fill
 from coordlang.vocabulary.job import Job, Outcome, Partition
 from coordlang.vocabulary.sat import Colouring, Effort, Problems, Undecided, by_demand, close_in
 from coordlang.warping import Pair, pair
-from planners.errors import OutOfMemory, OutOfTime
-from planners.limits import stop_clock
+from planners.errors import OutOfMemory
+from planners.limits import STOPPING, stop_clock
 
 #: Partitions filled greedily, for a first upper bound, before SAT takes over.
 _FILLED = 20
@@ -52,7 +52,7 @@ def _searched(job: Job, search: _Search, run: Callable[[_Search], None]) -> Outc
     stopped: BaseException | None = None
     try:
         run(search)
-    except (OutOfTime, OutOfMemory, MemoryError, KeyboardInterrupt) as error:
+    except STOPPING as error:
         if not isinstance(error, OutOfMemory):  # a walk was too large to keep: there may be other work to do, in time
             stop_clock()
         if search.best is None:

@@ -10,7 +10,8 @@ import pytest
 
 from coordlang.build import build_language
 from coordlang.coordination import walk
-from coordlang.separation import SeparationWalk, alternatives
+from coordlang.divergence import alternatives
+from coordlang.separation import SeparationWalk
 from coordlang.tasks import Candidates, all_pairs, from_problems
 from coordlang.vocabulary.exhaustive import _partitions
 from coordlang.witness import inseparable

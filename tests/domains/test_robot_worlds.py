@@ -11,12 +11,12 @@ from xml.etree import ElementTree
 
 import pytest
 
-from coordlang.build import Inseparable, build_language
+from coordlang.build import build_language
 from coordlang.language import WordTable
 from coordlang.task_file import read_task_file
 from coordlang.tasks import Candidates, all_pairs, from_listed, from_problems
 from coordlang.verify import verify
-from coordlang.witness import miscoordination
+from coordlang.witness import Inseparable, miscoordination
 from planners.fast_downward import optimal_cost
 from planners.joint import Cost
 from planners.model import Loaded, ModelOptions, load

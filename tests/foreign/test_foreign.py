@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from coordlang.build import Inseparable
 from coordlang.cli import run
 from coordlang.variation import varied_tasks
+from coordlang.witness import Inseparable
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from coordlang.build import Inseparable, build_language
+from coordlang.build import build_language
 from coordlang.file import signed
 from coordlang.language import sentence
 from coordlang.report import graph
@@ -20,6 +20,7 @@ from coordlang.report.shown import select_tasks
 from coordlang.report.task import task_part
 from coordlang.tasks import all_pairs, from_problems
 from coordlang.use.spoken import speak
+from coordlang.witness import Inseparable
 from planners.errors import ProvedImpossible, UsageError
 from planners.plans import Plans
 from tests.coordlang.random_models import random_model

@@ -7,11 +7,12 @@ from random import Random
 
 from hypothesis import assume
 
-from coordlang.build import Inseparable, build_language
+from coordlang.build import build_language
 from coordlang.language import Guarantee, Language, WordTable, name_words
 from coordlang.task_file import ListedTask
 from coordlang.tasks import Candidates, from_listed, from_problems
 from coordlang.use.spoken import Spoken
+from coordlang.witness import Inseparable
 from planners.errors import ProvedImpossible
 from planners.model import ModelOptions, build
 from planners.pddl import parse_domain, parse_problem, read_domain, read_problem

@@ -12,7 +12,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.build import Inseparable, build_language
+from coordlang.build import build_language
 from coordlang.language import WordTable
 from coordlang.tasks import Candidates, all_pairs, from_problems
 from coordlang.use.automaton import Automaton, determinise
@@ -22,6 +22,7 @@ from coordlang.use.fitting import fitting
 from coordlang.use.own import OwnAtoms
 from coordlang.use.spoken import Spoken, speak_candidates
 from coordlang.verify import verify
+from coordlang.witness import Inseparable
 from planners.errors import OutOfMemory, ProvedImpossible
 from planners.optimal import PlanSpace
 from planners.pddl import parse_domain, parse_problem, read_domain, read_problem
