@@ -11,15 +11,15 @@ import sys
 from pathlib import Path
 from time import process_time
 
-from coordlang.build import build_language
-from coordlang.sentences import task_sentences
-from coordlang.task_file import read_task_file
-from coordlang.tasks import from_listed
-from coordlang.tuples import EdgeIndex
-from coordlang.use.choices import choices
-from coordlang.use.choices_file import to_bytes
-from coordlang.use.spoken import speak_candidates
+from coordlang.building import build_language
+from coordlang.language.sentences import task_sentences
+from coordlang.tasks.candidates import from_listed
+from coordlang.tasks.task_file import read_task_file
+from coordlang.use.choices.choices import choices
+from coordlang.use.choices.file import to_bytes
+from coordlang.use.sentence.spoken import speak_candidates
 from planners.pddl import read_domain, read_problem
+from planners.search.tuples import EdgeIndex
 
 GRID = Path(__file__).resolve().parents[1] / "domains" / "grid"
 

@@ -22,18 +22,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from coordlang.build import build_language
-from coordlang.language import sentence
-from coordlang.sentences import task_sentences
-from coordlang.tasks import from_problems
+from coordlang.building import build_language
+from coordlang.language.sentences import task_sentences
+from coordlang.language.words import sentence
+from coordlang.required.miscoordination import Inseparable
+from coordlang.tasks.candidates import from_problems
 from coordlang.use.export.pddl import Exported, export_pddl
-from coordlang.use.fitting import fitting
-from coordlang.use.spoken import Spoken, speak_candidates
-from coordlang.witness import Inseparable
+from coordlang.use.sentence.fitting import fitting
+from coordlang.use.sentence.spoken import Spoken, speak_candidates
 from planners.errors import CoordlangError, OutOfMemory
-from planners.model import ModelOptions
+from planners.loading import ModelOptions
 from planners.pddl import read_domain, read_problem
-from planners.plans import Plans
+from planners.search.plans import Plans
 
 DOMAINS = Path(__file__).resolve().parent.parent / "domains"
 #: More plans than this are not listed, neither by us nor by others.
@@ -184,7 +184,7 @@ def by_symk(folder: Path, exported: Exported, seconds: float) -> int | None:
 
 def by_fast_downward(exported: Exported, seconds: float) -> int | None:
     """The optimal cost by Fast Downward, through unified-planning."""
-    from planners.fast_downward import total_cost
+    from planners.classical.fast_downward import total_cost
 
     try:
         return total_cost(exported.plain, time_limit=seconds)

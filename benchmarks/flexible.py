@@ -21,12 +21,12 @@ from typing import Literal
 import numpy as np
 from table1 import ROWS, candidates_of
 
-from coordlang.build import Built, build_language
-from coordlang.coordination import walk
-from coordlang.flexibility import flexibility
-from coordlang.flexibility_bound import flexibility_bounds
-from coordlang.language import WordTable
-from coordlang.tasks import Candidates
+from coordlang.building import Built, build_language
+from coordlang.language.flexibility import flexibility
+from coordlang.language.words import WordTable
+from coordlang.required.composition_walk import walk
+from coordlang.tasks.candidates import Candidates
+from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from planners.limits import time_limit
 
 #: Label, method, the language to prefer, whether words may overlap.

@@ -151,11 +151,11 @@ def k_star(row: Row, cost: str) -> dict[str, object]:
 
     from kstar_planner.planners import plan_topk
 
-    from planners.plain import compile_plain, to_pddl
-    from planners.plans import Plans
+    from planners.classical import compile_plain, to_pddl
+    from planners.search.plans import Plans
 
     loaded = load(row, cost)
-    from planners.optimal import search
+    from planners.search.plan_space import search
 
     space = search(loaded.model, loaded.tasks[0])
     ours = Plans.of(space).count
@@ -180,10 +180,10 @@ def k_star(row: Row, cost: str) -> dict[str, object]:
 
 def load(row: Row, cost: str, *, remember_actions: bool = False) -> Any:
     """The joint model of a row."""
-    from planners.model import ModelOptions, build
+    from planners.loading import ModelOptions, build
     from planners.pddl import read_domain, read_problem
     from planners.pddl.factored import read_factored
-    from planners.robots import RobotChoice
+    from planners.pddl.robots import RobotChoice
 
     words = dict(zip(row.options[::2], row.options[1::2], strict=True))
     choice = RobotChoice(
@@ -232,9 +232,9 @@ def languages(chosen: Sequence[Language], seconds: float) -> int:
 
 def build(language: Language, seconds: float) -> dict[str, object]:
     """Build and verify the two languages of a row, and see what the smaller one says."""
-    from coordlang.build import build_language
-    from coordlang.tasks import from_listed
-    from coordlang.variation import varied_tasks
+    from coordlang.building import build_language
+    from coordlang.tasks.candidates import from_listed
+    from coordlang.tasks.patterns import varied_tasks
     from planners.limits import time_limit
 
     row = BY_NAME[language.row]

@@ -65,7 +65,7 @@ BY_NAME = {row.name: row for row in ROWS}
 
 @dataclass(frozen=True, slots=True)
 class Language:
-    """Varied tasks of a row (`coordlang.variation`), and what the words say there.
+    """Varied tasks of a row (`coordlang.tasks.patterns`), and what the words say there.
 
     ``told``: what a sentence says of a plan; all plans of a sentence agree on it, in at least the share ``agree`` of
     the tasks whose plans differ in it.  ``means`` says the same for people.  ``left`` is what a sentence mostly leaves open.

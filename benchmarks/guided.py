@@ -13,7 +13,7 @@ The paper reports 1.6 times fewer nodes on GWB7.  For each language and heuristi
 - most: with the sentence that most plans have, as somebody would say who leaves as much open as he can.
 
 "pruned" is the paper's search: what does not fit the sentence is pruned, nothing else.  "+words" also takes the number of
-words still to say as a lower bound on the steps.  Ties are broken as `coordlang.use.guided.astar` says.  All plans found are
+words still to say as a lower bound on the steps.  Ties are broken as `coordlang.use.sentence.guided.astar` says.  All plans found are
 checked to be optimal and to have the sentence.
 """
 
@@ -26,10 +26,10 @@ from time import perf_counter
 
 from table1 import ROWS, candidates_of
 
-from coordlang.build import build_language
-from coordlang.sentences import task_sentences
-from coordlang.use.guided import Terrain, guided
-from coordlang.use.spoken import Spoken, speak_candidates
+from coordlang.building import build_language
+from coordlang.language.sentences import task_sentences
+from coordlang.use.sentence.guided import Terrain, guided
+from coordlang.use.sentence.spoken import Spoken, speak_candidates
 
 
 @dataclass(slots=True)

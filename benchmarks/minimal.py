@@ -23,8 +23,8 @@ from time import perf_counter
 
 from table1 import ROWS, candidates_of
 
-from coordlang.build import Built, build_language
-from coordlang.tasks import Candidates, all_pairs
+from coordlang.building import Built, build_language
+from coordlang.tasks.candidates import Candidates, all_pairs
 from planners.limits import time_limit
 from planners.pddl import parse_problem, read_domain, read_problem
 from planners.pddl.sexpr import Source

@@ -15,15 +15,15 @@ from time import perf_counter
 
 import numpy as np
 
-from coordlang.build import build_language
-from coordlang.language import WordTable
-from coordlang.pairs import pair_languages, together
-from coordlang.tasks import Candidates, all_pairs, from_problems
-from coordlang.verify import verify
+from coordlang.building import build_language
+from coordlang.language.words import WordTable
+from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
+from coordlang.verification.by_definition import verify
+from coordlang.vocabulary.pairwise import pair_languages, together
+from planners.joint.states import unique_rows
 from planners.limits import time_limit
-from planners.model import ModelOptions
+from planners.loading import ModelOptions
 from planners.pddl import read_domain, read_problem
-from planners.states import unique_rows
 
 DOMAINS = Path(__file__).parent.parent / "domains"
 PROBLEMS = (

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
-from coordlang.build import build_language
-from coordlang.task_file import read_task_file
-from coordlang.tasks import Candidates, all_pairs, from_listed
+from coordlang.building import build_language
+from coordlang.tasks.candidates import Candidates, all_pairs, from_listed
+from coordlang.tasks.task_file import read_task_file
 from planners.pddl import read_domain, read_problem
 
 GRID = Path(__file__).parent.parent / "domains" / "grid"

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 
-from coordlang.coordination import walk
-from coordlang.language import Language, WordTable, sentence
-from coordlang.tasks import Candidates
-from planners.plans import Plans
+from coordlang.language.words import Language, WordTable, sentence
+from coordlang.required.composition_walk import walk
+from coordlang.tasks.candidates import Candidates
+from planners.search.plans import Plans
 
 #: A plan: for each step and robot the subaction's text, None for idling.
 Plan = Sequence[Sequence[str | None]]

@@ -132,10 +132,11 @@ def tasks_text(task: Scenario, at_least: int) -> str:
 def reachable_states(task: Scenario) -> set[tuple[str, ...]]:
     """The reachable joint states, each as the robots' cells, found with the grid domain itself."""
     from planners.model import build
-    from planners.pddl import parse_problem, read_domain
-    from planners.pddl.sexpr import Source
     from planners.space import explore
     from planners.states import split_atoms
+
+    from planners.pddl import parse_problem, read_domain
+    from planners.pddl.sexpr import Source
 
     domain = read_domain(HERE / "grid" / "domain.pddl")
     loaded = build(domain, [parse_problem(Source(task.name, problem_text(task, domain.name)), domain)])

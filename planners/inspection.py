@@ -9,11 +9,12 @@ from itertools import combinations, product
 
 import numpy as np
 
-from planners.composition import Composition
 from planners.grounding import GroundAction
-from planners.interference import conflict, footprint
-from planners.joint import JointModel, show
-from planners.model import Loaded
+from planners.joint.composition import Composition
+from planners.joint.interference import conflict, footprint
+from planners.joint.model import JointModel, show
+from planners.joint.states import Rows, find_rows, unique_rows
+from planners.loading import Loaded
 from planners.pddl.lifted import (
     And,
     Atom,
@@ -28,7 +29,6 @@ from planners.pddl.lifted import (
     Truth,
     Variable,
 )
-from planners.states import Rows, find_rows, unique_rows
 
 #: States in which an example of interference is looked for.
 _LOOK_AT = 2000

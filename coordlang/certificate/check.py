@@ -14,14 +14,14 @@ import numpy as np
 
 from coordlang.certificate.encoding import Cnf, encode
 from coordlang.certificate.file import Certificate, PlanTexts, Reason
-from coordlang.task_file import goal_text
-from coordlang.tasks import Candidates
-from coordlang.warping import Clause, pair
+from coordlang.language.warping import Clause, pair
+from coordlang.tasks.candidates import Candidates
+from coordlang.tasks.task_file import goal_text
 from planners.errors import BadInput, Refuted
-from planners.joint import JointModel
-from planners.optimal import PlanSpace
+from planners.joint.model import JointModel
+from planners.joint.states import find_rows, split_atoms
 from planners.pddl.sexpr import Expression, Source, Word, parse
-from planners.states import find_rows, split_atoms
+from planners.search.plan_space import PlanSpace
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,8 @@ from itertools import combinations
 
 import numpy as np
 
+from coordlang.language.warping import Clause, Pair
 from coordlang.vocabulary.sat import Colouring, Undecided, by_demand, reduce, solved
-from coordlang.warping import Clause, Pair
 
 #: Conflicts after which the checking solver comes back.
 _SLICE = 10_000

@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from coordlang.file import write_atomically
+from coordlang.language.file import write_atomically
 from planners.errors import BadInput, Place
 
 FORMAT = "coordlang/certificate"

@@ -8,12 +8,12 @@ import numpy as np
 
 from coordlang.certificate.encoding import core
 from coordlang.certificate.file import Certificate, PlanTexts, Reason, WarpingPath
-from coordlang.task_file import goal_text
-from coordlang.tasks import Candidates
+from coordlang.language.warping import Clause, pair, warping_path
+from coordlang.tasks.candidates import Candidates
+from coordlang.tasks.task_file import goal_text
 from coordlang.vocabulary.job import Evidence
-from coordlang.warping import Clause, pair, warping_path
-from planners.optimal import PlanSpace
-from planners.states import split_atoms
+from planners.joint.states import split_atoms
+from planners.search.plan_space import PlanSpace
 
 
 def certify(candidates: Candidates, evidence: Mapping[Clause, Evidence], size: int) -> Certificate:

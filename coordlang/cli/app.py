@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from coordlang.tasks import Candidates
-    from planners.model import Loaded, ModelOptions
+    from coordlang.tasks.candidates import Candidates
+    from planners.loading import Loaded, ModelOptions
 
 EXIT_UNPROVED = 3
 EXIT_INTERRUPTED = 130
@@ -184,15 +184,15 @@ class GivenOptions:
         self.remember_actions = remember_actions
 
     def options(self) -> ModelOptions:
-        from planners.model import ModelOptions
-        from planners.robots import RobotChoice
+        from planners.loading import ModelOptions
+        from planners.pddl.robots import RobotChoice
 
         choice = RobotChoice(self.robots, self.robot_type, self.unowned or "error")
         return ModelOptions(choice, self.cost or "makespan", self.remember_actions)
 
     def for_language(self, language: Any) -> ModelOptions:
         """The language's own options; `UsageError` where the user's contradict them."""
-        from coordlang.file import options_of
+        from coordlang.language.file import options_of
 
         if self.robot_type:
             raise click.UsageError("--robot-type: a language file names its robots already")
@@ -239,8 +239,8 @@ def make_candidates(
     lifted: Any, read: list[Any], tasks: str | None, options: ModelOptions, *, skip_unsolvable: bool = False
 ) -> Candidates:
     """The candidate tasks that ``--tasks`` asks for; without it the problems' own."""
-    from coordlang.task_file import read_task_file
-    from coordlang.tasks import all_pairs, from_listed, from_problems
+    from coordlang.tasks.candidates import all_pairs, from_listed, from_problems
+    from coordlang.tasks.task_file import read_task_file
     from planners.errors import Place
 
     if tasks is None:
@@ -374,7 +374,7 @@ def task_files(function: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(function)
     def wrapped(pddl: PlanningFiles, given: GivenOptions, **arguments: Any) -> Any:
         def load() -> Loaded:
-            from planners.model import build
+            from planners.loading import build
 
             domain, problems = pddl.read()
             return build(domain, problems, given.options())

@@ -29,8 +29,8 @@ from coordlang.cli.app import (
 )
 
 if TYPE_CHECKING:
-    from coordlang.build import Built
-    from coordlang.tasks import Candidates
+    from coordlang.building import Built
+    from coordlang.tasks.candidates import Candidates
 
 
 @click.command(name="build")
@@ -73,10 +73,10 @@ def command(
 
     Exit 0: written, with the proof that the method promises.  3: written without it (a limit was hit).
     """
-    from coordlang.build import build_language
+    from coordlang.building import build_language
     from coordlang.cli.miscoordination import show
-    from coordlang.file import to_bytes, write_language
-    from coordlang.witness import Inseparable
+    from coordlang.language.file import to_bytes, write_language
+    from coordlang.required.miscoordination import Inseparable
     from planners.errors import ProvedImpossible
     from planners.limits import stop_clock, time_left
 
@@ -150,7 +150,7 @@ def command(
 
 def _certify(built: Built, path: str, seconds: float) -> BaseException | None:
     """Write the certificate, within ``seconds``; the error that ended it early, or None."""
-    from coordlang.build import certificate_of
+    from coordlang.building import certificate_of
     from coordlang.certificate import write_certificate
     from planners.limits import STOPPING, stop_clock, time_limit
 

@@ -11,7 +11,7 @@ import click
 from coordlang.cli.app import limits, model_options, task_files
 
 if TYPE_CHECKING:
-    from planners.model import Loaded
+    from planners.loading import Loaded
 
 
 @click.command(name="check")
@@ -24,9 +24,9 @@ def command(as_json: bool, load: Callable[[], Loaded]) -> int:
 
     Exit 0: equal.  1: they differ.  11: both prove that there is no plan.
     """
+    from planners.classical.fast_downward import optimal_cost
     from planners.errors import ProvedImpossible
-    from planners.fast_downward import optimal_cost
-    from planners.optimal import search
+    from planners.search.plan_space import search
 
     loaded = load()
     model, task = loaded.model, loaded.tasks[0]

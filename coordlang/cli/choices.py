@@ -20,8 +20,8 @@ from coordlang.cli.app import (
 )
 
 if TYPE_CHECKING:
-    from coordlang.use.choices import Choices, RobotChoices
-    from coordlang.use.monitor import Answer, Monitor
+    from coordlang.use.choices.choices import Choices, RobotChoices
+    from coordlang.use.choices.monitor import Answer, Monitor
 
 _STATES_SHOWN = 40
 
@@ -65,9 +65,9 @@ def command(
     With --did and the detours: what one robot may do next, and whether the detours can still be had, all at once.
     """
     from coordlang.cli.speaking import read_spoken, write
-    from coordlang.use.choices import MOST, choices
-    from coordlang.use.choices_dot import to_dot
-    from coordlang.use.choices_file import to_bytes
+    from coordlang.use.choices.choices import MOST, choices
+    from coordlang.use.choices.dot import to_dot
+    from coordlang.use.choices.file import to_bytes
 
     form = form_of(form, as_json)
     check_outputs([("-o", output)], [language, domain, problem])
@@ -112,8 +112,8 @@ def _judged(found: Choices, check: bool) -> int:
 
 
 def _text(found: Choices, chosen: list[int], check: bool) -> str:
-    from coordlang.tasks import describe
-    from planners.plans import Plans
+    from coordlang.tasks.candidates import describe
+    from planners.search.plans import Plans
 
     spoken = found.spoken
     plans = counted(Plans.of(found.fits).count, "plan")
@@ -131,7 +131,7 @@ def _text(found: Choices, chosen: list[int], check: bool) -> str:
 
 def _table(found: Choices, own: RobotChoices) -> list[str]:
     """The automaton state by state: what may be done there, where it leads, what is known there."""
-    from coordlang.use.choices_dot import distinguishing
+    from coordlang.use.choices.dot import distinguishing
 
     model, automaton = found.spoken.model, own.automaton
     subplans = counted(automaton.count, "subplan")
@@ -162,8 +162,8 @@ def _ask(
     found: Choices, robot: str, did: tuple[str, ...], wanted: dict[str, tuple[str, ...]], form: str
 ) -> tuple[str, int]:
     """What a monitor says after what the robot did, and of its detours."""
-    from coordlang.use.choices_file import monitor
-    from coordlang.use.monitor import MonitorError, NotAllowed
+    from coordlang.use.choices.file import monitor
+    from coordlang.use.choices.monitor import MonitorError, NotAllowed
     from planners.errors import Refuted, UsageError
 
     try:
@@ -192,7 +192,7 @@ def _ask(
 
 
 def _asked_data(at: Monitor, answer: Answer | None) -> dict[str, Any]:
-    from planners.planfile import json_count
+    from planners.search.plan_file import json_count
 
     data: dict[str, Any] = {
         "robot": at.robot,

@@ -18,7 +18,7 @@ from coordlang.cli.app import (
 )
 
 if TYPE_CHECKING:
-    from coordlang.witness import Miscoordination
+    from coordlang.required.miscoordination import Miscoordination
 
 
 @click.command(name="coordination")
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 def command(pddl: PlanningFiles, as_json: bool, given: GivenOptions) -> None:
     """Say which tasks require coordination, and show how robots that follow different optimal plans miscoordinate."""
     from coordlang.cli.miscoordination import show
-    from coordlang.tasks import from_problems
-    from coordlang.witness import miscoordination
-    from planners.plans import counts
+    from coordlang.required.miscoordination import miscoordination
+    from coordlang.tasks.candidates import from_problems
+    from planners.search.plans import counts
 
     lifted, read = pddl.read()
     candidates = from_problems(lifted, read, given.options())
@@ -58,7 +58,7 @@ def command(pddl: PlanningFiles, as_json: bool, given: GivenOptions) -> None:
 
 def _data(name: str, makespan: int, plans: int, witness: Miscoordination | None) -> dict[str, Any]:
     from coordlang.cli.miscoordination import witness_data
-    from planners.planfile import json_count
+    from planners.search.plan_file import json_count
 
     return {
         "problem": name,

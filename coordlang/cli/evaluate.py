@@ -14,8 +14,8 @@ import click
 from coordlang.cli.app import EXIT_UNPROVED, check_outputs, clear_progress, counted, limits
 
 if TYPE_CHECKING:
-    from coordlang.evaluation.recipe import Record, Section
-    from coordlang.evaluation.runner import Progress
+    from coordlang.evaluation.lab.recipe import Record, Section
+    from coordlang.evaluation.lab.runner import Progress
 
 
 @click.command(name="evaluate")
@@ -50,12 +50,12 @@ def command(
     NAME is table1, communication, flexibility, planning_cost, navigation, game, scenario, or all.  A run that was stopped or
     killed goes on where it was when it is started again.
     """
-    from coordlang.evaluation.experiments import RECIPES
-    from coordlang.evaluation.page import sections, write_page
-    from coordlang.evaluation.recipe import Settings
-    from coordlang.evaluation.results import Results
-    from coordlang.evaluation.runner import run
-    from coordlang.evaluation.suite import find_domains
+    from coordlang.evaluation.experiments.registry import RECIPES
+    from coordlang.evaluation.lab.page import sections, write_page
+    from coordlang.evaluation.lab.recipe import Settings
+    from coordlang.evaluation.lab.results import Results
+    from coordlang.evaluation.lab.runner import run
+    from coordlang.evaluation.material.suite import find_domains
     from planners.errors import OutOfTime
 
     for name in names:

@@ -19,12 +19,12 @@ from coordlang.cli.app import (
 )
 
 if TYPE_CHECKING:
-    from coordlang.explain.asks import Asked
-    from coordlang.explain.cover import Cover
-    from coordlang.explain.telling import Telling
-    from coordlang.explain.words import Mapped
-    from coordlang.sentences import TaskSentence
-    from coordlang.use.spoken import Spoken
+    from coordlang.explanation.asks import Asked
+    from coordlang.explanation.cover import Cover
+    from coordlang.explanation.telling import Telling
+    from coordlang.explanation.words import Mapped
+    from coordlang.language.sentences import TaskSentence
+    from coordlang.use.sentence.spoken import Spoken
 
 _SENTENCES_SHOWN = 10
 
@@ -50,11 +50,11 @@ def command(
     given: GivenOptions,
 ) -> int:
     """Show a language: each word as a short formula, and with --task what the sentences of a task ask of each robot."""
-    from coordlang.explain.telling import telling
-    from coordlang.explain.words import all_covers, mapped_states
-    from coordlang.file import read_language
-    from coordlang.sentences import task_sentences
-    from coordlang.use.spoken import speak
+    from coordlang.explanation.telling import telling
+    from coordlang.explanation.words import all_covers, mapped_states
+    from coordlang.language.file import read_language
+    from coordlang.language.sentences import task_sentences
+    from coordlang.use.sentence.spoken import speak
     from planners.errors import Place
 
     if sentence is not None and not task:
@@ -81,7 +81,7 @@ def command(
 
 
 def _only(spoken: Spoken, sentences: list[TaskSentence], sentence: str) -> list[TaskSentence]:
-    from coordlang.use.fitting import fitting
+    from coordlang.use.sentence.fitting import fitting
 
     words = spoken.words_of(sentence)
     said = [s for s in sentences if s.words == tuple(spoken.table.words[w] for w in words)]
@@ -91,8 +91,8 @@ def _only(spoken: Spoken, sentences: list[TaskSentence], sentence: str) -> list[
 
 
 def _asked(spoken: Spoken, formulas: dict[str, Cover], sentence: TaskSentence) -> Asked:
-    from coordlang.explain.asks import asked
-    from coordlang.use.fitting import fitting
+    from coordlang.explanation.asks import asked
+    from coordlang.use.sentence.fitting import fitting
 
     return asked(fitting(spoken, spoken.words_of(sentence.words)), spoken.table, formulas)
 
@@ -105,9 +105,9 @@ def _data(
     sentences: list[TaskSentence],
     asks: list[Asked],
 ) -> dict[str, Any]:
-    from coordlang.explain.text import asked_data, cover_data, shown
-    from coordlang.tasks import describe
-    from planners.planfile import json_count
+    from coordlang.explanation.text import asked_data, cover_data, shown
+    from coordlang.tasks.candidates import describe
+    from planners.search.plan_file import json_count
 
     listed = [
         {
@@ -135,7 +135,7 @@ def _data(
 
 
 def _words(spoken: Spoken, mapped: Mapped, told: Telling) -> str:
-    from coordlang.explain.text import telling_text
+    from coordlang.explanation.text import telling_text
 
     language = spoken.language
     g = language.guarantee
@@ -158,9 +158,9 @@ def _words(spoken: Spoken, mapped: Mapped, told: Telling) -> str:
 
 
 def _task(spoken: Spoken, number: int, sentences: list[TaskSentence], asks: list[Asked]) -> str:
-    from coordlang.explain.text import asked_text
-    from coordlang.tasks import describe
-    from planners.plans import Plans
+    from coordlang.explanation.text import asked_text
+    from coordlang.tasks.candidates import describe
+    from planners.search.plans import Plans
 
     total = Plans.of(spoken.space, spoken.task).count
     steps = int(spoken.space.layer[spoken.start])

@@ -25,7 +25,7 @@ from coordlang.cli.app import (
 if TYPE_CHECKING:
     from coordlang.use.export.ltlf import SentenceFormula
     from coordlang.use.export.pddl import Exported
-    from coordlang.use.spoken import Spoken
+    from coordlang.use.sentence.spoken import Spoken
 
 
 @click.command(name="export")
@@ -90,7 +90,7 @@ def command(
 
 def _write_pddl(exported: Exported, output: str | None, as_json: bool) -> None:
     from coordlang.cli.speaking import write
-    from coordlang.file import write_atomically
+    from coordlang.language.file import write_atomically
     from planners.errors import UsageError
 
     if as_json:
@@ -148,10 +148,10 @@ def _write_plan(
     """A plan of the exported problem, which must be an optimal one, as an ordinary plan file."""
     from coordlang.cli.speaking import write
     from coordlang.use.export.pddl import plan_names
-    from coordlang.use.fitting import fitting
+    from coordlang.use.sentence.fitting import fitting
     from planners.errors import BadInput, Place, Refuted
-    from planners.planfile import only_one_plan, to_ipc, to_json
-    from planners.plans import Plans
+    from planners.search.plan_file import only_one_plan, to_ipc, to_json
+    from planners.search.plans import Plans
 
     place = Place(back)
     try:

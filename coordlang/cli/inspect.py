@@ -13,7 +13,7 @@ from coordlang.cli.app import counted, limits, model_options, note_single_robot,
 
 if TYPE_CHECKING:
     from planners.inspection import Inspection
-    from planners.model import Loaded
+    from planners.loading import Loaded
 
 
 @click.command(name="inspect")
@@ -31,7 +31,7 @@ def command(count_states: bool, as_json: bool, load: Callable[[], Loaded]) -> No
     found = inspect(loaded)
     space = None
     if count_states:
-        from planners.space import count
+        from planners.search.reachable import count
 
         states, steps = count(loaded.model, loaded.tasks[0].init[None, :])
         space = {"states": states, "joint_steps": steps}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from planners.joint import NO_FACT
+from planners.joint.model import NO_FACT
 
 if TYPE_CHECKING:
-    from coordlang.witness import Miscoordination
+    from coordlang.required.miscoordination import Miscoordination
 
 
 def witness_data(witness: Miscoordination) -> dict[str, Any]:

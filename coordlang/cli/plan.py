@@ -18,9 +18,9 @@ from coordlang.cli.app import (
 )
 
 if TYPE_CHECKING:
-    from coordlang.use.best_sentence import Wished
-    from coordlang.use.guided import Search
-    from coordlang.use.wishes import Wish
+    from coordlang.use.sentence.best_sentence import Wished
+    from coordlang.use.sentence.guided import Search
+    from coordlang.use.sentence.wishes import Wish
 
 
 @click.command(name="plan")
@@ -60,11 +60,11 @@ def command(
     With --wish the best sentence of the task is found first.  The nodes expanded with and without the sentence go to stderr.
     """
     from coordlang.cli.speaking import covered, read_spoken
-    from coordlang.use.best_sentence import best_sentence
-    from coordlang.use.guided import Terrain, guided
-    from coordlang.use.understanding import understand, understood_data
-    from coordlang.use.wishes import read_wish
-    from planners.planfile import to_ipc
+    from coordlang.use.sentence.best_sentence import best_sentence
+    from coordlang.use.sentence.guided import Terrain, guided
+    from coordlang.use.sentence.understanding import understand, understood_data
+    from coordlang.use.sentence.wishes import read_wish
+    from planners.search.plan_file import to_ipc
 
     if (sentence is None) == (not wishes):
         raise click.UsageError("expected a SENTENCE or --wish, one of the two")
@@ -97,7 +97,7 @@ def _work(search: Search) -> dict[str, int]:
 
 
 def _fulfilled(wishes: list[Wish], best: Wished) -> list[dict[str, Any]]:
-    from planners.planfile import json_count
+    from planners.search.plan_file import json_count
 
     result: list[dict[str, Any]] = []
     for wish, value in zip(wishes, best.values, strict=True):

@@ -12,7 +12,7 @@ import click
 from coordlang.cli.app import check_listing, form_of, limits, model_options, note_single_robot, task_files
 
 if TYPE_CHECKING:
-    from planners.model import Loaded
+    from planners.loading import Loaded
 
 _DEFAULT_MAX = 10
 
@@ -44,9 +44,9 @@ def command(
 
     A plan is a sequence of joint actions; plans are listed in a stable order.
     """
-    from planners.optimal import search
-    from planners.planfile import to_ipc, to_json
-    from planners.plans import Plans
+    from planners.search.plan_file import to_ipc, to_json
+    from planners.search.plan_space import search
+    from planners.search.plans import Plans
 
     check_listing(only_count, most, sample)
     form = form_of(form, as_json)

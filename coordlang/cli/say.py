@@ -30,7 +30,7 @@ def command(language: str, domain: str, problem: str, plan: str, as_json: bool, 
     PLAN is a plan file, IPC text or JSON, or - for stdin; a JSON file with several plans gives one sentence a line.
     """
     from coordlang.cli.speaking import covered, read_spoken
-    from coordlang.use.saying import read_plan_file, say
+    from coordlang.use.sentence.saying import read_plan_file, say
     from planners.errors import CoordlangError
 
     spoken = read_spoken(language, domain, problem, given)

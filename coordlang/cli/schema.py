@@ -10,6 +10,6 @@ import click
 @click.command(name="schema")
 def command() -> None:
     """Print the JSON Schema of language files."""
-    from coordlang.record import json_schema
+    from coordlang.language.record import json_schema
 
     click.echo(json.dumps(json_schema(), indent=2))

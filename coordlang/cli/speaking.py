@@ -9,13 +9,13 @@ import click
 from coordlang.cli.app import GivenOptions, read_files
 
 if TYPE_CHECKING:
-    from coordlang.use.spoken import Spoken
+    from coordlang.use.sentence.spoken import Spoken
 
 
 def read_spoken(language: str, domain: str, problem: str, given: GivenOptions) -> Spoken:
     """The language of a file in the task of a problem file."""
-    from coordlang.file import read_language
-    from coordlang.use.spoken import speak
+    from coordlang.language.file import read_language
+    from coordlang.use.sentence.spoken import speak
     from planners.errors import Place
 
     read = read_language(language)
@@ -33,7 +33,7 @@ def covered(spoken: Spoken) -> int:
 
 def write(text: str, output: str | None) -> None:
     """Write to a file, or to stdout without one (or for ``-``)."""
-    from coordlang.file import write_atomically
+    from coordlang.language.file import write_atomically
 
     if output is None or output == "-":
         click.echo(text, nl=False)

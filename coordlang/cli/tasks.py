@@ -43,10 +43,10 @@ def command(
 
     In a PATTERN ? stands for any one name.
     """
-    from coordlang.file import write_atomically
-    from coordlang.task_file import tasks_text
-    from coordlang.variation import varied_tasks
-    from planners.model import build
+    from coordlang.language.file import write_atomically
+    from coordlang.tasks.patterns import varied_tasks
+    from coordlang.tasks.task_file import tasks_text
+    from planners.loading import build
 
     check_outputs([("-o", output)], [domain, problem])
     lifted, read = read_files(domain, (problem,))

@@ -21,8 +21,8 @@ from coordlang.cli.app import (
 )
 
 if TYPE_CHECKING:
-    from coordlang.use.understanding import Understood
-    from planners.plans import Plan
+    from coordlang.use.sentence.understanding import Understood
+    from planners.search.plans import Plan
 
 _DEFAULT_MAX = 10
 _DEFAULT_NODES = 200
@@ -72,7 +72,7 @@ def command(
     --format dot and svg draw them as one DAG, whose paths they are; json has both the listed plans and the DAG.
     """
     from coordlang.cli.speaking import covered, read_spoken, write
-    from coordlang.use.understanding import understand
+    from coordlang.use.sentence.understanding import understand
 
     form = form_of(form, as_json)
     check_listing(only_count, most, sample)
@@ -101,9 +101,9 @@ def command(
 
 
 def _drawn(understood: Understood, form: str, nodes: int) -> str:
-    from coordlang.use.drawing import cut_note, to_dot
-    from coordlang.use.picture import to_svg
-    from coordlang.use.understanding import dag
+    from coordlang.use.sentence.drawing import cut_note, to_dot
+    from coordlang.use.sentence.picture import to_svg
+    from coordlang.use.sentence.understanding import dag
 
     graph = dag(understood, nodes)
     note = cut_note(graph)
@@ -113,7 +113,7 @@ def _drawn(understood: Understood, form: str, nodes: int) -> str:
 
 
 def _data(understood: Understood, listed: list[Plan], only_count: bool, sampled: bool, nodes: int | None) -> str:
-    from coordlang.use.understanding import dag, understood_data
+    from coordlang.use.sentence.understanding import dag, understood_data
 
     data = understood_data(understood, listed, None if only_count else dag(understood, nodes))
     if sampled:
@@ -122,7 +122,7 @@ def _data(understood: Understood, listed: list[Plan], only_count: bool, sampled:
 
 
 def _listed(understood: Understood, listed: list[Plan], sampled: bool) -> str:
-    from planners.planfile import to_ipc
+    from planners.search.plan_file import to_ipc
 
     parts = []
     for number, plan in enumerate(listed, 1):

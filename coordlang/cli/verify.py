@@ -48,10 +48,10 @@ def command(
     """
     from coordlang.certificate import check, read_certificate
     from coordlang.cli.miscoordination import show, witness_data
-    from coordlang.file import check_source, read_language, recorded_candidates, write_atomically
-    from coordlang.language import WordTable, words_of_states
-    from coordlang.verify import verify
-    from coordlang.verify_overlapping import verify_overlapping
+    from coordlang.language.file import check_source, read_language, recorded_candidates, write_atomically
+    from coordlang.language.words import WordTable, words_of_states
+    from coordlang.verification.by_definition import verify
+    from coordlang.verification.overlapping import verify_overlapping
     from planners.errors import Place, Refuted
 
     if dimacs and not certificate:

@@ -11,17 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from coordlang.explain.telling import Telling, telling
-from coordlang.explain.text import term_text
-from coordlang.explain.words import all_covers, mapped_states
-from coordlang.language import Language
+from coordlang.explanation.telling import Telling, telling
+from coordlang.explanation.text import term_text
+from coordlang.explanation.words import all_covers, mapped_states
+from coordlang.language.words import Language
 from coordlang.report.layout import Point, graph_layout, place_layout, spread
 from coordlang.report.shown import Selection
 from coordlang.report.task import Tables, TaskPart, task_data, told
 from coordlang.report.world import World, find_world
-from coordlang.use.spoken import Spoken
-from planners.joint import JointModel, own_text
-from planners.states import find_rows, split_atoms
+from coordlang.use.sentence.spoken import Spoken
+from planners.joint.model import JointModel, own_text
+from planners.joint.states import find_rows, split_atoms
 
 #: States of the language beyond which their graph is not drawn, they are not listed, formulas are not sought.
 _STATES_DRAWN = 400

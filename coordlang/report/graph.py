@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coordlang.language import sentence
+from coordlang.language.sentences import sentence_counts
+from coordlang.language.words import sentence
 from coordlang.report.layout import layer_orders
-from coordlang.sentences import sentence_counts
-from coordlang.use.automaton import determinise
-from coordlang.use.fitting import fitting
-from coordlang.use.spoken import Spoken
+from coordlang.use.choices.automaton import determinise
+from coordlang.use.sentence.fitting import fitting
+from coordlang.use.sentence.spoken import Spoken
 from planners.errors import OutOfMemory
-from planners.matching import Ints, ranges
-from planners.optimal import PlanSpace
-from planners.plans import Plans, counts
+from planners.joint.matching import Ints, ranges
+from planners.search.plan_space import PlanSpace
+from planners.search.plans import Plans, counts
 
 #: Plan-space edges of one task beyond which plans are drawn.
 EDGES = 4_000

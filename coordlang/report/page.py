@@ -9,14 +9,14 @@ from importlib.metadata import version
 from importlib.resources import files
 from typing import Any
 
-from coordlang.explain.text import counted
-from coordlang.language import Language
+from coordlang.explanation.text import counted
+from coordlang.language.words import Language
 from coordlang.report.data import page_data
 from coordlang.report.layout import Point
 from coordlang.report.shown import select_tasks
 from coordlang.report.task import task_part
 from planners.errors import OutOfMemory, Place
-from planners.model import ModelOptions
+from planners.loading import ModelOptions
 from planners.pddl.lifted import Domain, Problem
 
 #: A page is smaller than this, in bytes.

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coordlang.use.spoken import Spoken
-from coordlang.witness import Miscoordination
+from coordlang.required.miscoordination import Miscoordination
+from coordlang.use.sentence.spoken import Spoken
 
 
 @dataclass(frozen=True, slots=True)

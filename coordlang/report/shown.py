@@ -6,17 +6,17 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from random import Random
 
-from coordlang.file import recorded_list
-from coordlang.language import Language
-from coordlang.task_file import goal_text, ground_tasks
-from coordlang.use.spoken import Spoken, speak
-from coordlang.witness import Miscoordination, miscoordination
+from coordlang.language.file import recorded_list
+from coordlang.language.words import Language
+from coordlang.required.miscoordination import Miscoordination, miscoordination
+from coordlang.tasks.task_file import goal_text, ground_tasks
+from coordlang.use.sentence.spoken import Spoken, speak
 from planners.errors import OutOfMemory, Place, ProvedImpossible, UsageError
-from planners.joint import FullState, Goal
-from planners.model import ModelOptions, PlanningTask
-from planners.optimal import search
+from planners.joint.model import FullState, Goal
+from planners.joint.states import Rows
+from planners.loading import ModelOptions, PlanningTask
 from planners.pddl.lifted import Domain, Problem
-from planners.states import Rows
+from planners.search.plan_space import search
 
 #: Tasks looked at for each one shown, so that enough of them require coordination.
 _TRIES = 12

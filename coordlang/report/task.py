@@ -8,20 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from coordlang.language import WordTable
+from coordlang.language.words import WordTable
 from coordlang.report.graph import Graph, ShownSentences, plan_graph, shown_sentences
 from coordlang.report.played import Played, play
 from coordlang.report.shown import ShownTask
 from coordlang.report.world import World
-from coordlang.task_file import goal_text
-from coordlang.use.spoken import Spoken
-from coordlang.verify import verify
-from coordlang.witness import Miscoordination
+from coordlang.required.miscoordination import Miscoordination
+from coordlang.tasks.task_file import goal_text
+from coordlang.use.sentence.spoken import Spoken
+from coordlang.verification.by_definition import verify
 from planners.errors import OutOfMemory
-from planners.joint import JointModel
-from planners.optimal import PlanSpace
-from planners.plans import counts
-from planners.states import split_atoms
+from planners.joint.model import JointModel
+from planners.joint.states import split_atoms
+from planners.search.plan_space import PlanSpace
+from planners.search.plans import counts
 
 #: Plan-space edges beyond which a task is not verified once more for the page.
 _VERIFIED = 20_000

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from itertools import combinations, product
 
 from planners.grounding import GroundAction
-from planners.joint import JointModel, show
+from planners.joint.model import JointModel, show
 from planners.pddl.lifted import TRUE, Atom
-from planners.robots import natural
+from planners.pddl.robots import natural
 
 #: What an atom says: ("at", thing, place), ("with", thing, thing), ("mark", place, text), ("about", thing, text), ("other",).
 Role = tuple[str, ...]

@@ -14,13 +14,13 @@ from math import prod
 
 import numpy as np
 
-from coordlang.coordination import Bools
-from coordlang.flexibility import Floats
-from coordlang.overlapping import Overlap, Readings, Sentence, TooManySentences, readings
+from coordlang.language.flexibility import Floats
+from coordlang.language.overlapping import Overlap, Readings, Sentence, TooManySentences, readings
+from coordlang.required.composition_walk import Bools
 from coordlang.vocabulary.objective import nodes_above
 from planners.limits import STOPPING, stop_clock
-from planners.optimal import PlanSpace
-from planners.plans import Plans, counts
+from planners.search.plan_space import PlanSpace
+from planners.search.plans import Plans, counts
 
 #: A task that requires coordination and has more plans than this keeps the sentences of the partition.
 MOST_PLANS = 1_000
@@ -48,7 +48,7 @@ class Enlarged:
 def enlarge(spaces: Sequence[PlanSpace], requires: Sequence[Bools], partition: Mapping[int, int]) -> Enlarged:
     """Enlarge the words of ``partition``, which must be a language for the tasks of ``spaces``.
 
-    ``requires`` says of the nodes of each space whether coordination is required (`coordlang.coordination.walk`).
+    ``requires`` says of the nodes of each space whether coordination is required (`coordlang.required.composition_walk.walk`).
     Anytime: out of time, or interrupted, it returns what it has.
     """
     search = _Search(spaces, requires, partition)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import product
 
-from coordlang.language import sentence
+from coordlang.language.words import sentence
 from coordlang.vocabulary.job import Job, Outcome
-from planners.plans import Plans, counts
+from planners.search.plans import Plans, counts
 
 #: A failing tuple of plans as state sequences.
 _Failing = tuple[tuple[int, ...], ...]

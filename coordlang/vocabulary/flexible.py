@@ -1,7 +1,7 @@
 """Among languages with equally many words, one whose sentences leave many plans open.
 
-Maximises the average of E = sum_s n_s^2 / N over the candidate tasks (`coordlang.flexibility`) by simulated annealing over
-partitions, with the clauses that counterexamples give (`coordlang.warping`) as constraints.  A partition may violate clauses
+Maximises the average of E = sum_s n_s^2 / N over the candidate tasks (`coordlang.language.flexibility`) by simulated annealing over
+partitions, with the clauses that counterexamples give (`coordlang.language.warping`) as constraints.  A partition may violate clauses
 on the way, at a price; one that violates none and is better than the best is searched for counterexamples, which give new
 clauses with their images under the model's symmetries.  What has none is verified by definition before it counts.
 """
@@ -14,20 +14,20 @@ from random import Random
 
 import numpy as np
 
-from coordlang.coordination import Bools, walk
-from coordlang.counterexamples import counterexamples
-from coordlang.flexibility import Flexibility, Floats, flexibility
-from coordlang.flexibility_bound import flexibility_bounds
-from coordlang.symmetry import state_symmetries
-from coordlang.tuples import EdgeIndex
+from coordlang.language.flexibility import Flexibility, Floats, flexibility
+from coordlang.language.warping import Clause, pair, separation_clause
+from coordlang.required.composition_walk import Bools, walk
+from coordlang.vocabulary.counterexamples import counterexamples
+from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from coordlang.vocabulary.job import Job, Outcome, Partition
 from coordlang.vocabulary.objective import Objective
 from coordlang.vocabulary.sat import reduce
-from coordlang.warping import Clause, pair, separation_clause
+from coordlang.vocabulary.symmetry import state_symmetries
 from planners.errors import OutOfMemory
+from planners.joint.matching import Ints
 from planners.limits import STOPPING, stop_clock
-from planners.matching import Ints
-from planners.optimal import PlanSpace
+from planners.search.plan_space import PlanSpace
+from planners.search.tuples import EdgeIndex
 
 #: Moves of the first cooling, for each state and word and at least; each cooling that pays is followed by one twice as long.
 _MOVES, _LEAST = 10, 1_000

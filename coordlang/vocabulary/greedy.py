@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from coordlang.divergence import Separation, separations
+from coordlang.required.divergences import Separation, separations
 from coordlang.vocabulary.job import Job, Outcome
 
 

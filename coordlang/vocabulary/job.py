@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from coordlang.counterexamples import Counterexample
-from coordlang.divergence import Alphas
-from coordlang.symmetry import Symmetry
-from coordlang.tasks import Candidates
-from coordlang.warping import Clause
-from planners.optimal import PlanSpace
+from coordlang.language.warping import Clause
+from coordlang.required.divergences import Alphas
+from coordlang.tasks.candidates import Candidates
+from coordlang.vocabulary.counterexamples import Counterexample
+from coordlang.vocabulary.symmetry import Symmetry
+from planners.search.plan_space import PlanSpace
 
 #: State number -> word number.
 Partition = Mapping[int, int]

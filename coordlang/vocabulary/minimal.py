@@ -1,7 +1,7 @@
 """The least number of words, with proof: counterexamples in, SAT out.
 
 Loop for K words: find a partition that satisfies all clauses so far; look for plans of one sentence whose mixture fails;
-each such tuple gives a clause that every language must satisfy (`coordlang.warping`).  No partition left: K words do not
+each such tuple gives a clause that every language must satisfy (`coordlang.language.warping`).  No partition left: K words do not
 suffice.  No counterexample left: a language.  Numbers of words are tried from below, and from above where that takes long,
 with the same clauses, until the two meet.
 """
@@ -16,17 +16,17 @@ from random import Random
 
 import numpy as np
 
-from coordlang.counterexamples import counterexamples
-from coordlang.symmetry import Symmetry, closed, symmetries
-from coordlang.tuples import EdgeIndex
+from coordlang.language.warping import Clause, pair, separation_clause
+from coordlang.vocabulary.counterexamples import counterexamples
 from coordlang.vocabulary.job import Evidence, Job, Outcome, Partition
 from coordlang.vocabulary.sat import Colouring, Effort, Problems, Undecided, by_demand, close_in, most_asked, reduce
 from coordlang.vocabulary.separating import quickly as separated
-from coordlang.warping import Clause, pair, separation_clause
+from coordlang.vocabulary.symmetry import Symmetry, closed, symmetries
 from planners.errors import OutOfMemory
+from planners.joint.matching import Ints
 from planners.limits import STOPPING, stop_clock
-from planners.matching import Ints
-from planners.optimal import PlanSpace
+from planners.search.plan_space import PlanSpace
+from planners.search.tuples import EdgeIndex
 
 #: Tasks are searched for counterexamples in parts, one after another: at least so many, of at most so many tasks.
 _PARTS, _TASKS = 8, 1_500

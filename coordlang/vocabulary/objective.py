@@ -1,9 +1,9 @@
 """The flexibility of partitions that differ in few states, measured again and again: the inner loop of `flexible`.
 
-The same sum as `coordlang.flexibility`, E = sum_s n_s^2 / N for every task.  Two things make it fast.  Sentences are told
+The same sum as `coordlang.language.flexibility`, E = sum_s n_s^2 / N for every task.  Two things make it fast.  Sentences are told
 apart by 63-bit hashes, not by tables.  And when some states change their words, only the tasks with plans through them
 are measured, each over its own part of the plan graph.  A collision of hashes can only mislead the search: what is
-reported is measured by `coordlang.flexibility`.
+reported is measured by `coordlang.language.flexibility`.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from coordlang.flexibility import MANY, Floats, edge_shares
-from planners.matching import Ints, ranges
-from planners.optimal import PlanSpace
-from planners.plans import counts
+from coordlang.language.flexibility import MANY, Floats, edge_shares
+from planners.joint.matching import Ints, ranges
+from planners.search.plan_space import PlanSpace
+from planners.search.plans import counts
 
 _MIX = np.uint64(0x9E3779B97F4A7C15)
 #: Edges kept in parts of plan graphs, one part for each state; beyond, parts are cut out anew each time.

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-from coordlang.warping import Clause, Pair, pair
+from coordlang.language.warping import Clause, Pair, pair
 
 Requirement = TypeVar("Requirement")
 

@@ -10,13 +10,13 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
-from coordlang.divergence import Separation, separations
-from coordlang.separation import Constraint, SeparationWalk, ordered
-from coordlang.symmetry import state_symmetries
+from coordlang.language.warping import Pair, pair
+from coordlang.required.divergences import Separation, separations
+from coordlang.required.last_differences import Constraint, SeparationWalk, ordered
 from coordlang.vocabulary.greedy import fill
 from coordlang.vocabulary.job import Job, Outcome, Partition
 from coordlang.vocabulary.sat import Colouring, Effort, Problems, Undecided, by_demand, close_in
-from coordlang.warping import Pair, pair
+from coordlang.vocabulary.symmetry import state_symmetries
 from planners.errors import OutOfMemory
 from planners.limits import STOPPING, stop_clock
 

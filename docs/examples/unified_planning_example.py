@@ -18,10 +18,10 @@ from unified_planning.shortcuts import (
     get_environment,
 )
 
-from coordlang.build import build_language
-from coordlang.sentences import task_sentences
-from coordlang.tasks import from_problems
-from coordlang.use.spoken import speak_candidates
+from coordlang.building import build_language
+from coordlang.language.sentences import task_sentences
+from coordlang.tasks.candidates import from_problems
+from coordlang.use.sentence.spoken import speak_candidates
 from coordlang.use.unified import register
 from coordlang.use.unified.translation import translate
 

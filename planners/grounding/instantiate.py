@@ -29,7 +29,7 @@ from planners.pddl.lifted import (
     Truth,
     Variable,
 )
-from planners.robots import Team, fluent_predicates, objects_of, static_atoms
+from planners.pddl.robots import Team, fluent_predicates, objects_of, static_atoms
 
 #: What to try when grounding is too much.
 FEWER = "fewer objects, or actions with fewer parameters"

@@ -9,7 +9,7 @@ from itertools import combinations, product
 from planners.errors import BadInput
 from planners.grounding.instantiate import GroundAction
 from planners.pddl.lifted import TRUE, And, Constraint, Domain, Formula, Not, Or, Problem, StepAtom
-from planners.robots import objects_of
+from planners.pddl.robots import objects_of
 
 #: (constraint, binding of its parameters) -> the ground actions that match.
 _Groups = dict[tuple[str, tuple[str, ...]], list[GroundAction]]

@@ -13,7 +13,7 @@ from typing import Any
 
 from planners.errors import CoordlangError, OutOfMemory
 from planners.pddl.lifted import And, Atom, Domain, Formula, Schema, Variable
-from planners.robots import natural
+from planners.pddl.robots import natural
 
 Arguments = tuple[str, ...]
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-import planners.fast_downward
-from planners.fast_downward import FastDownwardAnswer
+import planners.classical.fast_downward
+from planners.classical.fast_downward import FastDownwardAnswer
 from tests.conftest import DOMAINS, Command
 
 T_MAP = DOMAINS / "t-map"
@@ -37,7 +37,7 @@ def test_both_prove_that_there_is_no_plan(coordlang: Command, tmp_path: Path) ->
 
 def test_a_disagreement_is_refuted(coordlang: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     answer = FastDownwardAnswer((3, 0), "explicit", 1, 0.0)
-    monkeypatch.setattr(planners.fast_downward, "optimal_cost", lambda *_, **__: answer)
+    monkeypatch.setattr(planners.classical.fast_downward, "optimal_cost", lambda *_, **__: answer)
     outcome = coordlang("check", T_MAP / "domain.pddl", T_MAP / "problem.pddl")
     assert outcome.code == 1
     assert "coordlang      makespan 4" in outcome.out

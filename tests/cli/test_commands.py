@@ -12,10 +12,10 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from planners.model import load
-from planners.planfile import read_plans
-from planners.robots import RobotChoice, find_team
-from planners.validate import validate
+from planners.check.validate import validate
+from planners.loading import load
+from planners.pddl.robots import RobotChoice, find_team
+from planners.search.plan_file import read_plans
 from tests.conftest import DOMAINS, ROOT, Command
 
 GRID = DOMAINS / "grid"
@@ -223,7 +223,7 @@ def test_a_bug_is_said_plainly(error: Exception, coordlang: Command, monkeypatch
     def broken() -> None:
         raise error
 
-    monkeypatch.setattr("coordlang.record.json_schema", broken)
+    monkeypatch.setattr("coordlang.language.record.json_schema", broken)
     outcome = coordlang("schema")
     assert outcome.code == 32
     assert "internal error" in outcome.err

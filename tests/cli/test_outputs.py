@@ -95,7 +95,7 @@ def test_the_place_is_looked_at_before_the_work(
     Path("shut").mkdir()
     access = os.access  # the superuser may write everywhere
     monkeypatch.setattr(os, "access", lambda path, mode: Path(path).name != "shut" and access(path, mode))
-    for module in ("planners.pddl.read_domain", "coordlang.evaluation.runner.run"):
+    for module in ("planners.pddl.read_domain", "coordlang.evaluation.lab.runner.run"):
         monkeypatch.setattr(module, lambda *_: pytest.fail("no work before"))
     outcome = coordlang(*arguments, place)
     assert outcome.code == 2

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from coordlang.cli.miscoordination import show
-from coordlang.witness import Miscoordination
+from coordlang.required.miscoordination import Miscoordination
 from tests.conftest import DOMAINS, Command
 
 DOMAIN = """(define (domain e) (:types robot place) (:predicates (q ?r - robot) (ok ?r - robot))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import product
 
-from planners.optimal import PlanSpace
-from planners.plans import Plan, Plans, counts
+from planners.search.plan_space import PlanSpace
+from planners.search.plans import Plan, Plans, counts
 
 
 class TooLarge(Exception):

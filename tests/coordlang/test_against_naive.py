@@ -9,15 +9,15 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from coordlang.divergence import alphas, separations
-from coordlang.language import WordTable
-from coordlang.tasks import Candidates, all_pairs, from_problems
-from coordlang.verify import verify
+from coordlang.language.words import WordTable
+from coordlang.required.divergences import alphas, separations
+from coordlang.required.miscoordination import inseparable, miscoordination
+from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
+from coordlang.verification.by_definition import verify
 from coordlang.vocabulary.greedy import fill
-from coordlang.witness import inseparable, miscoordination
 from planners.errors import ProvedImpossible
-from planners.joint import FullState
-from planners.optimal import PlanSpace
+from planners.joint.model import FullState
+from planners.search.plan_space import PlanSpace
 from tests.coordlang import naive
 from tests.coordlang.random_models import random_model
 

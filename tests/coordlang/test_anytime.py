@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-import coordlang.build
-from coordlang.build import build_language
-from coordlang.file import read_language
+import coordlang.building
+from coordlang.building import build_language
+from coordlang.language.file import read_language
 from coordlang.vocabulary.sat import Colouring
 from planners.errors import OutOfMemory, OutOfTime
 from planners.limits import time_limit
@@ -69,7 +69,7 @@ def test_words_are_kept_when_enlarging_them_is_stopped(error: BaseException, mon
     def stop(*_: object) -> None:
         raise error
 
-    monkeypatch.setattr(coordlang.build, "verify_overlapping", stop)
+    monkeypatch.setattr(coordlang.building, "verify_overlapping", stop)
     built = build_language(shipped("grid", "gw1-2x2"), "minimal", overlap=True)
     assert built.stopped is error
     assert built.language.also == {}
@@ -96,7 +96,7 @@ def test_the_language_is_written_without_its_certificate(
     def stop(_: object) -> None:
         raise error
 
-    monkeypatch.setattr("coordlang.build.certificate_of", stop)
+    monkeypatch.setattr("coordlang.building.certificate_of", stop)
     path, proof = tmp_path / "l.json", tmp_path / "c.json"
     files = [DOMAINS / "three-cells" / name for name in ("domain.pddl", "problem.pddl")]
     outcome = coordlang("build", *files, "--method", "minimal", "-o", path, "--certificate", proof)

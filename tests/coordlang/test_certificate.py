@@ -9,16 +9,16 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from coordlang.build import Built, build_language, certificate_of
+from coordlang.building import Built, build_language, certificate_of
 from coordlang.certificate import Certificate, Reason, check, encode, read_certificate, write_certificate
 from coordlang.certificate.encoding import core
 from coordlang.certificate.file import WarpingPath
-from coordlang.task_file import read_task_file
-from coordlang.tasks import all_pairs, from_listed, from_problems
+from coordlang.required.miscoordination import inseparable
+from coordlang.tasks.candidates import all_pairs, from_listed, from_problems
+from coordlang.tasks.task_file import read_task_file
 from coordlang.vocabulary.minimal import refute
-from coordlang.witness import inseparable
 from planners.errors import BadInput, ProvedImpossible, Refuted
-from planners.model import ModelOptions
+from planners.loading import ModelOptions
 from planners.pddl import read_domain, read_problem
 from tests.conftest import DOMAINS, Command
 from tests.coordlang.random_models import random_model

@@ -7,13 +7,13 @@ from functools import cache
 
 import pytest
 
-from coordlang.build import build_language
-from coordlang.coordination import walk
-from coordlang.tasks import Candidates, all_pairs, from_problems
+from coordlang.building import build_language
+from coordlang.required.composition_walk import walk
+from coordlang.required.miscoordination import inseparable
+from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.vocabulary import METHODS, Job, Outcome
 from coordlang.vocabulary import exhaustive as by_brute_force
 from coordlang.vocabulary.job import Partition
-from coordlang.witness import inseparable
 from planners.errors import OutOfMemory, OutOfTime, ProvedImpossible
 from tests.coordlang import naive
 from tests.coordlang.random_models import random_model
@@ -72,10 +72,10 @@ def test_a_language_by_definition_with_a_true_bound(method: str, robots: int, mo
 @pytest.mark.parametrize("error", [OutOfTime("late"), OutOfMemory("full"), KeyboardInterrupt()])
 def test_stopped_while_it_checks(method: str, error: BaseException, monkeypatch: pytest.MonkeyPatch) -> None:
     """A limit while a better partition is verified: the one before it is left."""
-    import coordlang.build
+    import coordlang.building
 
     candidates = shipped("grid", "gw1-2x2")
-    verified = coordlang.build._verified
+    verified = coordlang.building._verified
     checked: list[Partition] = []
 
     def late(given: Candidates, partition: Partition) -> object:
@@ -84,7 +84,7 @@ def test_stopped_while_it_checks(method: str, error: BaseException, monkeypatch:
         checked.append(partition)
         return verified(given, partition)
 
-    monkeypatch.setattr(coordlang.build, "_verified", late)
+    monkeypatch.setattr(coordlang.building, "_verified", late)
     built = build_language(candidates, method)
     assert built.verdict.holds
     assert len(built.language.words) == len(set(checked[0].values()))

@@ -13,23 +13,23 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.build import build_language
-from coordlang.coordination import walk
-from coordlang.flexibility import flexibility
-from coordlang.flexibility_bound import flexibility_bounds
-from coordlang.pairs import divided
-from coordlang.task_file import ListedTask, read_task_file
-from coordlang.tasks import Candidates, all_pairs, from_listed, from_problems
+from coordlang.building import build_language
+from coordlang.language.flexibility import flexibility
+from coordlang.required.composition_walk import walk
+from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
+from coordlang.tasks.task_file import ListedTask, read_task_file
+from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Outcome, Partition
 from coordlang.vocabulary.objective import Objective
+from coordlang.vocabulary.pairwise import divided
 from planners.errors import ProvedImpossible
-from planners.model import ModelOptions
-from planners.optimal import PlanSpace
+from planners.joint.states import split_atoms
+from planners.loading import ModelOptions
 from planners.pddl import parse_domain, parse_problem, read_domain, read_problem
 from planners.pddl.sexpr import Source
-from planners.plans import Plan
-from planners.states import split_atoms
+from planners.search.plan_space import PlanSpace
+from planners.search.plans import Plan
 from tests.conftest import DOMAINS
 from tests.coordlang import naive
 from tests.coordlang.random_models import graph_text, random_model
@@ -285,10 +285,10 @@ def test_bounds_without_listing_all_boxes(monkeypatch: pytest.MonkeyPatch) -> No
     candidates = shipped("grid", "gw1-2x2")
     requires = [walk(space).requires for space in candidates.spaces]
     exact = flexibility_bounds(candidates.spaces, requires)
-    monkeypatch.setattr("coordlang.flexibility_bound._BOXES", 0)
+    monkeypatch.setattr("coordlang.vocabulary.flexibility_bound._BOXES", 0)
     loose = flexibility_bounds(candidates.spaces, requires)
     assert (loose >= exact - 1e-9).all()
-    monkeypatch.setattr("coordlang.flexibility_bound.MOST_PLANS", 0)
+    monkeypatch.setattr("coordlang.vocabulary.flexibility_bound.MOST_PLANS", 0)
     assert (flexibility_bounds(candidates.spaces, requires) >= loose).all()
 
 

@@ -8,10 +8,10 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang import keys
-from coordlang.keys import keys_of, read_keys
+from coordlang.language import keys
+from coordlang.language.keys import keys_of, read_keys
 from planners.errors import BadInput
-from planners.states import Rows, StateCodec
+from planners.joint.states import Rows, StateCodec
 
 
 def random_codec(random: Random) -> StateCodec:

@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coordlang.build import build_language
-from coordlang.file import read_language, to_bytes, write_atomically
-from coordlang.language import WordTable
-from coordlang.symmetry import closed, state_symmetries
-from coordlang.tasks import Candidates, all_pairs, from_problems
-from coordlang.verify import verify
+from coordlang.building import build_language
+from coordlang.language.file import read_language, to_bytes, write_atomically
+from coordlang.language.words import WordTable
+from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
+from coordlang.verification.by_definition import verify
+from coordlang.vocabulary.symmetry import closed, state_symmetries
 from planners.errors import BadInput
 from planners.pddl import parse_domain, parse_problem, read_domain
 from planners.pddl.sexpr import Source
-from planners.plans import Plans, counts
+from planners.search.plans import Plans, counts
 from tests.conftest import DOMAINS, Command
 from tests.coordlang import naive
 from tests.coordlang.test_minimal import shipped

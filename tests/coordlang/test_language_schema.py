@@ -13,9 +13,9 @@ import jsonschema
 import pytest
 
 import coordlang
-from coordlang.build import build_language
-from coordlang.file import language_from_bytes, read_language, to_bytes, write_language
-from coordlang.record import json_schema
+from coordlang.building import build_language
+from coordlang.language.file import language_from_bytes, read_language, to_bytes, write_language
+from coordlang.language.record import json_schema
 from planners.errors import BadInput, Place
 from tests.conftest import DOMAINS, Command
 from tests.coordlang.test_minimal import shipped
@@ -44,7 +44,7 @@ def readable(data: object) -> bool:
 
 def test_packaged_schema_is_the_printed_one(coordlang: Command) -> None:
     packaged = Path(coordlang_folder() / "language.schema.json").read_text()
-    assert packaged == coordlang("schema").out, "coordlang schema > coordlang/language.schema.json"
+    assert packaged == coordlang("schema").out, "coordlang schema > coordlang/language/language.schema.json"
     jsonschema.Draft202012Validator.check_schema(json.loads(packaged))
 
 

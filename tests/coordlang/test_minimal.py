@@ -9,15 +9,15 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from coordlang.build import build_language
-from coordlang.language import sentence
-from coordlang.tasks import Candidates, all_pairs, from_problems
+from coordlang.building import build_language
+from coordlang.language.warping import Clause, pair, separation_clause, warping_clause
+from coordlang.language.words import sentence
+from coordlang.required.miscoordination import inseparable
+from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.vocabulary.sat import Colouring, Problems, reduce
-from coordlang.warping import Clause, pair, separation_clause, warping_clause
-from coordlang.witness import inseparable
 from planners.errors import ProvedImpossible
-from planners.optimal import PlanSpace
 from planners.pddl import read_domain, read_problem
+from planners.search.plan_space import PlanSpace
 from tests.conftest import DOMAINS
 from tests.coordlang import naive
 from tests.coordlang.random_models import random_model

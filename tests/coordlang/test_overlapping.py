@@ -12,18 +12,18 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.build import build_language
-from coordlang.coordination import walk
-from coordlang.file import language_from_bytes, read_language, to_bytes, write_language
-from coordlang.flexibility_bound import flexibility_bounds
-from coordlang.language import words_of_states
-from coordlang.overlapping import Overlap, Readings, Sentence, readings
-from coordlang.tasks import Candidates
-from coordlang.verify_overlapping import verify_overlapping
+from coordlang.building import build_language
+from coordlang.language.file import language_from_bytes, read_language, to_bytes, write_language
+from coordlang.language.overlapping import Overlap, Readings, Sentence, readings
+from coordlang.language.words import words_of_states
+from coordlang.required.composition_walk import walk
+from coordlang.required.miscoordination import inseparable
+from coordlang.tasks.candidates import Candidates
+from coordlang.verification.overlapping import verify_overlapping
 from coordlang.vocabulary.enlarging import enlarge
-from coordlang.witness import inseparable
+from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from planners.errors import BadInput, Place
-from planners.plans import Plan
+from planners.search.plans import Plan
 from tests.coordlang import naive
 from tests.coordlang.test_flexible import listed, on_graph, shipped, some_tasks
 

@@ -8,15 +8,15 @@ from random import Random
 
 import pytest
 
-from coordlang.build import build_language
-from coordlang.language import WordTable
-from coordlang.pairs import language_for, pair_languages, together, unsafe_pair
-from coordlang.tasks import Candidates, from_problems
-from coordlang.verify import verify
-from coordlang.witness import Inseparable, inseparable
+from coordlang.building import build_language
+from coordlang.language.words import WordTable
+from coordlang.required.miscoordination import Inseparable, inseparable
+from coordlang.tasks.candidates import Candidates, from_problems
+from coordlang.verification.by_definition import verify
+from coordlang.vocabulary.pairwise import language_for, pair_languages, together, unsafe_pair
+from planners.joint.states import split_atoms, unique_rows
 from planners.pddl import read_domain, read_problem
-from planners.plans import Plan
-from planners.states import split_atoms, unique_rows
+from planners.search.plans import Plan
 from tests.conftest import DOMAINS
 from tests.coordlang import naive
 from tests.coordlang.test_flexible import listed, on_graph, partitions

@@ -8,13 +8,13 @@ from itertools import combinations, count
 
 import pytest
 
-from coordlang.build import build_language
-from coordlang.coordination import walk
-from coordlang.divergence import alternatives
-from coordlang.separation import SeparationWalk
-from coordlang.tasks import Candidates, all_pairs, from_problems
+from coordlang.building import build_language
+from coordlang.required.composition_walk import walk
+from coordlang.required.divergences import alternatives
+from coordlang.required.last_differences import SeparationWalk
+from coordlang.required.miscoordination import inseparable
+from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.vocabulary.exhaustive import _partitions
-from coordlang.witness import inseparable
 from planners.errors import ProvedImpossible
 from tests.coordlang import naive
 from tests.coordlang.random_models import random_model

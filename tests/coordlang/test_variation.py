@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 
 from coordlang.cli import run
-from coordlang.task_file import ListedTask, read_task_file
-from coordlang.tasks import from_listed
-from coordlang.variation import varied_tasks
+from coordlang.tasks.candidates import from_listed
+from coordlang.tasks.patterns import varied_tasks
+from coordlang.tasks.task_file import ListedTask, read_task_file
 from planners.errors import ProvedImpossible, UsageError
-from planners.model import Loaded, load
+from planners.loading import Loaded, load
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "planners"))
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from itertools import product
 
-from coordlang.witness import inseparable, miscoordination
-from planners.model import build
-from planners.optimal import PlanSpace, search
+from coordlang.required.miscoordination import inseparable, miscoordination
+from planners.loading import build
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
-from planners.plans import Plan, Plans
+from planners.search.plan_space import PlanSpace, search
+from planners.search.plans import Plan, Plans
 
 
 def joint_space(actions: list[tuple[str, str, str]], robots: int, goal: str, init: str = "") -> PlanSpace:

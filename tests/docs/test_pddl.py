@@ -8,7 +8,7 @@ import pytest
 
 from coordlang.cli import run
 from planners.errors import Unsupported
-from planners.model import build
+from planners.loading import build
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
 from tests.docs.pages import DOCS, ROOT, blocks, code, links, rows, sections

@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 
 from coordlang.cli import run
-from coordlang.file import options_of, read_language
-from coordlang.language import WordTable, sentence
-from coordlang.task_file import read_task_file
-from coordlang.tasks import all_pairs
+from coordlang.language.file import options_of, read_language
+from coordlang.language.words import WordTable, sentence
+from coordlang.tasks.candidates import all_pairs
+from coordlang.tasks.task_file import read_task_file
 from planners.pddl import read_domain, read_problem
-from planners.plans import Plans, counts
+from planners.search.plans import Plans, counts
 from tests.docs.pages import DOCS, ROOT, blocks
 
 DOMAIN, PROBLEM = (ROOT / "domains" / "t-map" / name for name in ("domain.pddl", "problem.pddl"))

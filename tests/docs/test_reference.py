@@ -90,8 +90,8 @@ def test_nothing_is_mentioned_that_does_not_exist(page: Path) -> None:
 
 
 def test_exit_codes() -> None:
-    importlib.import_module("planners.fast_downward")
-    importlib.import_module("coordlang.build")
+    importlib.import_module("planners.classical.fast_downward")
+    importlib.import_module("coordlang.building")
     listed = [int(cells[0]) for cells in rows(sections(CLI)["Exit codes"])]
     assert listed == sorted(listed)
     assert set(listed) == {0, EXIT_INTERRUPTED, EXIT_BROKEN_PIPE, *(kind.exit_code for kind in error_tree(CoordlangError))}

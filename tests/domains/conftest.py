@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from planners.model import Loaded, load
-from planners.optimal import PlanSpace, search
-from planners.space import Space, explore
+from planners.loading import Loaded, load
+from planners.search.plan_space import PlanSpace, search
+from planners.search.reachable import Space, explore
 
 ROOT = Path(__file__).resolve().parents[2]
 DOMAINS = ROOT / "domains"

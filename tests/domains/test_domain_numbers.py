@@ -13,14 +13,14 @@ import pytest
 from generate import Scenario, problem_text
 from gridmap import GridMap, open_grid, ring, three_cells
 
-from planners.interference import conjuncts
-from planners.joint import FullState
-from planners.model import build
-from planners.optimal import PlanSpace, TaskGroup, plan_spaces
+from planners.joint.interference import conjuncts
+from planners.joint.model import FullState
+from planners.loading import build
 from planners.pddl import parse_problem, read_domain
 from planners.pddl.sexpr import Source
-from planners.plans import Plans, counts
-from planners.space import Space, explore
+from planners.search.plan_space import PlanSpace, TaskGroup, plan_spaces
+from planners.search.plans import Plans, counts
+from planners.search.reachable import Space, explore
 
 DOMAINS = Path(__file__).resolve().parents[2] / "domains"
 

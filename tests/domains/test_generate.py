@@ -14,7 +14,7 @@ from generate import main, scenario
 from gridmap import open_grid
 
 from planners.errors import UsageError
-from planners.model import load
+from planners.loading import load
 
 DOMAINS = Path(__file__).resolve().parents[2] / "domains"
 

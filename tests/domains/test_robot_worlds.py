@@ -11,20 +11,20 @@ from xml.etree import ElementTree
 
 import pytest
 
-from coordlang.build import build_language
-from coordlang.language import WordTable
-from coordlang.task_file import read_task_file
-from coordlang.tasks import Candidates, all_pairs, from_listed, from_problems
-from coordlang.verify import verify
-from coordlang.witness import Inseparable, miscoordination
-from planners.fast_downward import optimal_cost
-from planners.joint import Cost
-from planners.model import Loaded, ModelOptions, load
-from planners.optimal import search
+from coordlang.building import build_language
+from coordlang.language.words import WordTable
+from coordlang.required.miscoordination import Inseparable, miscoordination
+from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
+from coordlang.tasks.task_file import read_task_file
+from coordlang.verification.by_definition import verify
+from planners.classical.fast_downward import optimal_cost
+from planners.joint.model import Cost
+from planners.loading import Loaded, ModelOptions, load
 from planners.pddl import read_domain, read_problem
-from planners.plans import Plans
-from planners.robots import static_atoms
-from planners.space import Space
+from planners.pddl.robots import static_atoms
+from planners.search.plan_space import search
+from planners.search.plans import Plans
+from planners.search.reachable import Space
 
 ROOT = Path(__file__).resolve().parents[2]
 DOMAINS = ROOT / "domains"

@@ -15,11 +15,11 @@ from pathlib import Path
 import pytest
 from test_robot_worlds import DOMAINS, ROOT, Row, candidates, tables
 
-from coordlang.build import build_language
-from coordlang.language import Guarantee, Language, WordTable
-from coordlang.tasks import Candidates
-from coordlang.verify import Verdict, verify
-from planners.states import split_atoms
+from coordlang.building import build_language
+from coordlang.language.words import Guarantee, Language, WordTable
+from coordlang.tasks.candidates import Candidates
+from coordlang.verification.by_definition import Verdict, verify
+from planners.joint.states import split_atoms
 from tests.docs.pages import blocks, commands
 from tests.docs.test_run import run_command
 

@@ -9,7 +9,12 @@ from statistics import fmean
 
 import pytest
 
-from coordlang.evaluation.game import expected_for_plans, expected_for_sentences, expected_widest_first, play
+from coordlang.evaluation.experiments.game import (
+    expected_for_plans,
+    expected_for_sentences,
+    expected_widest_first,
+    play,
+)
 
 
 def all_games(sizes: tuple[int, ...], liked: int) -> tuple[Fraction, Fraction, Fraction]:

@@ -6,15 +6,15 @@ from random import Random
 
 import pytest
 
-from coordlang.evaluation.hazards import Hazard, Sayings, exact_odds, own_choices
-from coordlang.evaluation.interval import wilson
-from coordlang.evaluation.languages import language_for
-from coordlang.evaluation.recipe import Settings
-from coordlang.evaluation.scenario import subplans
-from coordlang.evaluation.trials import Trial, Trials, subaction_trials, warehouse_trials
-from coordlang.evaluation.warehouse import LAYOUTS, WAREHOUSES, deliveries, human_in, listed_tasks
-from coordlang.use.spoken import Spoken
-from planners.plans import Plan
+from coordlang.evaluation.experiments.scenario import subplans
+from coordlang.evaluation.lab.interval import wilson
+from coordlang.evaluation.lab.recipe import Settings
+from coordlang.evaluation.material.hazards import Hazard, Sayings, exact_odds, own_choices
+from coordlang.evaluation.material.languages import language_for
+from coordlang.evaluation.material.trials import Trial, Trials, subaction_trials, warehouse_trials
+from coordlang.evaluation.material.warehouse import LAYOUTS, WAREHOUSES, deliveries, human_in, listed_tasks
+from coordlang.use.sentence.spoken import Spoken
+from planners.search.plans import Plan
 from tests.conftest import DOMAINS
 from tests.coordlang import naive
 from tests.evaluation.worlds import shipped, spoken, three_cells

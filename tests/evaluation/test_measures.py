@@ -9,15 +9,15 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.divergence import states_on_plans
-from coordlang.evaluation import communication, flexibility
-from coordlang.evaluation.interval import mean_interval, wilson
-from coordlang.evaluation.orders import NATURAL, greedy_in_orders, natural_orders
-from coordlang.evaluation.said import Said, said, sentence_counts
-from coordlang.evaluation.table1 import brute_force, pairs_of_plans
-from coordlang.flexibility import flexibility as measured
-from coordlang.language import WordTable
-from coordlang.verify import verify
+from coordlang.evaluation.experiments import communication, flexibility
+from coordlang.evaluation.experiments.table1 import brute_force, pairs_of_plans
+from coordlang.evaluation.lab.interval import mean_interval, wilson
+from coordlang.evaluation.material.orders import NATURAL, greedy_in_orders, natural_orders
+from coordlang.evaluation.material.said import Said, said, sentence_counts
+from coordlang.language.flexibility import flexibility as measured
+from coordlang.language.words import WordTable
+from coordlang.required.divergences import states_on_plans
+from coordlang.verification.by_definition import verify
 from planners.errors import OutOfMemory
 from tests.coordlang import naive
 from tests.evaluation.worlds import shipped, spoken, three_cells

@@ -8,12 +8,12 @@ from xml.etree import ElementTree
 
 import pytest
 
-from coordlang.evaluation.experiments import RECIPES
-from coordlang.evaluation.identity import file_hash
-from coordlang.evaluation.page import page_text, sections, write_page
-from coordlang.evaluation.paper import TABLE_1
-from coordlang.evaluation.recipe import Settings
-from coordlang.evaluation.results import Line, Results, record_of
+from coordlang.evaluation.experiments.registry import RECIPES
+from coordlang.evaluation.lab.identity import file_hash
+from coordlang.evaluation.lab.page import page_text, sections, write_page
+from coordlang.evaluation.lab.recipe import Settings
+from coordlang.evaluation.lab.results import Line, Results, record_of
+from coordlang.evaluation.material.paper import TABLE_1
 from tests.conftest import DOMAINS, ROOT
 
 PAGE, FOLDER = ROOT / "docs" / "evaluation.md", ROOT / "docs" / "evaluation"

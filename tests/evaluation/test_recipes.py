@@ -7,20 +7,28 @@ from random import Random
 
 import pytest
 
-from coordlang.evaluation import planning_cost, scenario, table1
-from coordlang.evaluation.experiments import RECIPES
-from coordlang.evaluation.languages import language_for
-from coordlang.evaluation.maps import place_of, position
-from coordlang.evaluation.paper import DIFFERING, OPEN_ALL, OPEN_SEVERAL, SAVING_ALL, SAVING_DIFFERING, SEVERAL, TABLE_1
-from coordlang.evaluation.recipe import Record, Settings, Unit, table
-from coordlang.evaluation.results import name_of
-from coordlang.evaluation.suite import OTHERS, ROWS, WORLDS, find_domains
-from coordlang.language import WordTable
-from coordlang.use.guided import Terrain
-from coordlang.use.spoken import speak_candidates
+from coordlang.evaluation.experiments import planning_cost, scenario, table1
+from coordlang.evaluation.experiments.registry import RECIPES
+from coordlang.evaluation.lab.recipe import Record, Settings, Unit, table
+from coordlang.evaluation.lab.results import name_of
+from coordlang.evaluation.material.languages import language_for
+from coordlang.evaluation.material.maps import place_of, position
+from coordlang.evaluation.material.paper import (
+    DIFFERING,
+    OPEN_ALL,
+    OPEN_SEVERAL,
+    SAVING_ALL,
+    SAVING_DIFFERING,
+    SEVERAL,
+    TABLE_1,
+)
+from coordlang.evaluation.material.suite import OTHERS, ROWS, WORLDS, find_domains
+from coordlang.language.words import WordTable
+from coordlang.use.sentence.guided import Terrain
+from coordlang.use.sentence.spoken import speak_candidates
 from coordlang.vocabulary.sat import Colouring
 from planners.errors import OutOfTime, UsageError
-from planners.plans import Plans
+from planners.search.plans import Plans
 from tests.conftest import DOMAINS
 from tests.evaluation.worlds import spoken, three_cells
 

@@ -13,10 +13,10 @@ from typing import Any
 
 import pytest
 
-from coordlang.evaluation.experiments import RECIPES
-from coordlang.evaluation.recipe import Settings
-from coordlang.evaluation.results import Results
-from coordlang.evaluation.runner import Progress, UnitFailed, run
+from coordlang.evaluation.experiments.registry import RECIPES
+from coordlang.evaluation.lab.recipe import Settings
+from coordlang.evaluation.lab.results import Results
+from coordlang.evaluation.lab.runner import Progress, UnitFailed, run
 from planners.errors import BadInput, UsageError
 from tests.conftest import DOMAINS, Command
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from functools import cache
 
-from coordlang.build import build_language
-from coordlang.language import Guarantee, Language
-from coordlang.tasks import Candidates, all_pairs, from_problems
-from coordlang.use.spoken import Spoken, speak_candidates
+from coordlang.building import build_language
+from coordlang.language.words import Guarantee, Language
+from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
+from coordlang.use.sentence.spoken import Spoken, speak_candidates
 from planners.pddl import read_domain, read_problem
 from tests.conftest import DOMAINS
 

@@ -9,16 +9,16 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.build import build_language
-from coordlang.explain import word_formulas
-from coordlang.explain.asks import Asked, asked
-from coordlang.explain.text import asked_text
-from coordlang.tasks import all_pairs, from_problems
-from coordlang.use.fitting import fitting
-from coordlang.use.spoken import Spoken, speak_candidates
+from coordlang.building import build_language
+from coordlang.explanation import word_formulas
+from coordlang.explanation.asks import Asked, asked
+from coordlang.explanation.text import asked_text
+from coordlang.tasks.candidates import all_pairs, from_problems
+from coordlang.use.sentence.fitting import fitting
+from coordlang.use.sentence.spoken import Spoken, speak_candidates
 from planners.errors import ProvedImpossible
 from planners.pddl import read_domain, read_problem
-from planners.plans import Plan, Plans
+from planners.search.plans import Plan, Plans
 from tests.conftest import DOMAINS, Command
 from tests.coordlang import naive
 from tests.coordlang.random_models import random_model

@@ -9,20 +9,20 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.build import build_language
-from coordlang.explain import Cover, Literal, Variable, word_formulas
-from coordlang.explain.boxes import Points, expand
-from coordlang.explain.minimise import minimise
-from coordlang.explain.telling import telling
-from coordlang.explain.text import literal_text, pddl_condition, shown
-from coordlang.explain.variables import truth, valuation
-from coordlang.explain.words import all_covers, mapped_states
-from coordlang.language import Guarantee, Language, WordTable
-from coordlang.tasks import Candidates, all_pairs, from_problems
+from coordlang.building import build_language
+from coordlang.explanation import Cover, Literal, Variable, word_formulas
+from coordlang.explanation.boxes import Points, expand
+from coordlang.explanation.minimise import minimise
+from coordlang.explanation.telling import telling
+from coordlang.explanation.text import literal_text, pddl_condition, shown
+from coordlang.explanation.variables import truth, valuation
+from coordlang.explanation.words import all_covers, mapped_states
+from coordlang.language.words import Guarantee, Language, WordTable
+from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from planners.errors import ProvedImpossible
-from planners.model import ModelOptions
+from planners.loading import ModelOptions
 from planners.pddl import read_domain, read_problem
-from planners.space import explore
+from planners.search.reachable import explore
 from tests.conftest import DOMAINS
 from tests.coordlang.random_models import random_model
 from tests.coordlang.test_minimal import shipped

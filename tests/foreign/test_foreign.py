@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from coordlang.cli import run
-from coordlang.variation import varied_tasks
-from coordlang.witness import Inseparable
+from coordlang.required.miscoordination import Inseparable
+from coordlang.tasks.patterns import varied_tasks
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 

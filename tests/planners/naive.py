@@ -1,7 +1,7 @@
 """Naive twin of the joint model: joint steps, reachable states and optimal plans by brute force.
 
 Every robot tries every type-correct argument tuple of every schema; what is a joint step is asked of
-`planners.validate`, one step at a time.  Nothing is shared with grounding, composition or search.
+`planners.check.validate`, one step at a time.  Nothing is shared with grounding, composition or search.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from itertools import product
 from math import prod
 
+from planners.check.validate import Moment, Rules, State
 from planners.pddl.lifted import And, Domain, Exists, Forall, Formula, Not, Or, Problem, StepAtom
-from planners.robots import Team
-from planners.validate import Moment, Rules, State
+from planners.pddl.robots import Team
 
 Labels = tuple[str | None, ...]
 Step = tuple[Labels, State]

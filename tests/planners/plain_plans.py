@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 
-from planners.plain import PlainTask
+from planners.classical import PlainTask
 
 PlainState = frozenset[int]
 

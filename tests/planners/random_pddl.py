@@ -12,7 +12,7 @@ from itertools import product
 from random import Random
 from typing import Literal
 
-from planners.robots import Unowned
+from planners.pddl.robots import Unowned
 
 Kind = Literal["agent", "plain", "joint"]
 KINDS: tuple[Kind, ...] = ("agent", "plain", "joint")

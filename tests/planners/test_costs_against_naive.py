@@ -12,17 +12,17 @@ import pytest
 from naive import TooLarge, Twin
 from random_pddl import Kind, random_model
 
+from planners.check.validate import Moment, State
 from planners.errors import BadInput
-from planners.joint import show
-from planners.model import Loaded, ModelOptions, build, task_of
-from planners.optimal import TaskGroup, plan_spaces, search
+from planners.joint.model import show
+from planners.loading import Loaded, ModelOptions, build, task_of
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import And, Formula, Not
+from planners.pddl.robots import RobotChoice
 from planners.pddl.sexpr import Source
-from planners.plans import Plans
-from planners.robots import RobotChoice
-from planners.space import explore
-from planners.validate import Moment, State
+from planners.search.plan_space import TaskGroup, plan_spaces, search
+from planners.search.plans import Plans
+from planners.search.reachable import explore
 
 Price = Callable[[str], int]
 

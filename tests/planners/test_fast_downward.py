@@ -13,16 +13,16 @@ from pathlib import Path
 
 import pytest
 
-from planners import fast_downward
-from planners import plain as plain_module
+from planners import classical as plain_module
+from planners.classical import fast_downward
+from planners.classical.fast_downward import FastDownwardFailed, optimal_cost
 from planners.errors import OutOfMemory, OutOfTime, ProvedImpossible
-from planners.fast_downward import FastDownwardFailed, optimal_cost
-from planners.joint import Cost
-from planners.model import Loaded, ModelOptions, build, load
-from planners.optimal import search
+from planners.joint.model import Cost
+from planners.loading import Loaded, ModelOptions, build, load
 from planners.pddl import parse_domain, parse_problem
+from planners.pddl.robots import RobotChoice
 from planners.pddl.sexpr import Source
-from planners.robots import RobotChoice
+from planners.search.plan_space import search
 
 FOREIGN = Path(__file__).parents[3] / "shared" / "data" / "foreign"
 
@@ -264,7 +264,7 @@ def test_a_crash_of_the_worker_shows_what_it_said(monkeypatch: pytest.MonkeyPatc
 
 
 def test_importing_is_cheap() -> None:
-    code = "import sys, planners.fast_downward; print([m for m in ('unified_planning', 'tarski') if m in sys.modules])"
+    code = "import sys, planners.classical.fast_downward; print([m for m in ('unified_planning', 'tarski') if m in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "[]\n"
 
 

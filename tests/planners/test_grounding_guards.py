@@ -7,10 +7,10 @@ from random_pddl import random_model
 
 from planners.grounding import ground_actions
 from planners.grounding.instantiate import GroundAction, _Grounder
-from planners.model import build
+from planners.loading import build
 from planners.pddl import parse_domain, parse_problem
+from planners.pddl.robots import RobotChoice, Unowned, find_team
 from planners.pddl.sexpr import Source
-from planners.robots import RobotChoice, Unowned, find_team
 
 DOMAIN = """(define (domain halls) (:types robot place - thing hall - place)
   (:constants home - hall)

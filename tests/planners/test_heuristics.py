@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from planners.errors import UsageError
-from planners.heuristics import FAR, HEURISTICS, heuristic
-from planners.joint import Goal, JointModel
-from planners.model import Loaded, build, load
-from planners.space import Space, explore
+from planners.joint.model import Goal, JointModel
+from planners.loading import Loaded, build, load
+from planners.search.bounds import FAR, HEURISTICS, heuristic
+from planners.search.reachable import Space, explore
 from tests.conftest import DOMAINS
 from tests.coordlang.random_models import random_model
 

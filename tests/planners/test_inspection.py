@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 from random_pddl import KINDS, Kind, random_model
 
-from planners.composition import Composition
 from planners.inspection import inspect, unparse
-from planners.model import Loaded, ModelOptions, build, load
+from planners.joint.composition import Composition
+from planners.loading import Loaded, ModelOptions, build, load
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.formulas import read_formula
 from planners.pddl.names import Names
+from planners.pddl.robots import RobotChoice
 from planners.pddl.sexpr import Source, parse
-from planners.robots import RobotChoice
-from planners.space import explore
+from planners.search.reachable import explore
 
 DOMAINS = Path(__file__).parents[2] / "domains"
 

@@ -14,19 +14,19 @@ from hypothesis import strategies as st
 from naive import TooLarge, Twin
 from random_pddl import KINDS, Kind, RandomModel, random_model
 
+from planners.check.validate import State, validate
 from planners.errors import BadInput, ProvedImpossible
 from planners.grounding import instantiate
 from planners.grounding.reachability import reachable_arguments
-from planners.joint import own_text
-from planners.model import Loaded, ModelOptions, build, task_of
-from planners.optimal import TaskGroup, plan_spaces, search
+from planners.joint.model import own_text
+from planners.loading import Loaded, ModelOptions, build, task_of
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import And, Atom, Domain, Formula, Not, Problem
+from planners.pddl.robots import RobotChoice
 from planners.pddl.sexpr import Source
-from planners.plans import Plans
-from planners.robots import RobotChoice
-from planners.space import explore
-from planners.validate import State, validate
+from planners.search.plan_space import TaskGroup, plan_spaces, search
+from planners.search.plans import Plans
+from planners.search.reachable import explore
 
 _MOST_STATES = 128
 _MOST_TRIES = 3_000

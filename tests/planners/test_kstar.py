@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from planners.model import load
-from planners.optimal import search
-from planners.plain import compile_plain, to_pddl
-from planners.plans import Plans
+from planners.classical import compile_plain, to_pddl
+from planners.loading import load
+from planners.search.plan_space import search
+from planners.search.plans import Plans
 
 pytestmark = pytest.mark.slow
 DOMAINS = Path(__file__).parents[2] / "domains"

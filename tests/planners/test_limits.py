@@ -12,19 +12,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coordlang import coordination, verify
-from coordlang.coordination import walk
-from coordlang.language import WordTable
-from coordlang.witness import miscoordination
+from coordlang.language.words import WordTable
+from coordlang.required import composition_walk as coordination
+from coordlang.required.composition_walk import walk
+from coordlang.required.miscoordination import miscoordination
+from coordlang.verification import by_definition as verify
 from planners import grounding
 from planners.errors import CoordlangError, OutOfMemory, OutOfTime
 from planners.grounding import instantiate
-from planners.joint import Stepper, Steps
+from planners.joint.model import Stepper, Steps
+from planners.joint.states import Rows
 from planners.limits import reaching, time_left, time_limit
-from planners.model import Loaded, load
-from planners.optimal import PlanSpace, TaskGroup, plan_spaces, search
-from planners.space import count, explore
-from planners.states import Rows
+from planners.loading import Loaded, load
+from planners.search.plan_space import PlanSpace, TaskGroup, plan_spaces, search
+from planners.search.reachable import count, explore
 
 DOMAINS = Path(__file__).parents[2] / "domains"
 
@@ -189,14 +190,14 @@ def test_the_goals_done_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     loaded = corners()
     space = explore(loaded.model, loaded.tasks[0].init[None, :])
     groups = [TaskGroup(loaded.tasks[0].goal)] * 3
-    monkeypatch.setattr("planners.optimal._BATCH", len(space))
+    monkeypatch.setattr("planners.search.plan_space._BATCH", len(space))
     batches = plan_spaces(space, groups)
     next(batches)
 
     def fail(*_: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr("planners.optimal.distances", fail)
+    monkeypatch.setattr("planners.search.plan_space.distances", fail)
     with pytest.raises(OutOfMemory) as caught:
         next(batches)
     assert "the optimal plans to 1 of 3 goals, over 72 states" in str(caught.value)
@@ -267,7 +268,7 @@ def test_verification_and_the_search_for_a_break_say_how_far_they_got(monkeypatc
     with pytest.raises(OutOfTime) as caught:
         verify.verify(table, [space])
     assert "layer 1 of 5 of the verification, 1 nodes of its walk" in str(caught.value)
-    monkeypatch.setattr("coordlang.witness.moves", fail)
+    monkeypatch.setattr("coordlang.required.miscoordination.moves", fail)
     with pytest.raises(OutOfTime) as caught:
         miscoordination(space, 0)
     assert "0 of 4 steps of the composition walk, 1 nodes" in str(caught.value)
@@ -278,11 +279,11 @@ def test_work_in_pieces_is_the_same_work(problem: str, monkeypatch: pytest.Monke
     loaded = corners(problem)
     init = loaded.tasks[0].init[None, :]
     whole, space = search(loaded.model, loaded.tasks[0]), explore(loaded.model, init)
-    monkeypatch.setattr("planners.space._BLOCK", 7)
-    monkeypatch.setattr("planners.space._STEPS", 40)
-    monkeypatch.setattr("planners.composition._CHUNK", 11)
+    monkeypatch.setattr("planners.search.reachable._BLOCK", 7)
+    monkeypatch.setattr("planners.search.reachable._STEPS", 40)
+    monkeypatch.setattr("planners.joint.composition._CHUNK", 11)
     for keep in (8_000_000, 100, 0):
-        monkeypatch.setattr("planners.optimal._KEEP", keep)
+        monkeypatch.setattr("planners.search.plan_space._KEEP", keep)
         pieces = search(loaded.model, loaded.tasks[0])
         for name in ("rows", "state", "layer", "first", "target", "labels", "cost", "starts"):
             assert (getattr(pieces, name) == getattr(whole, name)).all(), name
@@ -294,8 +295,8 @@ def test_work_in_pieces_is_the_same_work(problem: str, monkeypatch: pytest.Monke
 
 def test_combinations_that_do_not_fit_are_not_made(monkeypatch: pytest.MonkeyPatch) -> None:
     loaded = corners("three-robots-3x3")
-    monkeypatch.setattr("planners.composition._CHUNK", 10)
-    monkeypatch.setattr("planners.composition.memory_left", lambda: 1000)
+    monkeypatch.setattr("planners.joint.composition._CHUNK", 10)
+    monkeypatch.setattr("planners.joint.composition.memory_left", lambda: 1000)
     # Each robot in its corner may go two ways or stay; two of them may not go to the one cell between them.
     with pytest.raises(OutOfMemory, match="3 of 3 robots have 24 combinations of subactions in 1 state: about"):
         search(loaded.model, loaded.tasks[0])

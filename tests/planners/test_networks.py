@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from random_pddl import RandomModel, random_model
 from test_joint_against_naive import _check_model
 
+from planners.check.rules import Rules
 from planners.errors import BadInput
-from planners.model import Loaded, build
+from planners.loading import Loaded, build
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Atom, Domain
 from planners.pddl.sexpr import Source
-from planners.rules import Rules
 
 ROWING = """(define (domain rowing) (:types robot boat place)
   (:predicates (on ?r - robot ?b - boat) (moored ?b - boat ?p - place) (lit))

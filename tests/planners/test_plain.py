@@ -13,18 +13,18 @@ from hypothesis import event, given, reject, settings
 from hypothesis import strategies as st
 from random_pddl import KINDS, Kind, random_model
 
-from planners import plain as plain_module
+from planners import classical as plain_module
+from planners.classical import PlainTask, compile_plain, to_pddl
 from planners.errors import BadInput, ProvedImpossible
-from planners.joint import Cost, FullState, JointModel
-from planners.model import Loaded, ModelOptions, PlanningTask, build
-from planners.optimal import search
+from planners.joint.model import Cost, FullState, JointModel
+from planners.joint.states import Rows
+from planners.loading import Loaded, ModelOptions, PlanningTask, build
 from planners.pddl.domain import parse_domain
 from planners.pddl.problem import parse_problem
+from planners.pddl.robots import RobotChoice, Unowned
 from planners.pddl.sexpr import Source
-from planners.plain import PlainTask, compile_plain, to_pddl
-from planners.robots import RobotChoice, Unowned
-from planners.space import explore
-from planners.states import Rows
+from planners.search.plan_space import search
+from planners.search.reachable import explore
 
 COSTS: tuple[Cost, ...] = ("makespan", "makespan+actions")
 FORMS = {"explicit": 100_000, "select-then-apply": 0}

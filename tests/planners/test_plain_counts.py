@@ -11,13 +11,13 @@ from plain_plans import optimal_plans
 from random_pddl import KINDS, Kind, random_model
 from test_plain import COSTS, FORMS, MODELS, random_state, read
 
+from planners.classical import compile_plain
 from planners.errors import BadInput
-from planners.joint import Cost, FullState
-from planners.model import Loaded
-from planners.optimal import search
-from planners.plain import compile_plain
-from planners.plans import Plans
-from planners.space import explore
+from planners.joint.model import Cost, FullState
+from planners.loading import Loaded
+from planners.search.plan_space import search
+from planners.search.plans import Plans
+from planners.search.reachable import explore
 
 #: Two ground actions of joint-action PDDL with the same parts: where both are possible they are one joint action.
 TWICE = """

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
-import planners.rules
-import planners.validate
+import planners.check.rules
+import planners.check.validate
+from planners.check.rules import Rules
+from planners.check.validate import Labels, Verdict, validate
 from planners.errors import BadInput
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import And, Atom, Domain, Not, Problem
+from planners.pddl.robots import RobotChoice, Team, Unowned, find_team
 from planners.pddl.sexpr import Source
-from planners.robots import RobotChoice, Team, Unowned, find_team
-from planners.rules import Rules
-from planners.validate import Labels, Verdict, validate
 
 World = tuple[Domain, Problem, Team]
 
@@ -574,11 +574,11 @@ def test_the_parts_determine_the_result() -> None:
 
 def test_the_checker_shares_only_the_nouns() -> None:
     imported: set[str | None] = set()
-    for module in (planners.validate, planners.rules):
+    for module in (planners.check.validate, planners.check.rules):
         tree = ast.parse(Path(module.__file__).read_text())
         imported |= {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
         imported |= {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
-    imported.discard("planners.rules")
+    imported.discard("planners.check.rules")
     ours = {name for name in imported if name and name.startswith("planners")}
-    assert ours == {"planners.errors", "planners.pddl.lifted", "planners.robots"}
+    assert ours == {"planners.errors", "planners.pddl.lifted", "planners.pddl.robots"}
     assert "numpy" not in imported

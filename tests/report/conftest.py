@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from coordlang.build import build_language
-from coordlang.file import signed
-from coordlang.language import Language
+from coordlang.building import build_language
+from coordlang.language.file import signed
+from coordlang.language.words import Language
 from coordlang.report.page import Report, make_report
-from coordlang.task_file import read_task_file
-from coordlang.tasks import all_pairs, from_listed, from_problems
-from planners.model import ModelOptions
+from coordlang.tasks.candidates import all_pairs, from_listed, from_problems
+from coordlang.tasks.task_file import read_task_file
+from planners.loading import ModelOptions
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Domain, Problem
 from tests.conftest import DOMAINS

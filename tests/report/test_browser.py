@@ -8,10 +8,10 @@ from itertools import product
 import pytest
 
 from coordlang.report.page import LARGEST, make_report
-from coordlang.use.fitting import fitting
-from coordlang.use.spoken import speak
+from coordlang.use.sentence.fitting import fitting
+from coordlang.use.sentence.spoken import speak
 from planners.pddl.lifted import And
-from planners.plans import Plans
+from planners.search.plans import Plans
 from tests.report.conftest import Opened, Opener, World, make_language, make_world, refuted
 
 WORLDS = [

@@ -10,19 +10,19 @@ from typing import Any
 
 import pytest
 
-from coordlang.build import build_language
-from coordlang.file import signed
-from coordlang.language import sentence
+from coordlang.building import build_language
+from coordlang.language.file import signed
+from coordlang.language.words import sentence
 from coordlang.report import graph
 from coordlang.report.data import page_data
 from coordlang.report.page import make_report
 from coordlang.report.shown import select_tasks
 from coordlang.report.task import task_part
-from coordlang.tasks import all_pairs, from_problems
-from coordlang.use.spoken import speak
-from coordlang.witness import Inseparable
+from coordlang.required.miscoordination import Inseparable
+from coordlang.tasks.candidates import all_pairs, from_problems
+from coordlang.use.sentence.spoken import speak
 from planners.errors import ProvedImpossible, UsageError
-from planners.plans import Plans
+from planners.search.plans import Plans
 from tests.coordlang.random_models import random_model
 from tests.report.conftest import data_of, make_language, make_world, refuted
 

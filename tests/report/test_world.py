@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from coordlang.report.world import World, find_world
-from planners.model import Loaded, load
-from planners.space import explore
+from planners.loading import Loaded, load
+from planners.search.reachable import explore
 from tests.conftest import DOMAINS
 
 

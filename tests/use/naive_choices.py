@@ -9,9 +9,9 @@ from functools import cached_property
 from itertools import product
 from math import prod
 
-from coordlang.use.monitor import Detour
-from coordlang.use.spoken import Spoken
-from planners.plans import Plan, Plans
+from coordlang.use.choices.monitor import Detour
+from coordlang.use.sentence.spoken import Spoken
+from planners.search.plans import Plan, Plans
 from tests.coordlang import naive
 
 #: One robot's labels, step by step.

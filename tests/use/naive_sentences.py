@@ -7,19 +7,19 @@ from random import Random
 
 from hypothesis import assume
 
-from coordlang.build import build_language
-from coordlang.language import Guarantee, Language, WordTable, name_words
-from coordlang.task_file import ListedTask
-from coordlang.tasks import Candidates, from_listed, from_problems
-from coordlang.use.spoken import Spoken
-from coordlang.witness import Inseparable
+from coordlang.building import build_language
+from coordlang.language.words import Guarantee, Language, WordTable, name_words
+from coordlang.required.miscoordination import Inseparable
+from coordlang.tasks.candidates import Candidates, from_listed, from_problems
+from coordlang.tasks.task_file import ListedTask
+from coordlang.use.sentence.spoken import Spoken
 from planners.errors import ProvedImpossible
-from planners.model import ModelOptions, build
+from planners.loading import ModelOptions, build
 from planners.pddl import parse_domain, parse_problem, read_domain, read_problem
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.sexpr import Source
-from planners.plans import Plan, Plans
-from planners.space import explore
+from planners.search.plans import Plan, Plans
+from planners.search.reachable import explore
 from tests.conftest import DOMAINS
 from tests.coordlang.naive import TooLarge, listed
 from tests.coordlang.random_models import graph_text, random_model

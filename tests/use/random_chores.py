@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from random import Random
 
-from planners.model import ModelOptions
+from planners.loading import ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.sexpr import Source

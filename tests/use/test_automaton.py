@@ -8,8 +8,8 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.use.automaton import Automaton, determinise
-from planners.optimal import PlanSpace
+from coordlang.use.choices.automaton import Automaton, determinise
+from planners.search.plan_space import PlanSpace
 
 Word = tuple[int, ...]
 

@@ -12,22 +12,22 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.build import build_language
-from coordlang.language import WordTable
-from coordlang.tasks import Candidates, all_pairs, from_problems
-from coordlang.use.automaton import Automaton, determinise
-from coordlang.use.choices import Choices, RobotChoices, choices
-from coordlang.use.choices_file import monitor
-from coordlang.use.fitting import fitting
-from coordlang.use.own import OwnAtoms
-from coordlang.use.spoken import Spoken, speak_candidates
-from coordlang.verify import verify
-from coordlang.witness import Inseparable
+from coordlang.building import build_language
+from coordlang.language.words import WordTable
+from coordlang.required.miscoordination import Inseparable
+from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
+from coordlang.use.choices.automaton import Automaton, determinise
+from coordlang.use.choices.choices import Choices, RobotChoices, choices
+from coordlang.use.choices.file import monitor
+from coordlang.use.choices.own import OwnAtoms
+from coordlang.use.sentence.fitting import fitting
+from coordlang.use.sentence.spoken import Spoken, speak_candidates
+from coordlang.verification.by_definition import verify
 from planners.errors import OutOfMemory, ProvedImpossible
-from planners.optimal import PlanSpace
 from planners.pddl import parse_domain, parse_problem, read_domain, read_problem
 from planners.pddl.sexpr import Source
-from planners.plans import Plans
+from planners.search.plan_space import PlanSpace
+from planners.search.plans import Plans
 from tests.conftest import DOMAINS
 from tests.coordlang import naive
 from tests.coordlang.random_models import random_model
@@ -287,7 +287,7 @@ def shipped(folder: str, name: str) -> Iterator[Spoken]:
         try:
             language = build_language(candidates).language
         except Inseparable:
-            from planners.model import ModelOptions
+            from planners.loading import ModelOptions
 
             candidates = from_problems(domain, [problem], ModelOptions(remember_actions=True))
             language = build_language(candidates).language
@@ -384,8 +384,8 @@ def test_too_many_are_refused_with_an_estimate(monkeypatch: pytest.MonkeyPatch) 
     fits = fitting(spoken, words)
     with pytest.raises(OutOfMemory, match=r"after 1 of 6 steps their subsets have 1 members, at this rate about"):
         determinise(fits, 0, most=0)
-    monkeypatch.setattr("coordlang.use.mixtures._SMALL", 0)
-    monkeypatch.setattr("coordlang.use.mixtures.memory_left", lambda: 0)
+    monkeypatch.setattr("coordlang.use.choices.mixtures._SMALL", 0)
+    monkeypatch.setattr("coordlang.use.choices.mixtures.memory_left", lambda: 0)
     with pytest.raises(OutOfMemory, match=r"step 1 has \d+ combinations of what the robots may do") as caught:
         choices(spoken, words, most=None)
     assert caught.value.exit_code == 22

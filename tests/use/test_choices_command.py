@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from coordlang.use.monitor import Monitor
+from coordlang.use.choices.monitor import Monitor
 from tests.conftest import DOMAINS, Command
 
 CELLS = DOMAINS / "three-cells" / "domain.pddl", DOMAINS / "three-cells" / "problem.pddl"

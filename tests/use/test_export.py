@@ -18,20 +18,20 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from coordlang.build import build_language
-from coordlang.language import Guarantee, Language, sentence
-from coordlang.tasks import from_problems
+from coordlang.building import build_language
+from coordlang.language.words import Guarantee, Language, sentence
+from coordlang.tasks.candidates import from_problems
 from coordlang.use.export import membership as membership_module
 from coordlang.use.export.ltlf import export_ltlf, symbols_of
 from coordlang.use.export.membership import membership
 from coordlang.use.export.pddl import Exported, export_pddl, plan_names
-from coordlang.use.fitting import NoPlanFits
-from coordlang.use.spoken import Spoken, speak_candidates
+from coordlang.use.sentence.fitting import NoPlanFits
+from coordlang.use.sentence.spoken import Spoken, speak_candidates
+from planners.classical import action_names
 from planners.errors import BadInput, ProvedImpossible
 from planners.pddl import read_domain, read_problem
-from planners.plain import action_names
-from planners.plans import Plan, Plans
-from planners.space import explore
+from planners.search.plans import Plan, Plans
+from planners.search.reachable import explore
 from tests.conftest import DOMAINS, Command
 from tests.coordlang.random_models import random_model
 from tests.planners.plain_plans import optimal_plans

@@ -14,13 +14,13 @@ from typing import Any
 
 import pytest
 
-from coordlang.build import build_language
-from coordlang.tasks import from_problems
-from coordlang.use import monitor as monitor_module
-from coordlang.use.choices import Choices, choices
-from coordlang.use.choices_file import monitor, to_bytes, to_data
-from coordlang.use.monitor import Detour, Monitor, MonitorError, NotAllowed, NotPossible
-from coordlang.use.spoken import Spoken, speak_candidates
+from coordlang.building import build_language
+from coordlang.tasks.candidates import from_problems
+from coordlang.use.choices import monitor as monitor_module
+from coordlang.use.choices.choices import Choices, choices
+from coordlang.use.choices.file import monitor, to_bytes, to_data
+from coordlang.use.choices.monitor import Detour, Monitor, MonitorError, NotAllowed, NotPossible
+from coordlang.use.sentence.spoken import Spoken, speak_candidates
 from planners.pddl import read_domain, read_problem
 from tests.conftest import DOMAINS
 from tests.use.naive_choices import Known, Listed, Own

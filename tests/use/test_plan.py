@@ -10,15 +10,15 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from coordlang.task_file import ground_tasks
-from coordlang.tasks import Candidates
-from coordlang.use.fitting import NoPlanFits
-from coordlang.use.guided import Terrain, astar, guided
-from coordlang.use.spoken import Spoken
+from coordlang.tasks.candidates import Candidates
+from coordlang.tasks.task_file import ground_tasks
+from coordlang.use.sentence.fitting import NoPlanFits
+from coordlang.use.sentence.guided import Terrain, astar, guided
+from coordlang.use.sentence.spoken import Spoken
+from planners.check.validate import validate
 from planners.errors import UsageError
-from planners.heuristics import heuristic
-from planners.planfile import read_plans, texts
-from planners.validate import validate
+from planners.search.bounds import heuristic
+from planners.search.plan_file import read_plans, texts
 from tests.conftest import DOMAINS, Command
 from tests.use.naive_sentences import SHIPPED, by_sentence, random_spoken, shipped
 

@@ -14,16 +14,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordlang.task_file import ground_tasks
-from coordlang.tasks import Candidates
-from coordlang.use.saying import NotAPlan, NotOptimal, say
-from coordlang.use.spoken import Spoken
+from coordlang.tasks.candidates import Candidates
+from coordlang.tasks.task_file import ground_tasks
+from coordlang.use.sentence.saying import NotAPlan, NotOptimal, say
+from coordlang.use.sentence.spoken import Spoken
+from planners.check.validate import validate
 from planners.errors import BadInput, Place, ProvedImpossible
-from planners.model import PlanningTask
-from planners.optimal import search
-from planners.planfile import Texts, only_one_plan, texts
-from planners.plans import Plan, Plans
-from planners.validate import validate
+from planners.loading import PlanningTask
+from planners.search.plan_file import Texts, only_one_plan, texts
+from planners.search.plan_space import search
+from planners.search.plans import Plan, Plans
 from tests.conftest import Command
 from tests.use.naive_sentences import SHIPPED, by_sentence, random_spoken, shipped
 

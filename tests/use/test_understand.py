@@ -14,13 +14,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordlang.use.drawing import COLOURS, cut_note, edge_lines, inks, node_lines, to_dot
-from coordlang.use.fitting import NoPlanFits
-from coordlang.use.picture import _items, _place, to_svg
-from coordlang.use.spoken import Spoken
-from coordlang.use.understanding import Dag, dag, understand, understood_data
-from planners.planfile import texts
-from planners.plans import Plan
+from coordlang.use.sentence.drawing import COLOURS, cut_note, edge_lines, inks, node_lines, to_dot
+from coordlang.use.sentence.fitting import NoPlanFits
+from coordlang.use.sentence.picture import _items, _place, to_svg
+from coordlang.use.sentence.spoken import Spoken
+from coordlang.use.sentence.understanding import Dag, dag, understand, understood_data
+from planners.search.plan_file import texts
+from planners.search.plans import Plan
 from tests.conftest import DOMAINS, Command
 from tests.use.naive_sentences import SHIPPED, by_sentence, random_spoken, shipped
 

@@ -20,20 +20,20 @@ from unified_planning.io import PDDLReader
 from unified_planning.model.multi_agent import Agent, MultiAgentProblem
 from unified_planning.plans import ActionInstance, PartialOrderPlan, PlanKind, SequentialPlan
 
-from coordlang.build import build_language
-from coordlang.sentences import task_sentences
-from coordlang.tasks import from_problems
-from coordlang.use.spoken import speak_candidates
+from coordlang.building import build_language
+from coordlang.language.sentences import task_sentences
+from coordlang.tasks.candidates import from_problems
+from coordlang.use.sentence.spoken import speak_candidates
 from coordlang.use.unified import engine as engine_module
 from coordlang.use.unified import register
 from coordlang.use.unified.names import Names
 from coordlang.use.unified.plans import label
 from coordlang.use.unified.translation import translate
-from planners.model import ModelOptions, load
-from planners.optimal import search
+from planners.loading import ModelOptions, load
 from planners.pddl import read_domain
-from planners.plans import Plans
-from planners.robots import RobotChoice
+from planners.pddl.robots import RobotChoice
+from planners.search.plan_space import search
+from planners.search.plans import Plans
 from tests.conftest import DOMAINS, Command
 
 

@@ -13,12 +13,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordlang.use.best_sentence import best_sentence
-from coordlang.use.spoken import Spoken
-from coordlang.use.wishes import PlanWish, read_wish
+from coordlang.use.sentence.best_sentence import best_sentence
+from coordlang.use.sentence.spoken import Spoken
+from coordlang.use.sentence.wishes import PlanWish, read_wish
 from planners.errors import OutOfMemory, UsageError
-from planners.optimal import PlanSpace
-from planners.plans import Plan, Plans
+from planners.search.plan_space import PlanSpace
+from planners.search.plans import Plan, Plans
 from tests.conftest import DOMAINS, Command
 from tests.coordlang.naive import sentence
 from tests.use.naive_sentences import SHIPPED, by_sentence, random_spoken, shipped

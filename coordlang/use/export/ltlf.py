@@ -12,8 +12,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from coordlang.use.export.membership import Term, membership
-from coordlang.use.fitting import fitting
-from coordlang.use.spoken import Spoken
+from coordlang.use.sentence.fitting import fitting
+from coordlang.use.sentence.spoken import Spoken
 
 #: What must not begin a symbol: readers take it for a word of their own.
 _TAKEN = re.compile(r"[^a-z]|true|false|last|end|tt|ff")

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from coordlang.explain.variables import truth
-from coordlang.explain.words import word_formulas
-from coordlang.use.spoken import Spoken
-from planners.matching import Ints
-from planners.states import Rows, unique_rows
+from coordlang.explanation.variables import truth
+from coordlang.explanation.words import word_formulas
+from coordlang.use.sentence.spoken import Spoken
+from planners.joint.matching import Ints
+from planners.joint.states import Rows, unique_rows
 
 #: A conjunction of literals: atom (as in a state's key) -> its value.
 Term = dict[str, bool]
@@ -38,7 +38,7 @@ class Membership:
 
 
 def membership(spoken: Spoken, *, apart: bool = True, states: int = _STATES) -> Membership:
-    """The words of a language as terms: those of their formulas (`coordlang.explain`).
+    """The words of a language as terms: those of their formulas (`coordlang.explanation`).
 
     Exactly one term holds in each state; at least one, and shorter ones, if they need not be ``apart``.  For more than
     ``states`` states they are the leaves of a decision tree: found faster, up to twice as many, but never more than

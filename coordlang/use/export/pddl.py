@@ -1,11 +1,11 @@
 """A task under a sentence as plain PDDL, so that any planner can take part.
 
-The plain task of `planners.plain` gets one more fact per word said so far, and after each joint step two actions without
+The plain task of `planners.classical` gets one more fact per word said so far, and after each joint step two actions without
 cost: the state is *named* by its word, and then the sentence *stays* at this word or *goes on* to the next one.
 
 Why its optimal plans are exactly the plans that fit, one to one:
 
-1. Without naming, its plans stand one to one for the joint plans of the task, at the same cost (`planners.plain`).
+1. Without naming, its plans stand one to one for the joint plans of the task, at the same cost (`planners.classical`).
    Naming costs nothing and only forbids.  So no plan is cheaper than an optimal plan of the task.
 2. In a state on an optimal plan of the task exactly one naming is possible, that of its word (`membership`), and after
    it at most one action: which one, the word decides.  So an optimal plan of the task has at most one counterpart, and
@@ -25,14 +25,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from coordlang.use.export.membership import Membership, Term, membership
-from coordlang.use.fitting import fitting
-from coordlang.use.spoken import Spoken
+from coordlang.use.sentence.fitting import fitting
+from coordlang.use.sentence.spoken import Spoken
+from planners.classical import PlainAction, PlainTask, action_names, compile_plain, to_pddl
+from planners.classical.task import Condition
 from planners.errors import BadInput
-from planners.joint import IDLE, JointModel, show
-from planners.model import PlanningTask
-from planners.plain import PlainAction, PlainTask, action_names, compile_plain, to_pddl
-from planners.plain.task import Condition
-from planners.plans import Plan
+from planners.joint.model import IDLE, JointModel, show
+from planners.loading import PlanningTask
+from planners.search.plans import Plan
 
 #: A robot's label in a joint step, by the numbers of both.
 Choice = tuple[int, int]
@@ -88,7 +88,7 @@ def export_pddl(spoken: Spoken, words: Sequence[int], limit: int = 2000) -> Expo
     ----------
     limit
         Up to this many plain actions every joint action is written as one; beyond, robots choose one after another
-        (see `planners.plain.compile_plain`).
+        (see `planners.classical.compile_plain`).
 
     Raises `NoPlanFits` if there is nothing to plan.
     """

@@ -32,21 +32,21 @@ from unified_planning.model import ProblemKind
 from unified_planning.model.problem_kind_versioning import LATEST_PROBLEM_KIND_VERSION
 from unified_planning.plans import PlanKind
 
-from coordlang.file import options_of, read_language
-from coordlang.language import Language
-from coordlang.use.fitting import NoPlanFits, fitting
-from coordlang.use.saying import NotAPlan, NotOptimal, say
-from coordlang.use.spoken import Spoken, speak
+from coordlang.language.file import options_of, read_language
+from coordlang.language.words import Language
+from coordlang.use.sentence.fitting import NoPlanFits, fitting
+from coordlang.use.sentence.saying import NotAPlan, NotOptimal, say
+from coordlang.use.sentence.spoken import Spoken, speak
 from coordlang.use.unified import NAME
 from coordlang.use.unified.plans import NoSteps, of_up, to_up
 from coordlang.use.unified.translation import Subactions, Translated, translate
+from planners.check.validate import validate
 from planners.errors import BadInput, CoordlangError, OutOfMemory, OutOfTime, ProvedImpossible, Unsupported, UsageError
 from planners.limits import time_limit
-from planners.model import ModelOptions, build
-from planners.optimal import PlanSpace, search
-from planners.plans import Plans
-from planners.robots import RobotChoice
-from planners.validate import validate
+from planners.loading import ModelOptions, build
+from planners.pddl.robots import RobotChoice
+from planners.search.plan_space import PlanSpace, search
+from planners.search.plans import Plans
 
 _Status = PlanGenerationResultStatus
 _FEATURES = {
@@ -264,7 +264,7 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
     # Validation.
 
     def _validate(self, problem: Any, plan: Any) -> ValidationResult:
-        """By the rules of joint steps (`planners.validate`); under a sentence the plan must be optimal and fit, too."""
+        """By the rules of joint steps (`planners.check.validate`); under a sentence the plan must be optimal and fit, too."""
         try:
             found = translate(problem, self._subactions)
             loaded = build(found.domain, [found.problem], self._options(found))

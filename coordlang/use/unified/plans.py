@@ -14,11 +14,11 @@ from fractions import Fraction
 from typing import Any
 
 from coordlang.use.unified.translation import Translated
-from planners.joint import JointModel
-from planners.planfile import Texts
-from planners.plans import Plan, Plans
-from planners.robots import Team
-from planners.whole import WholeActions
+from planners.joint.joint_actions import WholeActions
+from planners.joint.model import JointModel
+from planners.pddl.robots import Team
+from planners.search.plan_file import Texts
+from planners.search.plans import Plan, Plans
 
 
 class NoSteps(Exception):

@@ -1,0 +1,186 @@
+"""Candidate tasks -> a verified language: the steps of the mission in their order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import Literal
+
+from coordlang.certificate import Certificate, certify
+from coordlang.language.file import signed
+from coordlang.language.warping import Clause
+from coordlang.language.words import Guarantee, Language, WordTable, name_words, words_of_states
+from coordlang.required.composition_walk import walk
+from coordlang.required.divergences import Alphas, alphas, states_on_plans
+from coordlang.required.miscoordination import Inseparable, inseparable
+from coordlang.tasks.candidates import Candidates, require_solvable
+from coordlang.verification.by_definition import Verdict, verify
+from coordlang.verification.overlapping import verify_overlapping
+from coordlang.vocabulary import METHODS, Job, Outcome, greedy
+from coordlang.vocabulary.enlarging import enlarge
+from coordlang.vocabulary.flexible import flexible
+from coordlang.vocabulary.job import Evidence, Partition
+from coordlang.vocabulary.minimal import refute
+from planners.limits import STOPPING, stop_clock
+
+
+@dataclass(frozen=True, slots=True)
+class Built:
+    """A verified language and the figures of its making.
+
+    ``figures`` are the method's own (rounds, clauses, ..), ``seconds`` are by phase.  ``stopped`` is the error that ended
+    the method before its proof was complete, or None.  ``job`` and ``evidence`` are what `certificate_of` needs.
+    """
+
+    language: Language
+    alphas: Alphas
+    states: int
+    verdict: Verdict
+    figures: Mapping[str, float]
+    seconds: dict[str, float]
+    stopped: BaseException | None
+    job: Job
+    evidence: Mapping[Clause, Evidence]
+
+
+def build_language(
+    candidates: Candidates,
+    method: str = "greedy",
+    *,
+    seed: int = 0,
+    alpha_only: bool = False,
+    prefer: Literal["flexible"] | None = None,
+    overlap: bool = False,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Built:
+    """Build a coordination language for candidate tasks and verify it by definition.
+
+    ``alpha_only`` is for the method "separating": plans are separated where they part, never where they meet.  ``prefer``
+    "flexible": of the languages with as many words as the method finds, one whose sentences leave many plans open.
+    ``overlap``: then give states further words as long as that leaves more plans open (`coordlang.language.overlapping`).
+
+    Raises `Inseparable` (with the two plans) when there is none, `OutOfMemory` before the memory budget is used up.
+    """
+    require_solvable(candidates)
+    clock = _Clock()
+    progress("looking for inseparable plans")
+    for space in candidates.spaces:
+        witness = inseparable(space)
+        if witness is not None:
+            raise Inseparable(witness)
+    progress("walking pairs of plans")
+    found = alphas(candidates.spaces)
+    clock.note("coordination")
+    checked: list[_Checked] = []
+
+    def check(partition: Partition) -> None:
+        checked.append(_verified(candidates, partition))
+
+    states = tuple(states_on_plans(candidates.spaces).tolist())
+    job = Job(candidates, states, found, None, seed, alpha_only, progress, check)
+    if method != "greedy":
+        # What is left when an anytime method is stopped; verified now, because there is no time then.
+        first = greedy(job).partition
+        check(first)
+        job = replace(job, incumbent=first)
+        clock.note("incumbent")
+    progress(f"building words ({method})")
+    try:
+        outcome = METHODS[method](job)
+        clock.note("vocabulary")
+        if prefer == "flexible" and outcome.stopped is None:
+            outcome = flexible(job, outcome)
+            clock.note("flexible")
+        if not any(known.partition is outcome.partition for known in checked):
+            progress("verifying by definition")
+            check(outcome.partition)
+    except STOPPING as error:
+        stop_clock()
+        if not checked:
+            raise
+        outcome = Outcome(checked[-1].partition, job.lower_bound, {}, error.with_traceback(None))
+    best = next(known for known in checked if known.partition is outcome.partition)
+    clock.note("verify")
+    size = len(best.language.words)
+    guarantee = Guarantee(method, size, outcome.lower_bound, size == outcome.lower_bound)
+    language = signed(replace(best.language, guarantee=guarantee), candidates, {"program": "coordlang"})
+    if overlap and outcome.stopped is None:
+        progress("enlarging words")
+        try:
+            language, outcome = _overlapping(candidates, language, outcome)
+        except STOPPING as error:
+            stop_clock()  # the words as they were are a verified language
+            outcome = replace(outcome, stopped=error.with_traceback(None))
+        clock.note("overlap")
+    return Built(
+        language, found, len(job.states), best.verdict, outcome.figures, clock.seconds, outcome.stopped, job, outcome.evidence
+    )
+
+
+def _overlapping(candidates: Candidates, language: Language, outcome: Outcome) -> tuple[Language, Outcome]:
+    """The language with further words of its states, verified by definition."""
+    model, spaces = candidates.model, candidates.spaces
+    word = WordTable.of(language, model).of_rows(candidates.rows)
+    enlarged = enlarge(
+        spaces, [walk(space).requires for space in spaces], {state: int(word[state]) for state in outcome.partition}
+    )
+    also = {
+        model.codec.key(candidates.rows[state]): tuple(language.words[w] for w in sorted(words - {int(word[state])}))
+        for state, words in enlarged.words.items()
+        if len(words) > 1
+    }
+    language = replace(language, also=dict(sorted(also.items())))
+    verdict = verify_overlapping(language.words, words_of_states(language, model, candidates.rows), spaces)
+    if not verdict.holds:
+        raise AssertionError(f"the enlarged words are no coordination language: {verdict.witness}")
+    figures = {
+        **outcome.figures,
+        "overlapping_words": enlarged.further,
+        "overlapping_flexibility": float(enlarged.expected.mean()),
+        "partition_flexibility": float(enlarged.before.mean()),
+    }
+    return language, replace(outcome, figures=figures, stopped=enlarged.stopped)
+
+
+def certificate_of(built: Built) -> Certificate:
+    """Why no partition with fewer words than the proved lower bound is a language, for others to check.
+
+    Uses what the method met on its way; for a method that meets nothing the search of `minimal` finds reasons.  As long as
+    that takes: not anytime.
+    """
+    refuted = built.language.guarantee.lower_bound - 1
+    evidence = built.evidence or (refute(built.job, refuted) if refuted else {})
+    return certify(built.job.candidates, evidence, refuted)
+
+
+@dataclass(frozen=True, slots=True)
+class _Checked:
+    """A partition with its words named and its verdict, which is that it holds."""
+
+    partition: Partition
+    language: Language
+    verdict: Verdict
+
+
+def _verified(candidates: Candidates, partition: Partition) -> _Checked:
+    words, mapping, default = name_words(candidates.model, candidates.rows, partition)
+    unknown = Guarantee("", len(words), 1, False)
+    language = Language(words, mapping, default, candidates.model.robots, unknown, {}, {}, {}, {})
+    verdict = verify(WordTable.of(language, candidates.model), candidates.spaces)
+    if not verdict.holds:
+        raise AssertionError(f"a method returned what is no coordination language: {verdict.witness}")
+    return _Checked(partition, language, verdict)
+
+
+class _Clock:
+    """Seconds by phase."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._since = perf_counter()
+
+    def note(self, phase: str) -> None:
+        now = perf_counter()
+        self.seconds[phase] = now - self._since
+        self._since = now

@@ -1,0 +1,197 @@
+"""How much shorter a sentence is than the plan that it stands for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from coordlang.evaluation.lab.plots import Panel, Series, histograms, per_task
+from coordlang.evaluation.lab.recipe import (
+    Figure,
+    Headline,
+    Recipe,
+    Record,
+    Result,
+    Section,
+    Settings,
+    Unit,
+    percent,
+    table,
+)
+from coordlang.evaluation.material.compared import Compared, compared_units
+from coordlang.evaluation.material.languages import TITLES, language_for
+from coordlang.evaluation.material.orders import NATURAL, greedy_in_orders
+from coordlang.evaluation.material.paper import DIFFERING, SAVING_ALL, SAVING_DIFFERING
+from coordlang.evaluation.material.said import MOST_LISTED, Said, mean, said_in
+from coordlang.evaluation.material.suite import ROW, WORLDS
+from coordlang.language.flexibility import flexibility
+
+#: Tasks that the paper's figure shows.
+SHOWN = 100
+
+
+def units(settings: Settings) -> list[Unit]:
+    # The most flexible language takes long, and is kept: `flexibility`, which starts sooner, builds it.
+    return compared_units("communication", settings, effort=1.5, flexible=1.5)
+
+
+def run(unit: Unit, settings: Settings) -> Result:
+    world = WORLDS[unit.parameters["world"]]
+    if "orders" in unit.parameters:
+        candidates = world.candidates(settings.domains)
+        found = {}
+        for name, words in greedy_in_orders(candidates, unit.parameters["orders"], unit.random(settings.seed)):
+            measured = flexibility(candidates.spaces, [words[space.state] for space in candidates.spaces])
+            shorter = measured.first_words < measured.steps + 1
+            found[name] = [int(shorter.sum()), round(float(measured.first_saving.mean()), 6)]
+        return {"differing_and_saving": found}
+    candidates, language = language_for(world, unit.parameters["method"], settings)
+    return {"words": len(language.words), **measures(list(said_in(candidates, language)))}
+
+
+def measures(tasks: Sequence[Said]) -> Result:
+    """Savings of the first plan of each task, and what they would be for other plans.
+
+    ``differing``: tasks whose first plan's sentence is shorter than its state sequence.
+    """
+    first = [task.saving(len(task.first)) for task in tasks]
+    shorter = [saving for saving in first if saving > 0]
+    return {
+        "tasks": len(tasks),
+        "differing": len(shorter),
+        "saving_differing": mean(shorter, 6),
+        "saving": mean(first, 6),
+        "saving_last": mean([task.saving(len(task.last)) for task in tasks], 6),
+        "saving_expected": mean([task.saving(task.expected_words) for task in tasks], 6),
+        "saving_most": mean([task.saving(task.fewest_words) for task in tasks], 6),
+        "saving_of_actions": mean([1 - len(task.first) / task.steps for task in tasks if task.steps], 6),
+        "states": [task.steps + 1 for task in tasks][:MOST_LISTED],
+        "first_words": [len(task.first) for task in tasks][:MOST_LISTED],
+    }
+
+
+def section(records: Sequence[Record]) -> Section:
+    found = Compared.of(records)
+    row, mine = found.row, found.languages
+    blocks: list[str | Figure] = [f"{_DEFINITION}{row}.", _table(mine)]
+    if mine:
+        blocks += [
+            Figure(
+                "communication-tasks",
+                f"Plan and sentence lengths of the first {SHOWN} tasks of {row} whose sentence is shorter",
+                lambda: _first_tasks(mine),
+            ),
+            f"The first {SHOWN} tasks whose greedy sentence is shorter than the plan, as in the paper's figure; below, the "
+            "savings of all tasks.",
+            Figure(
+                "communication-savings",
+                f"Distribution of the communication saving over the tasks of {row}, by method, with means",
+                lambda: _savings(mine),
+            ),
+        ]
+    if found.orders:
+        blocks.append(_told_orders(found.orders[0]))
+    if found.others:
+        blocks += ["Worlds that are no grids, all tasks:", _table(found.others, world=True)]
+    return Section(tuple(blocks), _differences(row, mine, found.orders), _headlines(found))
+
+
+def _headlines(found: Compared) -> tuple[Headline, ...]:
+    results = found.greedy_and_minimal()
+    if results is None:
+        return ()
+    row = found.row
+    greedy, least = results
+    there = "saving_differing"
+    return (
+        (f"{row}: saving, all tasks", percent(SAVING_ALL), percent(greedy["saving"]), percent(least["saving"])),
+        (f"{row}: saving where shorter", percent(SAVING_DIFFERING), percent(greedy[there]), percent(least[there])),
+        (f"{row}: tasks with a shorter sentence", f"{DIFFERING}", f"{greedy['differing']}", f"{least['differing']}"),
+    )
+
+
+_DEFINITION = f"""\
+The *communication saving* of a plan is `1 - words / states`: the words of its sentence against the states that it
+passes through, one more than its joint actions. The paper's two figures, {percent(SAVING_DIFFERING)} over {DIFFERING} tasks
+and {percent(SAVING_ALL)} over all 956, agree with each other only if the tasks that do not differ save nothing, as they do
+when states are counted. *Sentence shorter* are the tasks that differ; *last plan* takes each task's last plan in place of
+the first, *any plan* the expectation over all of them, *shortest* the plan with the shortest sentence. Measured on """
+
+
+def _table(records: Sequence[Record], world: bool = False) -> str:
+    rows: list[list[object]] = []
+    for record in records:
+        r = record.result
+        name = TITLES[record.unit.parameters["method"]]
+        rows.append([
+            f"{record.unit.parameters['world']}, {name}" if world else name,
+            r["words"],
+            f"{r['differing']:,} of {r['tasks']:,}",
+            percent(r["saving_differing"]) if r["differing"] else None,
+            percent(r["saving"]),
+            percent(r["saving_last"]),
+            percent(r["saving_expected"]),
+            percent(r["saving_most"]),
+        ])  # fmt: skip
+    if not world and records and records[0].unit.parameters["world"] == ROW:
+        paper = [f"{DIFFERING} of 956", percent(SAVING_DIFFERING), percent(SAVING_ALL)]
+        rows.insert(0, ["paper", 4, *paper, None, None, None])
+    head = ("language", "words", "sentence shorter", "saving there", "saving, all", "last plan", "any plan", "shortest")
+    return table(head, rows)
+
+
+def _told_orders(record: Record) -> str:
+    found: dict[str, list[Any]] = record.result["differing_and_saving"]
+    savings = sorted(saving for name, (_, saving) in found.items() if name not in NATURAL)
+    named = ", ".join(f"{name} {percent(found[name][1])}" for name in NATURAL)
+    return (
+        f"With its states in {len(savings)} random orders, the greedy method saves {percent(savings[0])} to "
+        f"{percent(savings[-1])} over all tasks (median {percent(savings[len(savings) // 2])}); in orders that an "
+        f"implementation may well have, {named}."
+    )
+
+
+def _first_tasks(records: Sequence[Record]) -> Any:
+    reference = records[0].result
+    differing = [n for n, (s, w) in enumerate(zip(reference["states"], reference["first_words"], strict=True)) if w < s]
+    shown = differing[:SHOWN]
+    series = [
+        Series(r.unit.parameters["method"], TITLES[r.unit.parameters["method"]], [r.result["first_words"][n] for n in shown])
+        for r in records
+        if r.unit.parameters["method"] in ("greedy", "minimal")
+    ]
+    return per_task([reference["states"][n] for n in shown], series, "length (states; words)")
+
+
+def _savings(records: Sequence[Record]) -> Any:
+    panels = []
+    for record in records:
+        r, method = record.result, record.unit.parameters["method"]
+        savings = [100 * (1 - w / s) for s, w in zip(r["states"], r["first_words"], strict=True)]
+        paper = 100 * SAVING_ALL if record.unit.parameters["world"] == ROW else None
+        panels.append(Panel(method, f"{TITLES[method]} ({r['words']} words)", savings, 100 * r["saving"], paper))
+    longest = max(records[0].result["states"])
+    bounds = [100 * (k - 0.5) / longest for k in range(longest + 1)]
+    return histograms(panels, bounds, "communication saving (%)", "tasks", 1)
+
+
+def _differences(row: str, records: Sequence[Record], orders: Sequence[Record]) -> tuple[str, ...]:
+    greedy = next((r.result for r in records if r.unit.parameters["method"] == "greedy"), None)
+    if row != ROW or greedy is None:
+        return ()
+    text = (
+        f"**Communication.** The paper saves {percent(SAVING_ALL)} over all tasks of {ROW}, our greedy language "
+        f"{percent(greedy['saving'])}. The figure depends on the order in which the greedy method tries the states and on "
+        "which plan is called the first, and the paper's are not known."
+    )
+    if orders:
+        savings = [saving for _, saving in orders[0].result["differing_and_saving"].values()]
+        reached = "the paper's is among them" if min(savings) <= SAVING_ALL <= max(savings) else "none gives the paper's"
+        text += f" {len(savings)} orders give {percent(min(savings))} to {percent(max(savings))} for first plans, {reached}."
+    return (
+        f"{text} The last plans in our order save {percent(greedy['saving_last'])}, the plans with the shortest sentences "
+        f"{percent(greedy['saving_most'])}.",
+    )
+
+
+RECIPE = Recipe("communication", "Communication: plans and sentences", units, run, section)

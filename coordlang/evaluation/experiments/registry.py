@@ -1,0 +1,29 @@
+"""All experiments, by the name that ``coordlang evaluate`` takes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from coordlang.evaluation.experiments import (
+    communication,
+    flexibility,
+    game,
+    navigation,
+    planning_cost,
+    scenario,
+    table1,
+)
+from coordlang.evaluation.lab.recipe import Recipe
+
+RECIPES: Mapping[str, Recipe] = {
+    recipe.name: recipe
+    for recipe in (
+        table1.RECIPE,
+        communication.RECIPE,
+        flexibility.RECIPE,
+        planning_cost.RECIPE,
+        navigation.RECIPE,
+        game.RECIPE,
+        scenario.RECIPE,
+    )
+}

@@ -1,0 +1,1 @@
+"""Experiments as recipes: run, kept, drawn, told on a page."""

@@ -1,0 +1,1 @@
+"""What experiments share: worlds, languages, trials, the values of the paper."""

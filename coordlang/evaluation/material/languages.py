@@ -1,0 +1,64 @@
+"""The languages that experiments use, built once and kept."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+from hashlib import sha256
+
+from coordlang.building import build_language
+from coordlang.evaluation.lab.identity import code_hash, file_hash
+from coordlang.evaluation.lab.recipe import Settings
+from coordlang.evaluation.material.suite import World
+from coordlang.language.file import read_language, write_language
+from coordlang.language.words import Language
+from coordlang.tasks.candidates import Candidates
+from coordlang.tasks.task_file import ListedTask
+
+#: The methods that experiments compare, in the order of tables.
+COMPARED = ("greedy", "separating", "minimal", "flexible")
+#: What the methods are called in texts.
+TITLES = {
+    "plan": "plan",
+    "greedy": "greedy",
+    "separating": "separating",
+    "minimal": "minimal",
+    "flexible": "minimal, most flexible",
+}
+
+
+def language_for(
+    world: World, method: str, settings: Settings, listed: tuple[ListedTask, ...] = ()
+) -> tuple[Candidates, Language]:
+    """The candidate tasks of a world and a language for them; "flexible" is ``--method minimal --prefer flexible``.
+
+    Raises `OutOfTime` or `OutOfMemory` where a limit ended the method early: what it then has depends on the machine, and
+    no experiment is made with it.
+    """
+    candidates = world.candidates(settings.domains, listed)
+    place = settings.cache / f"{_key(world, method, settings, listed)}.json.gz"
+    settings.cache.mkdir(parents=True, exist_ok=True)
+    with open(f"{place}.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # another process that builds this language is waited for
+        if place.exists():
+            return candidates, read_language(place)
+        if method == "flexible":
+            built = build_language(candidates, "minimal", seed=settings.seed, prefer="flexible")
+        else:
+            built = build_language(candidates, method, seed=settings.seed)
+        if built.stopped is not None:
+            raise built.stopped
+        write_language(built.language, place)
+        return candidates, built.language
+
+
+def _key(world: World, method: str, settings: Settings, listed: tuple[ListedTask, ...]) -> str:
+    parts = {
+        "files": [file_hash(settings.domains / name) for name in world.files],
+        "tasks": [[task.init, task.goal] for task in listed],
+        "kind": world.tasks,
+        "method": method,
+        "seed": settings.seed,
+        "code": code_hash(),
+    }
+    return sha256(json.dumps(parts).encode()).hexdigest()[:24]

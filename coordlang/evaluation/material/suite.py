@@ -1,0 +1,96 @@
+"""What the experiments run on: the shipped domains, with the candidate tasks of each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
+from coordlang.tasks.task_file import ListedTask, read_task_file
+from planners.errors import UsageError
+from planners.pddl import read_domain, read_problem
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """A domain, one of its problems, and candidate tasks: ``"all"``, ``"problem"`` or the name of a task file.
+
+    ``name`` is what tables call it; files are below the folder ``domains``.
+    """
+
+    name: str
+    folder: str
+    problem: str
+    tasks: str
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The files that are read, relative to the folder of all domains."""
+        names = ["domain.pddl", f"{self.problem}.pddl"]
+        if self.tasks.endswith(".json"):
+            names.append(self.tasks)
+        return tuple(f"{self.folder}/{name}" for name in names)
+
+    def candidates(self, domains: Path, listed: Sequence[ListedTask] = ()) -> Candidates:
+        """The candidate tasks; ``listed`` ones instead of the world's own where there are any."""
+        domain = read_domain(domains / self.files[0])
+        problem = read_problem(domains / self.files[1], domain)
+        if listed:
+            return from_listed(domain, [problem], listed)
+        if self.tasks == "all":
+            return all_pairs(domain, [problem])
+        if self.tasks == "problem":
+            return from_problems(domain, [problem])
+        return from_listed(domain, [problem], read_task_file(domains / self.files[2]))
+
+
+def _row(name: str, size: str, filtered: bool = False) -> World:
+    stem = f"{name.lower()}-{size}"
+    return World(name, "grid", stem, f"{stem}.tasks.json" if filtered else "all")
+
+
+#: The rows of the paper's Table 1.
+ROWS = (
+    _row("GW1", "2x2"),
+    _row("GW2", "2x3"),
+    _row("GW3", "2x4"),
+    _row("GW4", "3x3"),
+    _row("GWB1", "2x4"),
+    _row("GWB2", "3x3"),
+    _row("GWB3", "3x4"),
+    _row("GWB4", "2x5"),
+    _row("GWB5", "3x3", filtered=True),
+    _row("GWB6", "3x4", filtered=True),
+    _row("GWB7", "3x5", filtered=True),
+    _row("GWB8", "4x4", filtered=True),
+)
+
+#: Worlds that are no grids, for the experiments that the paper makes on grids only.
+OTHERS = (
+    World("handover", "handover", "two-doors", "all"),
+    World("push-box", "push-box", "next-door", "all"),
+    World("tray", "tray", "serve", "all"),
+)
+
+#: The row on which the paper measures sentences and planning, and the one that takes its place in a quick run.
+ROW = "GWB7"
+QUICK_ROW = "GWB5"
+
+WORLDS = {world.name: world for world in (*ROWS, *OTHERS)}
+
+
+def find_domains(given: str | None) -> Path:
+    """The folder of the shipped domains: as given, else ``domains`` here or beside the package (a checkout).
+
+    Raises `UsageError` if there is none.
+    """
+    beside = Path(__file__).resolve().parents[3] / "domains"
+    places = [Path(given)] if given else [Path("domains"), beside]
+    for place in places:
+        if (place / "grid" / "domain.pddl").is_file():
+            return place.resolve()
+    raise UsageError(
+        f"there are no domains in {' or '.join(str(p) for p in places)}",
+        remedy="Say --domains DIR, the folder domains of a checkout of coordlang.",
+    )

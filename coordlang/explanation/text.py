@@ -1,0 +1,192 @@
+"""Formulas, and what sentences ask, as text; formulas as PDDL conditions; all of it as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import groupby
+from typing import Any
+
+from coordlang.explanation.asks import Asked, RobotPart, WordChange
+from coordlang.explanation.cover import Cover, Literal, Term
+from coordlang.explanation.telling import Telling
+from coordlang.explanation.words import Mapped
+
+#: Terms of one formula, and alternatives of one choice, that are written out.
+_TERMS = 12
+_ALTERNATIVES = 4
+
+
+def literal_text(literal: Literal) -> str:
+    """``at(r2) = c``, ``at(r2) != c``, ``at(r2) in {a, b}``, ``at(r2) not in {a, b}``, ``free(r1)``, ``not free(r1)``."""
+    variable, negative = literal.variable, literal.is_negative
+    if variable.is_fact:
+        return variable.name if literal.values == {variable.values[0]} else f"not {variable.name}"
+    said = dict(zip(variable.values, variable.texts, strict=True))
+    values: dict[str, list[str]] = {}
+    for value in literal.others if negative else literal.listed:
+        subject, text = said[value]
+        values.setdefault(subject, []).append(text)
+    parts = [_compared(subject, texts, negative) for subject, texts in values.items()]
+    joined = (" and " if negative else " or ").join(parts)
+    return f"({joined})" if len(parts) > 1 and not negative else joined
+
+
+def _compared(subject: str, values: list[str], negative: bool) -> str:
+    if values == [""]:
+        return f"not {subject}" if negative else subject
+    if len(values) == 1:
+        return f"{subject} {'!=' if negative else '='} {values[0]}"
+    return f"{subject} {'not in' if negative else 'in'} {{{', '.join(values)}}}"
+
+
+def term_text(term: Term) -> str:
+    """A conjunction; the empty one is ``true``."""
+    return " and ".join(literal_text(literal) for literal in term) or "true"
+
+
+def shown(cover: Cover) -> str:
+    """A formula on one line; the empty one is ``false``."""
+    return " or ".join(term_text(term) for term in cover.terms) or "false"
+
+
+def pddl_condition(cover: Cover) -> str:
+    """A formula as PDDL, with ``and``, ``or`` and ``not``."""
+    parts = [_joined("and", list(conjunction)) for conjunction in cover.conditions()]
+    return _joined("or", parts)
+
+
+def _joined(operator: str, parts: list[str]) -> str:
+    return parts[0] if len(parts) == 1 else f"({' '.join((operator, *parts))})"
+
+
+def cover_data(cover: Cover) -> dict[str, Any]:
+    """A formula for JSON."""
+    return {
+        "text": shown(cover),
+        "pddl": pddl_condition(cover),
+        "states": cover.states,
+        "fewest_terms_proved": cover.fewest,
+        "terms": [
+            {
+                "text": term_text(term),
+                "states": count,
+                "literals": [
+                    {"variable": literal.variable.name, "values": list(literal.listed)} for literal in term
+                ],
+            }
+            for term, count in zip(cover.terms, cover.counts, strict=True)
+        ],
+    }
+
+
+def telling_text(told: Telling, mapped: Mapped) -> str:
+    """The words and their formulas, a term a line where there are several."""
+    lines = []
+    states = dict(zip(mapped.words, mapped.states, strict=True))
+    for word, formula in told.rules:
+        head = f"  {word} ({counted(states[word], 'state')}):"
+        terms = formula.terms if formula else ()
+        if formula is None:
+            lines.append(f"{head} every other state")
+        elif len(terms) < 2:
+            lines.append(f"{head} {shown(formula) if formula.states else 'no state'}")
+        else:
+            lines.append(head)
+            width = max(len(term_text(term)) for term in terms[:_TERMS])
+            for number, (term, count) in enumerate(zip(terms[:_TERMS], formula.counts, strict=False)):
+                lines.append(f"      {'or ' if number else '   '}{term_text(term):{min(width, 70)}}  [{count}]")
+            if len(terms) > _TERMS:
+                lines.append(f"      .. and {len(terms) - _TERMS} more terms")
+    return "\n".join(lines)
+
+
+def asked_text(asked: Asked) -> str:
+    """What a sentence asks, in plain sentences."""
+    lines = [f'"{" ".join(asked.sentence)}" leaves {counted(asked.plans, "plan")} open.']
+    lines += [line for part in asked.parts for line in _part_lines(part, asked.steps)]
+    lines += [f"  {change.before} -> {change.after} {_when(change)}: {_cause(change)}." for change in asked.changes]
+    return "\n".join(lines)
+
+
+def _part_lines(part: RobotPart, steps: int) -> list[str]:
+    if not steps:
+        return [f"  {part.robot} has nothing to do."]
+    if part.subplans == 1:
+        return [f"  {part.robot}: {_sequence(part.listed[0] if part.listed else [own[0] for own in part.choices])}."]
+    if part.listed:
+        return [f"  {part.robot} may choose:", *(f"    {_sequence(subplan)}" for subplan in part.listed)]
+    number = f"{part.subplans:,}" if part.subplans is not None else "very many"
+    lines = [f"  {part.robot} has {number} ways:"]
+    step = 0
+    while step < len(part.choices):
+        same = step
+        while same + 1 < len(part.choices) and part.choices[same + 1] == part.choices[step]:
+            same += 1
+        name = f"step {step + 1}" if same == step else f"steps {step + 1} to {same + 1}"
+        lines.append(f"    {name}: {_alternatives([own or 'wait' for own in part.choices[step]])}")
+        step = same + 1
+    return lines
+
+
+def _sequence(subplan: Sequence[str | None]) -> str:
+    """``waits 2 steps, move a b, move b c``."""
+    parts = []
+    for own, run in groupby(subplan):
+        number = len(list(run))
+        if own is None:
+            parts.append("wait" if number == 1 else f"wait {number} steps")
+        else:
+            parts += [own] * number
+    return ", ".join(parts)
+
+
+def _alternatives(texts: Sequence[str]) -> str:
+    rest = len(texts) - _ALTERNATIVES
+    return " or ".join(texts) if rest <= 0 else f"{', '.join(texts[:_ALTERNATIVES])} or one of {rest} others"
+
+
+def _when(change: WordChange) -> str:
+    if change.earliest == change.latest:
+        return f"in step {change.earliest}"
+    between = "or" if change.latest == change.earliest + 1 else "to"
+    return f"in step {change.earliest} {between} {change.latest}"
+
+
+def _cause(change: WordChange) -> str:
+    """Who brings the change about."""
+    if not change.robots:
+        return "whatever the robots do"
+    if len(change.robots) == 1:
+        return f"{change.robots[0]} decides it by {_alternatives([own or 'waiting' for (own,), _ in change.ways])}"
+    together = [" and ".join(f"{robot} {own or 'wait'}" for robot, own in zip(change.robots, does, strict=True))
+                for does, _ in change.ways]  # fmt: skip
+    rest = len(together) - _ALTERNATIVES
+    more = f"; or in {counted(rest, 'other way')}" if rest > 0 else ""
+    return f"{' and '.join(change.robots)} decide it together: {'; or '.join(together[:_ALTERNATIVES])}{more}"
+
+
+def counted(number: int, noun: str) -> str:
+    """``1 state``, ``1,200 states``."""
+    return f"{number:,} {noun}{'s' * (number != 1)}"
+
+
+def asked_data(asked: Asked) -> dict[str, Any]:
+    """What a sentence asks, for JSON; steps count from 1, null is idling."""
+    return {
+        "steps": asked.steps,
+        "robots": [
+            {"robot": part.robot, "subplans": part.subplans, "listed": [list(subplan) for subplan in part.listed]}
+            for part in asked.parts
+        ],
+        "changes": [
+            {
+                "from": change.before,
+                "to": change.after,
+                "earliest": change.earliest,
+                "latest": change.latest,
+                "decided_by": list(change.robots),
+                "ways": [{"subactions": list(does), "steps": list(when)} for does, when in change.ways],
+            }
+            for change in asked.changes
+        ],
+    }

@@ -1,0 +1,126 @@
+"""What a language file holds: its keys and types, and their JSON Schema (docs/formats.md)."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import msgspec
+from msgspec import UNSET, Meta, UnsetType
+
+from coordlang.tasks.candidates import Kind
+from planners.joint.model import Cost
+from planners.pddl.robots import Unowned
+
+FORMAT = "coordlang/language"
+VERSION = 1
+
+# What JSON Schema can say and the reader checks with messages of its own.
+_SOME = {"minItems": 1, "uniqueItems": True}
+_WORD = {"pattern": r"^\S+$"}
+_SIZE = {"minimum": 1}
+
+
+class DomainRecord(msgspec.Struct):
+    """The domain that a language belongs to."""
+
+    name: Annotated[str, Meta(description="The domain's name.")]
+    sha256: Annotated[
+        str | None,
+        Meta(description="The SHA-256 of the text of the domain file; a file without it is not held to one text."),
+    ] = None
+
+
+class ModelRecord(msgspec.Struct):
+    """How the PDDL files are understood."""
+
+    cost: Annotated[Cost, Meta(description="What optimal means.")] = "makespan"
+    unowned: Annotated[Unowned, Meta(description="Who owns actions that name no robot.")] = "error"
+    remember_actions: Annotated[
+        bool, Meta(description="Whether states also hold each robot's last subaction.")
+    ] = False
+    idle: Annotated[
+        list[str] | None,
+        Meta(description="The robots that may idle without an action of their own; without it: found from the model."),
+    ] = None
+    problem_sha256: Annotated[
+        str | None, Meta(description="The SHA-256 of the text of the (first) problem file; for information.")
+    ] = None
+    world_sha256: Annotated[
+        str | None, Meta(description="The SHA-256 of objects with their types, static facts and function values.")
+    ] = None
+
+
+class TaskRecord(msgspec.Struct):
+    """One candidate task."""
+
+    init: Annotated[list[str], Meta(description="The fluents that are true at the start, as PDDL atoms.")]
+    goal: Annotated[list[str], Meta(description="PDDL literals or formulas that must all hold at the end.")]
+
+
+class TasksRecord(msgspec.Struct):
+    """The candidate tasks that the language is guaranteed for."""
+
+    kind: Annotated[Kind, Meta(description="All pairs of states, those of problems, or those of a task file.")]
+    count: Annotated[int, Meta(description="How many they are.", ge=0)]
+    tasks: Annotated[list[TaskRecord] | None, Meta(description="The tasks; not for 'all'.")] = None
+
+
+class GuaranteeRecord(msgspec.Struct):
+    """What is known of the language's size."""
+
+    method: Annotated[str, Meta(description="How it was made.")]
+    size: Annotated[int, Meta(description="The number of words.", extra_json_schema=_SIZE)]
+    lower_bound: Annotated[
+        int,
+        Meta(
+            description="A proved lower bound on the words of any language for these tasks that gives each state one word.",
+            extra_json_schema=_SIZE,
+        ),
+    ]
+    proved_minimal: Annotated[bool, Meta(description="Whether the size equals that bound.")]
+
+
+Word = Annotated[str, Meta(extra_json_schema=_WORD)]
+
+
+class LanguageRecord(msgspec.Struct):
+    """A language file, version 1.  Keys that are not listed here are ignored by readers."""
+
+    format: Annotated[str, Meta(description="What kind of file this is.")]
+    version: Annotated[int, Meta(description="Readers refuse a version that they do not know.")]
+    words: Annotated[list[Word], Meta(description="The words.", extra_json_schema=_SOME)]
+    states: Annotated[
+        dict[str, str],
+        Meta(description="State key -> word.  A key lists the true fluents, sorted, joined by one space."),
+    ]
+    default: Annotated[str, Meta(description="The word of every state that is not listed.")]
+    robots: Annotated[
+        list[str] | UnsetType,
+        Meta(description="The robots, in the order of joint actions; without it: as the domain says.",
+             extra_json_schema=_SOME),
+    ] = UNSET  # fmt: skip
+    domain: DomainRecord | UnsetType = UNSET
+    model: ModelRecord = msgspec.field(default_factory=ModelRecord)
+    tasks: TasksRecord | UnsetType = UNSET
+    guarantee: GuaranteeRecord | UnsetType = UNSET
+    producer: Annotated[
+        dict[str, Any],
+        Meta(description="Version, arguments, seed, seconds; the only part that may differ between two runs."),
+    ] = {}
+    also: Annotated[
+        dict[str, list[str]],
+        Meta(description="Further words of states, where words overlap; without it this is a language all the same."),
+    ] = {}
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema of language files.
+
+    What it cannot say, readers check besides: words of ``states``, ``default`` and ``also`` are among ``words``, the
+    guarantee fits their number, and no key occurs twice.
+    """
+    schema: dict[str, Any] = msgspec.json.schema(LanguageRecord)
+    properties = schema["$defs"]["LanguageRecord"]["properties"]
+    for name, value in (("format", FORMAT), ("version", VERSION)):
+        properties[name] = {"const": value, "description": properties[name]["description"]}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "coordlang language", **schema}

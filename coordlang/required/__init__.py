@@ -1,0 +1,1 @@
+"""Where coordination is required: composition walks, first and last differences, miscoordination shown."""

@@ -1,0 +1,262 @@
+"""Theorem 3 in full: plans that introduce RC must be separated where they first part or where they last meet.
+
+Each tuple of plans that introduce RC has a *first difference* ``alpha = (p; s_1 .. s_n)``, the last shared state and the
+next ones, and a *last difference* ``beta = (t_1 .. t_n; q)``, or ends in different goal states.  A partition is a
+coordination language if for every such tuple some two different ``s_i, s_j`` and ``p`` lie in three different words, or
+some two different ``t_i, t_j`` and ``q`` do, or two of the different goal states lie in different words
+(docs/concepts.md).
+
+The relation of all alphas with all betas is written down only where it is small (`SeparationWalk.every`).  Else the
+composition walk is kept, and asked for pairs that a partition leaves unseparated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations, pairwise
+
+import numpy as np
+
+from coordlang.required.composition_walk import FAILED, Bools, moves
+from coordlang.required.divergences import Separation, alternatives
+from planners.errors import OutOfMemory
+from planners.joint.matching import Ints
+from planners.joint.states import bits
+from planners.limits import memory_left
+from planners.search.plan_space import PlanSpace
+from planners.search.tuples import EdgeIndex, unique_tuples
+
+#: At least one of these must hold.
+Constraint = tuple[Separation, ...]
+
+#: Links of a walk up to which all constraints may be written down.
+_LINKS = 1_000_000
+
+
+@dataclass(slots=True)
+class _Layer:
+    """Walk nodes ``(x_1 .. x_n, y)`` with as many joint steps to go, and what links them to the layer below.
+
+    ``x`` (k, robots) are plan-space nodes, ``meets``, ``parts`` (links) say whether a link leads from different nodes to one,
+    or from one node shared by all plans and their mixture to different ones.  ``tail`` (k): can the plans stay together
+    from here and still fail?
+    """
+
+    x: Ints
+    source: Ints
+    child: Ints
+    parts: Bools
+    meets: Bools
+    tail: Bools
+
+
+class SeparationWalk:
+    """The composition walk of one plan space, kept whole, from every node of the plan space.
+
+    Memory is that of the walk's links, of which only those are kept that lead to a failure.  Raises `OutOfMemory`
+    before the memory budget is used up.
+    """
+
+    def __init__(self, space: PlanSpace) -> None:
+        self._space = space
+        self._robots = space.labels.shape[1]
+        self._layers = _walk(space)
+
+    @property
+    def nodes(self) -> int:
+        return sum(len(layer.x) for layer in self._layers)
+
+    @property
+    def edges(self) -> int:
+        return sum(len(layer.source) for layer in self._layers)
+
+    def unseparated(self, word: Ints, random: np.random.Generator) -> Iterator[Constraint]:
+        """Constraints that ``word`` (a word number for each state of the table) breaks: for every unseparated first
+        difference of plans that introduce RC, one of their unseparated last differences, drawn at random.
+
+        None at all: the partition satisfies Theorem 3 for these tasks.  O(links).
+        """
+        state = self._space.state
+        ending = np.zeros(0, np.int64)  # per node: a link (of any layer, numbered through) or goal node that ends badly
+        endings: list[Ints] = []  # rows (q, t_1 .. t_n), or (-1, t_1 .. t_n) for different goal states
+        offset = 0
+        for number, layer in enumerate(self._layers):
+            x = state[layer.x]
+            if number == 0:
+                bad = (x != x[:, :1]).any(axis=1) & (word[x] == word[x[:, :1]]).all(axis=1)
+                ending = np.where(bad, np.arange(len(x)), -1)
+                endings.append(np.column_stack((np.full(len(x), -1), x)))
+                offset = len(x)
+                continue
+            below = self._layers[number - 1]
+            first = state[layer.x[layer.source]]
+            after = state[below.x[layer.child]]
+            if layer.parts.any():
+                rows = np.flatnonzero(layer.parts & (ending[layer.child] >= 0))
+                rows = rows[~_separated(word, first[rows, 0], after[rows])]
+                yield from self._constraints(first[rows, 0], after[rows], endings, ending[layer.child[rows]])
+            last = np.flatnonzero(layer.meets & below.tail[layer.child])
+            last = last[~_separated(word, after[last, 0], first[last])]
+            endings.append(np.column_stack((after[last, 0], first[last])))
+            on = np.flatnonzero(ending[layer.child] >= 0)
+            source = np.concatenate((layer.source[last], layer.source[on]))
+            value = np.concatenate((offset + np.arange(len(last)), ending[layer.child[on]]))
+            offset += len(last)
+            order = random.permutation(len(source))
+            ending = np.full(len(layer.x), -1)
+            ending[source[order]] = value[order]
+
+    def every(self, most: int) -> set[Constraint] | None:
+        """All constraints of these tasks: each first difference with each last difference that can follow.
+
+        None if there may be more than ``most``.  O(links x last differences / word size).
+        """
+        if self.edges > _LINKS:
+            return None
+        firsts, lasts = self._differences()
+        if sum(ends.bit_count() for ends in firsts.values()) > most:
+            return None
+        known = [alternatives(shared, others) for shared, *others in lasts]
+        found = set()
+        for (shared, *others), ends in firsts.items():
+            alpha = alternatives(shared, others)
+            found |= {ordered({*alpha, *known[number]}) for number in bits(ends)}
+        return found
+
+    def _differences(self) -> tuple[dict[tuple[int, ...], int], list[tuple[int, ...]]]:
+        """First differences with the last ones that can follow, as a set of bits: their numbers in the second list.
+
+        A difference is the shared state (-1: none) and then the different ones, sorted.
+        """
+        state = self._space.state
+        number: dict[tuple[int, ...], int] = {}
+        firsts: dict[tuple[int, ...], int] = {}
+        x = state[self._layers[0].x]
+        following = [
+            1 << number.setdefault((-1, *sorted(row)), len(number)) if len(set(row)) > 1 else 0 for row in x.tolist()
+        ]
+        for below, layer in pairwise(self._layers):
+            here, after = state[layer.x[layer.source]], state[below.x[layer.child]]
+            meets = layer.meets & below.tail[layer.child]
+            ends = [0] * len(layer.x)
+            links = zip(layer.source.tolist(), layer.child.tolist(), layer.parts.tolist(), meets.tolist(), strict=True)
+            for link, (source, child, parts, meet) in enumerate(links):
+                more = following[child]
+                if parts and more:
+                    first = (int(here[link, 0]), *sorted(after[link].tolist()))
+                    firsts[first] = firsts.get(first, 0) | more
+                if meet:
+                    last = (int(after[link, 0]), *sorted(here[link].tolist()))
+                    more |= 1 << number.setdefault(last, len(number))
+                ends[source] |= more
+            following = ends
+        return firsts, list(number)
+
+    def _constraints(
+        self, shared: Ints, following: Ints, endings: Sequence[Ints], ending: Ints
+    ) -> Iterator[Constraint]:
+        if not len(shared):
+            return
+        ends = np.concatenate(endings)[ending]
+        columns = (shared, np.sort(following, axis=1), ends[:, :1], np.sort(ends[:, 1:], axis=1))
+        table = np.unique(np.column_stack(columns), axis=0)
+        # One ending for each first difference will do in one round.
+        _, fresh = np.unique(table[:, : self._robots + 1], axis=0, return_index=True)
+        for row in table[fresh].tolist():
+            alpha = alternatives(row[0], row[1 : self._robots + 1])
+            beta = alternatives(row[self._robots + 1], row[self._robots + 2 :])
+            yield ordered({*alpha, *beta})
+
+
+def ordered(alternatives: Iterable[Separation]) -> Constraint:
+    """Alternatives in one order, so that equal constraints are equal."""
+    return tuple(sorted(alternatives, key=lambda s: sorted(s.pairs)))
+
+
+def _separated(word: Ints, shared: Ints, others: Ints) -> Bools:
+    """For each difference whether some two of ``others`` (k, robots) and ``shared`` (k) lie in three words."""
+    good = np.zeros(len(shared), np.bool_)
+    common = word[shared]
+    for i, j in combinations(range(others.shape[1]), 2):
+        a, b = word[others[:, i]], word[others[:, j]]
+        good |= (a != b) & (a != common) & (b != common)
+    return good
+
+
+def _walk(space: PlanSpace) -> list[_Layer]:
+    """All layers, goals first, without what cannot fail."""
+    robots = space.labels.shape[1]
+    failed = len(space)
+    index = EdgeIndex.of(space)
+    tables: list[Ints] = []
+    links: list[tuple[Ints, Ints]] = []
+    arriving = np.zeros((0, robots + 1), np.int64)
+    spans = space.layers
+    for number in range(len(spans) - 1, -1, -1):
+        starting = np.repeat(np.arange(spans[number].start, spans[number].stop)[:, None], robots + 1, axis=1)
+        table, place = unique_tuples(np.concatenate((starting, arriving)), [failed + 1] * (robots + 1))
+        if links:
+            links[-1] = (links[-1][0], place[len(starting) :][links[-1][1]])
+        tables.append(table)
+        if number:
+            source, arriving, child = _links(space, index, table)
+            links.append((source, child))
+        if 4 * sum(a.nbytes + b.nbytes for a, b in links) > memory_left():
+            raise OutOfMemory(
+                f"the composition walk has more than {sum(len(t) for t in tables):,} nodes: too large to keep",
+                remedy="Use --method greedy or minimal, fewer tasks, or a larger --memory-limit.",
+            )
+    return _pruned(space, tables[::-1], links[::-1])
+
+
+def _links(space: PlanSpace, index: EdgeIndex, table: Ints) -> tuple[Ints, Ints, Ints]:
+    """Links out of a table of nodes: (source, different children, number of each link's child among them)."""
+    robots = table.shape[1] - 1
+    failed = len(space)
+    bounds = [failed + 1] * (robots + 1)
+    y = table[:, robots]
+    walking = np.column_stack((table[:, :robots], np.where(y == failed, FAILED, y)))
+    sources: list[Ints] = [np.zeros(0, np.int64)]
+    children: list[Ints] = [np.zeros((0, robots + 1), np.int64)]
+    numbers: list[Ints] = [np.zeros(0, np.int64)]
+    count = 0
+    for move in moves(space, index, walking):
+        mixed = np.where(move.mixed == FAILED, failed, move.mixed)
+        fresh, number = unique_tuples(np.column_stack((space.target[move.edges], mixed)), bounds)
+        pairs, _ = unique_tuples(np.column_stack((move.source, number)), [len(table), len(fresh)])
+        sources.append(pairs[:, 0])
+        numbers.append(pairs[:, 1] + count)
+        children.append(fresh)
+        count += len(fresh)
+    merged, place = unique_tuples(np.concatenate(children), bounds)
+    return np.concatenate(sources), merged, place[np.concatenate(numbers)]
+
+
+def _pruned(space: PlanSpace, tables: Sequence[Ints], links: Sequence[tuple[Ints, Ints]]) -> list[_Layer]:
+    """Only what can end in a failed mixture."""
+    robots = tables[0].shape[1] - 1
+    failed = len(space)
+    none = np.zeros(0, np.int64)
+    nothing = np.zeros(0, np.bool_)
+    kept = tables[0][:, robots] == failed
+    x = tables[0][kept, :robots]
+    layers = [_Layer(x, none, none, nothing, nothing, (x == x[:, :1]).all(axis=1))]
+    for table, (source, child) in zip(tables[1:], links, strict=True):
+        number = np.cumsum(kept) - 1
+        alive = kept[child]
+        source, child = source[alive], number[child[alive]]
+        kept = np.zeros(len(table), np.bool_)
+        kept[source] = True
+        source = (np.cumsum(kept) - 1)[source]
+        table = table[kept]
+        x, below = table[:, :robots], layers[-1]
+        together = (x == x[:, :1]).all(axis=1)
+        joined = (below.x == below.x[:, :1]).all(axis=1)
+        tail = np.zeros(len(x), np.bool_)
+        tail[source[together[source] & joined[child] & below.tail[child]]] = True
+        diagonal = together & (table[:, robots] == x[:, 0])
+        parts = diagonal[source] & ~joined[child]
+        meets = ~together[source] & joined[child]
+        layers.append(_Layer(x, source, child, parts, meets, tail))
+    return layers

@@ -1,0 +1,207 @@
+"""Miscoordination shown: plans whose mixture breaks, the step at which it does, and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from coordlang.required.composition_walk import FAILED, INSTEAD, moves
+from coordlang.tasks.candidates import describe
+from planners.errors import ProvedImpossible
+from planners.joint.matching import Ints
+from planners.limits import reaching
+from planners.loading import PlanningTask
+from planners.search.plan_space import PlanSpace, search
+from planners.search.tuples import EdgeIndex, unique_tuples
+
+#: One joint step as text: each robot's subaction, None for idling.
+Step = tuple[str | None, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Miscoordination:
+    """Plans of one task that introduce RC: ``plans[i]`` is what robot i follows.
+
+    ``states[i]`` are the states that plan i passes through (keys); ``mixture`` the joint steps of the mixture up to and
+    with the one that breaks, ``mixed_states`` the states before each of them; ``step`` the number of the breaking step
+    (from 0) and ``reason`` why it breaks.  ``sentence`` is the plans' common sentence where a language was checked.
+    """
+
+    task: str
+    robots: tuple[str, ...]
+    plans: tuple[tuple[Step, ...], ...]
+    states: tuple[tuple[str, ...], ...]
+    mixture: tuple[Step, ...]
+    mixed_states: tuple[str, ...]
+    step: int
+    reason: str
+    sentence: tuple[str, ...] | None = None
+
+
+def miscoordination(space: PlanSpace, task: int) -> Miscoordination | None:
+    """The plans of a task whose mixture breaks earliest, or None if the task requires no coordination."""
+    trail = _trail(space, np.array([space.starts[task]]), together=False)
+    return describe_failure(space, trail) if trail is not None else None
+
+
+class Inseparable(ProvedImpossible):
+    """Two plans introduce RC but pass through the same states: no state-based language can tell them apart."""
+
+    def __init__(self, witness: Miscoordination) -> None:
+        super().__init__(
+            f"two optimal plans of task {witness.task} introduce required coordination but pass through the "
+            "same states: no language over states can tell them apart",
+            remedy="Build with --remember-actions: the state then also holds each robot's last subaction.",
+        )
+        self.witness = witness
+
+
+def inseparable(space: PlanSpace) -> Miscoordination | None:
+    """Plans of some task that pass through the same states and yet introduce RC, or None."""
+    trail = _inseparable(space)
+    return describe_failure(space, trail) if trail is not None else None
+
+
+def separable(space: PlanSpace) -> bool:
+    """Whether plans that introduce RC always pass through different states."""
+    return _inseparable(space) is None
+
+
+def _inseparable(space: PlanSpace) -> Trail | None:
+    ends = np.column_stack((space.sources, space.target))
+    if len(ends) == len(unique_tuples(ends, [len(space)] * 2)[0]):
+        return None  # no two edges join the same two nodes
+    return _trail(space, np.unique(space.starts), together=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Trail:
+    """A walk to a breaking step: where it started and the edges of each plan, step by step."""
+
+    start: int
+    edges: tuple[tuple[int, ...], ...]
+
+
+def _trail(space: PlanSpace, starts: Ints, *, together: bool) -> Trail | None:
+    """Breadth first through the layers, until a mixture breaks; of several breaks the first in order."""
+    walked = [0, 0]
+
+    def so_far() -> str:
+        return f"{walked[0]} of {len(space.layers) - 1} steps of the composition walk, {walked[1]:,} nodes"
+
+    with reaching(so_far, INSTEAD):
+        return _walk_to_a_break(space, starts, walked, together=together)
+
+
+def _walk_to_a_break(space: PlanSpace, starts: Ints, walked: list[int], *, together: bool) -> Trail | None:
+    """See `_trail`; ``walked`` counts layers and nodes."""
+    robots = space.labels.shape[1]
+    index = EdgeIndex.of(space)
+    table = np.zeros((0, robots + 1), np.int64)
+    history: list[tuple[Ints, Ints, Ints]] = []  # per layer: nodes, parents, the edges that led there
+    parents, came = np.zeros(0, np.int64), np.zeros((0, robots), np.int64)
+    for number in range(len(space.layers) - 1, 0, -1):
+        fresh = starts[space.layer[starts] == number]
+        table = np.concatenate((table, np.repeat(fresh[:, None], robots + 1, axis=1)))
+        parents = np.concatenate((parents, np.full(len(fresh), -1)))
+        came = np.concatenate((came, np.full((len(fresh), robots), -1)))
+        history.append((table, parents, came))
+        walked[1] += len(table)
+        found: list[Ints] = []
+        for move in moves(space, index, table, together=together):
+            broken = np.flatnonzero(move.mixed == FAILED)
+            if len(broken):
+                first = broken[0]
+                return _retrace(history, int(move.source[first]), tuple(move.edges[first].tolist()))
+            target = space.target[move.edges]
+            found.append(np.column_stack((target, move.mixed, move.source, move.edges)))
+        step = np.concatenate(found) if found else np.zeros((0, 2 * robots + 2), np.int64)
+        table, number_of = unique_tuples(step[:, : robots + 1], [len(space)] * (robots + 1))
+        one = np.zeros(len(table), np.int64)
+        one[number_of[::-1]] = np.arange(len(step))[::-1]
+        parents, came = step[one, robots + 1], step[one, robots + 2 :]
+        walked[0] += 1
+    return None
+
+
+def _retrace(history: list[tuple[Ints, Ints, Ints]], row: int, last: tuple[int, ...]) -> Trail:
+    edges = [last]
+    for table, parents, came in reversed(history):
+        if parents[row] < 0:
+            return Trail(int(table[row, 0]), tuple(reversed(edges)))
+        edges.append(tuple(came[row].tolist()))
+        row = int(parents[row])
+    raise AssertionError("a walk starts somewhere")
+
+
+def describe_failure(space: PlanSpace, trail: Trail, sentence: tuple[str, ...] | None = None) -> Miscoordination:
+    """A trail in words: the plans completed to the goal, the mixture up to its breaking step, and why it breaks."""
+    model = space.model
+    robots = len(model.robots)
+    paths = [_complete(space, [step[i] for step in trail.edges]) for i in range(robots)]
+    node = trail.start
+    mixed_nodes, mixture = [node], []
+    for edges in trail.edges:
+        labels = tuple(int(space.labels[edge, robot]) for robot, edge in enumerate(edges))
+        mixture.append(labels)
+        node = _follow(space, node, labels)
+        if node < 0:
+            break
+        mixed_nodes.append(node)
+    broken = mixed_nodes[len(mixture) - 1]
+    task = int(np.flatnonzero(space.starts == trail.start)[0])
+    return Miscoordination(
+        task=describe(space, task),
+        robots=model.robots,
+        plans=tuple(tuple(model.texts(space.labels[e].tolist()) for e in path) for path in paths),
+        states=tuple(_keys(space, trail.start, path) for path in paths),
+        mixture=tuple(model.texts(labels) for labels in mixture),
+        mixed_states=tuple(_key(space, n) for n in mixed_nodes),
+        step=len(mixture) - 1,
+        reason=_reason(space, broken, mixture[-1]),
+        sentence=sentence,
+    )
+
+
+def _complete(space: PlanSpace, edges: list[int]) -> list[int]:
+    """A path continued to the goal by first edges."""
+    path = list(edges)
+    while space.layer[space.target[path[-1]]] > 0:
+        path.append(int(space.first[space.target[path[-1]]]))
+    return path
+
+
+def _follow(space: PlanSpace, node: int, labels: tuple[int, ...]) -> int:
+    for edge in range(int(space.first[node]), int(space.first[node + 1])):
+        if tuple(space.labels[edge].tolist()) == labels:
+            return int(space.target[edge])
+    return FAILED
+
+
+def _keys(space: PlanSpace, start: int, path: list[int]) -> tuple[str, ...]:
+    return tuple(_key(space, n) for n in (start, *(int(space.target[e]) for e in path)))
+
+
+def _key(space: PlanSpace, node: int) -> str:
+    return space.model.codec.key(space.rows[space.state[node]])
+
+
+def _reason(space: PlanSpace, node: int, labels: tuple[int, ...]) -> str:
+    """Why the mixed joint action is no optimal step in a state: not applicable, or it wastes something."""
+    model = space.model
+    row = space.rows[space.state[node]]
+    steps = model.successors(row[None, :])
+    same = np.flatnonzero((steps.labels == np.array(labels)).all(axis=1))
+    if not len(same):
+        return model.why_not(row, labels)
+    goal = space.goals[space.goal[node]]
+    left = int(space.layer[node]) - 1
+    try:
+        onward = search(model, PlanningTask("the rest", steps.result[same[0]], goal))
+    except ProvedImpossible:
+        return "it is possible, but then the goal can no longer be reached"
+    makespan, _ = onward.cost_of(0)
+    if makespan > left:
+        return f"it is possible, but too late: the goal is then {makespan} steps away and {left} are left"
+    return "it is possible and in time, but costs more than an optimal plan"

@@ -1,0 +1,1 @@
+"""Candidate tasks: what a language is to be guaranteed for."""

@@ -1,0 +1,50 @@
+"""Robots' choices drawn: their automata in Graphviz' language, one cluster a robot, one rank a step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import reduce
+from operator import and_
+
+from coordlang.use.choices.choices import Choices, RobotChoices
+from coordlang.use.sentence.drawing import quoted
+from planners.joint.model import IDLE
+
+
+def to_dot(choices: Choices, robots: Sequence[int] | None = None) -> str:
+    """A digraph of all robots' automata, or of those with these numbers.
+
+    In a state stand its number, how many own subplans are left, and the atoms known to be true that tell it from the other
+    states of its step.
+    """
+    chosen = choices.robots if robots is None else [choices.robots[robot] for robot in robots]
+    lines = ["digraph choices {", "  rankdir=LR; node [shape=box, style=rounded, fontsize=10]; edge [fontsize=10];"]
+    for own in chosen:
+        lines += _cluster(choices, own)
+    return "\n".join([*lines, "}"]) + "\n"
+
+
+def distinguishing(choices: Choices, own: RobotChoices, states: range) -> list[list[str]]:
+    """For each state of one step the atoms known to be true there, without those known to be true in all of them."""
+    known = own.automaton.known[states.start : states.stop]
+    everywhere = reduce(and_, (true for true, _ in known))
+    facts = choices.spoken.model.codec.facts
+    return [[text for bit, text in enumerate(facts) if (true & ~everywhere) >> bit & 1] for true, _ in known]
+
+
+def _cluster(choices: Choices, own: RobotChoices) -> list[str]:
+    model, automaton = choices.spoken.model, own.automaton
+    name, labels = model.robots[own.robot], model.labels[own.robot]
+    title = f"{name}: {automaton.count:,} subplan{'s' * (automaton.count != 1)}"
+    lines = [f"  subgraph cluster_{own.robot} {{", f"    label={quoted(title)};"]
+    for step, states in enumerate(automaton.layers):
+        for state, atoms in zip(states, distinguishing(choices, own, states), strict=True):
+            text = "\n".join([f"{state}: {automaton.left[state]:,} left", *atoms])
+            final = ", peripheries=2" if step == len(automaton.layers) - 1 else ""
+            lines.append(f"    r{own.robot}s{state} [label={quoted(text)}{final}];")
+        lines.append("    {rank=same; " + " ".join(f"r{own.robot}s{state};" for state in states) + "}")
+    for state in range(len(automaton)):
+        for label, to in automaton.moves(state):
+            text = labels[label] if label else IDLE
+            lines.append(f"    r{own.robot}s{state} -> r{own.robot}s{to} [label={quoted(text)}];")
+    return [*lines, "  }"]

@@ -1,0 +1,79 @@
+"""Choices files: robots' choices as JSON (docs/formats.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+
+from coordlang.tasks.candidates import describe
+from coordlang.use.choices.automaton import Automaton
+from coordlang.use.choices.choices import Choices, RobotChoices
+from coordlang.use.choices.monitor import FORMAT, IDLE, VERSION, Monitor
+from planners.search.plan_file import json_count
+from planners.search.plans import Plans
+
+
+def to_data(choices: Choices, robots: Sequence[int] | None = None) -> dict[str, Any]:
+    """The data of a choices file, of all robots or of those with these numbers."""
+    spoken = choices.spoken
+    chosen = choices.robots if robots is None else [choices.robots[robot] for robot in robots]
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "domain": dict(spoken.language.domain) if spoken.language else {},
+        "robots": list(spoken.model.robots),
+        "task": describe(spoken.space, spoken.task),
+        "sentence": spoken.text(choices.words),
+        "plans": json_count(Plans.of(choices.fits).count),
+        "covered": spoken.covered,
+        "guaranteed": choices.guaranteed,
+        "combinations_walked": choices.mixtures.nodes if choices.mixtures is not None else None,
+        "choices": [_robot(choices, own) for own in chosen],
+    }
+
+
+def to_bytes(choices: Choices, robots: Sequence[int] | None = None) -> bytes:
+    """The text of a choices file: the same choices give the same bytes."""
+    return msgspec.json.encode(to_data(choices, robots)) + b"\n"
+
+
+def monitor(choices: Choices, robot: str) -> Monitor:
+    """A run-time monitor of one robot's choices.  Raises `coordlang.use.choices.monitor.MonitorError` for an unknown robot."""
+    names = choices.spoken.model.robots
+    return Monitor(to_data(choices, [names.index(robot)] if robot in names else None), robot)
+
+
+def _robot(choices: Choices, own: RobotChoices) -> dict[str, Any]:
+    model, automaton = choices.spoken.model, own.automaton
+    labels = model.labels[own.robot]
+    ever = 0
+    for true, possible in automaton.known:
+        ever |= true | ~possible
+    facts = {bit: text for bit, text in enumerate(model.codec.facts) if ever >> bit & 1}
+    number = {bit: n for n, bit in enumerate(facts)}
+    steps = [step for step, states in enumerate(automaton.layers) for _ in states]
+    return {
+        "robot": model.robots[own.robot],
+        "steps": len(automaton.layers) - 1,
+        "subplans": json_count(automaton.count),
+        "atoms": own.atoms,
+        "facts": list(facts.values()),
+        "others": [text for bit, text in enumerate(model.codec.facts) if bit not in facts],
+        "states": [
+            {
+                "step": steps[state],
+                "left": json_count(automaton.left[state]),
+                "next": {labels[label] if label else IDLE: to for label, to in automaton.moves(state)},
+                "true": [n for bit, n in number.items() if automaton.known[state][0] >> bit & 1],
+                "unknown": [n for bit, n in number.items() if _unknown(automaton, state) >> bit & 1],
+            }
+            for state in range(len(automaton))
+        ],
+    }
+
+
+def _unknown(automaton: Automaton, state: int) -> int:
+    true, possible = automaton.known[state]
+    return possible & ~true

@@ -1,0 +1,1 @@
+"""A language in one task: saying plans, understanding sentences, planning under them."""

@@ -1,0 +1,138 @@
+"""A language and one task in which it is used."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from coordlang.language.file import check_source, options_of, recorded_list
+from coordlang.language.words import Language, WordTable
+from coordlang.tasks.candidates import Candidates
+from coordlang.tasks.task_file import ListedTask, ground_tasks
+from planners.errors import BadInput, Place
+from planners.joint.matching import Ints
+from planners.joint.model import Goal, JointModel
+from planners.loading import ModelOptions, build
+from planners.pddl.lifted import TRUE, And, Atom, Domain, Formula, Problem
+from planners.search.plan_space import PlanSpace, search
+
+
+@dataclass(frozen=True, slots=True)
+class Spoken:
+    """A language with the optimal plans of one task.
+
+    ``space`` may hold further tasks: this one is number ``task`` of ``space.starts``.  ``word`` has the word number of
+    every plan-space node.  ``covered``: is it one of the candidate tasks that the language was built for?  For any other
+    one nothing is guaranteed.
+    """
+
+    language: Language
+    table: WordTable
+    space: PlanSpace
+    task: int
+    word: Ints
+    covered: bool
+
+    @property
+    def start(self) -> int:
+        """The plan-space node of the task's initial state."""
+        return int(self.space.starts[self.task])
+
+    @property
+    def model(self) -> JointModel:
+        return self.space.model
+
+    def words_of(self, text: str | Sequence[str]) -> tuple[int, ...]:
+        """Word numbers of a sentence, ``"w2 w0"`` or ``("w2", "w0")``.
+
+        Raises `BadInput` for an empty sentence, a word that the language does not have, or one that is said twice
+        in a row, which no sentence does.
+        """
+        words = text.split() if isinstance(text, str) else list(text)
+        if not words:
+            raise BadInput("the sentence is empty", remedy="It begins with the word of the initial state.")
+        known = {word: number for number, word in enumerate(self.table.words)}
+        for place, word in enumerate(words, 1):
+            if word not in known:
+                raise BadInput(
+                    f"word {place} of the sentence, {word!r}, is no word of this language",
+                    remedy=f"Its words are {', '.join(self.table.words)}.",
+                )
+            if place > 1 and words[place - 2] == word:
+                raise BadInput(
+                    f"the sentence says {word!r} twice in a row (words {place - 1} and {place})",
+                    remedy="Write a word once, however long the plan stays in it.",
+                )
+        return tuple(known[word] for word in words)
+
+    def text(self, words: Sequence[int]) -> str:
+        """A sentence as it is written."""
+        return " ".join(self.table.words[word] for word in words)
+
+
+def speak(
+    language: Language,
+    domain: Domain,
+    problem: Problem,
+    options: ModelOptions | None = None,
+    place: Place | None = None,
+) -> Spoken:
+    """A language in the task of a PDDL problem.
+
+    Raises `BadInput` when domain or problem are not the language's, `ProvedImpossible` for an unsolvable task.
+    """
+    place = place or Place("the language file")
+    check_source(language, domain, [problem], place)
+    recorded = ground_tasks(domain, problem, recorded_list(language), place)
+    options = options or options_of(language)
+    # What can be true depends on where tasks start: the states that the language speaks of must be possible here.
+    inits = [init for init, _ in recorded]
+    loaded = build(domain, [problem], options, inits=inits)
+    unknown = _atoms(language) - loaded.model.codec.index.keys()
+    if unknown:
+        (extra, _), *_ = ground_tasks(domain, problem, [ListedTask(tuple(sorted(unknown)), ())], place)
+        loaded = build(domain, [problem], options, inits=[*inits, extra])
+    space = search(loaded.model, loaded.tasks[0])
+    table = WordTable.of(language, loaded.model)
+    covered = _covers(language, space, recorded)
+    return Spoken(language, table, space, 0, table.of_rows(space.rows)[space.state], covered)
+
+
+def speak_candidates(language: Language, candidates: Candidates) -> Iterator[Spoken]:
+    """A language in each of its candidate tasks."""
+    table = WordTable.of(language, candidates.model)
+    for space in candidates.spaces:
+        word = table.of_rows(space.rows)[space.state]
+        for task in range(len(space.starts)):
+            yield Spoken(language, table, space, task, word, True)
+
+
+def _covers(language: Language, space: PlanSpace, recorded: Sequence[tuple[frozenset[Atom], Formula]]) -> bool:
+    """Whether the (one) task of a plan space is a candidate task of the language.
+
+    The guarantee is about a task's optimal plans, so a task with the same optimal plans as a candidate is one too:
+    under ``--tasks all``, a task whose optimal plans all end in one state.
+    """
+    model = space.model
+    row = space.rows[space.state[space.starts[0]]]
+    if language.tasks["kind"] == "all":
+        ends = np.unique(space.state[space.layer == 0])
+        return len(ends) == 1 and all(
+            model.codec.key(state) in language.states for state in (row, space.rows[ends[0]])
+        )
+    return any(
+        _literals(goal) == _literals(space.goals[0]) and (model.state(init) == row).all() for init, goal in recorded
+    )
+
+
+def _literals(goal: Goal) -> frozenset[object]:
+    return frozenset(goal.parts if isinstance(goal, And) else () if goal == TRUE else (goal,))
+
+
+def _atoms(language: Language) -> set[str]:
+    """All atoms in the state keys, without those of remembered actions."""
+    keys = [key for key in language.states if key]
+    found = set(" ".join(keys).replace(") (", ")\0(").split("\0"))
+    return {atom for atom in found if atom and not atom.startswith("(last ")}

@@ -1,0 +1,1 @@
+"""Whether words are a coordination language, by definition, in code of its own."""

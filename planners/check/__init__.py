@@ -1,0 +1,1 @@
+"""The independent twin: the rules of joint steps once more, and a plan checker that uses nothing else."""

@@ -1,0 +1,505 @@
+"""The rules of joint steps, read literally: one state and one step at a time, over states that are plain sets of atoms.
+
+The independent twin of grounding and composition (docs/pddl.md has the rules): nothing is shared with them, only the
+lifted nouns and the robots.  Formulas are never rewritten; they are read in negation normal form by carrying their
+polarity downwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+
+from planners.errors import BadInput
+from planners.pddl.lifted import (
+    And,
+    Atom,
+    Constraint,
+    Domain,
+    Equal,
+    Exists,
+    Forall,
+    Formula,
+    Not,
+    Or,
+    Problem,
+    Schema,
+    StepAtom,
+    Term,
+    Truth,
+    Variable,
+)
+from planners.pddl.robots import Team, fluent_predicates, objects_of
+
+#: The true fluents; what is static comes from the problem.
+State = frozenset[Atom]
+#: One entry per robot: the text of its subaction, or None for idling.
+Labels = Sequence[str | None]
+Binding = dict[str, str]
+#: A ground atom and whether it is required to be true.
+Literal = tuple[Atom | StepAtom, bool]
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """What a formula is read against: the state before the step, the subactions of the step, and who acts.
+
+    A negative action formula never speaks of the robots in ``acting`` (empty for conditions of effects and goals).
+    ``step`` None leaves the step open: every literal about it then counts as true.
+    """
+
+    state: State
+    step: frozenset[StepAtom] | None = frozenset()
+    acting: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Instance:
+    """A schema with arguments, and the robots that must choose it together; ``name`` is what formulas call it."""
+
+    schema: Schema
+    name: StepAtom
+    binding: Binding
+    owners: tuple[int, ...]
+
+    @property
+    def text(self) -> str:
+        return _text_of(self.name)
+
+
+@dataclass(frozen=True, slots=True)
+class Touched:
+    """What an action requires, names and changes, as the interference rule reads it."""
+
+    needs: frozenset[Literal]
+    adds: frozenset[Atom]
+    deletes: frozenset[Atom]
+
+
+@dataclass(frozen=True, slots=True)
+class Rules:
+    """The rules of joint steps for one problem and its team."""
+
+    domain: Domain
+    problem: Problem
+    team: Team
+    allow_idle: tuple[bool, ...]
+    fluents: frozenset[str]
+    schemas: dict[str, Schema]
+    is_joint_action: bool
+    _members: dict[tuple[str, ...], tuple[str, ...]] = field(default_factory=dict)
+    _instances: dict[str, Instance | str] = field(default_factory=dict)
+    _touched: dict[StepAtom, Touched] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, domain: Domain, problem: Problem, team: Team, allow_idle: Sequence[bool] | None = None) -> Rules:
+        idle = tuple(allow_idle) if allow_idle is not None else (True,) * len(team.robots)
+        schemas = {schema.name: schema for schema in domain.schemas}
+        return cls(domain, problem, team, idle, fluent_predicates(domain), schemas, domain.is_joint_action)
+
+    # -- joint steps -----------------------------------------------------------------------------------------
+
+    def broken_rule(self, state: State, labels: Labels) -> str | None:
+        """The first rule that the step breaks, in words; None for a legal step.
+
+        Raises `BadInput` where two applicable joint actions with these subactions have different results.
+        """
+        if len(labels) != len(self.team.robots):
+            return f"the step has {len(labels)} entries for {len(self.team.robots)} robots"
+        if self.is_joint_action:
+            return self._joint_action(state, labels)[0]
+        chosen: list[Instance | None] = []
+        for robot, label in enumerate(labels):
+            found = self.instance(label) if label is not None else None
+            if isinstance(found, str):
+                return f"{self.team.robots[robot]}: {found}"
+            chosen.append(found)
+        together = _together(chosen)
+        return (
+            self._wrong_choice(chosen)
+            or self._unmet(state, chosen)
+            or self._network(together)
+            or self._interference(together)
+        )
+
+    def result(self, state: State, labels: Labels) -> State:
+        """The state after a joint step without a `broken_rule`."""
+        if self.is_joint_action:
+            return self._joint_action(state, labels)[1]
+        chosen = _together([self._known(label) if label is not None else None for label in labels])
+        return self._after(state, chosen)
+
+    def instance(self, label: str) -> Instance | str:
+        """The subaction that a text names, or what is wrong with the text."""
+        if label not in self._instances:
+            self._instances[label] = self._read(label)
+        return self._instances[label]
+
+    def possible(self, state: State, label: str) -> bool:
+        """Whether some step could hold the subaction in a state, as far as its own precondition says."""
+        found = self._known(label)
+        moment = Moment(state, None, found.owners)
+        return self.holds(found.schema.precondition, found.binding, True, moment)
+
+    def _known(self, label: str) -> Instance:
+        found = self.instance(label)
+        assert isinstance(found, Instance), found
+        return found
+
+    def _read(self, label: str) -> Instance | str:
+        name, *args = label.lower().replace("(", " ").replace(")", " ").split() or [""]
+        schema = self.schemas.get(name)
+        if schema is None:
+            return f"{label} is no action of the domain"
+        if len(args) != len(schema.parameters):
+            return f"{label} has {len(args)} arguments, {name} takes {len(schema.parameters)}"
+        for parameter, arg in zip(schema.parameters, args, strict=True):
+            if arg not in self.objects(parameter.types):
+                return f"in {label}, {arg} is no object of type {' or '.join(parameter.types)}"
+        return self.bind(schema, tuple(args))
+
+    def bind(self, schema: Schema, args: tuple[str, ...]) -> Instance:
+        """A schema with (type-correct) arguments."""
+        binding = {p.name: arg for p, arg in zip(schema.parameters, args, strict=True)}
+        owners = () if schema.parts else self.team.owners(schema, args)
+        return Instance(schema, StepAtom(schema.name, args), binding, owners)
+
+    def _wrong_choice(self, chosen: Sequence[Instance | None]) -> str | None:
+        """Idling where it is not allowed, somebody else's action, a shared action that not all its owners chose."""
+        robots = self.team.robots
+        for robot, action in enumerate(chosen):
+            if action is None:
+                if not self.allow_idle[robot]:
+                    return f"{robots[robot]} has to choose an action of its own"
+                continue
+            if robot not in action.owners:
+                whose = " and ".join(robots[i] for i in action.owners) or "nobody"
+                return f"{robots[robot]} cannot do {action.text}: it belongs to {whose}"
+            for other in action.owners:
+                partner = chosen[other]
+                if partner is None or partner.name != action.name:
+                    return f"{action.text} needs {robots[other]} to choose it too"
+        return None
+
+    def _unmet(self, state: State, chosen: Sequence[Instance | None]) -> str | None:
+        """The first precondition that does not hold in the state before the step."""
+        step = frozenset(action.name for action in chosen if action)
+        for robot, action in enumerate(chosen):
+            if action is None:
+                continue
+            formula, moment = action.schema.precondition, Moment(state, step, action.owners)
+            if not self.holds(formula, action.binding, True, moment):
+                why = self.why_not(formula, action.binding, True, moment)
+                return f"{self.team.robots[robot]} cannot do {action.text} here: {why}"
+        return None
+
+    def _interference(self, actions: Sequence[Instance]) -> str | None:
+        for j, second in enumerate(actions):
+            for first in actions[:j]:
+                reason = self._clash(first, second) or self._clash(second, first)
+                if reason:
+                    return reason
+        return None
+
+    def _clash(self, one: Instance, other: Instance) -> str | None:
+        """How the changes of ``one`` interfere with ``other``."""
+        mine, theirs = self.touched(one), self.touched(other)
+        if both := mine.deletes & theirs.adds:
+            return f"{one.text} deletes {_first(both)}, which {other.text} adds"
+        if (other.name, True) in mine.needs or (one.name, True) in theirs.needs:
+            return None  # linked by a positive action formula: meant to be done together
+        if self._joined(one, other):
+            return None
+        if both := mine.deletes & {atom for atom, positive in theirs.needs if positive}:
+            return f"{one.text} deletes {_first(both)}, which {other.text} requires"
+        if both := mine.adds & {atom for atom, positive in theirs.needs if not positive}:
+            return f"{one.text} adds {_first(both)}, which {other.text} requires to be false"
+        return None
+
+    def _network(self, actions: Sequence[Instance]) -> str | None:
+        """The first constraint of the concurrency network that the step breaks."""
+        used: dict[str, dict[tuple[str, ...], list[Instance]]] = {}
+        for constraint in self.domain.constraints:
+            groups = used.setdefault(constraint.name, {})
+            for action in actions:
+                for binding in self._matches(constraint, action):
+                    groups.setdefault(binding, []).append(action)
+            for binding, group in groups.items():
+                if len(group) < constraint.low or (constraint.high is not None and len(group) > constraint.high):
+                    bounds = f"{constraint.low} to {constraint.high if constraint.high is not None else 'any number'}"
+                    doing = ", ".join(action.text for action in group)
+                    return f"constraint {constraint.name} {' '.join(binding)} takes {bounds} together: {doing}"
+        for needed, by in self.domain.dependences:
+            for binding, group in used[by].items():
+                if binding not in used[needed]:
+                    return f"{group[0].text} needs an action of constraint {needed} {' '.join(binding)} in the same step"
+        return None
+
+    def _matches(self, constraint: Constraint, action: Instance) -> set[tuple[str, ...]]:
+        """The bindings of a constraint's parameters that an action matches."""
+        return {
+            binding
+            for name, positions in constraint.actions
+            if name == action.schema.name
+            for binding in [tuple(action.name.args[p] for p in positions)]
+            if all(v in self.objects(p.types) for v, p in zip(binding, constraint.parameters, strict=True))
+        }
+
+    def _joined(self, one: Instance, other: Instance) -> bool:
+        """Linked by the network: of one constraint that takes two or more, or of two that depend on each other."""
+        by_name = {constraint.name: constraint for constraint in self.domain.constraints}
+        pairs = [(c.name, c.name) for c in self.domain.constraints if c.low > 1]
+        pairs += [pair for v, w in self.domain.dependences for pair in ((v, w), (w, v))]
+        return any(self._matches(by_name[v], one) & self._matches(by_name[w], other) for v, w in pairs)
+
+    def touched(self, action: Instance) -> Touched:
+        """Conditional effects count as if they fired and their conditions as required; adding wins over deleting."""
+        if action.name in self._touched:
+            return self._touched[action.name]
+        needs = set(self._required(action.schema.precondition, action.binding, True, action.owners) or ())
+        changes: dict[bool, set[Atom]] = {True: set(), False: set()}
+        for effect in action.schema.effects:
+            for binding in self._bindings(effect.variables, action.binding):
+                required = self._required(effect.condition, binding, True, ())
+                if required is not None:
+                    needs |= required
+                    changes[effect.adds].add(_atom(effect.atom, binding))
+        touched = Touched(frozenset(needs), frozenset(changes[True]), frozenset(changes[False] - changes[True]))
+        self._touched[action.name] = touched
+        return touched
+
+    def _after(self, state: State, actions: Iterable[Instance]) -> State:
+        """All effects together; an atom that is both added and deleted becomes true."""
+        actions = tuple(actions)
+        moment = Moment(state, frozenset(action.name for action in actions))
+        changes: dict[bool, set[Atom]] = {True: set(), False: set()}
+        for action in actions:
+            for effect in action.schema.effects:
+                for binding in self._bindings(effect.variables, action.binding):
+                    if self.holds(effect.condition, binding, True, moment):
+                        changes[effect.adds].add(_atom(effect.atom, binding))
+        return (state - changes[False]) | changes[True]
+
+    # -- joint-action PDDL -----------------------------------------------------------------------------------
+
+    def _joint_action(self, state: State, labels: Labels) -> tuple[str | None, State]:
+        """What is wrong with these subactions, or None and the state after them."""
+        reason = None
+        results: dict[State, str] = {}
+        for action in self._whole_actions(labels):
+            formula, moment = action.schema.precondition, Moment(state)
+            if self.holds(formula, action.binding, True, moment):
+                results.setdefault(self._after(state, (action,)), action.text)
+            elif reason is None:
+                reason = f"{action.text} is not applicable: {self.why_not(formula, action.binding, True, moment)}"
+        if len(results) > 1:
+            first, second = sorted(results.values())[:2]
+            raise BadInput(
+                f"{first} and {second} have the same subactions but different results",
+                place=self.domain.source.place(self.domain.schemas[0].offset),
+                remedy="The subactions of a joint action must determine what it does: rename one of them.",
+            )
+        for result in results:
+            return None, result
+        parts = ", ".join(f"{robot} {label or 'idle'}" for robot, label in zip(self.team.robots, labels, strict=True))
+        return reason or f"no joint action of the domain has the parts {parts}", state
+
+    def _whole_actions(self, labels: Labels) -> Iterator[Instance]:
+        """The type-correct joint actions whose subaction comments read as these labels."""
+        for schema in self.domain.schemas:
+            binding = self._match_parts(schema, labels)
+            if binding is None:
+                continue
+            domains = [
+                tuple(o for o in self.objects(p.types) if binding.get(p.name, o) == o) for p in schema.parameters
+            ]
+            for args in product(*domains):
+                yield self.bind(schema, args)
+
+    def _match_parts(self, schema: Schema, labels: Labels) -> Binding | None:
+        """The parameters that the labels determine, or None if the labels are not the schema's parts."""
+        templates: dict[str, tuple[Term, ...] | None] = {part.robot: part.template for part in schema.parts}
+        binding: Binding = {}
+        for robot, label in zip(self.team.robots, labels, strict=True):
+            template = templates.get(robot)  # a missing line means idle
+            words = None if label is None else label.lower().replace("(", " ").replace(")", " ").split()
+            if template is None and words is None:
+                continue
+            if template is None or words is None or len(template) != len(words):
+                return None
+            for term, word in zip(template, words, strict=True):
+                wanted = binding.setdefault(term, word) if term.startswith("?") else term
+                if wanted != word:
+                    return None
+        return binding
+
+    # -- formulas --------------------------------------------------------------------------------------------
+
+    def holds(self, formula: Formula, binding: Binding, positive: bool, moment: Moment) -> bool:
+        """Whether a formula (negated unless ``positive``) holds."""
+        formula, positive = _unsigned(formula, positive)
+        branches = self._branches(formula, binding)
+        if branches is not None:
+            values = (self.holds(part, inner, positive, moment) for part, inner in branches)
+            return all(values) if _is_conjunction(formula, positive) else any(values)
+        fixed = self._fixed(formula, binding, positive, moment.acting)
+        if fixed is not None:
+            return fixed
+        atom = _ground(formula, binding)
+        if isinstance(atom, Atom):
+            return (atom in moment.state) == positive
+        return moment.step is None or (atom in moment.step) == positive
+
+    def why_not(self, formula: Formula, binding: Binding, positive: bool, moment: Moment) -> str:
+        """Why a formula that does not hold does not hold, in words."""
+        formula, positive = _unsigned(formula, positive)
+        branches = self._branches(formula, binding)
+        if branches is None:
+            return self._literal_fails(formula, binding, positive)
+        failing = [
+            self.why_not(part, inner, positive, moment)
+            for part, inner in branches
+            if not self.holds(part, inner, positive, moment)
+        ]
+        if _is_conjunction(formula, positive):
+            return failing[0]
+        if len(failing) > 3:
+            failing[3:] = [f"{len(failing) - 3} more alternatives fail"]
+        return " and ".join(failing) or "there is nothing that it could be true of"
+
+    def _required(
+        self, formula: Formula, binding: Binding, positive: bool, acting: tuple[int, ...]
+    ) -> frozenset[Literal] | None:
+        """The literals left after statics, equalities and types are simplified; None if that makes it false.
+
+        A formula that this makes true requires nothing, whatever stands inside.
+        """
+        found = self._simplified(formula, binding, positive, acting)
+        if isinstance(found, bool):
+            return frozenset() if found else None
+        return found
+
+    def _simplified(
+        self, formula: Formula, binding: Binding, positive: bool, acting: tuple[int, ...]
+    ) -> frozenset[Literal] | bool:
+        formula, positive = _unsigned(formula, positive)
+        branches = self._branches(formula, binding)
+        if branches is None:
+            fixed = self._fixed(formula, binding, positive, acting)
+            return frozenset({(_ground(formula, binding), positive)}) if fixed is None else fixed
+        neutral = _is_conjunction(formula, positive)
+        left = [self._simplified(part, inner, positive, acting) for part, inner in branches]
+        if (not neutral) in left:
+            return not neutral
+        literals = [part for part in left if not isinstance(part, bool)]
+        return frozenset().union(*literals) if literals else neutral
+
+    def _fixed(self, formula: Formula, binding: Binding, positive: bool, acting: tuple[int, ...]) -> bool | None:
+        """The value of a literal that no state and no step can change; None for the others."""
+        match formula:
+            case Truth(value):
+                return value == positive
+            case Equal(left, right):
+                return (binding.get(left, left) == binding.get(right, right)) == positive
+            case Atom(predicate) if predicate not in self.fluents:
+                return (_ground(formula, binding) in self.problem.init) == positive
+            case StepAtom():
+                return self._fixed_step_atom(formula, binding, positive, acting)
+        return None
+
+    def _fixed_step_atom(
+        self, formula: StepAtom, binding: Binding, positive: bool, acting: tuple[int, ...]
+    ) -> bool | None:
+        schema = self.schemas[formula.action]
+        if self.is_joint_action:
+            raise BadInput(
+                f"action {schema.name!r} is used as a formula in a joint-action domain",
+                place=self.domain.source.place(schema.offset),
+                remedy="A joint action already says what every robot does: use predicates only.",
+            )
+        args = _ground(formula, binding).args
+        if not all(a in self.objects(p.types) for p, a in zip(schema.parameters, args, strict=True)):
+            return not positive  # no such subaction exists
+        if not positive and set(self.team.owners(schema, args)) & set(acting):
+            return True  # as if the domain had said "(or (= ?o ?r) (not ..))"
+        return None
+
+    def _branches(self, formula: Formula, binding: Binding) -> Iterable[tuple[Formula, Binding]] | None:
+        """The parts of a connective or quantifier; None for a literal."""
+        match formula:
+            case And(parts) | Or(parts):
+                return ((part, binding) for part in parts)
+            case Forall(variables, part) | Exists(variables, part):
+                return ((part, inner) for inner in self._bindings(variables, binding))
+        return None
+
+    def _bindings(self, variables: Sequence[Variable], binding: Binding) -> Iterator[Binding]:
+        """The binding with all values of more variables, which hide older ones of the same name."""
+        names = [v.name for v in variables]
+        for values in product(*(self.objects(v.types) for v in variables)):
+            yield {**binding, **dict(zip(names, values, strict=True))}
+
+    def _literal_fails(self, formula: Formula, binding: Binding, positive: bool) -> str:
+        match formula:
+            case Atom():
+                return f"{_text_of(_ground(formula, binding))} is {'false' if positive else 'true'}"
+            case StepAtom() if positive:
+                return f"nobody does {_text_of(_ground(formula, binding))} in the same step"
+            case StepAtom():
+                return f"{_text_of(_ground(formula, binding))} is done in the same step"
+            case Equal(left, right):
+                what = "are different" if positive else "are the same"
+                return f"{binding.get(left, left)} and {binding.get(right, right)} {what}"
+        return "its condition is never true"
+
+    # -- objects ---------------------------------------------------------------------------------------------
+
+    def objects(self, types: tuple[str, ...]) -> tuple[str, ...]:
+        """The objects of one of these types."""
+        if types not in self._members:
+            self._members[types] = objects_of(self.domain, self.problem, types)
+        return self._members[types]
+
+    def fluents_of(self, atoms: Iterable[Atom]) -> State:
+        """The state that a list of true atoms describes."""
+        return frozenset(atom for atom in atoms if atom.predicate in self.fluents)
+
+
+def _together(chosen: Iterable[Instance | None]) -> list[Instance]:
+    """The different subactions of a step: a shared one stands for all its owners."""
+    return list({action.name: action for action in chosen if action}.values())
+
+
+def _unsigned(formula: Formula, positive: bool) -> tuple[Formula, bool]:
+    """The formula inside all negations in front, and its polarity."""
+    while isinstance(formula, Not):
+        formula, positive = formula.part, not positive
+    return formula, positive
+
+
+def _is_conjunction(formula: Formula, positive: bool) -> bool:
+    """Whether all branches count (else any) when the formula is read with this polarity."""
+    return isinstance(formula, And | Forall) == positive
+
+
+def _atom(atom: Atom, binding: Binding) -> Atom:
+    return Atom(atom.predicate, tuple(binding.get(arg, arg) for arg in atom.args))
+
+
+def _ground(formula: Formula, binding: Binding) -> Atom | StepAtom:
+    match formula:
+        case Atom():
+            return _atom(formula, binding)
+        case StepAtom(name, args):
+            return StepAtom(name, tuple(binding.get(arg, arg) for arg in args))
+    raise AssertionError(formula)
+
+
+def _first(atoms: Iterable[Atom | StepAtom]) -> str:
+    return min(_text_of(atom) for atom in atoms)
+
+
+def _text_of(atom: Atom | StepAtom) -> str:
+    name = atom.predicate if isinstance(atom, Atom) else atom.action
+    return "(" + " ".join((name, *atom.args)) + ")"

@@ -1,0 +1,67 @@
+"""Independent plan checker: is this sequence of joint steps a plan?
+
+Reads `planners.check.rules`, the rules of joint steps taken literally, and nothing of grounding, composition or search.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from planners.check.rules import Instance, Labels, Moment, Rules, State
+from planners.pddl.lifted import Atom, Domain, Formula, Problem
+from planners.pddl.robots import Team
+
+__all__ = ["Instance", "Labels", "Moment", "Rules", "State", "Verdict", "validate"]
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Whether a plan is one.
+
+    ``makespan`` is its number of joint steps.  For an invalid plan ``step`` is the first step that breaks a rule (from
+    0; the makespan if only the goal fails) and ``reason`` says which, in words.
+    """
+
+    valid: bool
+    makespan: int
+    step: int | None
+    reason: str
+
+
+def validate(
+    domain: Domain,
+    problem: Problem,
+    team: Team,
+    plan: Sequence[Labels],
+    *,
+    init: Iterable[Atom] | None = None,
+    goal: Formula | None = None,
+    allow_idle: Sequence[bool] | None = None,
+) -> Verdict:
+    """Check that every step is a legal joint step where it is taken and that the goal holds at the end.
+
+    Parameters
+    ----------
+    plan
+        ``plan[k][i]`` is the subaction of robot ``i`` in step ``k``, such as ``"(move r1 a b)"``, or None if it idles.
+        In joint-action PDDL it is the filled-in template of the subaction comment.
+    init, goal
+        Another task than the problem's own: its true fluents (statics come from the problem) and its goal.
+    allow_idle
+        For each robot whether it may idle without an action of its own (`JointModel.keeps_idle`); None: all may.
+
+    Raises `BadInput` where two applicable joint actions with the same subactions have different results.
+    """
+    rules = Rules.of(domain, problem, team, allow_idle)
+    state = rules.fluents_of(problem.init if init is None else init)
+    for number, labels in enumerate(plan):
+        reason = rules.broken_rule(state, labels)
+        if reason is not None:
+            return Verdict(False, len(plan), number, reason)
+        state = rules.result(state, labels)
+    wanted = problem.goal if goal is None else goal
+    if not rules.holds(wanted, {}, True, Moment(state)):
+        reason = f"the goal does not hold at the end: {rules.why_not(wanted, {}, True, Moment(state))}"
+        return Verdict(False, len(plan), len(plan), reason)
+    return Verdict(True, len(plan), None, "every step is a joint step and the goal holds at the end")

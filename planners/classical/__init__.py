@@ -1,0 +1,62 @@
+"""A joint model and one task as a plain ground planning task, for the planners of others.
+
+Two forms.  *Explicit*: one plain action per joint action.  *Select-then-apply*, of linear size: the robots choose one
+after another, what they chose is checked, and only then the effects happen, one robot after another; all choices and
+checks see the state before the step, and only the first choice of a step pays for it.
+
+In both forms the optimal plans stand one to one for the optimal joint plans (sequences of the robots' labels): cases and
+formulas are decided in one order, so that nothing can be done in two ways.
+
+This is the cross-check of `planners.joint.composition`, `planners.joint.interference` and `planners.joint.joint_actions`, so it shares their
+input and nothing else: interference, formulas about the joint step and conditional effects are worked out anew here.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+from planners.classical.choosers import Choosers, choosers_of
+from planners.classical.explicit import TooManyError, explicit
+from planners.classical.pddl import action_names, to_pddl
+from planners.classical.selection import select_then_apply
+from planners.classical.task import LONGEST, Condition, Form, PlainAction, PlainTask
+from planners.classical.writer import Writer, state_literals
+from planners.joint.model import Goal, JointModel, show
+from planners.loading import PlanningTask
+
+__all__ = ["LONGEST", "Condition", "Form", "PlainAction", "PlainTask", "action_names", "compile_plain", "to_pddl"]
+
+
+def compile_plain(model: JointModel, task: PlanningTask, limit: int = 2000, longest: int = LONGEST) -> PlainTask:
+    """The plain form of a task: explicit with at most ``limit`` plain actions, else select-then-apply.
+
+    Parameters
+    ----------
+    limit
+        0 asks for select-then-apply.  Joint-action PDDL, whose ground actions are plain actions already, may exceed it.
+    longest
+        The makespan, in joint steps, up to which `PlainTask.cost` has to be sure.
+    """
+    team = choosers_of(model)
+    step_cost = team.dearest * longest + 1
+    out, form = _written(team, model, task.goal, step_cost, limit)
+    true = {out.fact(atom) for atom, holds in state_literals(model, task.init.tolist()).items() if holds}
+    return PlainTask(
+        name=task.name,
+        form=form,
+        facts=tuple(show(atom) for atom in out.facts),
+        init=frozenset(true | out.init),
+        actions=tuple(out.actions),
+        goal=out.goal,
+        step_cost=step_cost,
+        dearest=team.dearest,
+    )
+
+
+def _written(team: Choosers, model: JointModel, goal: Goal, step_cost: int, limit: int) -> tuple[Writer, Form]:
+    if model.is_joint_action and limit:
+        limit = max(limit, 4 * len(model.actions))
+    if limit:
+        with suppress(TooManyError):
+            return explicit(team, model, goal, step_cost, limit), "explicit"
+    return select_then_apply(team, model, goal, step_cost), "select-then-apply"

@@ -1,0 +1,186 @@
+"""The independent cross-check: the optimal cost of a task by Fast Downward, through unified-planning.
+
+unified-planning runs in a child process of its own group and in a directory of its own, so that nothing of it is left
+behind, whatever happens: no file, no output, no process.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from planners.classical import LONGEST, Form, PlainTask, compile_plain
+from planners.errors import CoordlangError, OutOfMemory, OutOfTime
+from planners.joint.model import JointModel
+from planners.loading import PlanningTask
+
+#: Fast Downward adds up costs in 32-bit integers.
+_GREATEST = 2**31 - 1
+#: The end of a message that is worth showing.
+_TAIL = 1500
+#: numpy, which unified-planning imports, would reserve memory for a thread per processor.
+_ENVIRONMENT = {"PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+#: How Python, the loader and numpy say that a limit of the calling process leaves them too little memory.
+_NO_MEMORY = re.compile("MemoryError|out of memory|allocat|failed to map|start new thread", re.IGNORECASE)
+
+
+class FastDownwardFailed(CoordlangError):
+    """Fast Downward gave no answer: the cost that was to be checked is neither confirmed nor refuted."""
+
+    exit_code = 3
+
+
+@dataclass(frozen=True, slots=True)
+class FastDownwardAnswer:
+    """What Fast Downward says of a task: its optimal cost (makespan, second component), None if it is unsolvable.
+
+    ``actions`` is the number of plain actions that it got, in the form ``form``; ``seconds`` are wall time.
+    """
+
+    cost: tuple[int, int] | None
+    form: Form
+    actions: int
+    seconds: float
+
+
+def optimal_cost(
+    model: JointModel,
+    task: PlanningTask,
+    *,
+    time_limit: float | None = None,
+    memory_limit: int | None = None,
+    limit: int = 2000,
+) -> FastDownwardAnswer:
+    """The optimal cost of a task according to Fast Downward.
+
+    Parameters
+    ----------
+    time_limit, memory_limit
+        Seconds of wall time for all of it; bytes of address space for Fast Downward's translator and its search.
+    limit
+        See `planners.classical.compile_plain`.
+
+    Raises
+    ------
+    OutOfTime, OutOfMemory
+        A limit is met.  No process is left behind.
+    FastDownwardFailed
+        unified-planning or Fast Downward broke down; the end of what they said is in the message.
+    """
+    start = time.monotonic()
+    longest = LONGEST
+    while True:
+        plain = compile_plain(model, task, limit, longest)
+        left = None if time_limit is None else time_limit - (time.monotonic() - start)
+        total = _solve(plain, left, time_limit, memory_limit)
+        cost = None if total is None else plain.cost(total)
+        if total is None or cost is not None:
+            return FastDownwardAnswer(cost, plain.form, len(plain.actions), time.monotonic() - start)
+        # No optimal plan has more steps than this one seems to have, so the second round is the last.
+        longest = total // plain.step_cost
+
+
+def total_cost(plain: PlainTask, *, time_limit: float | None = None, memory_limit: int | None = None) -> int | None:
+    """The total cost of an optimal plan of a plain task by Fast Downward, None if there is none; see `optimal_cost`."""
+    return _solve(plain, time_limit, time_limit, memory_limit)
+
+
+def as_json(plain: PlainTask, memory_limit: int | None) -> str:
+    """The task as `planners.classical.fast_downward_worker` reads it; names stay here."""
+    return json.dumps(
+        {
+            "facts": len(plain.facts),
+            "init": sorted(plain.init),
+            "actions": [(a.preconditions, a.adds, a.deletes, a.cost) for a in plain.actions],
+            "goal": plain.goal,
+            "memory_limit": memory_limit,
+        }
+    )
+
+
+def _solve(plain: PlainTask, left: float | None, time_limit: float | None, memory_limit: int | None) -> int | None:
+    """The cost of an optimal plan of a plain task, None if there is no plan."""
+    with tempfile.TemporaryDirectory(prefix="coordlang-") as name:
+        directory = Path(name)
+        (directory / "task.json").write_text(as_json(plain, memory_limit))
+        try:
+            code = _run(directory, left)
+        except subprocess.TimeoutExpired:
+            raise OutOfTime(
+                f"Fast Downward found no answer in {time_limit:g} s", remedy="Use a larger --time-limit."
+            ) from None
+        result = directory / "result.json"
+        if not result.exists():
+            errors = (directory / "stderr").read_text(errors="replace")
+            if code == -signal.SIGKILL:  # not by us: by the system, which is out of memory
+                raise _out_of_memory()
+            raise _crash(f"the process that runs Fast Downward ended with exit code {code}", errors)
+        answer: dict[str, Any] = json.loads(result.read_text())
+    match answer["status"]:
+        case "solved":
+            total = int(answer["total"])
+            if total + plain.step_cost > _GREATEST:
+                raise FastDownwardFailed(f"a cost of {total} is too large for Fast Downward's 32-bit integers",
+                                         remedy="Check with --cost makespan.")  # fmt: skip
+            return total
+        case "unsolvable":
+            return None
+        case "memory":
+            raise _out_of_memory()
+    raise _crash(f"Fast Downward {answer['status']}", answer["log"])
+
+
+def _run(directory: Path, left: float | None) -> int:
+    """Run the worker in a directory; its exit code.  However this ends, the worker and its children are gone."""
+    home = str(Path(__file__).resolve().parents[2])
+    path = os.pathsep.join(p for p in (home, os.environ.get("PYTHONPATH")) if p)
+    process = None
+    with (directory / "stderr").open("wb") as errors:
+        try:
+            process = subprocess.Popen(
+                [sys.executable, "-m", "planners.classical.fast_downward_worker", "task.json", "result.json"],
+                cwd=directory,
+                # What the worker's libraries put into a temporary directory goes away with this one.
+                env={**os.environ, **_ENVIRONMENT, "PYTHONPATH": path, "TMPDIR": str(directory)},
+                stdin=subprocess.PIPE,  # ends when we do, even by a signal: then the worker ends its group
+                stdout=subprocess.DEVNULL,
+                stderr=errors,
+                start_new_session=True,
+            )
+            return process.wait(None if left is None else max(left, 0.0))
+        finally:
+            if process is not None:
+                _end(process)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End the process group of the worker at once and wait for the worker."""
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(process.pid, signal.SIGKILL)
+    if process.stdin is not None:
+        process.stdin.close()
+    process.wait()
+
+
+def _crash(what: str, said: str) -> CoordlangError:
+    """The error for a process that gave no answer, with the end of what it said."""
+    # A limit of this process holds for all below it, and libraries crash in many ways when they meet it.
+    limited = resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
+    if limited or _NO_MEMORY.search(said):
+        return _out_of_memory()
+    return FastDownwardFailed(what, remedy=said[-_TAIL:].strip() or None)
+
+
+def _out_of_memory() -> OutOfMemory:
+    return OutOfMemory("Fast Downward needs more memory than it may use", remedy="Use a larger --memory-limit.")

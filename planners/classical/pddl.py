@@ -1,0 +1,78 @@
+"""A plain task as PDDL text."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+
+from planners.classical.task import Condition, PlainTask
+
+
+def to_pddl(plain: PlainTask) -> tuple[str, str]:
+    """Domain and problem text of a plain task: STRIPS with negative preconditions and action costs.
+
+    Facts become predicates without arguments; a comment keeps what each predicate and action stands for.
+    """
+    facts = _safe_names(plain.facts)
+    actions = action_names(plain)
+    domain = [
+        f"; {plain.name}: {plain.form} form; one joint step costs {plain.step_cost}",
+        "(define (domain plain)",
+        "  (:requirements :strips :negative-preconditions :action-costs)",
+        "  (:predicates",
+        *(f"    ({safe}) ; {text}" for safe, text in zip(facts, plain.facts, strict=True)),
+        "  )",
+        "  (:functions (total-cost) - number)",
+    ]
+    for safe, action in zip(actions, plain.actions, strict=True):
+        changes = [f"({facts[n]})" for n in action.adds] + [f"(not ({facts[n]}))" for n in action.deletes]
+        domain += [
+            f"  ; {action.name}",
+            f"  (:action {safe}",
+            "    :parameters ()",
+            f"    :precondition {_all_of(facts, action.preconditions)}",
+            f"    :effect (and {' '.join((*changes, f'(increase (total-cost) {action.cost})'))}))",
+        ]
+    problem = [
+        "(define (problem plain-task)",
+        "  (:domain plain)",
+        "  (:init",
+        "    (= (total-cost) 0)",
+        *(f"    ({facts[n]})" for n in sorted(plain.init)),
+        "  )",
+        f"  (:goal {_all_of(facts, plain.goal)})",
+        "  (:metric minimize (total-cost)))",
+    ]
+    return "\n".join((*domain, ")", "")), "\n".join((*problem, ""))
+
+
+def action_names(plain: PlainTask) -> list[str]:
+    """The names of the actions in `to_pddl`, in the order of ``plain.actions``."""
+    return _safe_names(action.name for action in plain.actions)
+
+
+def _all_of(names: Sequence[str], conditions: Iterable[Condition]) -> str:
+    parts = [f"({names[n]})" if positive else f"(not ({names[n]}))" for n, positive in conditions]
+    return f"(and{''.join(f' {part}' for part in parts)})"
+
+
+def _safe_names(texts: Iterable[str]) -> list[str]:
+    """For each text a PDDL name of its own: letters, digits, ``-`` and ``_``, beginning with a letter."""
+    taken: dict[str, int] = defaultdict(int)
+    used: set[str] = set()
+    names = []
+    for text in texts:
+        base = re.sub(r"[^a-z0-9-]+", "_", text.lower()).strip("_-")
+        base = base if base[:1].isalpha() else f"x_{base}"
+        name = base
+        while name in used or name in _RESERVED:
+            taken[base] += 1
+            name = f"{base}__{taken[base]}"
+        used.add(name)
+        names.append(name)
+    return names
+
+
+#: Names that are words of PDDL itself.
+_RESERVED = frozenset(["and", "or", "not", "imply", "forall", "exists", "when", "either", "object", "total-cost"])

@@ -1,0 +1,126 @@
+"""What both plain forms write: facts, actions, initial state and goal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+from planners.classical.formulas import Leaf, literals_of, negated, put
+from planners.classical.task import Condition, Known, PlainAction
+from planners.joint.model import FullState, Goal, JointModel
+from planners.pddl.lifted import FALSE, And, Atom, Formula, Not, Or
+
+
+class Writer:
+    """Collects facts and actions; equal actions are written once."""
+
+    def __init__(self, facts: Iterable[Atom]) -> None:
+        self.facts: dict[Atom, int] = {atom: n for n, atom in enumerate(facts)}
+        self.actions: list[PlainAction] = []
+        self.init: set[int] = set()
+        self.goal: tuple[Condition, ...] = ()
+        self._seen: set[PlainAction] = set()
+        self._places = 0
+
+    def fact(self, atom: Atom) -> int:
+        return self.facts.setdefault(atom, len(self.facts))
+
+    def conditions(self, known: Known) -> tuple[Condition, ...]:
+        return tuple(sorted((self.fact(atom), value) for atom, value in known.items()))
+
+    def action(self, name: str, known: Known, adds: Iterable[Atom], deletes: Iterable[Atom], cost: int = 0) -> None:
+        """An action; an atom that it both adds and deletes is added."""
+        plus = {self.fact(atom) for atom in adds}
+        minus = {self.fact(atom) for atom in deletes} - plus
+        new = PlainAction(name, self.conditions(known), tuple(sorted(plus)), tuple(sorted(minus)), cost)
+        if new not in self._seen:
+            self._seen.add(new)
+            self.actions.append(new)
+
+    def place(self) -> Atom:
+        """A new fact that says where between two joint states the computation is."""
+        self._places += 1
+        return own_fact("at place", str(self._places))
+
+    def route(
+        self,
+        name: str,
+        formula: Formula,
+        start: Atom,
+        end: Atom,
+        known: Known,
+        gain: tuple[Atom, ...] = (),
+        otherwise: Atom | None = None,
+    ) -> None:
+        """Zero-cost actions that lead from ``start`` to ``end`` (and add ``gain``) exactly if ``formula`` holds.
+
+        With ``otherwise`` they lead there if it does not hold.  Formulas are evaluated from left to right, as in a
+        programming language, so that there is one way in every state, and the size is linear.
+        """
+        if isinstance(formula, And | Or) and formula.parts:
+            if isinstance(formula, And) and otherwise is None:
+                self._route_conjunction(name, formula, start, end, known, gain)
+                return
+            here = start
+            for left, part in zip(range(len(formula.parts) - 1, -1, -1), formula.parts, strict=True):
+                after = self.place() if left else None
+                if isinstance(formula, And):
+                    self.route(name, part, here, after or end, known, () if left else gain, otherwise)
+                else:
+                    self.route(name, part, here, end, known, gain, after or otherwise)
+                here = after or here
+            return
+        self._test(name, formula, start, (end, *gain), known)
+        if otherwise is not None:
+            self._test(name, negated(formula), start, (otherwise,), known)
+
+    def _route_conjunction(
+        self, name: str, formula: And, start: Atom, end: Atom, known: Known, gain: tuple[Atom, ...]
+    ) -> None:
+        """Of what must hold all literals are tested at once."""
+        found = literals_of(formula)
+        if found is None or any(known.get(atom, value) != value for atom, value in found[0].items()):
+            return
+        literals, forks = found
+        here = start
+        if literals or not forks:
+            here = self.place() if forks else end
+            self.action(name, {**known, **literals, start: True}, (here, *(() if forks else gain)), (start,))
+        for left, fork in zip(range(len(forks) - 1, -1, -1), forks, strict=True):
+            after = self.place() if left else end
+            self.route(name, fork, here, after, known, () if left else gain)
+            here = after
+
+    def _test(self, name: str, literal: Formula, start: Atom, gain: tuple[Atom, ...], known: Known) -> None:
+        """An action that is possible exactly if a literal (or truth value) holds."""
+        found = literals_of(literal)
+        if found is None or any(known.get(atom, value) != value for atom, value in found[0].items()):
+            return
+        self.action(name, {**known, **found[0], start: True}, gain, (start,))
+
+def own_fact(kind: str, *args: str) -> Atom:
+    """A fact of the compilation: its predicate contains a space, so that no name of the user's can be the same."""
+    assert " " in kind
+    return Atom(kind, args)
+
+
+def fact_atoms(model: JointModel) -> list[Atom]:
+    numbers = model.evaluator.facts
+    return sorted(numbers, key=numbers.__getitem__)
+
+
+def state_literals(model: JointModel, words: Sequence[int]) -> dict[Atom, bool]:
+    """The value of each fact in a row of the model; remembered actions are left out."""
+    return {atom: bool(words[n // 64] >> n % 64 & 1) for n, atom in enumerate(fact_atoms(model))}
+
+
+def goal_formula(model: JointModel, goal: Goal) -> Formula:
+    """A goal over facts of the model; a fact that can never be true is replaced by its value."""
+    if isinstance(goal, FullState):
+        values = state_literals(model, goal.words)
+        return And(tuple(atom if value else Not(atom) for atom, value in values.items()))
+    return put(goal, state_reader(model))
+
+
+def state_reader(model: JointModel) -> Callable[[Leaf], Formula]:
+    facts = model.evaluator.facts
+    return lambda leaf: leaf if leaf in facts else FALSE

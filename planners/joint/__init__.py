@@ -1,0 +1,1 @@
+"""The joint model: states, conditions, interference, and the joint actions that robots compose."""

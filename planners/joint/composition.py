@@ -1,0 +1,263 @@
+"""Joint steps composed from the robots' own subactions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planners.errors import OutOfMemory
+from planners.grounding import GroundAction, GroundEffect
+from planners.joint.conditions import Evaluator, Labels, speaks_of_step
+from planners.joint.interference import compatible, conflict, conjuncts
+from planners.joint.matching import Ints, Matcher, ranges, spans
+from planners.joint.model import Cost, Steps, show
+from planners.joint.states import Rows, StateCodec
+from planners.limits import memory_left
+from planners.pddl.lifted import TRUE, Atom, Formula, Not, StepAtom
+
+#: Joint steps composed at a time, before compatibility is looked up.
+_CHUNK = 1_000_000
+
+
+class Composition:
+    """The `Stepper` of PDDL with one action per robot: every robot picks one subaction or idles.
+
+    Parameters
+    ----------
+    subactions
+        For each robot its ground actions, shared ones in the lists of all their owners.
+    keeps_idle
+        For each robot whether it may do nothing at all.
+
+    ``tables[i, j]`` (i < j) says which labels of two robots may share a step (`planners.joint.interference`).
+    """
+
+    def __init__(
+        self,
+        codec: StateCodec,
+        evaluator: Evaluator,
+        robots: Sequence[str],
+        subactions: Sequence[Sequence[GroundAction]],
+        keeps_idle: Sequence[bool],
+        cost: Cost,
+    ) -> None:
+        self._codec, self._evaluator, self._robots = codec, evaluator, tuple(robots)
+        self._keeps_idle = tuple(keeps_idle)
+        self._choices: list[list[GroundAction | None]] = [[None, *own] for own in subactions]
+        self.tables = {
+            (i, j): compatible(self._choices[i], self._choices[j], i, j) for j in range(len(robots)) for i in range(j)
+        }
+        self._robot = [_Subactions(own, codec, evaluator, number, cost) for number, own in enumerate(subactions)]
+
+    def steps(self, rows: Rows) -> Steps:
+        """All joint steps applicable in the states of a table, sorted by source and labels."""
+        options = self.choices(rows)
+        sizes = np.ones(len(rows))
+        for first, _ in options:
+            sizes *= np.diff(first)
+        parts = [self._compose(rows, options, span) for span in spans(sizes, _CHUNK)] or [
+            self._compose(rows, options, slice(0, 0))
+        ]
+        return Steps(
+            np.concatenate([p.source for p in parts]),
+            np.concatenate([p.labels for p in parts]),
+            np.concatenate([p.result for p in parts]),
+            np.concatenate([p.cost for p in parts]),
+        )
+
+    def choices(self, rows: Rows) -> list[tuple[Ints, Ints]]:
+        """For each robot the labels whose conditions on the state hold, by state: (first index, labels), CSR."""
+        return [self._options(robot, number, rows) for number, robot in enumerate(self._robot)]
+
+    def why_not(self, row: Rows, labels: Sequence[int]) -> str:
+        """Why these labels are no joint step in a state: the first rule that they break."""
+        rows = row[None, :]
+        here = np.zeros(1, np.int64)
+        chosen = [self._choices[i][label] for i, label in enumerate(labels)]
+        for robot, action in zip(self._robots, chosen, strict=True):
+            for part in conjuncts(action.precondition) if action else ():
+                if not speaks_of_step(part) and not self._evaluator.holds(part, rows, here)[0]:
+                    assert action is not None
+                    return f"{robot} cannot {action.label} here: it needs {_text(part)}"
+        for i, label in enumerate(labels):
+            if label == 0 and not self._keeps_idle[i]:
+                return f"{self._robots[i]} has to choose an action of its own"
+            action = chosen[i]
+            for j in action.owners if action else ():
+                if chosen[j] != action:
+                    assert action is not None
+                    return f"{action.label} needs {self._robots[j]} to choose it too"
+        for j, second in enumerate(chosen):
+            for i, first in enumerate(chosen[:j]):
+                if first and second and not self.tables[i, j][labels[i], labels[j]]:
+                    return conflict(first, second) or f"{first.label} and {second.label} interfere"
+        both = np.array([labels], np.int32)
+        for action in chosen:
+            if action and not self._evaluator.holds(action.precondition, rows, here, both)[0]:
+                return f"{action.label} needs another subaction in the same step, and nobody does it"
+        return "this is a joint step"
+
+    def _options(self, robot: _Subactions, number: int, rows: Rows) -> tuple[Ints, Ints]:
+        """CSR of each state's labels for one robot: (first index, labels)."""
+        row, operator = robot.applicable(rows)
+        label = operator + 1
+        if self._keeps_idle[number]:
+            row = np.concatenate((np.arange(len(rows)), row))
+            label = np.concatenate((np.zeros(len(rows), np.int64), label))
+            order = np.lexsort((label, row))
+            row, label = row[order], label[order]
+        return np.searchsorted(row, np.arange(len(rows) + 1)), label
+
+    def _compose(self, rows: Rows, options: list[tuple[Ints, Ints]], span: slice) -> Steps:
+        source = np.arange(span.start, span.stop)
+        chosen: list[Ints] = []
+        for j, (first, label) in enumerate(options):
+            counts = first[source + 1] - first[source]
+            self._require_room(int(counts.sum()), j, len(rows[span]))
+            new = label[ranges(first[source], counts)]
+            source = np.repeat(source, counts)
+            chosen = [np.repeat(old, counts) for old in chosen]
+            fits = np.ones(len(source), np.bool_)
+            for i, old in enumerate(chosen):
+                fits &= self.tables[i, j][old, new]
+            source, chosen = source[fits], [old[fits] for old in chosen] + [new[fits]]
+        labels = np.stack(chosen, axis=1).astype(np.int32)
+        fits = np.ones(len(source), np.bool_)
+        for i, robot in enumerate(self._robot):
+            robot.drop_unmet(fits, i, rows, source, labels)
+        source, labels = source[fits], labels[fits]
+        return Steps(source, labels, *self._apply(rows, source, labels))
+
+    def _require_room(self, combinations: int, robot: int, states: int) -> None:
+        """Stop before the combinations of one more robot's labels take more memory than there is."""
+        # A number of the state and one of each label so far, in two copies, and what compares them.
+        needed = 8 * (2 * robot + 6) * combinations
+        if combinations > _CHUNK and needed > memory_left():
+            raise OutOfMemory(
+                f"{robot + 1} of {len(self._robots)} robots have {combinations:,} combinations of subactions in {states:,} "
+                f"state{'s' * (states != 1)}: about {needed / 2**30:,.1f} GiB, and {memory_left() / 2**30:.1f} GiB are left",
+                remedy="Use fewer robots, or a larger --memory-limit.",
+            )
+
+    def _apply(self, rows: Rows, source: Ints, labels: Labels) -> tuple[Rows, Ints]:
+        shape = (len(source), self._codec.fact_words)
+        adds, deletes = np.zeros(shape, np.uint64), np.zeros(shape, np.uint64)
+        cost = np.zeros(len(source), np.int64)
+        for i, robot in enumerate(self._robot):
+            own = labels[:, i]
+            adds |= robot.adds[own]
+            deletes |= robot.deletes[own]
+            cost += robot.cost[own]
+            for label, effects in robot.conditional.items():
+                there = np.flatnonzero(own == label)
+                for effect in effects if len(there) else ():
+                    fires = there[self._evaluator.holds(effect.condition, rows, source[there], labels[there])]
+                    number = self._evaluator.facts.get(effect.atom)
+                    if number is not None:
+                        into = adds if effect.adds else deletes
+                        into[fires, number // 64] |= np.uint64(1 << number % 64)
+        return (rows[source] & ~deletes) | adds, cost
+
+
+class _Subactions:
+    """One robot's subactions as tables; index 0 of ``adds``, ``deletes`` and ``cost`` is idling."""
+
+    def __init__(
+        self,
+        actions: Sequence[GroundAction],
+        codec: StateCodec,
+        evaluator: Evaluator,
+        robot: int,
+        cost: Cost,
+    ) -> None:
+        self._evaluator = evaluator
+        required, forbidden = [], np.zeros((len(actions), codec.fact_words), np.uint64)
+        self._state_formulas: dict[int, list[Formula]] = {}
+        self._step_formulas: dict[int, list[Formula]] = {}
+        self.conditional: dict[int, list[GroundEffect]] = {}
+        self.adds = np.zeros((len(actions) + 1, codec.fact_words), np.uint64)
+        self.deletes = np.zeros_like(self.adds)
+        self.cost = np.zeros(len(actions) + 1, np.int64)
+        for number, action in enumerate(actions):
+            literals, rest = split(action.precondition, evaluator)
+            required.append(frozenset(n for n, positive in literals if positive))
+            forbidden[number] = codec.mask(n for n, positive in literals if not positive)
+            for formula in rest:
+                kind = self._step_formulas if speaks_of_step(formula) else self._state_formulas
+                kind.setdefault(number, []).append(formula)
+            for into, adding in ((self.adds, True), (self.deletes, False)):
+                into[number + 1] = codec.mask(
+                    evaluator.facts[e.atom]
+                    for e in action.effects
+                    if e.adds == adding and e.condition == TRUE and e.atom in evaluator.facts
+                )
+            conditional = [e for e in action.effects if e.condition != TRUE]
+            if conditional:
+                self.conditional[number + 1] = conditional
+            if action.owners[0] == robot:  # a shared subaction is paid once
+                self.cost[number + 1] = cost_of(action, cost)
+        self._matcher = Matcher(required, forbidden)
+        self._has_step_formula = np.zeros(len(actions) + 1, np.bool_)
+        self._has_step_formula[[n + 1 for n in self._step_formulas]] = True
+
+    def applicable(self, rows: Rows) -> tuple[Ints, Ints]:
+        """Pairs (row, subaction) whose conditions on the state hold, sorted."""
+        row, operator = self._matcher.match(rows)
+        keep = np.ones(len(row), np.bool_)
+        for number, formulas in self._state_formulas.items():
+            there = np.flatnonzero(operator == number)
+            for formula in formulas:
+                keep[there] &= self._evaluator.holds(formula, rows, row[there])
+        return row[keep], operator[keep]
+
+    def drop_unmet(self, fits: NDArray[np.bool_], robot: int, rows: Rows, source: Ints, labels: Labels) -> None:
+        """Clear ``fits`` where this robot's subaction has a formula about the joint step that is not met."""
+        asks = np.flatnonzero(self._has_step_formula[labels[:, robot]])
+        if not len(asks):
+            return
+        own = labels[asks, robot]
+        for label in np.unique(own):
+            there = asks[own == label]
+            for formula in self._step_formulas[int(label) - 1]:
+                fits[there] &= self._evaluator.holds(formula, rows, source[there], labels[there])
+
+
+def split(precondition: Formula, evaluator: Evaluator) -> tuple[list[tuple[int, bool]], list[Formula]]:
+    """Literals (fact number, positive) and the rest of a precondition.
+
+    Negative step literals are left out (the compatibility table has them), and negative literals on facts that are
+    never true.
+    """
+    literals: list[tuple[int, bool]] = []
+    rest: list[Formula] = []
+    for part in conjuncts(precondition):
+        positive = not isinstance(part, Not)
+        inner = part.part if isinstance(part, Not) else part
+        if isinstance(inner, StepAtom) and not positive:
+            continue
+        if isinstance(inner, Atom) and inner in evaluator.facts:
+            literals.append((evaluator.facts[inner], positive))
+        elif isinstance(inner, Atom) and not positive:
+            continue
+        elif part != TRUE:
+            rest.append(part)
+    return literals, rest
+
+
+def cost_of(action: GroundAction, cost: Cost) -> int:
+    """The second component of a subaction's cost; doing nothing is free."""
+    if cost == "makespan+cost":
+        return action.cost
+    return int(cost == "makespan+actions" and not action.does_nothing)
+
+
+def _text(formula: Formula) -> str:
+    match formula:
+        case Atom() | StepAtom():
+            return show(formula)
+        case Not(part):
+            return f"(not {_text(part)})"
+    return "a formula of its precondition"
+

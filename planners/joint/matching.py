@@ -1,0 +1,108 @@
+"""Which operators are applicable in which states: a discrimination tree over required facts, for whole layers of
+states at a time."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planners.joint.states import Rows, test_bits
+
+Ints = NDArray[np.int64]
+
+
+def ranges(starts: Ints, counts: Ints) -> Ints:
+    """``[s, s+1, .., s+c-1]`` for every pair, joined."""
+    total = int(counts.sum())
+    ends = np.cumsum(counts)
+    within: Ints = np.arange(total) + np.repeat(starts - (ends - counts), counts)
+    return within
+
+
+def spans(sizes: NDArray[np.float64], most: int) -> Iterator[slice]:
+    """Cut a table so that the sizes of each piece sum to at most ``most``; a larger row is a piece of its own."""
+    ends = np.cumsum(sizes)
+    start = 0
+    while start < len(sizes):
+        before = ends[start - 1] if start else 0.0
+        end = max(start + 1, int(np.searchsorted(ends, before + most, side="right")))
+        yield slice(start, end)
+        start = end
+
+
+@dataclass(frozen=True, slots=True)
+class _Level:
+    """One depth of the tree: each node's children (facts to test) and the operators that end in it."""
+
+    first_child: Ints
+    child_fact: Ints
+    first_operator: Ints
+    operators: Ints
+
+
+class Matcher:
+    """A tree in which the path to an operator tests each fact that it requires to be true once.
+
+    Parameters
+    ----------
+    required
+        For each operator the numbers of the facts that it requires to be true.
+    forbidden
+        For each operator the mask of facts that it requires to be false (operators x words).
+    """
+
+    def __init__(self, required: Sequence[frozenset[int]], forbidden: Rows) -> None:
+        self._forbidden = forbidden
+        self._has_forbidden = bool(forbidden.any())
+        frequency = Counter(fact for facts in required for fact in facts)
+        # Frequent facts first: operators then share long beginnings of their paths.
+        paths = [sorted(facts, key=lambda f: (-frequency[f], f)) for facts in required]
+        self._levels: list[_Level] = []
+        nodes: list[list[int]] = [list(range(len(required)))]
+        depth = 0
+        while nodes:
+            first_child, child_fact, first_operator, operators = [0], [], [0], []
+            following: list[list[int]] = []
+            for members in nodes:
+                children: dict[int, list[int]] = {}
+                for operator in members:
+                    if len(paths[operator]) == depth:
+                        operators.append(operator)
+                    else:
+                        children.setdefault(paths[operator][depth], []).append(operator)
+                for fact in sorted(children):
+                    child_fact.append(fact)
+                    following.append(children[fact])
+                first_child.append(len(child_fact))
+                first_operator.append(len(operators))
+            self._levels.append(_Level(*(np.array(a, np.int64) for a in
+                                         (first_child, child_fact, first_operator, operators))))  # fmt: skip
+            nodes, depth = following, depth + 1
+
+    def match(self, rows: Rows) -> tuple[Ints, Ints]:
+        """All pairs (row number, operator) with the operator's literals satisfied, sorted."""
+        row = np.arange(len(rows))
+        node = np.zeros(len(rows), np.int64)
+        found_rows: list[Ints] = []
+        found_operators: list[Ints] = []
+        for level in self._levels:
+            counts = level.first_operator[node + 1] - level.first_operator[node]
+            found_rows.append(np.repeat(row, counts))
+            found_operators.append(level.operators[ranges(level.first_operator[node], counts)])
+            counts = level.first_child[node + 1] - level.first_child[node]
+            child = ranges(level.first_child[node], counts)
+            row = np.repeat(row, counts)
+            holds = test_bits(rows, row, level.child_fact[child])
+            row, node = row[holds], child[holds]
+        rows_out = np.concatenate(found_rows)
+        operators_out = np.concatenate(found_operators)
+        if self._has_forbidden:
+            fact_words = self._forbidden.shape[1]
+            clash = (rows[rows_out, :fact_words] & self._forbidden[operators_out]).any(axis=1)
+            rows_out, operators_out = rows_out[~clash], operators_out[~clash]
+        order = np.lexsort((operators_out, rows_out))
+        return rows_out[order], operators_out[order]

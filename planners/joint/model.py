@@ -1,0 +1,148 @@
+"""Robots' subactions -> the joint model: states, joint actions, their results.
+
+A joint step gives every robot one label: 0 is idling, ``k`` the robot's k-th subaction.  The product of the robots'
+subactions is never stored: `JointModel.successors` composes what is applicable, a whole table of states at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planners.grounding import GroundAction, label
+from planners.joint.conditions import Evaluator, Labels
+from planners.joint.matching import Ints
+from planners.joint.states import Rows, StateCodec
+from planners.pddl.lifted import Atom, Formula, StepAtom
+
+Cost = Literal["makespan", "makespan+actions", "makespan+cost"]
+
+#: The text of label 0.
+IDLE = "idle"
+#: A state in which nothing is true, for people; its key is empty.
+NO_FACT = "(no fact holds)"
+
+
+@dataclass(frozen=True, slots=True)
+class FullState:
+    """A goal that is one state: every fluent as in the row (given as a tuple of words, so that it can be hashed)."""
+
+    words: tuple[int, ...]
+
+
+#: What a task asks for: a ground formula, or one full state.
+Goal = Formula | FullState
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """Joint steps out of a table of states, sorted by source and labels.
+
+    ``source`` (k) row numbers of the table; ``labels`` (k, robots); ``result`` (k, words) the states reached;
+    ``cost`` (k) the second component of the cost (0 under ``makespan``).
+    """
+
+    source: Ints
+    labels: Labels
+    result: Rows
+    cost: Ints
+
+    def __len__(self) -> int:
+        return len(self.source)
+
+
+class Stepper(Protocol):
+    """What composes joint steps: `planners.joint.composition` or `planners.joint.joint_actions`."""
+
+    def steps(self, rows: Rows) -> Steps:
+        """All joint steps applicable in the states of a table."""
+
+    def why_not(self, row: Rows, labels: Sequence[int]) -> str:
+        """Why these labels are no joint step in a state, in words."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointModel:
+    """A joint model ``M = (P, A)`` (the paper, section 2) over the robots of one problem.
+
+    ``labels[i]`` are robot i's labels, ``labels[i][0]`` being idle.  ``actions`` are the ground actions it is made
+    of; ``keeps_idle[i]`` says whether robot i may idle without an action of its own.
+    """
+
+    name: str
+    robots: tuple[str, ...]
+    labels: tuple[tuple[str, ...], ...]
+    actions: tuple[GroundAction, ...]
+    keeps_idle: tuple[bool, ...]
+    codec: StateCodec
+    stepper: Stepper
+    evaluator: Evaluator
+    cost: Cost = "makespan"
+    statics: frozenset[Atom] = frozenset()
+    is_joint_action: bool = False
+
+    @property
+    def remembers(self) -> bool:
+        return self.codec.memory is not None
+
+    def successors(self, rows: Rows) -> Steps:
+        """All joint steps from a table of states (see `Steps`)."""
+        if not self.remembers:
+            return self.stepper.steps(rows)
+        base = self.stepper.steps(np.ascontiguousarray(rows[:, : self.codec.fact_words]))
+        last = (base.labels + 1).astype(np.uint64)
+        return Steps(base.source, base.labels, np.hstack((base.result, last)), base.cost)
+
+    def holds(self, goal: Goal, rows: Rows) -> NDArray[np.bool_]:
+        """Which states of a table satisfy a goal.  Remembered actions never count."""
+        if isinstance(goal, FullState):
+            wanted = np.array(goal.words, np.uint64)
+            same: NDArray[np.bool_] = (rows[:, : self.codec.fact_words] == wanted).all(axis=1)
+            return same
+        return self.evaluator.holds(goal, rows, np.arange(len(rows)))
+
+    def state(self, atoms: Iterable[Atom]) -> Rows:
+        """The row of an initial state: the fluents among ``atoms`` (statics are left out)."""
+        names = sorted(show(a) for a in atoms if a not in self.statics)
+        return self.codec.encode(names)
+
+    def why_not(self, row: Rows, labels: Sequence[int]) -> str:
+        """Why these labels are no joint step in a state, in words."""
+        return self.stepper.why_not(row[: self.codec.fact_words], labels)
+
+    def state_text(self, row: Rows) -> str:
+        """A state for people: its key, if it is not empty."""
+        return self.codec.key(row) or NO_FACT
+
+    def texts(self, labels: Sequence[int]) -> tuple[str | None, ...]:
+        """Label numbers as text; None is idling."""
+        return tuple(own[number] if number else None for own, number in zip(self.labels, labels, strict=True))
+
+    def numbers(self, texts: Sequence[str | None]) -> tuple[int, ...] | None:
+        """Text as label numbers, or None if some robot has no such subaction."""
+        numbers = []
+        for own, text in zip(self.labels, texts, strict=True):
+            if text is not None and text not in own:
+                return None
+            numbers.append(0 if text is None else own.index(text))
+        return tuple(numbers)
+
+
+def show(atom: Atom | StepAtom) -> str:
+    """PDDL syntax of a ground atom."""
+    return label(atom.predicate if isinstance(atom, Atom) else atom.action, atom.args)
+
+
+def own_text(text: str, robot: str) -> str:
+    """A subaction's text as the robot says it of itself: ``(pass r1 r2 ball)`` of r1 is ``pass r2 ball``.
+
+    Without the parentheses and the first of its arguments that is the robot's name; a further one is what it acts on.
+    """
+    name, *args = text.strip("()").split()
+    if robot in args:
+        args.remove(robot)
+    return " ".join((name, *args))

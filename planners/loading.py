@@ -1,0 +1,227 @@
+"""Domain and problems -> joint model and planning tasks: the steps of the front end in their order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from planners.errors import BadInput, Place, UsageError
+from planners.grounding import FEWER, GroundAction, ground_actions, ground_goal
+from planners.grounding.networks import apply_network
+from planners.joint.composition import Composition
+from planners.joint.conditions import Evaluator
+from planners.joint.joint_actions import WholeActions
+from planners.joint.model import IDLE, Cost, Goal, JointModel, show
+from planners.joint.states import Rows, StateCodec
+from planners.limits import reaching
+from planners.pddl import read_domain, read_problem
+from planners.pddl.lifted import TRUE, Atom, Domain, Problem, StepAtom
+from planners.pddl.robots import (
+    RobotChoice,
+    Team,
+    find_team,
+    fluent_predicates,
+    natural,
+    static_atoms,
+    without_idle_environment,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ModelOptions:
+    """How the files are to be understood; all of it is recorded in a language file.
+
+    ``idle`` names the robots that may idle without an action of their own; None: found from the model.
+    """
+
+    robots: RobotChoice = field(default_factory=RobotChoice)
+    cost: Cost = "makespan"
+    remember_actions: bool = False
+    idle: tuple[str, ...] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class PlanningTask:
+    """A task ``(I, G)`` of a joint model: an initial row and a goal; ``place`` is the file that it is from."""
+
+    name: str
+    init: Rows
+    goal: Goal
+    place: Place | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Loaded:
+    """A joint model with the files and options it was made from and one task per problem."""
+
+    domain: Domain
+    problems: tuple[Problem, ...]
+    model: JointModel
+    tasks: tuple[PlanningTask, ...]
+    options: ModelOptions
+    team: Team
+
+
+def load(domain: str | Path, problems: Sequence[str | Path], options: ModelOptions | None = None) -> Loaded:
+    """Read PDDL files and build their joint model.
+
+    Raises `BadInput`, `Unsupported` or `UsageError` with place and remedy.
+    """
+    lifted = read_domain(domain)
+    return build(lifted, [read_problem(p, lifted) for p in problems], options)
+
+
+def build(
+    domain: Domain,
+    problems: Sequence[Problem],
+    options: ModelOptions | None = None,
+    inits: Sequence[frozenset[Atom]] = (),
+) -> Loaded:
+    """The joint model of problems over the same objects and statics.
+
+    ``inits`` are the fluents of further initial states (of a task file): what can be true, and whether idling is
+    dropped, depends on where tasks start.
+    """
+    options = options or ModelOptions()
+    if options.remember_actions and "last" in domain.predicates:
+        raise UsageError(
+            "--remember-actions writes facts (last ROBOT ACTION), but this domain has a predicate 'last'",
+            remedy="Rename the predicate.",
+        )
+    first = problems[0]
+    for other in problems[1:]:
+        _check_same_world(domain, first, other)
+    team = find_team(domain, first, options.robots)
+    starts = [*(problem.init for problem in problems), *inits]
+    extra = {atom for start in starts for atom in start}
+    actions = ground_actions(domain, first, team, also=extra, costs=options.cost == "makespan+cost")
+    with reaching(lambda: f"comparing {len(actions):,} ground actions of {len(team.robots)} robots", FEWER):
+        actions = apply_network(domain, first, actions)
+        team = without_idle_environment(team, (i for action in actions for i in action.owners))
+        model = _joint_model(domain, problems, team, actions, starts, options)
+    tasks = tuple(task_of(model, domain, problem) for problem in problems)
+    return Loaded(domain, tuple(problems), model, tasks, options, team)
+
+
+def task_of(model: JointModel, domain: Domain, problem: Problem) -> PlanningTask:
+    """The planning task of a problem."""
+    goal = ground_goal(domain, problem, problem.goal)
+    return PlanningTask(problem.name, model.state(problem.init), goal, Place(problem.source.name))
+
+
+def _check_same_world(domain: Domain, first: Problem, other: Problem) -> None:
+    remedy = f"Compared with {first.source.name}: the problems of one model have the same objects and statics."
+    objects, init = other.source.section(":objects"), other.source.section(":init")
+    if first.objects != other.objects:
+        odd = sorted({*first.objects.items()} ^ {*other.objects.items()})[0][0]
+        raise BadInput(f"object {odd!r} is not the same in all problems", place=objects, remedy=remedy)
+    changed = static_atoms(domain, first) ^ static_atoms(domain, other)
+    if changed:
+        odd = min(show(atom) for atom in changed)
+        raise BadInput(f"static fact {odd} is not the same in all problems", place=init, remedy=remedy)
+    if first.values != other.values:
+        raise BadInput("function values differ between the problems", place=init, remedy=remedy)
+
+
+def _joint_model(
+    domain: Domain,
+    problems: Sequence[Problem],
+    team: Team,
+    actions: tuple[GroundAction, ...],
+    starts: Sequence[frozenset[Atom]],
+    options: ModelOptions,
+) -> JointModel:
+    fluents = fluent_predicates(domain)
+    possible = {atom for start in starts for atom in start if atom.predicate in fluents}
+    possible |= {e.atom for action in actions for e in action.effects if e.adds}
+    by_text = {show(atom): atom for atom in possible}
+    texts = tuple(sorted(by_text))
+    robots = team.robots
+    subactions = [[a for a in actions if i in a.owners] for i in range(len(robots))]
+    labels: tuple[tuple[str, ...], ...]
+    if domain.is_joint_action:
+        parts = [{a.parts[i] for a in actions} for i in range(len(robots))]
+        labels = tuple((IDLE, *sorted((p for p in own if p), key=_natural_label)) for own in parts)
+    else:
+        labels = tuple((IDLE, *(a.label for a in own)) for own in subactions)
+    memory = labels if options.remember_actions else None
+    codec = StateCodec(texts, robots, memory)
+    evaluator = Evaluator(
+        {by_text[text]: n for n, text in enumerate(texts)},
+        {} if domain.is_joint_action else {
+            StepAtom(a.schema, a.args): (i, n + 1)
+            for i, own in reversed([*enumerate(subactions)])
+            for n, a in enumerate(own)
+        },
+    )  # fmt: skip
+    keeps_idle = tuple(
+        robots[i] in options.idle
+        if options.idle is not None
+        else domain.is_joint_action or not _always_has_nothing_to_do(i, own, actions, starts)
+        for i, own in enumerate(subactions)
+    )
+    stepper: Composition | WholeActions
+    if domain.is_joint_action:
+        places = {schema.name: domain.source.place(schema.offset) for schema in domain.schemas}
+        stepper = WholeActions(codec, evaluator, robots, labels, actions, options.cost, places)
+    else:
+        stepper = Composition(codec, evaluator, robots, subactions, keeps_idle, options.cost)
+    return JointModel(
+        name=domain.name,
+        robots=robots,
+        labels=labels,
+        actions=actions,
+        keeps_idle=keeps_idle,
+        codec=codec,
+        stepper=stepper,
+        evaluator=evaluator,
+        cost=options.cost,
+        statics=static_atoms(domain, problems[0]),
+        is_joint_action=domain.is_joint_action,
+    )
+
+
+def _always_has_nothing_to_do(
+    robot: int,
+    subactions: Sequence[GroundAction],
+    actions: Sequence[GroundAction],
+    inits: Sequence[frozenset[Atom]],
+) -> bool:
+    """Whether a do-nothing schema of the robot's own is as good as idling: always possible, and named in no formula.
+
+    Proved for a precondition that is true, or for instances with one positive literal each of which at least one is
+    true at the start, which no action makes false without making another one true, and which no other robot's action
+    makes false at all (it would interfere with the schema, and not with idling).
+    """
+    by_schema: dict[str, list[GroundAction]] = {}
+    for action in subactions:
+        if action.does_nothing and action.owners == (robot,):
+            by_schema.setdefault(action.schema, []).append(action)
+    return any(_one_always_holds(robot, own, actions, inits) for own in by_schema.values())
+
+
+def _one_always_holds(
+    robot: int,
+    candidates: Sequence[GroundAction],
+    actions: Sequence[GroundAction],
+    inits: Sequence[frozenset[Atom]],
+) -> bool:
+    if any(c.precondition == TRUE for c in candidates):
+        return True
+    group = {c.precondition for c in candidates if isinstance(c.precondition, Atom)}
+    if not all(any(atom in group for atom in init) for init in inits):
+        return False
+    for action in actions:
+        added = {e.atom for e in action.effects if e.adds and e.condition == TRUE}
+        deleted = {e.atom for e in action.effects if not e.adds} - added
+        if deleted & group and (not added & group or robot not in action.owners):
+            return False
+    return True
+
+
+def _natural_label(text: str) -> tuple[object, ...]:
+    return tuple(natural(word) for word in text.strip("()").split())
+
+
+__all__ = ["Loaded", "ModelOptions", "PlanningTask", "build", "load", "task_of"]

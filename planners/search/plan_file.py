@@ -1,0 +1,176 @@
+"""Plan files: IPC text and JSON, written and read (docs/formats.md)."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from planners.errors import BadInput, Place
+from planners.joint.joint_actions import WholeActions
+from planners.joint.model import JointModel
+from planners.search.plans import Plan, Plans
+
+#: Each robot's subaction, None for idling.
+Texts = tuple[str | None, ...]
+
+#: Larger counts are written as strings: not every JSON reader has big integers.
+_EXACT = 2**53
+#: A step number above this one is a mistake, not a plan with so many steps in which all robots idle.
+_MOST_STEPS = 1_000_000
+
+
+def json_count(number: int) -> int | str:
+    """A count as it stands in JSON: a string above 2^53."""
+    return number if number <= _EXACT else str(number)
+
+
+class NoSuchAction(BadInput):
+    """A plan names an action that the problem does not have; ``step`` is where, from 0."""
+
+    def __init__(self, action: str, step: int, place: Place) -> None:
+        super().__init__(f"{action} is no action of this problem", place=place)
+        self.step = step
+
+
+#: The comments with which a plan of `coordlang plans`, or of another planner, begins and ends.
+_BEGIN = re.compile(r"\s*;\s*(?:sampled )?plan \d+\b", re.IGNORECASE)
+_END = re.compile(r"\s*;\s*(?:makespan|cost) = \d", re.IGNORECASE)
+_LINE = re.compile(r"(?:(?P<step>\d+)\s*:)?\s*(?P<action>\([^()]*\))\s*(?:\[\s*[\d.]+\s*\])?$")
+
+
+def texts(model: JointModel, plan: Plan) -> tuple[Texts, ...]:
+    """A plan's label numbers as text."""
+    return tuple(model.texts(step) for step in plan)
+
+
+def to_ipc(plans: Plans, plan: Plan) -> str:
+    """An IPC plan file.
+
+    Joint-action PDDL: one ``(action args)`` a line.  Otherwise one subaction a line with its step,
+    ``0: (move r1 a b)``, idling left out, a shared subaction once.  Then ``; makespan = 3``.
+    """
+    model = plans.space.model
+    lines: list[str] = []
+    if isinstance(model.stepper, WholeActions):
+        states = plans.states(plan)
+        lines += [
+            model.stepper.name(plans.space.rows[state][: model.codec.fact_words], labels)
+            for state, labels in zip(states, plan, strict=False)
+        ]
+    else:
+        for number, step in enumerate(texts(model, plan)):
+            lines += [f"{number}: {text}" for text in dict.fromkeys(step) if text is not None]
+    return "\n".join([*lines, f"; makespan = {len(plan)}"]) + "\n"
+
+
+def to_json(plans: Plans, listed: Sequence[Plan], task: int = 0) -> dict[str, Any]:
+    """The data of a JSON plan file: the listed plans, the exact number of all, the optimal cost."""
+    model = plans.space.model
+    makespan, second = plans.space.cost_of(task)
+    data: dict[str, Any] = {
+        "plans": [{"cost": len(plan), "actions": [list(step) for step in texts(model, plan)]} for plan in listed],
+        "count": json_count(plans.count),
+        "complete": len(listed) == plans.count,
+        "optimal_cost": makespan,
+        "robots": list(model.robots),
+    }
+    if model.cost != "makespan":
+        data["optimal_second_cost"] = second
+    return data
+
+
+def read_plans(path: str | Path, model: JointModel) -> list[tuple[Texts, ...]]:
+    """The plans of a plan file, JSON or IPC text.  Raises `BadInput` with the line."""
+    place = Place(str(path))
+    try:
+        text = sys.stdin.read() if str(path) == "-" else Path(path).read_text()
+    except OSError as error:
+        raise BadInput(f"cannot be read: {error.strerror}", place=place) from None
+    except UnicodeDecodeError as error:
+        raise BadInput(f"this is no text: {error}", place=place) from None
+    if text.lstrip().startswith("{"):
+        return _from_json(text, model, place)
+    return [_from_ipc(text, model, str(path))]
+
+
+def only_one_plan(text: str, place: Place) -> None:
+    """Raise `BadInput`, with the line, where a second plan begins in IPC text.
+
+    It begins with its comment, after the closing comment of the plan before it, or with step numbers that start again.
+    """
+    first = last = -1  # step numbers
+    begun = ended = actions = False
+    for number, raw in enumerate(text.splitlines(), 1):
+        line, _, _ = raw.partition(";")
+        step = re.match(r"\s*(\d{1,8})(?:\.\d+)?\s*:", line)
+        now = int(step[1]) if step else last
+        title = bool(_BEGIN.match(raw))
+        again = bool(line.strip()) and (ended or now == first < last)
+        if again or (title and (begun or actions)):
+            raise BadInput(
+                "this file holds several plans: a second one begins here",
+                place=Place(place.file, number, 1),
+                remedy="Write one plan a file (`coordlang plans --max 1`), or use the JSON form.",
+            )
+        begun, ended = begun or title, ended or (actions and bool(_END.match(raw)))
+        if line.strip():
+            actions, last = True, now
+            first = now if first < 0 else first
+
+
+def _from_json(text: str, model: JointModel, place: Place) -> list[tuple[Texts, ...]]:
+    try:
+        entries = json.loads(text)["plans"]
+        found = [tuple(tuple(step) for step in entry["actions"]) for entry in entries]
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise BadInput(f"this is no JSON plan file: {error}", place=place) from None
+    for plan in found:
+        for number, step in enumerate(plan):
+            if len(step) != len(model.robots) or not all(t is None or isinstance(t, str) for t in step):
+                raise BadInput(
+                    f"step {number} must have one text or null for each of {', '.join(model.robots)}", place=place
+                )
+    return found
+
+
+def _from_ipc(text: str, model: JointModel, name: str) -> tuple[Texts, ...]:
+    only_one_plan(text, Place(name))
+    steps: dict[int, list[str | None]] = {}
+    for number, raw in enumerate(text.splitlines(), 1):
+        line = raw.split(";")[0].strip().lower()
+        if not line:
+            continue
+        match = _LINE.match(line)
+        if match is None:
+            raise BadInput(f"expected '0: (action args)', found {raw.strip()!r}", place=Place(name, number, 1))
+        action = "(" + " ".join(match["action"][1:-1].split()) + ")"
+        step = int(match["step"][-8:]) if match["step"] else len(steps)
+        if match["step"] and (len(match["step"]) > 8 or step > _MOST_STEPS):
+            raise BadInput(f"step {match['step'][:20]} is too many steps", place=Place(name, number, 1))
+        own = steps.setdefault(step, [None] * len(model.robots))
+        _put(own, step, action, model, Place(name, number, 1))
+    last = max(steps, default=-1)
+    return tuple(tuple(steps.get(k, [None] * len(model.robots))) for k in range(last + 1))
+
+
+def _put(own: list[str | None], step: int, action: str, model: JointModel, place: Place) -> None:
+    """Enter an action for the robots that it belongs to."""
+    if model.is_joint_action:
+        parts = next((a.parts for a in model.actions if a.label == action), None)
+        if parts is None:
+            raise NoSuchAction(action, step, place)
+        if any(own):
+            raise BadInput(f"two joint actions in one step: {action} is the second", place=place)
+        own[:] = parts
+        return
+    owners = next((a.owners for a in model.actions if a.label == action), None)
+    if owners is None:
+        raise NoSuchAction(action, step, place)
+    for robot in owners:
+        if own[robot] is not None:
+            raise BadInput(f"{model.robots[robot]} does two things in one step: {own[robot]} and {action}", place=place)
+        own[robot] = action

@@ -1,0 +1,132 @@
+"""Optimal plans counted, iterated, ranked and sampled, without listing them."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import accumulate
+from random import Random
+
+import numpy as np
+
+from planners.search.plan_space import PlanSpace
+
+#: A plan: the label numbers of all robots, step by step.
+Plan = tuple[tuple[int, ...], ...]
+
+
+def counts(space: PlanSpace) -> list[int]:
+    """For each node the exact number of optimal plans from it, as big integers.
+
+    Plans are different sequences of joint *actions*; they may pass through the same states.
+    O(edges) additions: in 64 bits as long as they fit, then in Python integers.
+    """
+    values = np.zeros(len(space), np.int64)
+    for number, span in enumerate(space.layers):
+        if number == 0:
+            values[span] = 1
+            continue
+        low, high = int(space.first[span.start]), int(space.first[span.stop])
+        addends = values[space.target[low:high]]
+        if values.dtype != object and addends.astype(np.float64).sum() > 2.0**62:
+            values = values.astype(object)
+            addends = addends.astype(object)
+        values[span] = np.add.reduceat(addends, space.first[span] - low)
+    return [int(v) for v in values]
+
+
+@dataclass(frozen=True, slots=True)
+class Plans:
+    """The optimal plans of one task as a sequence in a stable order: lexicographic by label numbers.
+
+    ``space`` holds the task's plans as paths from node ``start``; ``counted`` is `counts` of it.
+    """
+
+    space: PlanSpace
+    start: int
+    counted: list[int]
+
+    @classmethod
+    def of(cls, space: PlanSpace, task: int = 0) -> Plans:
+        return cls(space, int(space.starts[task]), counts(space))
+
+    @property
+    def count(self) -> int:
+        return self.counted[self.start]
+
+    def __iter__(self) -> Iterator[Plan]:
+        """All plans, lazily: memory is one plan."""
+        plan: list[tuple[int, ...]] = []
+        # One iterator of edges for each step of the current plan.
+        open_edges = [iter(self._edges(self.start))]
+        if self.space.layer[self.start] == 0:
+            yield ()
+            return
+        while open_edges:
+            edge = next(open_edges[-1], None)
+            if edge is None:
+                open_edges.pop()
+                if plan:
+                    plan.pop()
+                continue
+            plan.append(self._labels(edge))
+            target = int(self.space.target[edge])
+            if self.space.layer[target] == 0:
+                yield tuple(plan)
+                plan.pop()
+            else:
+                open_edges.append(iter(self._edges(target)))
+
+    def unrank(self, rank: int) -> Plan:
+        """The plan at a position of the order; raises `IndexError` outside ``0 .. count - 1``."""
+        if not 0 <= rank < self.count:
+            raise IndexError(f"there are {self.count} plans, no plan number {rank}")
+        plan = []
+        node = self.start
+        while self.space.layer[node] > 0:
+            edges = self._edges(node)
+            sums = list(accumulate((self.counted[self.space.target[e]] for e in edges), initial=0))
+            position = bisect_right(sums, rank) - 1
+            rank -= sums[position]
+            plan.append(self._labels(edges[position]))
+            node = int(self.space.target[edges[position]])
+        return tuple(plan)
+
+    def rank(self, plan: Plan) -> int | None:
+        """The position of a plan, or None if it is not an optimal plan of the task."""
+        if len(plan) != self.space.layer[self.start]:
+            return None
+        rank, node = 0, self.start
+        for step in plan:
+            for edge in self._edges(node):
+                target = int(self.space.target[edge])
+                if self._labels(edge) == tuple(step):
+                    break
+                rank += self.counted[target]
+            else:
+                return None
+            node = target
+        return rank
+
+    def sample(self, number: int, seed: int) -> Iterator[Plan]:
+        """Plans drawn uniformly and independently; the same seed draws the same plans."""
+        random = Random(seed)
+        for _ in range(number):
+            yield self.unrank(random.randrange(self.count))
+
+    def states(self, plan: Plan) -> list[int]:
+        """The state numbers (in ``space.rows``) that a plan passes through, first to last."""
+        node = self.start
+        states = [int(self.space.state[node])]
+        for step in plan:
+            edge = next(e for e in self._edges(node) if self._labels(e) == tuple(step))
+            node = int(self.space.target[edge])
+            states.append(int(self.space.state[node]))
+        return states
+
+    def _edges(self, node: int) -> range:
+        return range(int(self.space.first[node]), int(self.space.first[node + 1]))
+
+    def _labels(self, edge: int) -> tuple[int, ...]:
+        return tuple(int(label) for label in self.space.labels[edge])

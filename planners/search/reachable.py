@@ -1,0 +1,120 @@
+"""The reachable joint states as numpy arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from planners.joint.conditions import Labels
+from planners.joint.matching import Ints
+from planners.joint.model import JointModel, Steps
+from planners.joint.states import Rows, find_rows, unique_rows
+from planners.limits import reaching
+
+#: States expanded at a time, and the joint steps that this should give: they bound the memory of one expansion.
+_BLOCK = 20_000
+_STEPS = 4_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Space:
+    """All states reachable from some initial states, with every joint step between them.
+
+    ``rows`` (states, words) are sorted; a state's *number* is its position there.  ``first`` (states + 1) delimits
+    the steps out of a state in ``target``, ``labels`` (steps, robots) and ``cost``, sorted by labels (CSR).
+    """
+
+    model: JointModel
+    rows: Rows
+    first: Ints
+    target: Ints
+    labels: Labels
+    cost: Ints
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def numbers(self, rows: Rows) -> Ints:
+        """The numbers of states given as rows, -1 for those that are not reachable."""
+        return find_rows(self.rows, rows)
+
+
+def blocks(model: JointModel, rows: Rows) -> Iterator[tuple[int, Steps]]:
+    """`JointModel.successors` of a long table in pieces: (number of the piece's first row, its steps).
+
+    The first piece is short; how many steps its states have says how long the next ones may be.
+    """
+    start, size = 0, min(_BLOCK, 500)
+    while start < len(rows):
+        steps = model.successors(rows[start : start + size])
+        yield start, steps
+        start += size
+        size = max(1, min(_BLOCK, int(_STEPS * size / max(1, len(steps)))))
+
+
+def explore(model: JointModel, inits: Rows) -> Space:
+    """Breadth-first search from all ``inits`` (a table of rows) to the end.
+
+    Time and memory are linear in the number of joint steps.
+    """
+    layer, _ = unique_rows(inits)
+    seen = layer
+    sources: list[Rows] = []
+    found: list[Steps] = []
+    depth = 0
+
+    def so_far() -> str:
+        return (
+            f"{len(seen):,} states within {depth} steps of the initial states, {sum(map(len, found)):,} joint steps; "
+            f"{len(layer):,} states are new in the last step"
+        )
+
+    with reaching(so_far, "fewer objects or robots"):
+        while len(layer):
+            fresh: list[Rows] = []
+            for start, steps in blocks(model, layer):
+                sources.append(layer[start:])
+                found.append(steps)
+                fresh.append(unique_rows(steps.result)[0])
+            new, _ = unique_rows(np.concatenate(fresh))
+            layer = new[find_rows(seen, new) < 0]
+            seen, _ = unique_rows(np.concatenate((seen, layer)))
+            depth += 1
+        return _joined(model, seen, sources, found)
+
+
+def count(model: JointModel, inits: Rows) -> tuple[int, int]:
+    """How many states `explore` finds, and how many joint steps between them, in the memory that the states take."""
+    layer, _ = unique_rows(inits)
+    seen = layer
+    steps_counted = depth = 0
+
+    def so_far() -> str:
+        return f"{len(seen):,} states within {depth} steps of the initial states, {steps_counted:,} joint steps"
+
+    with reaching(so_far, "fewer objects or robots"):
+        while len(layer):
+            fresh = seen[:0]
+            for _, steps in blocks(model, layer):
+                steps_counted += len(steps)
+                new, _ = unique_rows(steps.result)
+                fresh, _ = unique_rows(np.concatenate((fresh, new[find_rows(seen, new) < 0])))
+            layer = fresh
+            seen, _ = unique_rows(np.concatenate((seen, layer)))
+            depth += 1
+    return len(seen), steps_counted
+
+
+def _joined(model: JointModel, seen: Rows, sources: list[Rows], found: list[Steps]) -> Space:
+    source = np.concatenate([find_rows(seen, rows)[steps.source] for rows, steps in zip(sources, found, strict=True)])
+    order = np.argsort(source, kind="stable")
+    return Space(
+        model=model,
+        rows=seen,
+        first=np.searchsorted(source[order], np.arange(len(seen) + 1)),
+        target=np.concatenate([find_rows(seen, s.result) for s in found])[order],
+        labels=np.concatenate([s.labels for s in found])[order],
+        cost=np.concatenate([s.cost for s in found])[order],
+    )

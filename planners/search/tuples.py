@@ -1,0 +1,75 @@
+"""Tables of node tuples: duplicates out, members found.  The inner loop of the composition walks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planners.joint.matching import Ints
+from planners.joint.states import unique_rows
+from planners.search.plan_space import PlanSpace
+
+#: Values a coded tuple may have.
+_MOST = 2**63 - 1
+
+
+def unique_tuples(table: Ints, bounds: list[int]) -> tuple[Ints, Ints]:
+    """The different rows of ``table``, sorted, and each row's number among them.
+
+    ``bounds[k]`` is one more than the largest value of column k; values start at 0.  Columns are packed into as few
+    64-bit codes as they fit, so that most tables sort as plain numbers.
+    """
+    codes: list[Ints] = []
+    code = np.zeros(len(table), np.int64)
+    size = 1
+    for column, bound in enumerate(bounds):
+        if size * bound > _MOST:
+            codes.append(code)
+            code, size = np.zeros(len(table), np.int64), 1
+        code = code * bound + table[:, column]
+        size *= bound
+    codes.append(code)
+    if len(codes) == 1:
+        _, position, inverse = np.unique(code, return_index=True, return_inverse=True)
+        return table[position], inverse.reshape(-1)
+    _, inverse = unique_rows(np.stack(codes, axis=1).astype(np.uint64))
+    position = np.zeros(int(inverse.max(initial=-1)) + 1, np.int64)
+    position[inverse] = np.arange(len(table))
+    return table[position], inverse
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeIndex:
+    """Finds the edge of a node with given labels, robot by robot (a tree over label tuples, without overflow).
+
+    ``keys[i]`` are sorted codes (prefix, label of robot i); a prefix is first the node, then the number of the
+    code one robot earlier; the last number is the edge itself.
+    """
+
+    radix: tuple[int, ...]
+    keys: tuple[Ints, ...]
+
+    @classmethod
+    def of(cls, space: PlanSpace) -> EdgeIndex:
+        prefix = space.sources
+        radix, keys = [], []
+        for robot in range(space.labels.shape[1]):
+            size = int(space.labels[:, robot].max(initial=0)) + 1
+            code = prefix * size + space.labels[:, robot]
+            fresh = np.ones(len(code), np.bool_)
+            fresh[1:] = code[1:] != code[:-1]
+            radix.append(size)
+            keys.append(code[fresh])
+            prefix = np.cumsum(fresh) - 1
+        return cls(tuple(radix), tuple(keys))
+
+    def follow(self, robot: int, prefix: Ints, label: NDArray[np.int32]) -> Ints:
+        """The prefixes one robot further; -1 where there is none (and where ``prefix`` is -1)."""
+        keys, size = self.keys[robot], self.radix[robot]
+        if len(keys) == 0:
+            return np.full(len(prefix), -1, np.int64)
+        wanted = np.where((prefix >= 0) & (label < size), prefix * size + label, -1)
+        found = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        return np.where(keys[found] == wanted, found, -1)
