@@ -1,4 +1,5 @@
-"""Every robot's choices for every sentence of every task of GWB7: how large they are, and how long they take.
+"""Every robot's choices for every sentence of every task of GWB7: how large they are, and how long
+they take.
 
     python benchmarks/choices.py [NAME]
 
@@ -47,8 +48,12 @@ def main(name: str = "gwb7-3x5") -> None:
             states += [len(own.automaton) for own in found.robots]
             subplans += [own.automaton.count for own in found.robots]
     free = sum(count > 1 for count in subplans)
-    print(f"{candidates.count:,} tasks, {sentences:,} sentences of {len(language.words)} words: every combination optimal")
-    print(f"{len(states):,} automata, {free:,} of them with more than one subplan (at most {max(subplans):,})")
+    print(
+        f"{candidates.count:,} tasks, {sentences:,} sentences of {len(language.words)} words: every combination optimal"
+    )
+    print(
+        f"{len(states):,} automata, {free:,} of them with more than one subplan (at most {max(subplans):,})"
+    )
     print(f"states: {sum(states):,}, {sum(states) / len(states):.1f} each, at most {max(states)}")
     print(f"{walked:,} nodes of combinations walked; choices files: {size / 1e6:.1f} MB")
     print(f"{seconds:.1f} s of CPU, {1000 * seconds / sentences:.2f} ms a sentence")

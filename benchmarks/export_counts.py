@@ -1,11 +1,14 @@
-"""How many plans fit a sentence: by our graph, by listing all optimal plans, and by other planners on the exported PDDL.
+"""How many plans fit a sentence: by our graph, by listing all optimal plans, and by other planners
+on the exported PDDL.
 
-    python benchmarks/export_counts.py [FOLDER ..] [--time-limit SECONDS] [--language greedy|minimal]
+    python benchmarks/export_counts.py [FOLDER ..] [--time-limit SECONDS] [--language
+    greedy|minimal]
 
-For every problem in `domains/` a language is built, and of its sentences the one that leaves most plans open and the one
-that leaves fewest are exported, in both forms.  Columns: all optimal plans of the task; those that fit by the graph, by
-listing (each optimal plan's sentence by definition); optimal plans of the export by K* and by SymK, every one distinct;
-and the optimal cost by Fast Downward, through unified-planning.  ``-``: too many to list, or no answer in the time limit.
+For every problem in `domains/` a language is built, and of its sentences the one that leaves most
+plans open and the one that leaves fewest are exported, in both forms.  Columns: all optimal plans
+of the task; those that fit by the graph, by listing (each optimal plan's sentence by definition);
+optimal plans of the export by K* and by SymK, every one distinct; and the optimal cost by Fast
+Downward, through unified-planning.  ``-``: too many to list, or no answer in the time limit.
 
 K* and SymK come with ``pip install '.[oracles]'``.  Exit code 1 if two numbers differ.
 """
@@ -64,7 +67,9 @@ class Row:
         return len(counts) == 1 and self.fast_downward in (None, self.cost)
 
 
-def rows(folders: list[str], seconds: float, method: str = "greedy", *, other: bool = True) -> Iterator[Row]:
+def rows(
+    folders: list[str], seconds: float, method: str = "greedy", *, other: bool = True
+) -> Iterator[Row]:
     """The rows of every problem in these folders (all without any)."""
     for path in sorted(DOMAINS.glob("*/*.pddl")):
         if path.name == "domain.pddl" or (folders and path.parent.name not in folders):
@@ -75,7 +80,9 @@ def rows(folders: list[str], seconds: float, method: str = "greedy", *, other: b
             print(f"{path.parent.name}/{path.stem}: {str(error).splitlines()[0]}", file=sys.stderr)
 
 
-def problem_rows(path: Path, seconds: float, method: str = "greedy", *, other: bool = True) -> Iterator[Row]:
+def problem_rows(
+    path: Path, seconds: float, method: str = "greedy", *, other: bool = True
+) -> Iterator[Row]:
     """Two sentences of a problem in both forms."""
     domain = read_domain(path.parent / "domain.pddl")
     problem = read_problem(path, domain)
@@ -91,12 +98,16 @@ def problem_rows(path: Path, seconds: float, method: str = "greedy", *, other: b
         for limit in (2000, 0):
             exported = export_pddl(spoken, words, limit)
             if exported.plain.form != last:
-                yield row(f"{path.parent.name}/{path.stem}", spoken, words, exported, seconds, other=other)
+                yield row(
+                    f"{path.parent.name}/{path.stem}", spoken, words, exported, seconds, other=other
+                )
             last = exported.plain.form
 
 
 def two_sentences(spoken: Spoken) -> list[tuple[int, ...]]:
-    """The sentence of most and that of fewest plans; of the first and the last plan where there are too many to compare."""
+    """The sentence of most and that of fewest plans; of the first and the last plan where there are
+    too many to compare.
+    """
     try:
         listed = task_sentences(spoken.space, spoken.task, spoken.table)
         found = [spoken.words_of(s.words) for s in (listed[0], listed[-1])]
@@ -108,7 +119,15 @@ def two_sentences(spoken: Spoken) -> list[tuple[int, ...]]:
     return list(dict.fromkeys(found))
 
 
-def row(name: str, spoken: Spoken, words: tuple[int, ...], exported: Exported, seconds: float, *, other: bool) -> Row:
+def row(
+    name: str,
+    spoken: Spoken,
+    words: tuple[int, ...],
+    exported: Exported,
+    seconds: float,
+    *,
+    other: bool,
+) -> Row:
     """All answers for one exported problem."""
     plans = Plans.of(spoken.space, spoken.task)
     fits = Plans.of(fitting(spoken, words)).count
@@ -123,13 +142,24 @@ def row(name: str, spoken: Spoken, words: tuple[int, ...], exported: Exported, s
                 found["symk"] = by_symk(folder, exported, seconds)
             found["fast_downward"] = by_fast_downward(exported, seconds)
     return Row(
-        name, spoken.text(words), exported.plain.form, len(exported.plain.actions), plans.count, fits,
-        by_listing(spoken, plans, words), found["kstar"], found["symk"], exported.cost, found["fast_downward"],
-    )  # fmt: skip
+        name,
+        spoken.text(words),
+        exported.plain.form,
+        len(exported.plain.actions),
+        plans.count,
+        fits,
+        by_listing(spoken, plans, words),
+        found["kstar"],
+        found["symk"],
+        exported.cost,
+        found["fast_downward"],
+    )
 
 
 def by_listing(spoken: Spoken, plans: Plans, words: tuple[int, ...]) -> int | None:
-    """The definition: of all optimal plans those whose states' words, repeated ones collapsed, are the sentence."""
+    """The definition: of all optimal plans those whose states' words, repeated ones collapsed, are
+    the sentence.
+    """
     if plans.count > 40 * MOST:
         return None
     word = spoken.table.of_rows(plans.space.rows).tolist()
@@ -154,7 +184,9 @@ def by_kstar(folder: Path, exported: Exported, seconds: float) -> int | None:
         return None
     if answer["timeout_triggered"] or "search exit code: 0" not in answer["planner_output"]:
         return None
-    found = [exported.joint_plan([name.strip() for name in plan["actions"]]) for plan in answer["plans"]]
+    found = [
+        exported.joint_plan([name.strip() for name in plan["actions"]]) for plan in answer["plans"]
+    ]
     assert all(plan["cost"] == exported.cost for plan in answer["plans"])
     return _distinct(found)
 
@@ -167,14 +199,22 @@ def by_symk(folder: Path, exported: Exported, seconds: float) -> int | None:
         return None
     from coordlang.use.export.pddl import plan_names
 
-    search = (
-        "symq_bd(simple=false,plan_selection=top_k(num_plans=infinity,dump_plans=false),bound=infinity,quality=1.0)"
-    )
-    command = [sys.executable, get_resource_path(), "--plan-file", "plan", "--overall-time-limit", f"{int(seconds)}s"]
+    search = "symq_bd(simple=false,plan_selection=top_k(num_plans=infinity,dump_plans=false),bound=infinity,quality=1.0)"
+    command = [
+        sys.executable,
+        get_resource_path(),
+        "--plan-file",
+        "plan",
+        "--overall-time-limit",
+        f"{int(seconds)}s",
+    ]
     done = subprocess.run(
         [*command, "domain.pddl", "problem.pddl", *TRANSLATE, "--search", search],
-        cwd=folder, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     if done.returncode != 0:
         return None
     texts = [path.read_text() for path in folder.glob("plan*")]
@@ -200,18 +240,43 @@ def _distinct(plans: list[tuple[tuple[int, ...], ...]]) -> int:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folders", nargs="*")
-    parser.add_argument("--time-limit", type=float, default=60.0, help="seconds for each planner and problem")
+    parser.add_argument(
+        "--time-limit", type=float, default=60.0, help="seconds for each planner and problem"
+    )
     parser.add_argument("--language", choices=["greedy", "minimal"], default="greedy")
     arguments = parser.parse_args()
-    header = ("problem", "form", "actions", "words", "plans", "graph", "listing", "K*", "SymK", "cost", "FD", "")
+    header = (
+        "problem",
+        "form",
+        "actions",
+        "words",
+        "plans",
+        "graph",
+        "listing",
+        "K*",
+        "SymK",
+        "cost",
+        "FD",
+        "",
+    )
     widths = (24, 8, 7, 5, 15, 9, 9, 7, 7, 4, 4, 1)
     print("  ".join(f"{h:>{w}}" for h, w in zip(header, widths, strict=True)))
     wrong = total = 0
     for found in rows(arguments.folders, arguments.time_limit, arguments.language):
         cells = (
-            found.problem, found.form.split("-")[0], found.actions, len(found.sentence.split()), found.plans, found.graph,
-            found.listing, found.kstar, found.symk, found.cost, found.fast_downward, "" if found.agrees else "!",
-        )  # fmt: skip
+            found.problem,
+            found.form.split("-")[0],
+            found.actions,
+            len(found.sentence.split()),
+            found.plans,
+            found.graph,
+            found.listing,
+            found.kstar,
+            found.symk,
+            found.cost,
+            found.fast_downward,
+            "" if found.agrees else "!",
+        )
         texts = ("-" if c is None else f"{c:,}" if isinstance(c, int) else c for c in cells)
         print("  ".join(f"{t:>{w}}" for t, w in zip(texts, widths, strict=True)), flush=True)
         total += 1

@@ -1,14 +1,16 @@
-"""Plans that a sentence leaves open, and words saved: GWB5 and GWB7 by method, beside the paper's figures.
+"""Plans that a sentence leaves open, and words saved: GWB5 and GWB7 by method, beside the paper's
+figures.
 
     python benchmarks/flexible.py [ROW ..] [--time-limit SECONDS]
 
-One line for each language: words, the average over the tasks of the plans left open (for a plan drawn uniformly, and for the
-first plan in our order), the bound that no language exceeds, tasks in which the first plan's sentence leaves more than
-one plan open and their average, communication saving (all plans in expectation; first plans; first plans with a sentence
-shorter than the plan), seconds.  "+ overlap" enlarges the words of the language above it.
+One line for each language: words, the average over the tasks of the plans left open (for a plan
+drawn uniformly, and for the first plan in our order), the bound that no language exceeds, tasks in
+which the first plan's sentence leaves more than one plan open and their average, communication
+saving (all plans in expectation; first plans; first plans with a sentence shorter than the plan),
+seconds.  "+ overlap" enlarges the words of the language above it.
 
-The paper gives for its own language of GWB7: 4 words, 12.1 plans a task (14.7 over 774 tasks), saving 27.3 % (33.3 %
-over 784 plans).
+The paper gives for its own language of GWB7: 4 words, 12.1 plans a task (14.7 over 774 tasks),
+saving 27.3 % (33.3 % over 784 plans).
 """
 
 from __future__ import annotations
@@ -38,8 +40,20 @@ LANGUAGES: tuple[tuple[str, str, Literal["flexible"] | None, bool], ...] = (
     ("minimal, flexible", "minimal", "flexible", False),
     ("flexible + overlap", "minimal", "flexible", True),
 )
-COLUMNS = (("row", 5), ("language", 18), ("words", 5), ("open", 6), ("first", 6), ("bound", 6), ("tasks > 1", 9),
-           ("their", 6), ("saving", 7), ("first", 7), ("shorter", 14), ("s", 6))  # fmt: skip
+COLUMNS = (
+    ("row", 5),
+    ("language", 18),
+    ("words", 5),
+    ("open", 6),
+    ("first", 6),
+    ("bound", 6),
+    ("tasks > 1", 9),
+    ("their", 6),
+    ("saving", 7),
+    ("first", 7),
+    ("shorter", 14),
+    ("s", 6),
+)
 
 
 def line(cells: tuple[str, ...]) -> str:
@@ -49,7 +63,9 @@ def line(cells: tuple[str, ...]) -> str:
 def measures(candidates: Candidates, built: Built) -> tuple[str, ...]:
     """The columns from "open" to "shorter", without the bound."""
     table = WordTable.of(built.language, candidates.model)
-    found = flexibility(candidates.spaces, [table.of_rows(space.rows)[space.state] for space in candidates.spaces])
+    found = flexibility(
+        candidates.spaces, [table.of_rows(space.rows)[space.state] for space in candidates.spaces]
+    )
     several = found.first > 1.5
     shorter = found.first_saving > 1e-9
     return (
@@ -59,14 +75,18 @@ def measures(candidates: Candidates, built: Built) -> tuple[str, ...]:
         f"{found.first[several].mean():.1f}" if several.any() else "",
         f"{100 * found.saving.mean():.1f} %",
         f"{100 * found.first_saving.mean():.1f} %",
-        f"{100 * found.first_saving[shorter].mean():.1f} % of {shorter.sum():,}" if shorter.any() else "",
+        f"{100 * found.first_saving[shorter].mean():.1f} % of {shorter.sum():,}"
+        if shorter.any()
+        else "",
     )
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("rows", nargs="*", default=["GWB5", "GWB7"])
-    parser.add_argument("--time-limit", type=float, default=120, help="seconds for each language (default: 120)")
+    parser.add_argument(
+        "--time-limit", type=float, default=120, help="seconds for each language (default: 120)"
+    )
     arguments = parser.parse_args()
     print(line(tuple(name for name, _ in COLUMNS)))
     for row in ROWS:
@@ -76,7 +96,24 @@ def main() -> int:
         requires = [walk(space).requires for space in candidates.spaces]
         bound = f"{np.mean(flexibility_bounds(candidates.spaces, requires)):.2f}"
         if row.name == "GWB7":
-            print(line((row.name, "the paper's", "4", "", "12.1", "", "774", "14.7", "", "27.3 %", "33.3 % of 784", "")))
+            print(
+                line(
+                    (
+                        row.name,
+                        "the paper's",
+                        "4",
+                        "",
+                        "12.1",
+                        "",
+                        "774",
+                        "14.7",
+                        "",
+                        "27.3 %",
+                        "33.3 % of 784",
+                        "",
+                    )
+                )
+            )
         for label, method, prefer, overlap in LANGUAGES:
             start = perf_counter()
             with time_limit(arguments.time_limit):
@@ -87,7 +124,24 @@ def main() -> int:
             if overlap:  # the other columns are about partitions
                 left = f"{built.figures['overlapping_flexibility']:.2f}"
                 first = several = their = saving = first_saving = shorter = ""
-            print(line((row.name, label, words, left, first, bound, several, their, saving, first_saving, shorter, seconds)))
+            print(
+                line(
+                    (
+                        row.name,
+                        label,
+                        words,
+                        left,
+                        first,
+                        bound,
+                        several,
+                        their,
+                        saving,
+                        first_saving,
+                        shorter,
+                        seconds,
+                    )
+                )
+            )
             sys.stdout.flush()
     return 0
 

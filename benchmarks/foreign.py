@@ -1,11 +1,13 @@
-"""PDDL that others wrote (../shared/data): the reference numbers again, and a language for each domain.
+"""PDDL that others wrote (../shared/data): the reference numbers again, and a language for each
+domain.
 
-    python benchmarks/foreign.py --numbers [--oracles] [ROW ..]   # states, makespan, plans; beside the reference
-    python benchmarks/foreign.py [--time-limit S] [ROW ..]        # languages over varied tasks, and what their words say
-    python benchmarks/foreign.py --refused                        # what is refused, and with which message
+    python benchmarks/foreign.py --numbers [--oracles] [ROW ..]   # states, makespan, plans; beside
+    the reference python benchmarks/foreign.py [--time-limit S] [ROW ..]        # languages over
+    varied tasks, and what their words say python benchmarks/foreign.py --refused
+    # what is refused, and with which message
 
-Every figure is the work of a process of its own, whose seconds (whole process) and peak memory are shown.  With
-``--oracles`` K* counts the plans, too (it has to be installed: the extra ``oracles``).
+Every figure is the work of a process of its own, whose seconds (whole process) and peak memory are
+shown.  With ``--oracles`` K* counts the plans, too (it has to be installed: the extra ``oracles``).
 """
 
 from __future__ import annotations
@@ -54,7 +56,11 @@ def _process(arguments: Sequence[str]) -> Done:
     start = perf_counter()
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         process = subprocess.Popen(
-            [sys.executable, *arguments], stdout=out, stderr=err, stdin=subprocess.DEVNULL, start_new_session=True
+            [sys.executable, *arguments],
+            stdout=out,
+            stderr=err,
+            stdin=subprocess.DEVNULL,
+            start_new_session=True,
         )
         pid = 0
         while pid == 0:
@@ -76,8 +82,14 @@ def _process(arguments: Sequence[str]) -> Done:
 def table(header: Sequence[str], lines: Iterable[Sequence[object]], widths: Sequence[int]) -> None:
     """Print rows as they come."""
     for cells in (header, *lines) if isinstance(lines, list) else _chain(header, lines):
-        texts = [f"{cell:,}" if isinstance(cell, int) and not isinstance(cell, bool) else str(cell) for cell in cells]
-        print("  ".join(f"{text:<{w}}" for text, w in zip(texts, widths, strict=True)).rstrip(), flush=True)
+        texts = [
+            f"{cell:,}" if isinstance(cell, int) and not isinstance(cell, bool) else str(cell)
+            for cell in cells
+        ]
+        print(
+            "  ".join(f"{text:<{w}}" for text, w in zip(texts, widths, strict=True)).rstrip(),
+            flush=True,
+        )
 
 
 def _chain(header: Sequence[str], lines: Iterable[Sequence[object]]) -> Iterable[Sequence[object]]:
@@ -85,7 +97,8 @@ def _chain(header: Sequence[str], lines: Iterable[Sequence[object]]) -> Iterable
     yield from lines
 
 
-# ---- the numbers -----------------------------------------------------------------------------------------------------
+# ---- the numbers
+# -----------------------------------------------------------------------------------------------------
 
 
 def numbers(rows: Sequence[Row], *, oracles: bool) -> int:
@@ -94,7 +107,12 @@ def numbers(rows: Sequence[Row], *, oracles: bool) -> int:
 
     def judged(row: Row, what: str, found: object, expected: object) -> str:
         same = found == expected
-        if row.approximate and what == "plans" and isinstance(found, int) and isinstance(expected, int):
+        if (
+            row.approximate
+            and what == "plans"
+            and isinstance(found, int)
+            and isinstance(expected, int)
+        ):
             same = abs(found - expected) <= 0.05 * expected
         if not same:
             wrong.append(f"{row.name}: {what} {found}, the reference has {expected}")
@@ -104,24 +122,46 @@ def numbers(rows: Sequence[Row], *, oracles: bool) -> int:
         for row in rows:
             states = coordlang("inspect", *row.arguments, "--states", "--json")
             all_plans = coordlang("plans", *row.arguments, "--count", "--json")
-            fewest = coordlang("plans", *row.arguments, "--count", "--json", "--cost", "makespan+actions")
+            fewest = coordlang(
+                "plans", *row.arguments, "--count", "--json", "--cost", "makespan+actions"
+            )
             check = coordlang("check", *row.arguments, "--json", "--cost", "makespan+actions")
             cost = check.data.get("fast_downward")
             if not check.data.get("agree"):
-                wrong.append(f"{row.name}: Fast Downward {cost}, coordlang {check.data.get('coordlang')}")
+                wrong.append(
+                    f"{row.name}: Fast Downward {cost}, coordlang {check.data.get('coordlang')}"
+                )
             cells = [
                 row.name,
-                judged(row, "states", states.data.get("states"), row.states), states.cost,
+                judged(row, "states", states.data.get("states"), row.states),
+                states.cost,
                 judged(row, "makespan", all_plans.data.get("optimal_cost"), row.makespan),
-                judged(row, "plans", _number(all_plans.data.get("count")), row.plans), all_plans.cost,
-                judged(row, "fewest", _number(fewest.data.get("count")), row.fewest), fewest.cost,
-                f"{cost[0]}, {cost[1]}" if cost else "none", check.cost,
-            ]  # fmt: skip
+                judged(row, "plans", _number(all_plans.data.get("count")), row.plans),
+                all_plans.cost,
+                judged(row, "fewest", _number(fewest.data.get("count")), row.fewest),
+                fewest.cost,
+                f"{cost[0]}, {cost[1]}" if cost else "none",
+                check.cost,
+            ]
             if oracles:
-                cells += [_counted(row, "makespan", wrong), _counted(row, "makespan+actions", wrong)]
+                cells += [
+                    _counted(row, "makespan", wrong),
+                    _counted(row, "makespan+actions", wrong),
+                ]
             yield cells
 
-    header = ["row", "states", "", "makespan", "plans", "", "fewest actions", "", "Fast Downward", ""]
+    header = [
+        "row",
+        "states",
+        "",
+        "makespan",
+        "plans",
+        "",
+        "fewest actions",
+        "",
+        "Fast Downward",
+        "",
+    ]
     widths = [13, 8, 14, 8, 18, 14, 14, 14, 13, 14]
     if oracles:
         header += ["K* plans", "K* fewest actions"]
@@ -139,9 +179,13 @@ def _number(count: object) -> object:
 def _counted(row: Row, cost: str, wrong: list[str]) -> str:
     done = _process((__file__, "--k-star", row.name, "--cost", cost))
     if done.code != 0 or "plans" not in done.data:
-        return str(done.data.get("why", f"did not finish in {MOST} s" if done.code < 0 else "failed"))
+        return str(
+            done.data.get("why", f"did not finish in {MOST} s" if done.code < 0 else "failed")
+        )
     if done.data["plans"] != done.data["ours"]:
-        wrong.append(f"{row.name}: K* counts {done.data['plans']} plans under {cost}, coordlang {done.data['ours']}")
+        wrong.append(
+            f"{row.name}: K* counts {done.data['plans']} plans under {cost}, coordlang {done.data['ours']}"
+        )
     return f"{done.data['plans']:,} ({done.seconds:.1f} s)"
 
 
@@ -173,7 +217,11 @@ def k_star(row: Row, cost: str) -> dict[str, object]:
         return {"why": "did not finish"}
     best = min(plan["cost"] for plan in found)
     different = {tuple(plan["actions"]) for plan in found if plan["cost"] == best}
-    if not any(plan["cost"] > best for plan in found) and len(different) == len(found) and len(found) < ours + 100:
+    if (
+        not any(plan["cost"] > best for plan in found)
+        and len(different) == len(found)
+        and len(found) < ours + 100
+    ):
         return {"why": f"stopped at {len(different):,}"}
     return {"plans": len(different), "ours": ours, "form": plain.form}
 
@@ -199,7 +247,8 @@ def load(row: Row, cost: str, *, remember_actions: bool = False) -> Any:
     return build(domain, [problem], ModelOptions(choice, cost, remember_actions))  # type: ignore[arg-type]
 
 
-# ---- a language for each ---------------------------------------------------------------------------------------------
+# ---- a language for each
+# ---------------------------------------------------------------------------------------------
 
 
 def languages(chosen: Sequence[Language], seconds: float) -> int:
@@ -214,17 +263,38 @@ def languages(chosen: Sequence[Language], seconds: float) -> int:
                 wrong.append(f"{language.name}: {done.errors.strip()[-300:]}")
                 continue
             if figures["told"] < language.agree * figures["different"] or not figures["different"]:
-                wrong.append(f"{language.name}: told in {figures['told']} of {figures['different']} tasks")
+                wrong.append(
+                    f"{language.name}: told in {figures['told']} of {figures['different']} tasks"
+                )
             bound = "proved" if figures["proved"] else f"at least {figures['bound']}"
             options = language.cost.removeprefix("makespan").lstrip("+") or "-"
             yield [
-                language.name, figures["tasks"], figures["requiring"], figures["states"], figures["greedy"],
-                f"{figures['words']} {bound}", options + (", remembered" if language.remember_actions else ""),
-                f"{figures['told']}/{figures['different']}", f"{figures['left']}/{figures['open']}", done.cost,
+                language.name,
+                figures["tasks"],
+                figures["requiring"],
+                figures["states"],
+                figures["greedy"],
+                f"{figures['words']} {bound}",
+                options + (", remembered" if language.remember_actions else ""),
+                f"{figures['told']}/{figures['different']}",
+                f"{figures['left']}/{figures['open']}",
+                done.cost,
                 language.means,
-            ]  # fmt: skip
+            ]
 
-    header = ["language", "tasks", "requiring", "states", "greedy", "minimal", "cost", "told", "left", "process", "words say"]
+    header = [
+        "language",
+        "tasks",
+        "requiring",
+        "states",
+        "greedy",
+        "minimal",
+        "cost",
+        "told",
+        "left",
+        "process",
+        "words say",
+    ]
     table(header, lines(), [13, 6, 9, 7, 6, 12, 8, 8, 8, 14, 20])
     print(f"\n{len(wrong)} wrong", *wrong, sep="\n  ")
     return len(wrong)
@@ -259,13 +329,15 @@ def build(language: Language, seconds: float) -> dict[str, object]:
     }
 
 
-# ---- what is refused -------------------------------------------------------------------------------------------------
+# ---- what is refused
+# -------------------------------------------------------------------------------------------------
 
 
 def refused() -> int:
     """Run everything in ``refuse/``; how many runs ended otherwise than expected.
 
-    ``numeric`` holds no numeric feature (`tests/foreign` goes through its words), so it is read, told who the robots are.
+    ``numeric`` holds no numeric feature (`tests/foreign` goes through its words), so it is read,
+    told who the robots are.
     """
     place = SHARED / "refuse"
     wrong = 0
@@ -274,7 +346,11 @@ def refused() -> int:
         problem = next(iter(sorted(set(folder.glob("*.pddl")) - {domain})), domain)
         robots = ("--robots", "driver,truck") if folder.name == "numeric" else ()
         done = coordlang("plans", str(domain), str(problem), "--count", "--json", *robots)
-        said = done.errors.strip().splitlines()[0].replace(str(place) + "/", "") if done.errors.strip() else done.data
+        said = (
+            done.errors.strip().splitlines()[0].replace(str(place) + "/", "")
+            if done.errors.strip()
+            else done.data
+        )
         print(f"{folder.name:<16} exit {done.code}  {said}")
         wrong += done.code != (0 if robots else 34)
     return wrong
@@ -284,11 +360,15 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("rows", nargs="*", metavar="ROW", help=f"of {', '.join(BY_NAME)}")
     parser.add_argument("--numbers", action="store_true", help="the reference table again")
-    parser.add_argument("--oracles", action="store_true", help="with --numbers: K* counts the plans, too")
+    parser.add_argument(
+        "--oracles", action="store_true", help="with --numbers: K* counts the plans, too"
+    )
     parser.add_argument("--refused", action="store_true", help="what is refused")
     parser.add_argument("--k-star", metavar="ROW", help=argparse.SUPPRESS)
     parser.add_argument("--one", metavar="LANGUAGE", help=argparse.SUPPRESS)
-    parser.add_argument("--time-limit", type=float, default=120, help="seconds for each minimal language (120)")
+    parser.add_argument(
+        "--time-limit", type=float, default=120, help="seconds for each minimal language (120)"
+    )
     parser.add_argument("--cost", default="makespan", help=argparse.SUPPRESS)
     given = parser.parse_args()
     if unknown := set(given.rows) - {*BY_NAME, *LANGUAGE_BY_NAME}:

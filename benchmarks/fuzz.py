@@ -1,9 +1,11 @@
-"""Broken and odd PDDL against the command line: no traceback, no hang, a documented exit code, a useful message.
+"""Broken and odd PDDL against the command line: no traceback, no hang, a documented exit code, a
+useful message.
 
-Takes the PDDL files in ``domains/`` (and ``../shared/data/foreign`` where it is there), breaks them in many ways, and
-runs ``plans --count``, ``coordination`` or ``build -o`` on the result, under limits.  Most mutants share one worker
-process; every `_FRESH`-th one gets a process of its own, which also shows what goes wrong when a process ends.  Prints a
-table of exit codes and every failure, whose files are kept in a folder of their own.
+Takes the PDDL files in ``domains/`` (and ``../shared/data/foreign`` where it is there), breaks them
+in many ways, and runs ``plans --count``, ``coordination`` or ``build -o`` on the result, under
+limits.  Most mutants share one worker process; every `_FRESH`-th one gets a process of its own,
+which also shows what goes wrong when a process ends.  Prints a table of exit codes and every
+failure, whose files are kept in a folder of their own.
 
     python benchmarks/fuzz.py [--number N] [--seed S] [--start K] [--keep FOLDER]
 
@@ -50,7 +52,8 @@ _PLACE = re.compile(r":\d+:\d+: ")
 _PLACELESS = ("no such file", "found an empty file", "binary file")
 
 
-# ---- the files to break ----------------------------------------------------------------------------------------------
+# ---- the files to break
+# ----------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -76,11 +79,21 @@ _FOREIGN: tuple[tuple[str, str, str, tuple[str, ...]], ...] = (
     ("boxpushing", "domain.pddl", "p2_3_2_1_1_0.pddl", ()),
     ("depot", "domain.pddl", "pfile1.pddl", ()),
     ("driverlog", "domain.pddl", "pfile1.pddl", ()),
-    ("gripper", "domain.pddl", "prob01.pddl", ("--robot-type", "gripper", "--unowned", "environment")),
+    (
+        "gripper",
+        "domain.pddl",
+        "prob01.pddl",
+        ("--robot-type", "gripper", "--unowned", "environment"),
+    ),
     ("mapf", "mapf-domain.pddl", "mapf-problem2.pddl", ()),
     ("storage", "domain.pddl", "p05.pddl", ("--robot-type", "hoist")),
     ("taxi", "domain.pddl", "p01.pddl", ()),
-    ("transport", "p11.DOMAIN.pddl", "p11.pddl", ("--robot-type", "vehicle", "--cost", "makespan+cost")),
+    (
+        "transport",
+        "p11.DOMAIN.pddl",
+        "p11.pddl",
+        ("--robot-type", "vehicle", "--cost", "makespan+cost"),
+    ),
     ("workshop", "workshop_dom_cal.pddl", "workshop2_1_2_2_2.pddl", ()),
     ("workshop", "workshop_dom_cn.pddl", "workshop2_1_2_2_2.pddl", ()),
 )
@@ -89,12 +102,18 @@ _FOREIGN: tuple[tuple[str, str, str, tuple[str, ...]], ...] = (
 def pairs(*, foreign: bool = True) -> list[Pair]:
     """The files to break; without ``foreign`` only those that come with the project."""
     found = [
-        Pair(folder, _read(ROOT / "domains" / folder / "domain.pddl"), _read(ROOT / "domains" / folder / problem))
+        Pair(
+            folder,
+            _read(ROOT / "domains" / folder / "domain.pddl"),
+            _read(ROOT / "domains" / folder / problem),
+        )
         for folder, problem in _SHIPPED
     ]
     if foreign and FOREIGN.is_dir():
         found += [
-            Pair(folder, _read(FOREIGN / folder / domain), _read(FOREIGN / folder / problem), options)
+            Pair(
+                folder, _read(FOREIGN / folder / domain), _read(FOREIGN / folder / problem), options
+            )
             for folder, domain, problem, options in _FOREIGN
         ]
     return found
@@ -108,7 +127,8 @@ def _bytes(text: str) -> bytes:
     return text.encode("utf-8", "surrogateescape")
 
 
-# ---- ways to break a text --------------------------------------------------------------------------------------------
+# ---- ways to break a text
+# --------------------------------------------------------------------------------------------
 
 Mutation = Callable[[str, Random], str]
 
@@ -160,7 +180,9 @@ def replace_token(text: str, random: Random) -> str:
     def edit(tokens: list[str], numbers: list[int]) -> None:
         words = [n for n in numbers if tokens[n] not in "()"]
         if words:
-            tokens[random.choice(words)] = random.choice((*(tokens[n] for n in words), *_ODD, "and", "not", "forall"))
+            tokens[random.choice(words)] = random.choice(
+                (*(tokens[n] for n in words), *_ODD, "and", "not", "forall")
+            )
 
     return _edit_tokens(text, random, edit)
 
@@ -201,12 +223,27 @@ def wrap_group(text: str, random: Random) -> str:
     if not spans:
         return text
     start, end = random.choice(spans)
-    before, after = random.choice((
-        ("(not ", ")"), ("(and ", ")"), ("(or ", ")"), ("(imply (and) ", ")"), ("(when (and) ", ")"), ("(", ")"),
-        ("(forall (?r ?o ?x) ", ")"), ("(exists (?from ?a) ", ")"), ("(forall () ", ")"), ("(increase ", " 1)"),
-        ("(when ", " (and))"), ("(preference p ", ")"), ("(at 5 ", ")"), ("(= ", " 1)"), ("(:private ", ")"),
-        ("(either ", ")"), ("(oneof ", ")"),
-    ))  # fmt: skip
+    before, after = random.choice(
+        (
+            ("(not ", ")"),
+            ("(and ", ")"),
+            ("(or ", ")"),
+            ("(imply (and) ", ")"),
+            ("(when (and) ", ")"),
+            ("(", ")"),
+            ("(forall (?r ?o ?x) ", ")"),
+            ("(exists (?from ?a) ", ")"),
+            ("(forall () ", ")"),
+            ("(increase ", " 1)"),
+            ("(when ", " (and))"),
+            ("(preference p ", ")"),
+            ("(at 5 ", ")"),
+            ("(= ", " 1)"),
+            ("(:private ", ")"),
+            ("(either ", ")"),
+            ("(oneof ", ")"),
+        )
+    )
     return text[:start] + before + text[start:end] + after + text[end:]
 
 
@@ -230,8 +267,19 @@ def edit_literal(text: str, random: Random) -> str:
             random.shuffle(rest)
             words = [first, *rest]
         other = text[slice(*random.choice(spans))]
-        new = random.choice(("", f"(not {atom})", f"{atom} {atom}", f"({' '.join(words)})", other, f"{atom} {other}",
-                             f"(or {atom} {other})", f"(imply {atom} {other})", f"(when {atom} {other})"))  # fmt: skip
+        new = random.choice(
+            (
+                "",
+                f"(not {atom})",
+                f"{atom} {atom}",
+                f"({' '.join(words)})",
+                other,
+                f"{atom} {other}",
+                f"(or {atom} {other})",
+                f"(imply {atom} {other})",
+                f"(when {atom} {other})",
+            )
+        )
         text = text[:start] + new + text[end:]
     return text
 
@@ -271,7 +319,9 @@ def nest(text: str, random: Random) -> str:
     if not spans:
         return text
     start, end = random.choice(spans)
-    head = random.choice(("(not ", "(and ", "(or ", "(forall (?r) ", "(when (and) ", "(imply (and) ", "("))
+    head = random.choice(
+        ("(not ", "(and ", "(or ", "(forall (?r) ", "(when (and) ", "(imply (and) ", "(")
+    )
     return text[:start] + head * depth + text[start:end] + ")" * depth + text[end:]
 
 
@@ -286,19 +336,79 @@ def many_objects(text: str, random: Random) -> str:
 
 def many_sections(text: str, random: Random) -> str:
     number = random.choice((50, 2_000))
-    section = random.choice((
-        "(:action a{n} :parameters (?r - robot))", "(:action a{n} :parameters () :effect (p{n}))",
-        "(:predicates (p{n}) (q{n} ?x))", "(:types t{n} - t{m})", "(:constants c{n})", "(:init)", "(:requirements :r{n})",
-    ))  # fmt: skip
-    return _insert_section(text, " ".join(section.format(n=n, m=n + 1) for n in range(number)), random)
+    section = random.choice(
+        (
+            "(:action a{n} :parameters (?r - robot))",
+            "(:action a{n} :parameters () :effect (p{n}))",
+            "(:predicates (p{n}) (q{n} ?x))",
+            "(:types t{n} - t{m})",
+            "(:constants c{n})",
+            "(:init)",
+            "(:requirements :r{n})",
+        )
+    )
+    return _insert_section(
+        text, " ".join(section.format(n=n, m=n + 1) for n in range(number)), random
+    )
 
 
 _ODD = (
-    "9", "9x", "-", "--", "-1", "1.5", "=", "?", "?x", "??", ":x", "object", "either", "and", "not", "when", "forall",
-    "idle", "none", "last", "environment", "robot", "agent", "total-cost", "define", "nan", "inf", "1e999", "x@y",
-    "x.y_z+1", "a,b", "a'b", '"', "\\", "%s", "{0}", "é", "\u0130", "\u00b2", "\u0663", "\u200b", "\x00", "\x1b[31m",
-    "x" * 5_000, "9" * 5_000, "None", "../../x", "$HOME", "`id`", "#", "_", "@", "o0", "p0", "v0",
-)  # fmt: skip
+    "9",
+    "9x",
+    "-",
+    "--",
+    "-1",
+    "1.5",
+    "=",
+    "?",
+    "?x",
+    "??",
+    ":x",
+    "object",
+    "either",
+    "and",
+    "not",
+    "when",
+    "forall",
+    "idle",
+    "none",
+    "last",
+    "environment",
+    "robot",
+    "agent",
+    "total-cost",
+    "define",
+    "nan",
+    "inf",
+    "1e999",
+    "x@y",
+    "x.y_z+1",
+    "a,b",
+    "a'b",
+    '"',
+    "\\",
+    "%s",
+    "{0}",
+    "é",
+    "\u0130",
+    "\u00b2",
+    "\u0663",
+    "\u200b",
+    "\x00",
+    "\x1b[31m",
+    "x" * 5_000,
+    "9" * 5_000,
+    "None",
+    "../../x",
+    "$HOME",
+    "`id`",
+    "#",
+    "_",
+    "@",
+    "o0",
+    "p0",
+    "v0",
+)
 
 
 def _names(text: str) -> list[str]:
@@ -318,12 +428,16 @@ def one_name(text: str, random: Random) -> str:
     if len(plain) < 2:
         return text
     target = random.choice(plain)
-    return _renamed(text, dict.fromkeys(random.sample(plain, min(len(plain), random.choice((1, 2, 4)))), target))
+    return _renamed(
+        text, dict.fromkeys(random.sample(plain, min(len(plain), random.choice((1, 2, 4)))), target)
+    )
 
 
 def upper_case(text: str, random: Random) -> str:
     share = random.choice((0.1, 0.5, 1.0))
-    return "".join(t.upper() if t[0] != ";" and random.random() < share else t for t in _tokens(text))
+    return "".join(
+        t.upper() if t[0] != ";" and random.random() < share else t for t in _tokens(text)
+    )
 
 
 def shadow(text: str, random: Random) -> str:
@@ -385,19 +499,56 @@ def double_section(text: str, random: Random) -> str:
 
 
 def foreign_section(text: str, random: Random) -> str:
-    return _insert_section(text, random.choice((
-        "(:durative-action x)", "(:derived (p ?x) (q ?x))", "(:constraints (and))", "(:functions (f) - number)",
-        "(:metric minimize (total-time))", "(:objects a b)", "(:goal (and))", "(:init)", "(:types a - b b - a)",
-        "(:types object)", "(:types a - (either b c) object)", "(:predicates (= ?a ?b))", "(:predicates ())",
-        "(:predicates p)", "(:action)", "(:action x)", "(:action x y)", "(:action x :parameters)", "(:action (x))",
-        "(:action x :agent)", "(:action x :agent ?a :parameters (?x))", "(:functions)", "(:functions (total-cost))",
-        "(:constants)", "(:constants a - )", "(:constants - a)", "()", "x", "(x)", "(:domain)", "(:domain x y)",
-        "(:length)", "(:private)", "; subaction\n", "(:action x ; subaction r1 (x)\n)", "(:concurrency-constraint v)",
-        "(:action x :parameters (?x) :effect (increase (total-cost) 1e400))",
-        "(:action x :parameters (?r - robot) :effect (increase (total-cost) " + "9" * 400 + "))",
-        "(:action x :parameters (?r - robot) :effect (increase (total-cost) 99999999999999999999))",
-        "(:action x :parameters (?a ?b ?c ?d ?e ?f ?g ?h) :effect (and))",
-    )), random)  # fmt: skip
+    return _insert_section(
+        text,
+        random.choice(
+            (
+                "(:durative-action x)",
+                "(:derived (p ?x) (q ?x))",
+                "(:constraints (and))",
+                "(:functions (f) - number)",
+                "(:metric minimize (total-time))",
+                "(:objects a b)",
+                "(:goal (and))",
+                "(:init)",
+                "(:types a - b b - a)",
+                "(:types object)",
+                "(:types a - (either b c) object)",
+                "(:predicates (= ?a ?b))",
+                "(:predicates ())",
+                "(:predicates p)",
+                "(:action)",
+                "(:action x)",
+                "(:action x y)",
+                "(:action x :parameters)",
+                "(:action (x))",
+                "(:action x :agent)",
+                "(:action x :agent ?a :parameters (?x))",
+                "(:functions)",
+                "(:functions (total-cost))",
+                "(:constants)",
+                "(:constants a - )",
+                "(:constants - a)",
+                "()",
+                "x",
+                "(x)",
+                "(:domain)",
+                "(:domain x y)",
+                "(:length)",
+                "(:private)",
+                "; subaction\n",
+                "(:action x ; subaction r1 (x)\n)",
+                "(:concurrency-constraint v)",
+                "(:action x :parameters (?x) :effect (increase (total-cost) 1e400))",
+                "(:action x :parameters (?r - robot) :effect (increase (total-cost) "
+                + "9" * 400
+                + "))",
+                "(:action x :parameters (?r - robot) :effect (increase (total-cost) 99999999999999999999))",
+                "(:action x :parameters (?a ?b ?c ?d ?e ?f ?g ?h) :effect (and))",
+            )
+        ),
+        random,
+    )
 
 
 def _insert_section(text: str, section: str, random: Random) -> str:
@@ -412,7 +563,19 @@ def numbers(text: str, random: Random) -> str:
     places = [n for n, t in enumerate(tokens) if re.fullmatch(r"-?\d+(\.\d+)?", t)]
     if not places:
         return foreign_section(text, random)
-    odd = ("-1", "0.5", "1e9", "9" * 400, "99999999999999999999", "\u0663", "x", "+3", ".5", "5.", "007")
+    odd = (
+        "-1",
+        "0.5",
+        "1e9",
+        "9" * 400,
+        "99999999999999999999",
+        "\u0663",
+        "x",
+        "+3",
+        ".5",
+        "5.",
+        "007",
+    )
     tokens[random.choice(places)] = random.choice(odd)
     return "".join(tokens)
 
@@ -420,24 +583,75 @@ def numbers(text: str, random: Random) -> str:
 def comments(text: str, random: Random) -> str:
     """A comment behind a random token, among them such as mean something."""
     tokens = _tokens(text)
-    said = random.choice((
-        "; x", ";;;;", ";", "; subaction", "; subaction r1", "; subaction r1 idle", "; subaction r1 (move ?from ?to)",
-        "; subaction r1 (", "; subaction r1 ()", "; subactions follow", "; (((", "; )))", "; \x00",
-    ))  # fmt: skip
+    said = random.choice(
+        (
+            "; x",
+            ";;;;",
+            ";",
+            "; subaction",
+            "; subaction r1",
+            "; subaction r1 idle",
+            "; subaction r1 (move ?from ?to)",
+            "; subaction r1 (",
+            "; subaction r1 ()",
+            "; subactions follow",
+            "; (((",
+            "; )))",
+            "; \x00",
+        )
+    )
     for _ in range(random.choice((1, 5))):
         tokens.insert(random.randrange(len(tokens) + 1), f" {said}\n")
     return "".join(tokens)
 
 
 def nothing(text: str, random: Random) -> str:
-    return random.choice(("", " \n", "; nothing\n", "()", "(define)", "(define (domain x))", "(define ())", "\x00", "x", ")"))
+    return random.choice(
+        (
+            "",
+            " \n",
+            "; nothing\n",
+            "()",
+            "(define)",
+            "(define (domain x))",
+            "(define ())",
+            "\x00",
+            "x",
+            ")",
+        )
+    )
 
 
 MUTATIONS: tuple[Mutation, ...] = (
-    drop, double, swap, replace_token, drop_group, swap_groups, wrap_group, truncate, random_bytes, unbalance, nest,
-    many_objects, many_sections, odd_name, one_name, upper_case, shadow, long_line, line_ends, marked, empty_section,
-    double_section, foreign_section, numbers, comments, nothing, edit_literal, other_variable,
-)  # fmt: skip
+    drop,
+    double,
+    swap,
+    replace_token,
+    drop_group,
+    swap_groups,
+    wrap_group,
+    truncate,
+    random_bytes,
+    unbalance,
+    nest,
+    many_objects,
+    many_sections,
+    odd_name,
+    one_name,
+    upper_case,
+    shadow,
+    long_line,
+    line_ends,
+    marked,
+    empty_section,
+    double_section,
+    foreign_section,
+    numbers,
+    comments,
+    nothing,
+    edit_literal,
+    other_variable,
+)
 #: How often each is used: the quiet ones get past the reader and are worth more.
 _WEIGHT: dict[Mutation, float] = {
     edit_literal: 16,
@@ -458,7 +672,8 @@ _WEIGHT: dict[Mutation, float] = {
 }
 
 
-# ---- mutants ---------------------------------------------------------------------------------------------------------
+# ---- mutants
+# ---------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -503,7 +718,8 @@ def mutant(number: int, seed: int, sources: Sequence[Pair]) -> Mutant:
     return Mutant(number, ", ".join(done), pair, _bytes(domain), _bytes(problem), command)
 
 
-# ---- running them ----------------------------------------------------------------------------------------------------
+# ---- running them
+# ----------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -533,7 +749,9 @@ class Report:
     slowest: list[tuple[float, str]] = field(default_factory=list)
 
     def text(self) -> str:
-        columns = sorted({code for _, code in self.codes}, key=lambda c: (not c.isdigit(), c.zfill(4)))
+        columns = sorted(
+            {code for _, code in self.codes}, key=lambda c: (not c.isdigit(), c.zfill(4))
+        )
         commands = sorted({command for command, _ in self.codes})
         rows = [["command", *columns, "all"]]
         for command in commands:
@@ -541,13 +759,23 @@ class Report:
             rows.append([command, *map(str, counts), str(sum(counts))])
         total = [sum(self.codes[command, code] for command in commands) for code in columns]
         rows.append(["all", *map(str, total), str(sum(total))])
-        lines = ["exit codes", *("  " + "".join(f"{cell:>9}" for cell in row) for row in rows), "", "slowest"]
-        lines += [f"  {seconds:6.2f} s  {what}" for seconds, what in sorted(self.slowest, reverse=True)[:5]]
+        lines = [
+            "exit codes",
+            *("  " + "".join(f"{cell:>9}" for cell in row) for row in rows),
+            "",
+            "slowest",
+        ]
+        lines += [
+            f"  {seconds:6.2f} s  {what}"
+            for seconds, what in sorted(self.slowest, reverse=True)[:5]
+        ]
         lines += ["", f"{len(self.failures)} failures"]
         for failure in self.failures:
             m = failure.mutant
             lines.append(f"  #{m.number} {m.pair.name}, {m.what}, {m.command}: {failure.why}")
-            lines += [f"      {line}" for line in failure.outcome.err.strip()[-600:].splitlines()[-4:]]
+            lines += [
+                f"      {line}" for line in failure.outcome.err.strip()[-600:].splitlines()[-4:]
+            ]
         return "\n".join(lines)
 
 
@@ -578,15 +806,25 @@ class Runner:
         return Outcome(code, _text(out), _text(err), seconds, tuple(self._leftovers()))
 
     def _environment(self) -> dict[str, str]:
-        return {**os.environ, "TMPDIR": str(self._folder / "tmp"), "PYTHONPATH": str(ROOT), "PYTHONFAULTHANDLER": "1"}
+        return {
+            **os.environ,
+            "TMPDIR": str(self._folder / "tmp"),
+            "PYTHONPATH": str(ROOT),
+            "PYTHONFAULTHANDLER": "1",
+        }
 
     def _once(self, arguments: Sequence[str], out: Path, err: Path) -> int | None:
         command = [sys.executable, "-c", "from coordlang.cli import main; main()", *arguments]
         with out.open("wb") as to, err.open("wb") as errors:
             process = subprocess.Popen(
-                command, stdin=subprocess.DEVNULL, stdout=to, stderr=errors,
-                cwd=self._folder / "work", env=self._environment(), start_new_session=True,
-            )  # fmt: skip
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=to,
+                stderr=errors,
+                cwd=self._folder / "work",
+                env=self._environment(),
+                start_new_session=True,
+            )
             try:
                 return process.wait(TIME_LIMIT + GRACE)
             except subprocess.TimeoutExpired:
@@ -601,13 +839,19 @@ class Runner:
         if self._worker is None:
             self._age = 0
             self._worker = subprocess.Popen(
-                [sys.executable, str(Path(__file__).resolve()), "--worker"], stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE, text=True, cwd=self._folder / "work", env=self._environment(),
-            )  # fmt: skip
+                [sys.executable, str(Path(__file__).resolve()), "--worker"],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+                cwd=self._folder / "work",
+                env=self._environment(),
+            )
             self._answer(30)
         worker = self._worker
         assert worker.stdin is not None
-        worker.stdin.write(json.dumps({"arguments": list(arguments), "out": str(out), "err": str(err)}) + "\n")
+        worker.stdin.write(
+            json.dumps({"arguments": list(arguments), "out": str(out), "err": str(err)}) + "\n"
+        )
         worker.stdin.flush()
         answer = self._answer(TIME_LIMIT + GRACE)
         if answer is None:
@@ -632,7 +876,11 @@ class Runner:
                 path.unlink()
         if self._worker is not None and self._worker.poll() is None:
             try:
-                children = Path(f"/proc/{self._worker.pid}/task/{self._worker.pid}/children").read_text().split()
+                children = (
+                    Path(f"/proc/{self._worker.pid}/task/{self._worker.pid}/children")
+                    .read_text()
+                    .split()
+                )
             except OSError:
                 children = []
             yield from (f"process {pid}" for pid in children)
@@ -719,7 +967,10 @@ def fuzz(
     An interrupt (Ctrl-C) ends it early, with the report so far.
     """
     report = Report()
-    with tempfile.TemporaryDirectory(prefix="fuzz-") as name, contextlib.suppress(KeyboardInterrupt):
+    with (
+        tempfile.TemporaryDirectory(prefix="fuzz-") as name,
+        contextlib.suppress(KeyboardInterrupt),
+    ):
         folder = Path(name)
         runner = Runner(folder)
         try:
@@ -742,7 +993,9 @@ def _judge(m: Mutant, runner: Runner, work: Path, report: Report, keep: Path | N
     language.unlink(missing_ok=True)
     outcome = runner.run(arguments_of(m), fresh=m.number % _FRESH == 0)
     report.codes[m.command, "killed" if outcome.code is None else str(outcome.code)] += 1
-    report.slowest = sorted([*report.slowest, (outcome.seconds, f"#{m.number} {m.pair.name}, {m.what}")])[-5:]
+    report.slowest = sorted(
+        [*report.slowest, (outcome.seconds, f"#{m.number} {m.pair.name}, {m.what}")]
+    )[-5:]
     why = complaint(m, outcome, language.exists())
     if why is None:
         return
@@ -761,7 +1014,12 @@ def main() -> int:
     parser.add_argument("--number", type=int, default=2000, help="how many mutants")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--start", type=int, default=0, help="number of the first mutant")
-    parser.add_argument("--keep", type=Path, default=Path(tempfile.gettempdir()) / "coordlang-fuzz", help="for failures")
+    parser.add_argument(
+        "--keep",
+        type=Path,
+        default=Path(tempfile.gettempdir()) / "coordlang-fuzz",
+        help="for failures",
+    )
     parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.worker:

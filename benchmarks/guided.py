@@ -1,4 +1,5 @@
-"""How many nodes A* expands with and without a sentence, over all candidate tasks of a row of Table 1.
+"""How many nodes A* expands with and without a sentence, over all candidate tasks of a row of Table
+1.
 
     python benchmarks/guided.py [ROW ..] [--method greedy|minimal] [--heuristic NAME]
 
@@ -6,15 +7,19 @@ The paper reports 1.6 times fewer nodes on GWB7.  For each language and heuristi
 
 - steps: the mean makespan, which is the least number of nodes that any search expands.
 - without: nodes expanded without a sentence (mean over the tasks).
-- first: with the sentence of the plan that A* finds without one: as a robot would that plans first, then speaks.
-- average: with every sentence of the task, weighted by the number of plans that have it: the expected number for a plan drawn
-  uniformly.
-- sum ratio: all nodes without / all nodes with a sentence.  mean ratio: the mean over the tasks of that ratio.
-- most: with the sentence that most plans have, as somebody would say who leaves as much open as he can.
+- first: with the sentence of the plan that A* finds without one: as a robot would that plans first,
+  then speaks.
+- average: with every sentence of the task, weighted by the number of plans that have it: the
+  expected number for a plan drawn uniformly.
+- sum ratio: all nodes without / all nodes with a sentence.  mean ratio: the mean over the tasks of
+  that ratio.
+- most: with the sentence that most plans have, as somebody would say who leaves as much open as he
+  can.
 
-"pruned" is the paper's search: what does not fit the sentence is pruned, nothing else.  "+words" also takes the number of
-words still to say as a lower bound on the steps.  Ties are broken as `coordlang.use.sentence.guided.astar` says.  All plans found are
-checked to be optimal and to have the sentence.
+"pruned" is the paper's search: what does not fit the sentence is pruned, nothing else.  "+words"
+also takes the number of words still to say as a lower bound on the steps.  Ties are broken as
+`coordlang.use.sentence.guided.astar` says.  All plans found are checked to be optimal and to have
+the sentence.
 """
 
 from __future__ import annotations
@@ -64,7 +69,13 @@ def run(spoken: Spoken, terrain: Terrain, heuristic: str, count_words: bool, sum
     plans = sum(sentences.values())
     average = sum(nodes[words] * number for words, number in sentences.items()) / plans
     most = max(sorted(sentences), key=lambda words: sentences[words])
-    sums.add(without.cost[0], without.expanded, first=nodes[without.words], average=average, most=nodes[most])
+    sums.add(
+        without.cost[0],
+        without.expanded,
+        first=nodes[without.words],
+        average=average,
+        most=nodes[most],
+    )
     return len(nodes) + 1
 
 
@@ -75,7 +86,18 @@ def main() -> int:
     parser.add_argument("--heuristic", choices=["blind", "manhattan", "relaxed"], action="append")
     arguments = parser.parse_args()
     kinds = ("first", "average", "most")
-    head = ("row", "language", "words", "heuristic", "search", "tasks", "searches", "steps", "without", *kinds)
+    head = (
+        "row",
+        "language",
+        "words",
+        "heuristic",
+        "search",
+        "tasks",
+        "searches",
+        "steps",
+        "without",
+        *kinds,
+    )
     head += tuple(f"{how} {kind}" for kind in kinds for how in ("sum", "mean"))
     widths = (5, 8, 5, 9, 7, 6, 8, 6, 8, *(7,) * 3, *(12,) * 6, 6)
     print("  ".join(f"{h:>{w}}" for h, w in zip((*head, "s"), widths, strict=True)))
@@ -90,16 +112,34 @@ def main() -> int:
             for heuristic in arguments.heuristic or ["manhattan", "blind", "relaxed"]:
                 for count_words in (False, True):
                     start, sums = perf_counter(), Sums()
-                    searches = sum(run(one, terrain, heuristic, count_words, sums) for one in spoken)
+                    searches = sum(
+                        run(one, terrain, heuristic, count_words, sums) for one in spoken
+                    )
                     cells = (
-                        row.name, method, len(language.words), heuristic, "+words" if count_words else "pruned",
-                        sums.tasks, searches, f"{sums.steps / sums.tasks:.2f}", f"{sums.without / sums.tasks:.2f}",
+                        row.name,
+                        method,
+                        len(language.words),
+                        heuristic,
+                        "+words" if count_words else "pruned",
+                        sums.tasks,
+                        searches,
+                        f"{sums.steps / sums.tasks:.2f}",
+                        f"{sums.without / sums.tasks:.2f}",
                         *(f"{sums.with_sentence[kind] / sums.tasks:.2f}" for kind in kinds),
-                        *(f"{value:.2f}x" for kind in kinds for value in
-                          (sums.without / sums.with_sentence[kind], sums.ratios[kind] / sums.tasks)),
+                        *(
+                            f"{value:.2f}x"
+                            for kind in kinds
+                            for value in (
+                                sums.without / sums.with_sentence[kind],
+                                sums.ratios[kind] / sums.tasks,
+                            )
+                        ),
                         f"{perf_counter() - start:.1f}",
-                    )  # fmt: skip
-                    print("  ".join(f"{c:>{w}}" for c, w in zip(cells, widths, strict=True)), flush=True)
+                    )
+                    print(
+                        "  ".join(f"{c:>{w}}" for c, w in zip(cells, widths, strict=True)),
+                        flush=True,
+                    )
     return 0
 
 

@@ -2,9 +2,10 @@
 
     python benchmarks/large_language.py [--states N] [--words N] [--directory DIR]
 
-The model is the grid domain with three robots on an 11 x 10 grid; the states are the first N placements of the robots on
-different cells, their words are drawn at random (which compresses worst).  Each step runs in a process of its own; *peak*
-is the most memory that this process had at any time, *over* what it had more than before the step began.
+The model is the grid domain with three robots on an 11 x 10 grid; the states are the first N
+placements of the robots on different cells, their words are drawn at random (which compresses
+worst).  Each step runs in a process of its own; *peak* is the most memory that this process had at
+any time, *over* what it had more than before the step began.
 """
 
 from __future__ import annotations
@@ -39,7 +40,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--states", type=int, default=1_000_000)
     parser.add_argument("--words", type=int, default=8)
-    parser.add_argument("--directory", type=Path, help="where the files go (default: a temporary folder)")
+    parser.add_argument(
+        "--directory", type=Path, help="where the files go (default: a temporary folder)"
+    )
     parser.add_argument("--step", choices=STEPS, help=argparse.SUPPRESS)
     parser.add_argument("--file", type=Path, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
@@ -51,8 +54,18 @@ def main() -> int:
         for ending in ("json", "json.gz"):
             path = (arguments.directory or Path(folder)) / f"large.{ending}"
             for step in STEPS[0 if ending == "json" else 1 :]:
-                command = [sys.executable, __file__, "--step", step, "--file", str(path), "--states", str(arguments.states),
-                           "--words", str(arguments.words)]  # fmt: skip
+                command = [
+                    sys.executable,
+                    __file__,
+                    "--step",
+                    step,
+                    "--file",
+                    str(path),
+                    "--states",
+                    str(arguments.states),
+                    "--words",
+                    str(arguments.words),
+                ]
                 subprocess.run(command, check=True)
     return 0
 
@@ -93,9 +106,22 @@ class measured:  # noqa: N801  (reads like a verb)
 
     def __exit__(self, *_: object) -> None:
         seconds = process_time() - self.start
-        size = f"{self.path.stat().st_size / 1e6:.0f}" if self.path.exists() and self.step != "name" else ""
+        size = (
+            f"{self.path.stat().st_size / 1e6:.0f}"
+            if self.path.exists() and self.step != "name"
+            else ""
+        )
         form = "" if self.step == "name" else "".join(self.path.suffixes)[1:]
-        show((self.step, form, size, f"{seconds:.1f}", f"{peak():.0f}", f"{peak() - self.before:.0f}"))
+        show(
+            (
+                self.step,
+                form,
+                size,
+                f"{seconds:.1f}",
+                f"{peak():.0f}",
+                f"{peak() - self.before:.0f}",
+            )
+        )
 
 
 def peak() -> float:
@@ -142,13 +168,24 @@ def placements(model: JointModel, number: int) -> Rows:
 def language_of(model: JointModel, rows: Rows, word: np.ndarray) -> Language:
     words, states, default = name_words(model, rows, dict(enumerate(word.tolist())))
     guarantee = Guarantee("random", len(words), 1, len(words) == 1)
-    return Language(words, states, default, ROBOTS, guarantee, {"name": "grid"}, {"cost": "makespan"},
-                    {"kind": "all", "count": len(rows)}, {})  # fmt: skip
+    return Language(
+        words,
+        states,
+        default,
+        ROBOTS,
+        guarantee,
+        {"name": "grid"},
+        {"cost": "makespan"},
+        {"kind": "all", "count": len(rows)},
+        {},
+    )
 
 
 def show(cells: tuple[object, ...]) -> None:
     widths = (18, 8, 6, 9, 9, 9)
-    print("".join(f"{cell!s:>{width}}" for cell, width in zip(cells, widths, strict=True)), flush=True)
+    print(
+        "".join(f"{cell!s:>{width}}" for cell, width in zip(cells, widths, strict=True)), flush=True
+    )
 
 
 if __name__ == "__main__":

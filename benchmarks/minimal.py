@@ -1,15 +1,20 @@
-"""The least numbers of words for the running example, the T-shaped map and the rows of Table 1, with bounds.
+"""The least numbers of words for the running example, the T-shaped map and the rows of Table 1,
+with bounds.
 
-    python benchmarks/minimal.py [ROW ..] [--time-limit SECONDS] [--methods greedy,alpha,separating,minimal]
+    python benchmarks/minimal.py [ROW ..] [--time-limit SECONDS] [--methods
+    greedy,alpha,separating,minimal]
 
-For each method its words, with the proved bound where that is smaller (7..8: between 7 and 8), and seconds: *greedy*;
-*alpha*: least under the alpha part of Theorem 3; *separating*: under alpha or beta; *minimal*: least of all languages,
-with its rounds, counterexamples, clauses and the symmetries of the model.  Where the paper has an exact value (GW1: 3), it
-is the one in brackets.  The time limit is for each method and row.
+For each method its words, with the proved bound where that is smaller (7..8: between 7 and 8), and
+seconds: *greedy*; *alpha*: least under the alpha part of Theorem 3; *separating*: under alpha or
+beta; *minimal*: least of all languages, with its rounds, counterexamples, clauses and the
+symmetries of the model.  Where the paper has an exact value (GW1: 3), it is the one in brackets.
+The time limit is for each method and row.
 
-Further rows on demand: ``open-RxC`` and ``ring-RxC``, two robots on an open grid or on its border, all pairs of states:
+Further rows on demand: ``open-RxC`` and ``ring-RxC``, two robots on an open grid or on its border,
+all pairs of states:
 
-    python benchmarks/minimal.py open-2x5 open-2x6 open-3x4 open-3x5 ring-4x4 ring-4x5 --methods minimal --time-limit 600
+    python benchmarks/minimal.py open-2x5 open-2x6 open-3x4 open-3x5 ring-4x4 ring-4x5 --methods
+    minimal --time-limit 600
 """
 
 from __future__ import annotations
@@ -36,7 +41,21 @@ from gridmap import open_grid, ring  # noqa: E402
 
 PAPER_EXACT = {"GW1": " (3)"}
 METHODS = ("greedy", "alpha", "separating", "minimal")
-HEADER = ("row", "paper", "greedy", "alpha", "s", "separating", "s", "minimal", "s", "rounds", "counter", "clauses", "sym")
+HEADER = (
+    "row",
+    "paper",
+    "greedy",
+    "alpha",
+    "s",
+    "separating",
+    "s",
+    "minimal",
+    "s",
+    "rounds",
+    "counter",
+    "clauses",
+    "sym",
+)
 WIDTHS = (12, 7, 7, 9, 6, 10, 7, 8, 7, 7, 10, 8, 6)
 
 
@@ -59,7 +78,9 @@ def main() -> int:
             start = perf_counter()
             with time_limit(arguments.time_limit):
                 built = build_language(
-                    candidates, "separating" if method == "alpha" else method, alpha_only=method == "alpha"
+                    candidates,
+                    "separating" if method == "alpha" else method,
+                    alpha_only=method == "alpha",
                 )
             size, bound = built.language.guarantee.size, bound_of(built, method)
             unproved += method != "greedy" and bound < size
@@ -67,7 +88,10 @@ def main() -> int:
             if method != "greedy":
                 cells.append(f"{perf_counter() - start:.1f}")
             if method == "minimal":
-                cells += [int(built.figures.get(k, 0)) for k in ("rounds", "counterexamples", "clauses", "symmetries")]
+                cells += [
+                    int(built.figures.get(k, 0))
+                    for k in ("rounds", "counterexamples", "clauses", "symmetries")
+                ]
         show(cells)
     print(f"together {perf_counter() - begin:.1f} s; numbers without proof: {unproved}")
     return 0
@@ -77,7 +101,11 @@ def inputs(wanted: list[str]) -> Iterator[tuple[str, str, Candidates]]:
     for folder in ("three-cells", "t-map"):
         if not wanted or folder in wanted:
             domain = read_domain(DOMAINS / folder / "domain.pddl")
-            yield folder, "3", all_pairs(domain, [read_problem(DOMAINS / folder / "problem.pddl", domain)])
+            yield (
+                folder,
+                "3",
+                all_pairs(domain, [read_problem(DOMAINS / folder / "problem.pddl", domain)]),
+            )
     for row in ROWS:
         if not wanted or row.name in wanted:
             yield row.name, f"{row.words}{PAPER_EXACT.get(row.name, '')}", candidates_of(row)
@@ -96,7 +124,12 @@ def bound_of(built: Built, method: str) -> int:
 
 
 def show(cells: list[object] | tuple[object, ...]) -> None:
-    print("  ".join(f"{c:>{w},}" if isinstance(c, int) else f"{c!s:>{w}}" for c, w in zip(cells, WIDTHS, strict=False)))
+    print(
+        "  ".join(
+            f"{c:>{w},}" if isinstance(c, int) else f"{c!s:>{w}}"
+            for c, w in zip(cells, WIDTHS, strict=False)
+        )
+    )
     sys.stdout.flush()
 
 

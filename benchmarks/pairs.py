@@ -2,9 +2,10 @@
 
     python benchmarks/pairs.py [FOLDER/PROBLEM ..]
 
-"FOLDER/PROBLEM all": every pair of states as tasks, otherwise the problem's own.  Columns: tasks, words of a smallest
-language for all robots and of one for each pair, nodes of the composition walks and seconds of both, and whether robots
-that say a sentence for each pair are safe: checked for the words of all pairs together.
+"FOLDER/PROBLEM all": every pair of states as tasks, otherwise the problem's own.  Columns: tasks,
+words of a smallest language for all robots and of one for each pair, nodes of the composition walks
+and seconds of both, and whether robots that say a sentence for each pair are safe: checked for the
+words of all pairs together.
 """
 
 from __future__ import annotations
@@ -55,7 +56,17 @@ def is_language(candidates: Candidates, words: dict[int, int]) -> bool:
 
 
 def main(wanted: list[str]) -> int:
-    header = ("problem", "tasks", "words", "pairs", "walk nodes", "of pairs", "s", "s pairs", "pairs are safe")
+    header = (
+        "problem",
+        "tasks",
+        "words",
+        "pairs",
+        "walk nodes",
+        "of pairs",
+        "s",
+        "s pairs",
+        "pairs are safe",
+    )
     widths = (24, 6, 5, 10, 11, 10, 6, 7, 14)
     print("  ".join(f"{h:>{w}}" for h, w in zip(header, widths, strict=True)))
     for name in wanted or PROBLEMS:
@@ -69,7 +80,9 @@ def main(wanted: list[str]) -> int:
         cells = (
             name,
             candidates.count,
-            guarantee.size if guarantee.proved_minimal else f"{guarantee.lower_bound}..{guarantee.size}",
+            guarantee.size
+            if guarantee.proved_minimal
+            else f"{guarantee.lower_bound}..{guarantee.size}",
             " ".join(str(language.size) for language in languages),
             joint.alphas.nodes,
             sum(language.nodes for language in languages),
@@ -77,7 +90,12 @@ def main(wanted: list[str]) -> int:
             f"{perf_counter() - middle:.1f}",
             "yes" if is_language(candidates, together(languages)) else "no",
         )
-        print("  ".join(f"{c:>{w},}" if isinstance(c, int) else f"{c:>{w}}" for c, w in zip(cells, widths, strict=True)))
+        print(
+            "  ".join(
+                f"{c:>{w},}" if isinstance(c, int) else f"{c:>{w}}"
+                for c, w in zip(cells, widths, strict=True)
+            )
+        )
         sys.stdout.flush()
     return 0
 

@@ -2,8 +2,9 @@
 
     python benchmarks/table1.py [ROW ..]
 
-Columns: candidate tasks and reachable states (must equal the paper's), divergences, words beside the paper's, nodes and
-edges of the composition walks, nodes of the verification, and seconds (from PDDL text to verified language).
+Columns: candidate tasks and reachable states (must equal the paper's), divergences, words beside
+the paper's, nodes and edges of the composition walks, nodes of the verification, and seconds (from
+PDDL text to verified language).
 """
 
 from __future__ import annotations
@@ -60,7 +61,19 @@ def candidates_of(row: Row) -> Candidates:
 
 
 def main(wanted: list[str]) -> int:
-    header = ("row", "tasks", "states", "diverg.", "words", "paper", "walk nodes", "walk edges", "verify", "s", "paper s")
+    header = (
+        "row",
+        "tasks",
+        "states",
+        "diverg.",
+        "words",
+        "paper",
+        "walk nodes",
+        "walk edges",
+        "verify",
+        "s",
+        "paper s",
+    )
     widths = (5, 6, 6, 8, 5, 5, 10, 10, 8, 6, 8)
     print("  ".join(f"{h:>{w}}" for h, w in zip(header, widths, strict=True)))
     wrong = 0
@@ -72,7 +85,11 @@ def main(wanted: list[str]) -> int:
         candidates = candidates_of(row)
         built = build_language(candidates, "greedy")
         seconds = perf_counter() - start
-        if (candidates.count, candidates.states, built.verdict.holds) != (row.tasks, row.states, True):
+        if (candidates.count, candidates.states, built.verdict.holds) != (
+            row.tasks,
+            row.states,
+            True,
+        ):
             wrong += 1
         cells = (
             row.name,
@@ -87,8 +104,15 @@ def main(wanted: list[str]) -> int:
             f"{seconds:.2f}",
             row.seconds,
         )
-        print("  ".join(f"{c:>{w},}" if isinstance(c, int) else f"{c:>{w}}" for c, w in zip(cells, widths, strict=True)))
-    print(f"together {perf_counter() - begin:.2f} s; rows that differ from the paper in tasks or states: {wrong}")
+        print(
+            "  ".join(
+                f"{c:>{w},}" if isinstance(c, int) else f"{c:>{w}}"
+                for c, w in zip(cells, widths, strict=True)
+            )
+        )
+    print(
+        f"together {perf_counter() - begin:.2f} s; rows that differ from the paper in tasks or states: {wrong}"
+    )
     return 1 if wrong else 0
 
 

@@ -1,4 +1,6 @@
-"""What the sentences of a language tell of a plan, and what they leave open: plans with one sentence are compared."""
+"""What the sentences of a language tell of a plan, and what they leave open: plans with one
+sentence are compared.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,9 @@ def in_which_order(*schemas: str) -> Feature:
     def feature(plan: Plan) -> Hashable:
         parts = _parts(plan, schemas)
         steps = sorted({step for step, _, _ in parts})
-        return tuple(frozenset((robot, text) for at, robot, text in parts if at == step) for step in steps)
+        return tuple(
+            frozenset((robot, text) for at, robot, text in parts if at == step) for step in steps
+        )
 
     return feature
 
@@ -58,11 +62,14 @@ def all_of(*features: Feature) -> Feature:
     return lambda plan: tuple(feature(plan) for feature in features)
 
 
-def said(language: Language, candidates: Candidates, told: Feature, left: Feature = exactly) -> dict[str, int]:
+def said(
+    language: Language, candidates: Candidates, told: Feature, left: Feature = exactly
+) -> dict[str, int]:
     """Of the tasks that require coordination and have few plans, how many ..
 
-    have plans with different ``told`` ("different"), and in which all plans of every sentence agree on it ("told");
-    have plans with different ``left`` ("open"), and in which some sentence has plans that disagree about it ("left").
+    have plans with different ``told`` ("different"), and in which all plans of every sentence agree
+    on it ("told"); have plans with different ``left`` ("open"), and in which some sentence has
+    plans that disagree about it ("left").
     """
     table_of_words = WordTable.of(language, candidates.model)
     figures = dict.fromkeys(("different", "told", "open", "left"), 0)
@@ -76,7 +83,9 @@ def said(language: Language, candidates: Candidates, told: Feature, left: Featur
             by_sentence: dict[tuple[int, ...], tuple[set[object], set[object]]] = {}
             for plan in plans:
                 texts = [space.model.texts(step) for step in plan]
-                sets = by_sentence.setdefault(sentence(word[s] for s in plans.states(plan)), (set(), set()))
+                sets = by_sentence.setdefault(
+                    sentence(word[s] for s in plans.states(plan)), (set(), set())
+                )
                 sets[0].add(told(texts))
                 sets[1].add(left(texts))
             groups = list(by_sentence.values())

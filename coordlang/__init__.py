@@ -1,1 +1,3 @@
-"""Coordination languages: the fewest words that let robots plan on their own and still act together."""
+"""Coordination languages: the fewest words that let robots plan on their own and still act
+together.
+"""

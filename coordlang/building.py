@@ -29,8 +29,9 @@ from planners.limits import STOPPING, stop_clock
 class Built:
     """A verified language and the figures of its making.
 
-    ``figures`` are the method's own (rounds, clauses, ..), ``seconds`` are by phase.  ``stopped`` is the error that ended
-    the method before its proof was complete, or None.  ``job`` and ``evidence`` are what `certificate_of` needs.
+    ``figures`` are the method's own (rounds, clauses, ..), ``seconds`` are by phase.  ``stopped``
+    is the error that ended the method before its proof was complete, or None.  ``job`` and
+    ``evidence`` are what `certificate_of` needs.
     """
 
     language: Language
@@ -56,11 +57,13 @@ def build_language(
 ) -> Built:
     """Build a coordination language for candidate tasks and verify it by definition.
 
-    ``alpha_only`` is for the method "separating": plans are separated where they part, never where they meet.  ``prefer``
-    "flexible": of the languages with as many words as the method finds, one whose sentences leave many plans open.
-    ``overlap``: then give states further words as long as that leaves more plans open (`coordlang.language.overlapping`).
+    ``alpha_only`` is for the method "separating": plans are separated where they part, never where
+    they meet.  ``prefer`` "flexible": of the languages with as many words as the method finds, one
+    whose sentences leave many plans open. ``overlap``: then give states further words as long as
+    that leaves more plans open (`coordlang.language.overlapping`).
 
-    Raises `Inseparable` (with the two plans) when there is none, `OutOfMemory` before the memory budget is used up.
+    Raises `Inseparable` (with the two plans) when there is none, `OutOfMemory` before the memory
+    budget is used up.
     """
     require_solvable(candidates)
     clock = _Clock()
@@ -80,7 +83,8 @@ def build_language(
     states = tuple(states_on_plans(candidates.spaces).tolist())
     job = Job(candidates, states, found, None, seed, alpha_only, progress, check)
     if method != "greedy":
-        # What is left when an anytime method is stopped; verified now, because there is no time then.
+        # What is left when an anytime method is stopped; verified now, because there is no time
+        # then.
         first = greedy(job).partition
         check(first)
         job = replace(job, incumbent=first)
@@ -104,7 +108,9 @@ def build_language(
     clock.note("verify")
     size = len(best.language.words)
     guarantee = Guarantee(method, size, outcome.lower_bound, size == outcome.lower_bound)
-    language = signed(replace(best.language, guarantee=guarantee), candidates, {"program": "coordlang"})
+    language = signed(
+        replace(best.language, guarantee=guarantee), candidates, {"program": "coordlang"}
+    )
     if overlap and outcome.stopped is None:
         progress("enlarging words")
         try:
@@ -114,24 +120,40 @@ def build_language(
             outcome = replace(outcome, stopped=error.with_traceback(None))
         clock.note("overlap")
     return Built(
-        language, found, len(job.states), best.verdict, outcome.figures, clock.seconds, outcome.stopped, job, outcome.evidence
+        language,
+        found,
+        len(job.states),
+        best.verdict,
+        outcome.figures,
+        clock.seconds,
+        outcome.stopped,
+        job,
+        outcome.evidence,
     )
 
 
-def _overlapping(candidates: Candidates, language: Language, outcome: Outcome) -> tuple[Language, Outcome]:
+def _overlapping(
+    candidates: Candidates, language: Language, outcome: Outcome
+) -> tuple[Language, Outcome]:
     """The language with further words of its states, verified by definition."""
     model, spaces = candidates.model, candidates.spaces
     word = WordTable.of(language, model).of_rows(candidates.rows)
     enlarged = enlarge(
-        spaces, [walk(space).requires for space in spaces], {state: int(word[state]) for state in outcome.partition}
+        spaces,
+        [walk(space).requires for space in spaces],
+        {state: int(word[state]) for state in outcome.partition},
     )
     also = {
-        model.codec.key(candidates.rows[state]): tuple(language.words[w] for w in sorted(words - {int(word[state])}))
+        model.codec.key(candidates.rows[state]): tuple(
+            language.words[w] for w in sorted(words - {int(word[state])})
+        )
         for state, words in enlarged.words.items()
         if len(words) > 1
     }
     language = replace(language, also=dict(sorted(also.items())))
-    verdict = verify_overlapping(language.words, words_of_states(language, model, candidates.rows), spaces)
+    verdict = verify_overlapping(
+        language.words, words_of_states(language, model, candidates.rows), spaces
+    )
     if not verdict.holds:
         raise AssertionError(f"the enlarged words are no coordination language: {verdict.witness}")
     figures = {
@@ -144,10 +166,11 @@ def _overlapping(candidates: Candidates, language: Language, outcome: Outcome) -
 
 
 def certificate_of(built: Built) -> Certificate:
-    """Why no partition with fewer words than the proved lower bound is a language, for others to check.
+    """Why no partition with fewer words than the proved lower bound is a language, for others to
+    check.
 
-    Uses what the method met on its way; for a method that meets nothing the search of `minimal` finds reasons.  As long as
-    that takes: not anytime.
+    Uses what the method met on its way; for a method that meets nothing the search of `minimal`
+    finds reasons.  As long as that takes: not anytime.
     """
     refuted = built.language.guarantee.lower_bound - 1
     evidence = built.evidence or (refute(built.job, refuted) if refuted else {})
@@ -169,7 +192,9 @@ def _verified(candidates: Candidates, partition: Partition) -> _Checked:
     language = Language(words, mapping, default, candidates.model.robots, unknown, {}, {}, {}, {})
     verdict = verify(WordTable.of(language, candidates.model), candidates.spaces)
     if not verdict.holds:
-        raise AssertionError(f"a method returned what is no coordination language: {verdict.witness}")
+        raise AssertionError(
+            f"a method returned what is no coordination language: {verdict.witness}"
+        )
     return _Checked(partition, language, verdict)
 
 

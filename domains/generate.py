@@ -1,9 +1,9 @@
 """Makes the problems, task files and pictures of the grid domains.
 
-    python domains/generate.py all                                    every generated file in domains/, again
-    python domains/generate.py open 3x4                               one problem, on stdout
-    python domains/generate.py ring 3x5 --picture ring.svg -o ring.pddl
-    python domains/generate.py map FILE --robots 3 --starts c0-0 c0-1 c0-2 --goals c2-0 c2-1 c2-2
+python domains/generate.py all                                    every generated file in domains/,
+again python domains/generate.py open 3x4                               one problem, on stdout
+python domains/generate.py ring 3x5 --picture ring.svg -o ring.pddl python domains/generate.py map
+FILE --robots 3 --starts c0-0 c0-1 c0-2 --goals c2-0 c2-1 c2-2
 """
 
 from __future__ import annotations
@@ -24,13 +24,16 @@ from planners.errors import BadInput, CoordlangError, UsageError
 
 HERE = Path(__file__).resolve().parent
 
-#: ``agents``: one action per robot (MA-PDDL); ``joint``: an action is a whole joint action of r1 and r2.
+#: ``agents``: one action per robot (MA-PDDL); ``joint``: an action is a whole joint action of r1
+#: and r2.
 Style = Literal["agents", "joint"]
 
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """Robots on a map: robot number k is named ``r{k+1}``, starts in ``starts[k]`` and goes to ``goals[k]``."""
+    """Robots on a map: robot number k is named ``r{k+1}``, starts in ``starts[k]`` and goes to
+    ``goals[k]``.
+    """
 
     name: str
     grid: GridMap
@@ -51,16 +54,18 @@ def scenario(
 ) -> Scenario:
     """A scenario on a map.
 
-    Without ``starts`` the robots are spread over the list of cells, from the first to the last; without ``goals``
-    each goes to the start of the next (one robot: to the last cell).  Two robots on a rectangle thus trade opposite
-    corners.
-    Raises `UsageError` if the map has no such cell or two robots share one.
+    Without ``starts`` the robots are spread over the list of cells, from the first to the last;
+    without ``goals`` each goes to the start of the next (one robot: to the last cell).  Two robots
+    on a rectangle thus trade opposite corners. Raises `UsageError` if the map has no such cell or
+    two robots share one.
     """
     cells = list(grid.cells)
     if not 1 <= robots <= len(cells):
         raise UsageError(f"cannot place {robots} robots on {len(cells)} cells")
     if starts is None:
-        starts = [cells[number * (len(cells) - 1) // max(1, robots - 1)] for number in range(robots)]
+        starts = [
+            cells[number * (len(cells) - 1) // max(1, robots - 1)] for number in range(robots)
+        ]
     if goals is None:
         goals = [*starts[1:], starts[0]] if robots > 1 else [cells[-1]]
     for what, chosen in (("start", starts), ("goal", goals)):
@@ -68,9 +73,13 @@ def scenario(
             raise UsageError(f"{robots} robots need {robots} {what} cells, not {len(chosen)}")
         for cell in chosen:
             if cell not in grid.cells:
-                raise UsageError(f"the map has no {what} cell {cell!r}", remedy=f"Cells: {' '.join(cells)}.")
+                raise UsageError(
+                    f"the map has no {what} cell {cell!r}", remedy=f"Cells: {' '.join(cells)}."
+                )
         if len(set(chosen)) < robots:
-            raise UsageError(f"two robots have the same {what} cell", remedy=f"Given: {' '.join(chosen)}.")
+            raise UsageError(
+                f"two robots have the same {what} cell", remedy=f"Given: {' '.join(chosen)}."
+            )
     return Scenario(name, grid, tuple(starts), tuple(goals))
 
 
@@ -117,7 +126,9 @@ def _positions(robots: Sequence[str], cells: Sequence[str]) -> str:
 
 
 def tasks_text(task: Scenario, at_least: int) -> str:
-    """A task file: all pairs of reachable states in which some robot is ``at_least`` from its goal (Manhattan)."""
+    """A task file: all pairs of reachable states in which some robot is ``at_least`` from its goal
+    (Manhattan).
+    """
     states = sorted(reachable_states(task), key=partial(_order, task.grid))
     pairs = [
         {"init": _atoms(task, init), "goal": _atoms(task, goal)}
@@ -139,7 +150,9 @@ def reachable_states(task: Scenario) -> set[tuple[str, ...]]:
     from planners.pddl.sexpr import Source
 
     domain = read_domain(HERE / "grid" / "domain.pddl")
-    loaded = build(domain, [parse_problem(Source(task.name, problem_text(task, domain.name)), domain)])
+    loaded = build(
+        domain, [parse_problem(Source(task.name, problem_text(task, domain.name)), domain)]
+    )
     space = explore(loaded.model, loaded.tasks[0].init[None, :])
     states = set()
     for row in space.rows:
@@ -161,13 +174,17 @@ def picture_text(task: Scenario) -> str:
     """The map with starts and goals, as SVG."""
     robots = task.robots
     return draw(
-        task.grid, task.name, dict(zip(robots, task.starts, strict=True)), dict(zip(robots, task.goals, strict=True))
+        task.grid,
+        task.name,
+        dict(zip(robots, task.starts, strict=True)),
+        dict(zip(robots, task.goals, strict=True)),
     )
 
 
 # What domains/ ships.
 
-#: Rows of the paper's Table 1: rows, columns, and for the filtered rows the least Manhattan distance.
+#: Rows of the paper's Table 1: rows, columns, and for the filtered rows the least Manhattan
+#: distance.
 TABLE_1: dict[str, tuple[Callable[[int, int], GridMap], int, int, int | None]] = {
     "gw1": (open_grid, 2, 2, None),
     "gw2": (open_grid, 2, 3, None),
@@ -183,7 +200,8 @@ TABLE_1: dict[str, tuple[Callable[[int, int], GridMap], int, int, int | None]] =
     "gwb8": (ring, 4, 4, 6),
 }
 
-#: Open n x n grids on which two robots trade opposite corners; the joint style grows with the square of the moves.
+#: Open n x n grids on which two robots trade opposite corners; the joint style grows with the
+#: square of the moves.
 CORNERS = (3, 4, 5, 6, 8, 10)
 LARGEST_JOINT_CORNERS = 8
 
@@ -196,14 +214,22 @@ def shipped() -> Iterator[tuple[str, str]]:
         if at_least is not None:
             yield f"grid/{task.name}.tasks.json", tasks_text(task, at_least)
     for size in CORNERS:
-        yield from _grid_files(scenario(f"corners-{size}x{size}", open_grid(size, size)), size <= LARGEST_JOINT_CORNERS)
+        yield from _grid_files(
+            scenario(f"corners-{size}x{size}", open_grid(size, size)), size <= LARGEST_JOINT_CORNERS
+        )
     three_robots = scenario("three-robots-3x3", open_grid(3, 3), 3, ("c0-0", "c0-2", "c2-0"))
     yield from _grid_files(three_robots, joint=False)
-    yield from _folder_files(scenario("three-cells", three_cells(), starts=("a", "b"), goals=("b", "a")))
+    yield from _folder_files(
+        scenario("three-cells", three_cells(), starts=("a", "b"), goals=("b", "a"))
+    )
     t_map = read_map(HERE / "t-map" / "t-map.map")
-    yield from _folder_files(scenario("t-map", t_map, starts=("c0-1", "c1-0"), goals=("c1-0", "c0-1")))
+    yield from _folder_files(
+        scenario("t-map", t_map, starts=("c0-1", "c1-0"), goals=("c1-0", "c0-1"))
+    )
     corridor = read_map(HERE / "corridor" / "corridor.map")
-    yield from _folder_files(scenario("corridor", corridor, starts=("c1-0", "c1-8"), goals=("c1-8", "c1-0")))
+    yield from _folder_files(
+        scenario("corridor", corridor, starts=("c1-0", "c1-8"), goals=("c1-8", "c1-0"))
+    )
 
 
 def _grid_files(task: Scenario, joint: bool = True) -> Iterator[tuple[str, str]]:
@@ -215,10 +241,15 @@ def _grid_files(task: Scenario, joint: bool = True) -> Iterator[tuple[str, str]]
 
 
 def _folder_files(task: Scenario) -> Iterator[tuple[str, str]]:
-    """A folder with a domain of its own, the grid domain under another name; and the problem in the joint style."""
+    """A folder with a domain of its own, the grid domain under another name; and the problem in the
+    joint style.
+    """
     domain = (HERE / "grid" / "domain.pddl").read_text(encoding="utf-8")
     head = "; Written by domains/generate.py: the domain of ../grid under this name.\n;\n"
-    yield f"{task.name}/domain.pddl", head + domain.replace("(domain grid)", f"(domain {task.name})")
+    yield (
+        f"{task.name}/domain.pddl",
+        head + domain.replace("(domain grid)", f"(domain {task.name})"),
+    )
     yield f"{task.name}/problem.pddl", problem_text(task, task.name)
     yield f"{task.name}/{task.name}.svg", picture_text(task)
     yield f"grid-joint/{task.name}.pddl", problem_text(task, "grid-joint", "joint")
@@ -276,13 +307,22 @@ def _write(path: str, text: str) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description="Make problems, task files and pictures of the grid domains.")
+    parser = argparse.ArgumentParser(
+        description="Make problems, task files and pictures of the grid domains."
+    )
     commands = parser.add_subparsers(dest="command", required=True, metavar="all|open|ring|map")
     everything = commands.add_parser("all", help="write every generated file of domains/ again")
-    everything.add_argument("--into", type=Path, default=HERE, metavar="DIR", help="another folder than domains/")
-    for command, meaning in (("open", "a full rectangle"), ("ring", "the border cells of a rectangle")):
+    everything.add_argument(
+        "--into", type=Path, default=HERE, metavar="DIR", help="another folder than domains/"
+    )
+    for command, meaning in (
+        ("open", "a full rectangle"),
+        ("ring", "the border cells of a rectangle"),
+    ):
         one = commands.add_parser(command, help=meaning)
-        one.add_argument("size", type=partial(_size, least=1 if command == "open" else 2), metavar="ROWSxCOLUMNS")
+        one.add_argument(
+            "size", type=partial(_size, least=1 if command == "open" else 2), metavar="ROWSxCOLUMNS"
+        )
         _add_options(one)
     from_file = commands.add_parser("map", help="a movingai map")
     from_file.add_argument("file", type=Path)
@@ -292,9 +332,21 @@ def _parser() -> argparse.ArgumentParser:
 
 def _add_options(one: argparse.ArgumentParser) -> None:
     one.add_argument("--robots", type=int, default=2, metavar="N", help="how many (2)")
-    one.add_argument("--starts", nargs="+", metavar="CELL", help="a cell for each robot, e.g. c0-0 c2-2 (spread out)")
-    one.add_argument("--goals", nargs="+", metavar="CELL", help="a cell for each robot (the start of the next robot)")
-    one.add_argument("--style", choices=("agents", "joint"), default="agents", help="domain grid, or grid-joint")
+    one.add_argument(
+        "--starts",
+        nargs="+",
+        metavar="CELL",
+        help="a cell for each robot, e.g. c0-0 c2-2 (spread out)",
+    )
+    one.add_argument(
+        "--goals",
+        nargs="+",
+        metavar="CELL",
+        help="a cell for each robot (the start of the next robot)",
+    )
+    one.add_argument(
+        "--style", choices=("agents", "joint"), default="agents", help="domain grid, or grid-joint"
+    )
     one.add_argument("--name", help="the name of the problem")
     one.add_argument("--domain", help="the name of the domain")
     one.add_argument("-o", "--output", default="-", metavar="FILE", help="the problem (stdout)")
@@ -312,7 +364,9 @@ def _add_options(one: argparse.ArgumentParser) -> None:
 def _size(text: str, least: int) -> tuple[int, int]:
     rows, _, columns = text.partition("x")
     if not (rows.isdecimal() and columns.isdecimal() and min(int(rows), int(columns)) >= least):
-        raise argparse.ArgumentTypeError(f"expected ROWSxCOLUMNS, both at least {least}, not {text!r}")
+        raise argparse.ArgumentTypeError(
+            f"expected ROWSxCOLUMNS, both at least {least}, not {text!r}"
+        )
     return int(rows), int(columns)
 
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from planners.errors import BadInput, Place
 
-#: The characters of a movingai map: ground, ground, swamp | out of bounds, out of bounds, trees, water.
+#: The characters of a movingai map: ground, ground, swamp | out of bounds, out of bounds, trees,
+#: water.
 PASSABLE = ".GS"
 BLOCKED = "@OTW"
 
@@ -17,10 +18,11 @@ Position = tuple[int, int]
 
 @dataclass(frozen=True, slots=True)
 class GridMap:
-    """Cells with their (row, column), in the order in which they are listed, and pairs of adjacent cells.
+    """Cells with their (row, column), in the order in which they are listed, and pairs of adjacent
+    cells.
 
-    ``edges`` holds every pair once, the earlier cell first.  Cells that touch need not be adjacent: a wall is then
-    between them.
+    ``edges`` holds every pair once, the earlier cell first.  Cells that touch need not be adjacent:
+    a wall is then between them.
     """
 
     cells: dict[str, Position]
@@ -29,7 +31,9 @@ class GridMap:
     @property
     def size(self) -> tuple[int, int]:
         """Rows and columns."""
-        return 1 + max(row for row, _ in self.cells.values()), 1 + max(col for _, col in self.cells.values())
+        return 1 + max(row for row, _ in self.cells.values()), 1 + max(
+            col for _, col in self.cells.values()
+        )
 
     def neighbours(self, cell: str) -> list[str]:
         """The adjacent cells, in the order of the map."""
@@ -71,7 +75,9 @@ def three_cells() -> GridMap:
 
 
 def read_map(path: Path) -> GridMap:
-    """A map in the format of movingai.com, with or without its ``type`` line; raises `BadInput` with the line."""
+    """A map in the format of movingai.com, with or without its ``type`` line; raises `BadInput`
+    with the line.
+    """
     try:
         lines = path.read_text(encoding="ascii").splitlines()
     except (OSError, UnicodeDecodeError) as error:
@@ -101,10 +107,14 @@ def _map_rows(path: Path, lines: list[str]) -> tuple[list[str], int]:
         match words:
             case [] | ["type", _]:
                 continue
-            case ["height" | "width" as key, value] if value.isdigit() and int(value) > 0 and key not in sizes:
+            case ["height" | "width" as key, value] if (
+                value.isdigit() and int(value) > 0 and key not in sizes
+            ):
                 sizes[key] = int(value)
             case ["map"] if len(sizes) == 2:
-                return _checked_rows(path, lines, number, sizes["height"], sizes["width"]), number + 1
+                return _checked_rows(
+                    path, lines, number, sizes["height"], sizes["width"]
+                ), number + 1
             case _:
                 raise BadInput(
                     f"unexpected {line!r} in the header of a map",
@@ -121,7 +131,8 @@ def _checked_rows(path: Path, lines: list[str], header: int, height: int, width:
     for number, row in enumerate(rows[:height], start=header + 1):
         if len(row) != width:
             raise BadInput(
-                f"this row has {len(row)} cells where the header says {width}", place=Place(str(path), number, 1)
+                f"this row has {len(row)} cells where the header says {width}",
+                place=Place(str(path), number, 1),
             )
     if len(rows) != height:
         place = Place(str(path), header + 1 + min(len(rows), height), 1)
@@ -139,9 +150,13 @@ def _clockwise(rows: int, columns: int) -> list[Position]:
 
 
 def _of(passable: set[Position], edges: set[tuple[Position, Position]] | None = None) -> GridMap:
-    """The map of these cells in row-major order; without ``edges`` all cells that touch are adjacent."""
+    """The map of these cells in row-major order; without ``edges`` all cells that touch are
+    adjacent.
+    """
     if edges is None:
-        steps = [((row, col), near) for row, col in passable for near in ((row, col + 1), (row + 1, col))]
+        steps = [
+            ((row, col), near) for row, col in passable for near in ((row, col + 1), (row + 1, col))
+        ]
         edges = {(a, b) for a, b in steps if b in passable}
     return GridMap(
         {cell_name(position): position for position in sorted(passable)},

@@ -17,11 +17,15 @@ CELL, MARGIN = 72, 12
 
 
 def draw(grid: GridMap, title: str, starts: dict[str, str], goals: dict[str, str]) -> str:
-    """The picture of a map with each robot's start (a disc) and goal (a dashed ring); both map robot -> cell."""
+    """The picture of a map with each robot's start (a disc) and goal (a dashed ring); both map
+    robot -> cell.
+    """
     rows, columns = grid.size
     width, height = columns * CELL + 2 * MARGIN, rows * CELL + 2 * MARGIN
     colour = {robot: COLOURS[number % len(COLOURS)] for number, robot in enumerate(starts)}
-    told = "; ".join(f"{robot} starts in {starts[robot]} and goes to {goals[robot]}" for robot in starts)
+    told = "; ".join(
+        f"{robot} starts in {starts[robot]} and goes to {goals[robot]}" for robot in starts
+    )
     shapes = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
         'role="img" font-family="Helvetica, Arial, sans-serif" text-anchor="middle">',

@@ -1,1 +1,3 @@
-"""Planning for several robots: PDDL -> joint model -> all optimal plans.  Knows nothing of languages."""
+"""Planning for several robots: PDDL -> joint model -> all optimal plans.  Knows nothing of
+languages.
+"""

@@ -1,6 +1,7 @@
 """The one error tree.  Every error carries the exit code that the command line ends with.
 
-The codes follow Fast Downward's grouping: 1x proved impossible, 2x out of resources, 3x bad input or a failure.
+The codes follow Fast Downward's grouping: 1x proved impossible, 2x out of resources, 3x bad input
+or a failure.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""What was understood of a domain and problem: robots, subactions, constraints, interference, fluents."""
+"""What was understood of a domain and problem: robots, subactions, constraints, interference,
+fluents.
+"""
 
 from __future__ import annotations
 
@@ -38,12 +40,13 @@ _LOOK_AT = 2000
 class Inspection:
     """Everything that a user needs to see whether the domain was read as it was meant.
 
-    ``objects`` counts them by type, each in all its types; ``subactions[robot][schema]`` counts ground subactions, and
-    ``impossible`` are the schemas that have none; ``idle[robot]`` says how the robot may do nothing; ``formulas`` shows
-    for each schema of ``step_formulas`` what one of its subactions asks of the others.  ``interfering`` counts pairs of
-    subactions of different robots that cannot share a step; the ``example`` is one that meets in a reachable state, None
-    if no state near the start has one.  ``start`` counts the fluents that are true at first, ``never`` are the predicates
-    that no state can make true.
+    ``objects`` counts them by type, each in all its types; ``subactions[robot][schema]`` counts
+    ground subactions, and ``impossible`` are the schemas that have none; ``idle[robot]`` says how
+    the robot may do nothing; ``formulas`` shows for each schema of ``step_formulas`` what one of
+    its subactions asks of the others.  ``interfering`` counts pairs of subactions of different
+    robots that cannot share a step; the ``example`` is one that meets in a reachable state, None if
+    no state near the start has one.  ``start`` counts the fluents that are true at first, ``never``
+    are the predicates that no state can make true.
     """
 
     domain: str
@@ -78,7 +81,9 @@ def inspect(loaded: Loaded) -> Inspection:
     """
     model, domain = loaded.model, loaded.domain
     start = model.codec.decode(loaded.tasks[0].init)
-    possible = {fact[1:-1].split(" ")[0] for fact in model.codec.facts} | {a.predicate for a in model.statics}
+    possible = {fact[1:-1].split(" ")[0] for fact in model.codec.facts} | {
+        a.predicate for a in model.statics
+    }
     return Inspection(
         domain=domain.name,
         problem=loaded.problems[0].name,
@@ -87,7 +92,9 @@ def inspect(loaded: Loaded) -> Inspection:
         robots_by=loaded.team.by,
         objects=_objects(loaded),
         subactions=_subactions(model),
-        impossible=tuple(s.name for s in domain.schemas if s.name not in {a.schema for a in model.actions}),
+        impossible=tuple(
+            s.name for s in domain.schemas if s.name not in {a.schema for a in model.actions}
+        ),
         idle=_idle(model),
         shared=_counted(a.schema for a in model.actions if len(a.owners) > 1 and not a.parts),
         unowned=loaded.options.robots.unowned,
@@ -131,7 +138,9 @@ def _idle(model: JointModel) -> dict[str, str]:
         return dict.fromkeys(model.robots, "where a joint action says so")
     nothing = sorted({a.schema for a in model.actions if a.does_nothing})
     return {
-        robot: "may idle in every step" if keeps else f"does nothing by its own action ({', '.join(nothing)})"
+        robot: "may idle in every step"
+        if keeps
+        else f"does nothing by its own action ({', '.join(nothing)})"
         for robot, keeps in zip(model.robots, model.keeps_idle, strict=True)
     }
 
@@ -145,7 +154,8 @@ def _objects(loaded: Loaded) -> dict[str, int]:
     """How many objects each type has; untyped ones count as ``object``."""
     domain = loaded.domain
     types = [
-        frozenset().union(*(domain.supertypes(t) for t in own)) - ({"object"} if own != ("object",) else set())
+        frozenset().union(*(domain.supertypes(t) for t in own))
+        - ({"object"} if own != ("object",) else set())
         for own in loaded.problems[0].objects.values()
     ]
     return _counted(t for own in types for t in own)
@@ -159,7 +169,9 @@ def _formulas(model: JointModel) -> tuple[str, ...]:
         touched = footprint(action)
         for kind, others in (("speaks of", touched.partners), ("forbids", touched.excluded)):
             if others and (key := f"{action.schema} {kind}") not in found:
-                found[key] = f"{action.label} {kind} {_some(others & there) or _nobody(others)} in the same step"
+                found[key] = (
+                    f"{action.label} {kind} {_some(others & there) or _nobody(others)} in the same step"
+                )
     return tuple(found.values())
 
 
@@ -181,7 +193,9 @@ def _interfering(model: JointModel) -> int:
 
 
 def _example(model: JointModel, init: Rows) -> str | None:
-    """Why two subactions interfere that are both possible in some state: breadth first from the start, some states."""
+    """Why two subactions interfere that are both possible in some state: breadth first from the
+    start, some states.
+    """
     stepper = model.stepper
     if not isinstance(stepper, Composition):
         return None
@@ -190,9 +204,16 @@ def _example(model: JointModel, init: Rows) -> str | None:
     while len(layer) and len(seen) <= _LOOK_AT:
         choices = stepper.choices(np.ascontiguousarray(layer[:, : model.codec.fact_words]))
         for state, (i, j) in product(range(len(layer)), combinations(range(len(own)), 2)):
-            mine, theirs = (labels[first[state] : first[state + 1]] for first, labels in (choices[i], choices[j]))
+            mine, theirs = (
+                labels[first[state] : first[state + 1]]
+                for first, labels in (choices[i], choices[j])
+            )
             for a, b in np.argwhere(~stepper.tables[i, j][np.ix_(mine, theirs)]).tolist():
-                if mine[a] and theirs[b] and (why := conflict(own[i][mine[a] - 1], own[j][theirs[b] - 1])):
+                if (
+                    mine[a]
+                    and theirs[b]
+                    and (why := conflict(own[i][mine[a] - 1], own[j][theirs[b] - 1]))
+                ):
                     return why
         new, _ = unique_rows(model.successors(layer[:_LOOK_AT]).result)
         layer = new[find_rows(seen, new) < 0]
@@ -230,10 +251,11 @@ def unparse(formula: Formula) -> str:
 
 
 def _typed(variable: Variable) -> str:
-    types = variable.types[0] if len(variable.types) == 1 else f"(either {' '.join(variable.types)})"
+    types = (
+        variable.types[0] if len(variable.types) == 1 else f"(either {' '.join(variable.types)})"
+    )
     return f"{variable.name} - {types}"
 
 
 def _counted(names: Iterable[str]) -> dict[str, int]:
     return dict(sorted(Counter(names).items()))
-

@@ -1,7 +1,9 @@
-"""Time and memory limits of a process: over the limit, work in progress ends with an error that the caller can catch.
+"""Time and memory limits of a process: over the limit, work in progress ends with an error that the
+caller can catch.
 
-An alarm raises `OutOfTime` wherever the program is, so that algorithms need no clock of their own; anytime methods catch
-it and return what they have.  The memory limit is the operating system's (address space), met as `MemoryError`.
+An alarm raises `OutOfTime` wherever the program is, so that algorithms need no clock of their own;
+anytime methods catch it and return what they have.  The memory limit is the operating system's
+(address space), met as `MemoryError`.
 """
 
 from __future__ import annotations
@@ -17,10 +19,11 @@ from types import FrameType
 
 from planners.errors import OutOfMemory, OutOfTime
 
-#: The alarm rings again, should nobody have caught it (libraries in C may lose an exception); not too soon, so that whoever
-#: caught it can save his work and stop the clock.
+#: The alarm rings again, should nobody have caught it (libraries in C may lose an exception); not
+#: too soon, so that whoever caught it can save his work and stop the clock.
 _AGAIN = 5.0
-#: And very soon where Python itself lost it: an exception cannot leave a finalizer or the callback of a weak reference.
+#: And very soon where Python itself lost it: an exception cannot leave a finalizer or the callback
+#: of a weak reference.
 _SOON = 0.01
 #: Seconds that no timer counts to the end (some cannot be set to more).
 _FOR_EVER = 1e9
@@ -60,7 +63,9 @@ def time_limit(seconds: float | None) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
         sys.unraisablehook = lost_before
         if outer:  # the block around this one goes on with its own time
-            signal.setitimer(signal.ITIMER_REAL, max(_SOON, outer - (time.monotonic() - begin)), again)
+            signal.setitimer(
+                signal.ITIMER_REAL, max(_SOON, outer - (time.monotonic() - begin)), again
+            )
 
 
 def stop_clock() -> None:
@@ -78,8 +83,9 @@ def time_left() -> float:
 def reaching(so_far: Callable[[], str], instead: str) -> Iterator[None]:
     """Should a limit end the block, let the error say how far it got.
 
-    ``so_far`` says it, in numbers; ``instead`` is what to try besides a larger limit ("fewer objects").  Of nested blocks
-    the innermost speaks.  Memory that is used up (`MemoryError`) leaves the block as `OutOfMemory`.
+    ``so_far`` says it, in numbers; ``instead`` is what to try besides a larger limit ("fewer
+    objects").  Of nested blocks the innermost speaks.  Memory that is used up (`MemoryError`)
+    leaves the block as `OutOfMemory`.
     """
     try:
         yield
@@ -92,7 +98,9 @@ def reaching(so_far: Callable[[], str], instead: str) -> Iterator[None]:
         raise
     except MemoryError:
         pass  # what the frames below hold is free once this block is left
-    full = OutOfMemory("the memory is used up", remedy=f"Use a larger --memory-limit, or {instead}.")
+    full = OutOfMemory(
+        "the memory is used up", remedy=f"Use a larger --memory-limit, or {instead}."
+    )
     full.reached = f"Reached: {so_far()}."
     raise full
 
@@ -106,9 +114,11 @@ def limit_memory(size: int | None) -> None:
 
 
 def require_memory(size: int) -> None:
-    """Raise `OutOfMemory` if the program alone, its libraries loaded, has more than ``size`` bytes already.
+    """Raise `OutOfMemory` if the program alone, its libraries loaded, has more than ``size`` bytes
+    already.
 
-    To be asked before `limit_memory`: numpy aborts the process when it is loaded under a limit that is too small.
+    To be asked before `limit_memory`: numpy aborts the process when it is loaded under a limit that
+    is too small.
     """
     import numpy as np
 

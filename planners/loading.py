@@ -32,7 +32,8 @@ from planners.pddl.robots import (
 class ModelOptions:
     """How the files are to be understood; all of it is recorded in a language file.
 
-    ``idle`` names the robots that may idle without an action of their own; None: found from the model.
+    ``idle`` names the robots that may idle without an action of their own; None: found from the
+    model.
     """
 
     robots: RobotChoice = field(default_factory=RobotChoice)
@@ -43,7 +44,9 @@ class ModelOptions:
 
 @dataclass(frozen=True, slots=True)
 class PlanningTask:
-    """A task ``(I, G)`` of a joint model: an initial row and a goal; ``place`` is the file that it is from."""
+    """A task ``(I, G)`` of a joint model: an initial row and a goal; ``place`` is the file that it
+    is from.
+    """
 
     name: str
     init: Rows
@@ -63,7 +66,9 @@ class Loaded:
     team: Team
 
 
-def load(domain: str | Path, problems: Sequence[str | Path], options: ModelOptions | None = None) -> Loaded:
+def load(
+    domain: str | Path, problems: Sequence[str | Path], options: ModelOptions | None = None
+) -> Loaded:
     """Read PDDL files and build their joint model.
 
     Raises `BadInput`, `Unsupported` or `UsageError` with place and remedy.
@@ -80,8 +85,8 @@ def build(
 ) -> Loaded:
     """The joint model of problems over the same objects and statics.
 
-    ``inits`` are the fluents of further initial states (of a task file): what can be true, and whether idling is
-    dropped, depends on where tasks start.
+    ``inits`` are the fluents of further initial states (of a task file): what can be true, and
+    whether idling is dropped, depends on where tasks start.
     """
     options = options or ModelOptions()
     if options.remember_actions and "last" in domain.predicates:
@@ -96,7 +101,9 @@ def build(
     starts = [*(problem.init for problem in problems), *inits]
     extra = {atom for start in starts for atom in start}
     actions = ground_actions(domain, first, team, also=extra, costs=options.cost == "makespan+cost")
-    with reaching(lambda: f"comparing {len(actions):,} ground actions of {len(team.robots)} robots", FEWER):
+    with reaching(
+        lambda: f"comparing {len(actions):,} ground actions of {len(team.robots)} robots", FEWER
+    ):
         actions = apply_network(domain, first, actions)
         team = without_idle_environment(team, (i for action in actions for i in action.owners))
         model = _joint_model(domain, problems, team, actions, starts, options)
@@ -115,11 +122,15 @@ def _check_same_world(domain: Domain, first: Problem, other: Problem) -> None:
     objects, init = other.source.section(":objects"), other.source.section(":init")
     if first.objects != other.objects:
         odd = sorted({*first.objects.items()} ^ {*other.objects.items()})[0][0]
-        raise BadInput(f"object {odd!r} is not the same in all problems", place=objects, remedy=remedy)
+        raise BadInput(
+            f"object {odd!r} is not the same in all problems", place=objects, remedy=remedy
+        )
     changed = static_atoms(domain, first) ^ static_atoms(domain, other)
     if changed:
         odd = min(show(atom) for atom in changed)
-        raise BadInput(f"static fact {odd} is not the same in all problems", place=init, remedy=remedy)
+        raise BadInput(
+            f"static fact {odd} is not the same in all problems", place=init, remedy=remedy
+        )
     if first.values != other.values:
         raise BadInput("function values differ between the problems", place=init, remedy=remedy)
 
@@ -149,12 +160,14 @@ def _joint_model(
     codec = StateCodec(texts, robots, memory)
     evaluator = Evaluator(
         {by_text[text]: n for n, text in enumerate(texts)},
-        {} if domain.is_joint_action else {
+        {}
+        if domain.is_joint_action
+        else {
             StepAtom(a.schema, a.args): (i, n + 1)
             for i, own in reversed([*enumerate(subactions)])
             for n, a in enumerate(own)
         },
-    )  # fmt: skip
+    )
     keeps_idle = tuple(
         robots[i] in options.idle
         if options.idle is not None
@@ -188,11 +201,13 @@ def _always_has_nothing_to_do(
     actions: Sequence[GroundAction],
     inits: Sequence[frozenset[Atom]],
 ) -> bool:
-    """Whether a do-nothing schema of the robot's own is as good as idling: always possible, and named in no formula.
+    """Whether a do-nothing schema of the robot's own is as good as idling: always possible, and
+    named in no formula.
 
-    Proved for a precondition that is true, or for instances with one positive literal each of which at least one is
-    true at the start, which no action makes false without making another one true, and which no other robot's action
-    makes false at all (it would interfere with the schema, and not with idling).
+    Proved for a precondition that is true, or for instances with one positive literal each of which
+    at least one is true at the start, which no action makes false without making another one true,
+    and which no other robot's action makes false at all (it would interfere with the schema, and
+    not with idling).
     """
     by_schema: dict[str, list[GroundAction]] = {}
     for action in subactions:

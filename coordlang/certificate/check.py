@@ -1,7 +1,8 @@
-"""Is a certificate right?  Every reason is checked against the model, and the rest is left to a SAT solver.
+"""Is a certificate right?  Every reason is checked against the model, and the rest is left to a SAT
+solver.
 
-Code of its own: it shares the joint model and the plan spaces with the builders, and the encoding, which is what the
-solver is asked about.
+Code of its own: it shares the joint model and the plan spaces with the builders, and the encoding,
+which is what the solver is asked about.
 """
 
 from __future__ import annotations
@@ -43,13 +44,15 @@ class Checked:
 
 
 def check(
-    certificate: Certificate, candidates: Candidates, progress: Callable[[str], None] = lambda _: None
+    certificate: Certificate,
+    candidates: Candidates,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Checked:
     """Check a certificate for candidate tasks.
 
-    For every reason: its plans are optimal plans of one candidate task, their mixture is not, and its cells are warping
-    paths.  Then no partition of states into the refuted number of words separates a pair on every reason's paths.
-    Raises `Refuted` with the reason that is wrong.
+    For every reason: its plans are optimal plans of one candidate task, their mixture is not, and
+    its cells are warping paths.  Then no partition of states into the refuted number of words
+    separates a pair on every reason's paths. Raises `Refuted` with the reason that is wrong.
     """
     if tuple(certificate.robots) != candidates.model.robots:
         raise Refuted(f"the certificate is about other robots: {', '.join(certificate.robots)}")
@@ -66,7 +69,9 @@ def check(
     progress(f"refuting {certificate.refuted} words")
     cnf = encode(clauses, certificate.refuted)
     if certificate.refuted and not cnf.refuted():
-        raise Refuted(f"the certificate's {len(clauses):,} reasons leave languages with {certificate.refuted} words")
+        raise Refuted(
+            f"the certificate's {len(clauses):,} reasons leave languages with {certificate.refuted} words"
+        )
     names = {state: candidates.model.codec.key(candidates.rows[state]) for state in cnf.word}
     return Checked(certificate.refuted + 1, len(clauses), cnf, names)
 
@@ -78,7 +83,10 @@ def _clause(reason: Reason, tasks: _Tasks) -> Clause:
     if len(reason.plans) != robots:
         raise Refuted(f"expected a plan for each of {robots} robots")
     states = [_states(space, start, plan, f"plan {n}") for n, plan in enumerate(reason.plans)]
-    mixture = [[steps[robot][robot] for robot in range(robots)] for steps in zip(*reason.plans, strict=True)]
+    mixture = [
+        [steps[robot][robot] for robot in range(robots)]
+        for steps in zip(*reason.plans, strict=True)
+    ]
     if _follow(space, start, mixture) is not None:
         raise Refuted("the mixture of its plans is an optimal plan: they need no separation")
     clause = set()
@@ -88,7 +96,9 @@ def _clause(reason: Reason, tasks: _Tasks) -> Clause:
         if not (0 <= a < robots and 0 <= b < robots):
             raise Refuted(f"there are no plans {a} and {b}")
         _check_path(path.cells, len(states[a]), len(states[b]), f"the path of plans {a} and {b}")
-        clause |= {pair(states[a][i], states[b][j]) for i, j in path.cells if states[a][i] != states[b][j]}
+        clause |= {
+            pair(states[a][i], states[b][j]) for i, j in path.cells if states[a][i] != states[b][j]
+        }
         union = joined[a] | joined[b]
         for number in union:
             joined[number] = union
@@ -111,7 +121,11 @@ def _follow(space: PlanSpace, start: int, plan: PlanTexts) -> list[int] | None:
     for step in plan:
         labels = space.model.numbers(step) if len(step) == len(space.model.robots) else None
         edges = np.arange(space.first[node], space.first[node + 1])
-        hit = edges[(space.labels[edges] == np.array(labels)).all(axis=1)] if labels is not None else edges[:0]
+        hit = (
+            edges[(space.labels[edges] == np.array(labels)).all(axis=1)]
+            if labels is not None
+            else edges[:0]
+        )
         if not len(hit):
             return None
         node = int(space.target[hit[0]])
@@ -143,7 +157,9 @@ class _Tasks:
         state = int(find_rows(self._rows, row[None, :])[0])
         goal = _canonical(part for text in reason.goal for part in split_atoms(text))
         if (state, goal) not in self._tasks:
-            raise Refuted(f"{' '.join(reason.init)} -> {' '.join(reason.goal)} is no candidate task")
+            raise Refuted(
+                f"{' '.join(reason.init)} -> {' '.join(reason.goal)} is no candidate task"
+            )
         return self._tasks[state, goal]
 
 

@@ -13,7 +13,8 @@ from coordlang.vocabulary.sat import Colouring, Undecided, by_demand, reduce, so
 
 #: Conflicts after which the checking solver comes back.
 _SLICE = 10_000
-#: Conflicts, of one partition on the way to a core and of its last reduction, after which it is taken as it is.
+#: Conflicts, of one partition on the way to a core and of its last reduction, after which it is
+#: taken as it is.
 _EASY, _CONFLICTS = 5_000, 50_000
 #: Clauses that a core takes in for each partition that breaks them.
 _AT_ONCE = 50
@@ -21,10 +22,12 @@ _AT_ONCE = 50
 
 @dataclass(frozen=True, slots=True)
 class Cnf:
-    """A formula in conjunctive normal form: "the states can be given ``size`` words so that every clause holds".
+    """A formula in conjunctive normal form: "the states can be given ``size`` words so that every
+    clause holds".
 
     The last of ``clauses`` are the necessary ones, in their order; those before say what words are.
-    ``word[state]`` are the variables "the state has word 0, 1, ..", ``separated[pair]`` "the two have different words".
+    ``word[state]`` are the variables "the state has word 0, 1, ..", ``separated[pair]`` "the two
+    have different words".
     """
 
     size: int
@@ -35,16 +38,23 @@ class Cnf:
 
     def dimacs(self, names: Mapping[int, str]) -> str:
         """DIMACS text.  ``names`` are the states' keys, for the comments."""
-        lines = [f"c Unsatisfiable iff no {self.size} words satisfy the clauses of a coordlang certificate."]
+        lines = [
+            f"c Unsatisfiable iff no {self.size} words satisfy the clauses of a coordlang certificate."
+        ]
         for state, variables in self.word.items():
             lines += [f"c {v}: word {n} holds {names[state]}" for n, v in enumerate(variables)]
-        lines += [f"c {v}: {names[a]} and {names[b]} have different words" for (a, b), v in self.separated.items()]
+        lines += [
+            f"c {v}: {names[a]} and {names[b]} have different words"
+            for (a, b), v in self.separated.items()
+        ]
         lines.append(f"p cnf {self.variables} {len(self.clauses)}")
         lines += [" ".join(map(str, (*clause, 0))) for clause in self.clauses]
         return "\n".join(lines) + "\n"
 
     def refuted(self, solver: str = "maplechrono") -> bool:
-        """Whether the formula is unsatisfiable, by a solver and a loop that the builders do not use."""
+        """Whether the formula is unsatisfiable, by a solver and a loop that the builders do not
+        use.
+        """
         from pysat.solvers import Solver
 
         with Solver(name=solver, bootstrap_with=self.clauses) as sat:
@@ -58,8 +68,9 @@ class Cnf:
 def encode(clauses: Sequence[Clause], size: int) -> Cnf:
     """The CNF of necessary clauses for ``size`` words.
 
-    Words are interchangeable: a state may have word w only if a state before it, in the order of ``word``, has word w - 1.
-    Any partition can be named like that, so the formula stays satisfiable if it was.
+    Words are interchangeable: a state may have word w only if a state before it, in the order of
+    ``word``, has word w - 1. Any partition can be named like that, so the formula stays satisfiable
+    if it was.
     """
     states = by_demand(sorted({s for clause in clauses for p in clause for s in p}), clauses)
     counter = iter(range(1, 2**62))
@@ -77,7 +88,9 @@ def encode(clauses: Sequence[Clause], size: int) -> Cnf:
     return Cnf(size, next(counter) - 1, tuple(cnf), word, separated)
 
 
-def _words_in_order(words: Sequence[Sequence[int]], size: int, counter: Iterable[int]) -> list[tuple[int, ...]]:
+def _words_in_order(
+    words: Sequence[Sequence[int]], size: int, counter: Iterable[int]
+) -> list[tuple[int, ...]]:
     """``used[w]`` after each state: some state so far has word w."""
     fresh = iter(counter)
     cnf: list[tuple[int, ...]] = []
@@ -96,7 +109,8 @@ def _words_in_order(words: Sequence[Sequence[int]], size: int, counter: Iterable
 
 
 def core(clauses: Iterable[Clause], size: int) -> list[Clause]:
-    """A part of the clauses that still refutes ``size`` words, small but not least; all of them where that takes long.
+    """A part of the clauses that still refutes ``size`` words, small but not least; all of them
+    where that takes long.
 
     Raises `ValueError` if it finds that they do not refute it.
     """
@@ -123,7 +137,9 @@ def _in_the_way(clauses: Sequence[Clause], size: int) -> list[Clause]:
         while (partition := colouring.solve(_EASY)) is not None:
             words[list(partition)] = list(partition.values())
             apart = words[pairs[:, 0]] != words[pairs[:, 1]]
-            broken = np.flatnonzero(~np.logical_or.reduceat(apart, bounds)) if len(clauses) else bounds
+            broken = (
+                np.flatnonzero(~np.logical_or.reduceat(apart, bounds)) if len(clauses) else bounds
+            )
             if not len(broken):
                 raise ValueError(f"the clauses leave a partition into {size} words")
             for number in broken[:_AT_ONCE].tolist():

@@ -22,15 +22,18 @@ PlanTexts = list[list[str | None]]
 
 
 class WarpingPath(msgspec.Struct, frozen=True):
-    """A warping path of the states of two of a reason's ``plans`` (numbers from 0): cells (step in one, in the other)."""
+    """A warping path of the states of two of a reason's ``plans`` (numbers from 0): cells (step in
+    one, in the other).
+    """
 
     plans: tuple[int, int]
     cells: list[tuple[int, int]]
 
 
 class Reason(msgspec.Struct, frozen=True):
-    """One necessary clause: plans of a task, whose mixture - robot i does its part of ``plans[i]`` - is no optimal plan,
-    and warping paths that join all of them.  On some cell of these paths the two states need different words.
+    """One necessary clause: plans of a task, whose mixture - robot i does its part of ``plans[i]``
+    - is no optimal plan, and warping paths that join all of them.  On some cell of these paths the
+    two states need different words.
 
     ``init`` are the true fluents at the start, ``goal`` the literals at the end, as in a task file.
     """
@@ -77,7 +80,8 @@ def read_certificate(path: str | Path) -> Certificate:
         head = msgspec.json.decode(data, type=_Head)
         if head.format != FORMAT or head.version != VERSION:
             raise BadInput(
-                f"format {head.format!r} version {head.version!r}, expected {FORMAT!r} version {VERSION}", place=place
+                f"format {head.format!r} version {head.version!r}, expected {FORMAT!r} version {VERSION}",
+                place=place,
             )
         return msgspec.json.decode(data, type=Certificate)
     except FileNotFoundError:

@@ -19,8 +19,8 @@ from planners.search.plan_space import PlanSpace
 def certify(candidates: Candidates, evidence: Mapping[Clause, Evidence], size: int) -> Certificate:
     """A certificate that no language for the candidates has ``size`` words or fewer.
 
-    ``evidence`` are necessary clauses that refute it (`coordlang.vocabulary.minimal.refute`); a small part of them is
-    kept.  Raises `ValueError` if they do not refute it.
+    ``evidence`` are necessary clauses that refute it (`coordlang.vocabulary.minimal.refute`); a
+    small part of them is kept.  Raises `ValueError` if they do not refute it.
     """
     needed = core(evidence, size) if size else []
     reasons = [_reason(candidates, clause, evidence[clause]) for clause in needed]
@@ -42,7 +42,9 @@ def _reason(candidates: Candidates, clause: Clause, evidence: Evidence) -> Reaso
     init = model.codec.decode(space.rows[space.state[start]])
     goal = split_atoms(goal_text(model, space.goals[space.goal[start]]))
     if symmetry is not None:
-        plans = [[list(symmetry.joint_action(model.robots, step)) for step in plan] for plan in plans]
+        plans = [
+            [list(symmetry.joint_action(model.robots, step)) for step in plan] for plan in plans
+        ]
         sequences = [[int(symmetry.states[s]) for s in states] for states in sequences]
         init, goal = (sorted(symmetry.text(atom) for atom in atoms) for atoms in (init, goal))
     order = list(range(len(plans)))
@@ -52,7 +54,9 @@ def _reason(candidates: Candidates, clause: Clause, evidence: Evidence) -> Reaso
     paths = []
     first = sequences[0]
     for number, other in enumerate(sequences[1:], 1):
-        cells = warping_path(first, other, [[a == b or pair(a, b) in clause for b in other] for a in first])
+        cells = warping_path(
+            first, other, [[a == b or pair(a, b) in clause for b in other] for a in first]
+        )
         assert cells is not None, "the clause was made from warping paths of these plans"
         paths.append(WarpingPath((order[0], order[number]), cells))
     return Reason(init, goal, [plans[order.index(robot)] for robot in range(len(plans))], paths)

@@ -49,7 +49,10 @@ def run(arguments: list[str]) -> int:
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - what is still in the buffer has no place to go
         return _fail(f"the output cannot be written: {error.strerror}", 2)
     except MemoryError:
-        return _fail("out of memory\n  Use a smaller task, or a larger --memory-limit.", OutOfMemory.exit_code)
+        return _fail(
+            "out of memory\n  Use a smaller task, or a larger --memory-limit.",
+            OutOfMemory.exit_code,
+        )
     except CoordlangError as error:
         if debug:
             traceback.print_exc()

@@ -84,7 +84,10 @@ SUMMARIES = {
 }
 
 
-@click.group(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.group(
+    cls=_LazyGroup,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)
 @click.version_option(package_name="coordlang")
 def cli() -> None:
     """Coordination languages for robots that plan on their own and act together.
@@ -111,10 +114,17 @@ def limits(function: Callable[..., Any]) -> Callable[..., Any]:
         metavar="SECONDS",
         help="Stop after this long (exit 23).",
     )
-    @click.option("--memory-limit", callback=_size, metavar="SIZE", help="Stop before using more, e.g. 4G (exit 22).")
+    @click.option(
+        "--memory-limit",
+        callback=_size,
+        metavar="SIZE",
+        help="Stop before using more, e.g. 4G (exit 22).",
+    )
     @click.option("--debug", is_flag=True, help="Show tracebacks.")
     @functools.wraps(function)
-    def wrapped(time_limit: float | None, memory_limit: int | None, debug: bool, **arguments: Any) -> Any:
+    def wrapped(
+        time_limit: float | None, memory_limit: int | None, debug: bool, **arguments: Any
+    ) -> Any:
         from planners.limits import limit_memory, require_memory
         from planners.limits import time_limit as limit_time
 
@@ -133,7 +143,9 @@ def model_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """How the PDDL files are understood; the command gets `GivenOptions` as ``given``."""
 
     @click.option("--robots", metavar="R1,R2", help="The robots, where the domain does not say.")
-    @click.option("--robot-type", metavar="TYPE", help="The type (or unary predicate) of the robots.")
+    @click.option(
+        "--robot-type", metavar="TYPE", help="The type (or unary predicate) of the robots."
+    )
     @click.option(
         "--unowned",
         type=click.Choice(["error", "environment", "shared"]),
@@ -146,7 +158,9 @@ def model_options(function: Callable[..., Any]) -> Callable[..., Any]:
         default=None,
         help="What optimal means (default: makespan).",
     )
-    @click.option("--remember-actions", is_flag=True, help="Add each robot's last subaction to the state.")
+    @click.option(
+        "--remember-actions", is_flag=True, help="Add each robot's last subaction to the state."
+    )
     @functools.wraps(function)
     def wrapped(
         robots: str | None,
@@ -176,8 +190,12 @@ class GivenOptions:
         if robots is not None and not robots.replace(",", "").strip():
             raise click.UsageError("--robots: expected names, as in --robots r1,r2")
         if robots and robot_type:
-            raise click.UsageError("--robots and --robot-type both say who the robots are: give one of them")
-        self.robots = tuple(r.strip().lower() for r in robots.split(",") if r.strip()) if robots else ()
+            raise click.UsageError(
+                "--robots and --robot-type both say who the robots are: give one of them"
+            )
+        self.robots = (
+            tuple(r.strip().lower() for r in robots.split(",") if r.strip()) if robots else ()
+        )
         self.robot_type = robot_type.lower() if robot_type else None
         self.unowned: Any = unowned
         self.cost: Any = cost
@@ -207,7 +225,10 @@ class GivenOptions:
 
 def was_given(name: str) -> bool:
     """Whether the user gave this parameter of the command himself."""
-    return click.get_current_context().get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
+    return (
+        click.get_current_context().get_parameter_source(name)
+        is click.core.ParameterSource.COMMANDLINE
+    )
 
 
 def form_of(form: str, as_json: bool) -> str:
@@ -236,7 +257,12 @@ def read_files(domain: str, problems: tuple[str, ...]) -> tuple[Any, list[Any]]:
 
 
 def make_candidates(
-    lifted: Any, read: list[Any], tasks: str | None, options: ModelOptions, *, skip_unsolvable: bool = False
+    lifted: Any,
+    read: list[Any],
+    tasks: str | None,
+    options: ModelOptions,
+    *,
+    skip_unsolvable: bool = False,
 ) -> Candidates:
     """The candidate tasks that ``--tasks`` asks for; without it the problems' own."""
     from coordlang.tasks.candidates import all_pairs, from_listed, from_problems
@@ -252,12 +278,17 @@ def make_candidates(
 
 
 def check_outputs(
-    outputs: Sequence[tuple[str, str | None]], inputs: Iterable[str | None], *, makes_folder: bool = False
+    outputs: Sequence[tuple[str, str | None]],
+    inputs: Iterable[str | None],
+    *,
+    makes_folder: bool = False,
 ) -> None:
-    """Refuse outputs that cannot be written, overwrite an input file or one another: before the work, not after it.
+    """Refuse outputs that cannot be written, overwrite an input file or one another: before the
+    work, not after it.
 
-    ``outputs`` are pairs (option, path).  None is no file, ``-`` is stdout or stdin and not looked at.  ``makes_folder``:
-    the command makes the folder itself where it is missing.  Raises `UsageError`.
+    ``outputs`` are pairs (option, path).  None is no file, ``-`` is stdout or stdin and not looked
+    at.  ``makes_folder``: the command makes the folder itself where it is missing.  Raises
+    `UsageError`.
     """
     from planners.errors import UsageError
 
@@ -272,10 +303,16 @@ def check_outputs(
         if os.path.exists(path) and not os.path.isfile(path):
             continue  # a device or a pipe: written to, and never replaced
         if any(os.path.samefile(path, other) for other in read if os.path.exists(path)):
-            raise UsageError(f"{option} {path} would overwrite an input file", remedy="Give the output another name.")
+            raise UsageError(
+                f"{option} {path} would overwrite an input file",
+                remedy="Give the output another name.",
+            )
         other = written.setdefault(os.path.realpath(path), option)
         if other != option:
-            raise UsageError(f"{other} and {option} name the same file: {path}", remedy="Give each a file of its own.")
+            raise UsageError(
+                f"{other} and {option} name the same file: {path}",
+                remedy="Give each a file of its own.",
+            )
 
 
 def _unwritable(path: str, makes_folder: bool) -> str | None:
@@ -322,7 +359,10 @@ def counted(number: int, noun: str) -> str:
 def note_single_robot(robots: tuple[str, ...]) -> None:
     """One robot is no mistake in itself, but surely not what this program is for."""
     if len(robots) == 1:
-        click.echo(f"coordlang: note: {robots[0]} is the only robot: there is nothing to coordinate", err=True)
+        click.echo(
+            f"coordlang: note: {robots[0]} is the only robot: there is nothing to coordinate",
+            err=True,
+        )
 
 
 class PlanningFiles:
@@ -335,7 +375,11 @@ class PlanningFiles:
     @property
     def paths(self) -> list[str]:
         """All files that are read."""
-        return [str(path) for path in Path(self.factored).glob("*-*.pddl")] if self.factored else list(self.files)
+        return (
+            [str(path) for path in Path(self.factored).glob("*-*.pddl")]
+            if self.factored
+            else list(self.files)
+        )
 
     def read(self) -> tuple[Any, list[Any]]:
         """The domain and its problems."""
@@ -347,13 +391,19 @@ class PlanningFiles:
         return domain, [problem]
 
 
-def planning_files(metavar: str, most: int | None = None) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """DOMAIN and at most so many problems, or ``--factored DIR``; the command gets `PlanningFiles` as ``pddl``."""
+def planning_files(
+    metavar: str, most: int | None = None
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """DOMAIN and at most so many problems, or ``--factored DIR``; the command gets `PlanningFiles`
+    as ``pddl``.
+    """
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
         @click.argument("files", nargs=-1, metavar=metavar)
         @click.option(
-            "--factored", metavar="DIR", help="Read domain-ROBOT.pddl and problem-ROBOT.pddl of every robot here."
+            "--factored",
+            metavar="DIR",
+            help="Read domain-ROBOT.pddl and problem-ROBOT.pddl of every robot here.",
         )
         @functools.wraps(function)
         def wrapped(files: tuple[str, ...], factored: str | None, **arguments: Any) -> Any:
@@ -368,7 +418,9 @@ def planning_files(metavar: str, most: int | None = None) -> Callable[[Callable[
 
 
 def task_files(function: Callable[..., Any]) -> Callable[..., Any]:
-    """DOMAIN PROBLEM, or ``--factored DIR`` in their place; the command gets a `Loaded` maker as ``load``."""
+    """DOMAIN PROBLEM, or ``--factored DIR`` in their place; the command gets a `Loaded` maker as
+    ``load``.
+    """
 
     @planning_files("DOMAIN PROBLEM", most=1)
     @functools.wraps(function)

@@ -35,21 +35,54 @@ if TYPE_CHECKING:
 
 @click.command(name="build")
 @planning_files("DOMAIN PROBLEMS...")
-@click.option("--tasks", metavar="all|FILE", help="Candidate tasks: every pair of reachable states, or a task file "
-              "(default: the problems' own).")  # fmt: skip
-@click.option("--method", type=click.Choice(["greedy", "separating", "minimal", "exhaustive"]), default="greedy",
-              show_default=True, help="greedy: fast.  separating: fewest words that part plans where they differ first or "
-              "last.  minimal: fewest words at all, with proof.  exhaustive: brute force.")
-@click.option("--alpha-only", is_flag=True, help="separating: part plans where they differ first, never where last.")
-@click.option("--prefer", type=click.Choice(["flexible"]), help="flexible: of the languages with the fewest words, one "
-              "whose sentences leave many plans open (with --method minimal or exhaustive).")
-@click.option("--overlap", is_flag=True, help="Then give states further words while that leaves more plans open.")
-@click.option("--certificate", metavar="FILE", help="Also write why fewer words do not suffice, for `verify "
-              "--lower-bound`.")
-@click.option("--unsolvable", type=click.Choice(["fail", "skip"]), default="fail", show_default=True,
-              help="What to do about candidate tasks without plans: stop (exit 11), or name and leave them out.")
 @click.option(
-    "-o", "--output", required=True, metavar="LANGUAGE", help="The language file; .json or .json.gz, - for stdout."
+    "--tasks",
+    metavar="all|FILE",
+    help="Candidate tasks: every pair of reachable states, or a task file "
+    "(default: the problems' own).",
+)
+@click.option(
+    "--method",
+    type=click.Choice(["greedy", "separating", "minimal", "exhaustive"]),
+    default="greedy",
+    show_default=True,
+    help="greedy: fast.  separating: fewest words that part plans where they differ first or "
+    "last.  minimal: fewest words at all, with proof.  exhaustive: brute force.",
+)
+@click.option(
+    "--alpha-only",
+    is_flag=True,
+    help="separating: part plans where they differ first, never where last.",
+)
+@click.option(
+    "--prefer",
+    type=click.Choice(["flexible"]),
+    help="flexible: of the languages with the fewest words, one "
+    "whose sentences leave many plans open (with --method minimal or exhaustive).",
+)
+@click.option(
+    "--overlap",
+    is_flag=True,
+    help="Then give states further words while that leaves more plans open.",
+)
+@click.option(
+    "--certificate",
+    metavar="FILE",
+    help="Also write why fewer words do not suffice, for `verify --lower-bound`.",
+)
+@click.option(
+    "--unsolvable",
+    type=click.Choice(["fail", "skip"]),
+    default="fail",
+    show_default=True,
+    help="What to do about candidate tasks without plans: stop (exit 11), or name and leave them out.",
+)
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    metavar="LANGUAGE",
+    help="The language file; .json or .json.gz, - for stdout.",
 )
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as one JSON object.")
@@ -71,7 +104,8 @@ def command(
 ) -> int:
     """Build a coordination language and verify it before it is written.
 
-    Exit 0: written, with the proof that the method promises.  3: written without it (a limit was hit).
+    Exit 0: written, with the proof that the method promises.  3: written without it (a limit was
+    hit).
     """
     from coordlang.building import build_language
     from coordlang.cli.miscoordination import show
@@ -91,10 +125,14 @@ def command(
     start = perf_counter()
     lifted, read = pddl.read()
     try:
-        candidates = make_candidates(lifted, read, tasks, given.options(), skip_unsolvable=unsolvable == "skip")
+        candidates = make_candidates(
+            lifted, read, tasks, given.options(), skip_unsolvable=unsolvable == "skip"
+        )
     except ProvedImpossible as error:
         if unsolvable == "fail":
-            error.remedy = "\n  ".join(filter(None, (error.remedy, "--unsolvable skip leaves out such tasks.")))
+            error.remedy = "\n  ".join(
+                filter(None, (error.remedy, "--unsolvable skip leaves out such tasks."))
+            )
         raise
     for name in candidates.skipped:
         click.echo(f"coordlang: left out, it has no plan: {name}", err=True)
@@ -102,7 +140,13 @@ def command(
     seconds = {"space": perf_counter() - start}
     try:
         built = build_language(
-            candidates, method, seed=seed, alpha_only=alpha_only, prefer=prefer, overlap=overlap, progress=progress
+            candidates,
+            method,
+            seed=seed,
+            alpha_only=alpha_only,
+            prefer=prefer,
+            overlap=overlap,
+            progress=progress,
         )
     except Inseparable as error:
         clear_progress()
@@ -163,7 +207,10 @@ def _certify(built: Built, path: str, seconds: float) -> BaseException | None:
             write_certificate(proof, path)
     except STOPPING as error:
         clear_progress()
-        click.echo("coordlang: no certificate is written: there was no time or memory left for it", err=True)
+        click.echo(
+            "coordlang: no certificate is written: there was no time or memory left for it",
+            err=True,
+        )
         return error
     return None
 
@@ -190,7 +237,11 @@ def _figures(candidates: Candidates, built: Built, seconds: dict[str, float]) ->
 
 def _summary(figures: dict[str, Any], output: str) -> str:
     words, total = figures["words"], sum(figures["seconds"].values())
-    proof = "proved minimal, " if figures["proved_minimal"] else f"at least {figures['lower_bound']} needed, "
+    proof = (
+        "proved minimal, "
+        if figures["proved_minimal"]
+        else f"at least {figures['lower_bound']} needed, "
+    )
     flexible = (
         f"a sentence leaves {figures['flexibility']:,.2f} plans open on average ("
         f"{figures['flexibility_before']:,.2f} before, {figures['flexibility_bound']:,.2f} at most), "

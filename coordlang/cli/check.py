@@ -37,11 +37,22 @@ def command(as_json: bool, load: Callable[[], Loaded]) -> int:
     answer = optimal_cost(model, task)
     theirs = answer.cost
     if as_json:
-        click.echo(json.dumps({"coordlang": ours, "fast_downward": theirs, "agree": ours == theirs,
-                               "form": answer.form, "actions": answer.actions}))  # fmt: skip
+        click.echo(
+            json.dumps(
+                {
+                    "coordlang": ours,
+                    "fast_downward": theirs,
+                    "agree": ours == theirs,
+                    "form": answer.form,
+                    "actions": answer.actions,
+                }
+            )
+        )
     else:
         click.echo(f"coordlang      {_cost(ours, model.cost)}")
-        click.echo(f"Fast Downward  {_cost(theirs, model.cost)}   ({answer.form} form, {answer.actions} plain actions)")
+        click.echo(
+            f"Fast Downward  {_cost(theirs, model.cost)}   ({answer.form} form, {answer.actions} plain actions)"
+        )
     if ours != theirs:
         click.echo("coordlang: the optimal costs differ", err=True)
         return 1

@@ -27,7 +27,9 @@ if TYPE_CHECKING:
 @model_options
 @limits
 def command(pddl: PlanningFiles, as_json: bool, given: GivenOptions) -> None:
-    """Say which tasks require coordination, and show how robots that follow different optimal plans miscoordinate."""
+    """Say which tasks require coordination, and show how robots that follow different optimal plans
+    miscoordinate.
+    """
     from coordlang.cli.miscoordination import show
     from coordlang.required.miscoordination import miscoordination
     from coordlang.tasks.candidates import from_problems
@@ -50,7 +52,9 @@ def command(pddl: PlanningFiles, as_json: bool, given: GivenOptions) -> None:
         answer = "is required" if witness else "is not required"
         if not witness and plans > 1:
             answer += ": any mixture of them is optimal"
-        click.echo(f"{name}: {counted(plans, 'optimal plan')} of {counted(makespan, 'step')}; coordination {answer}")
+        click.echo(
+            f"{name}: {counted(plans, 'optimal plan')} of {counted(makespan, 'step')}; coordination {answer}"
+        )
         if witness:
             click.echo()
             click.echo(show(witness))

@@ -20,17 +20,37 @@ if TYPE_CHECKING:
 
 @click.command(name="evaluate")
 @click.argument("names", nargs=-1, required=True, metavar="NAME...")
-@click.option("--results", metavar="DIR", help="Where results are kept (default: evaluation; with --quick "
-              "evaluation/quick).")  # fmt: skip
-@click.option("--page", metavar="FILE", help="The page that tells them (default: evaluation.md in DIR).")
+@click.option(
+    "--results",
+    metavar="DIR",
+    help="Where results are kept (default: evaluation; with --quick evaluation/quick).",
+)
+@click.option(
+    "--page", metavar="FILE", help="The page that tells them (default: evaluation.md in DIR)."
+)
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--jobs", type=click.IntRange(min=1), help="Processes (default: one for each core).")
-@click.option("--samples", type=click.IntRange(min=1), default=100, show_default=True,
-              help="Random runs; a hundred times as many where intervals are wanted.")  # fmt: skip
+@click.option(
+    "--samples",
+    type=click.IntRange(min=1),
+    default=100,
+    show_default=True,
+    help="Random runs; a hundred times as many where intervals are wanted.",
+)
 @click.option("--quick", is_flag=True, help="The smallest rows and sizes only, 10 samples.")
-@click.option("--unit-limit", type=click.FloatRange(min=0, min_open=True), default=180.0, show_default=True,
-              metavar="SECONDS", help="For each piece of work; then it is left out.")  # fmt: skip
-@click.option("--domains", metavar="DIR", help="The shipped domains (default: domains here, or those of the checkout).")
+@click.option(
+    "--unit-limit",
+    type=click.FloatRange(min=0, min_open=True),
+    default=180.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="For each piece of work; then it is left out.",
+)
+@click.option(
+    "--domains",
+    metavar="DIR",
+    help="The shipped domains (default: domains here, or those of the checkout).",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print all results as one JSON object.")
 @limits
 def command(
@@ -47,8 +67,8 @@ def command(
 ) -> int:
     """Run experiments of the paper and set their results beside the paper's own.
 
-    NAME is table1, communication, flexibility, planning_cost, navigation, game, scenario, or all.  A run that was stopped or
-    killed goes on where it was when it is started again.
+    NAME is table1, communication, flexibility, planning_cost, navigation, game, scenario, or all.
+    A run that was stopped or killed goes on where it was when it is started again.
     """
     from coordlang.evaluation.experiments.registry import RECIPES
     from coordlang.evaluation.lab.page import sections, write_page
@@ -60,7 +80,9 @@ def command(
 
     for name in names:
         if name != "all" and name not in RECIPES:
-            raise click.UsageError(f"there is no experiment {name!r}; there are {', '.join(RECIPES)}, all")
+            raise click.UsageError(
+                f"there is no experiment {name!r}; there are {', '.join(RECIPES)}, all"
+            )
     check_outputs([("--page", page)], [])
     chosen = [recipe for name, recipe in RECIPES.items() if name in names or "all" in names]
     given = click.get_current_context().get_parameter_source("samples")
@@ -80,16 +102,28 @@ def command(
     written = write_page(kept, Path(page) if page else folder / "evaluation.md")
     seconds = perf_counter() - begin
     if as_json:
-        click.echo(json.dumps({
-            "results": {name: [as_data(record) for record in records] for name, records in found.items()},
-            "files": [str(path) for path in written],
-            "seconds": round(seconds, 3),
-        }))  # fmt: skip
+        click.echo(
+            json.dumps(
+                {
+                    "results": {
+                        name: [as_data(record) for record in records]
+                        for name, records in found.items()
+                    },
+                    "files": [str(path) for path in written],
+                    "seconds": round(seconds, 3),
+                }
+            )
+        )
     else:
         for name, section in sections(found).items():
             click.echo(f"# {RECIPES[name].title}\n")
             click.echo(as_text(section))
-    unfinished = [f"{name}/{r.unit.key}" for name, records in found.items() for r in records if r.status != "done"]
+    unfinished = [
+        f"{name}/{r.unit.key}"
+        for name, records in found.items()
+        for r in records
+        if r.status != "done"
+    ]
     done = sum(map(len, found.values()))
     told = f"{counted(done, 'piece')} of work in {seconds:.1f} s; results in {folder}, page {written[0]}"
     click.echo(told, err=True)
@@ -112,7 +146,10 @@ def as_data(record: Record) -> dict[str, object]:
 
 def as_text(section: Section) -> str:
     """A section for the terminal: its text and tables, and the names of its figures."""
-    parts = [block if isinstance(block, str) else f"[figure {block.name}.svg: {block.alt}]" for block in section.blocks]
+    parts = [
+        block if isinstance(block, str) else f"[figure {block.name}.svg: {block.alt}]"
+        for block in section.blocks
+    ]
     return "\n\n".join([*parts, *(f"- {difference}" for difference in section.differences)]) + "\n"
 
 
@@ -120,4 +157,8 @@ def show_progress(progress: Progress) -> None:
     """One line about what is being done, on a terminal only."""
     if sys.stderr.isatty():
         running = ", ".join(f"{unit.experiment}/{unit.key}" for unit in progress.running)
-        click.echo(f"\r\033[K{progress.done} of {progress.all} ({progress.known} known) {running} ..", nl=False, err=True)
+        click.echo(
+            f"\r\033[K{progress.done} of {progress.all} ({progress.known} known) {running} ..",
+            nl=False,
+            err=True,
+        )

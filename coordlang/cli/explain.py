@@ -33,9 +33,15 @@ _SENTENCES_SHOWN = 10
 @language_argument
 @domain_argument
 @problem_argument
-@click.option("--task", is_flag=True, help="What each sentence of PROBLEM's task asks of each robot.")
+@click.option(
+    "--task", is_flag=True, help="What each sentence of PROBLEM's task asks of each robot."
+)
 @click.option("--sentence", metavar="WORDS", help='With --task: this sentence only, as in "w1 w0".')
-@click.option("--each", is_flag=True, help="A formula of its own for every word, also where less would say the same.")
+@click.option(
+    "--each",
+    is_flag=True,
+    help="A formula of its own for every word, also where less would say the same.",
+)
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
 @model_options
 @limits
@@ -49,7 +55,9 @@ def command(
     as_json: bool,
     given: GivenOptions,
 ) -> int:
-    """Show a language: each word as a short formula, and with --task what the sentences of a task ask of each robot."""
+    """Show a language: each word as a short formula, and with --task what the sentences of a task
+    ask of each robot.
+    """
     from coordlang.explanation.telling import telling
     from coordlang.explanation.words import all_covers, mapped_states
     from coordlang.language.file import read_language
@@ -66,16 +74,28 @@ def command(
     formulas = all_covers(mapped)
     told = telling(mapped, formulas, each)
     if not as_json:
-        click.echo(_words(spoken, mapped, told) + "\n")  # first: a task may have too many sentences to list
+        click.echo(
+            _words(spoken, mapped, told) + "\n"
+        )  # first: a task may have too many sentences to list
     every = task_sentences(spoken.space, spoken.task, spoken.table)
     sentences = every if sentence is None else _only(spoken, every, sentence)
-    asks = [_asked(spoken, formulas, s) for s in (sentences if as_json else sentences[:_SENTENCES_SHOWN])] if task else []
+    asks = (
+        [
+            _asked(spoken, formulas, s)
+            for s in (sentences if as_json else sentences[:_SENTENCES_SHOWN])
+        ]
+        if task
+        else []
+    )
     if as_json:
         click.echo(json.dumps(_data(spoken, mapped, formulas, told, sentences, asks)))
     else:
         click.echo(_task(spoken, len(every), sentences, asks))
     if task and not spoken.covered:
-        click.echo("coordlang: warning: the language does not cover this task: it guarantees nothing here", err=True)
+        click.echo(
+            "coordlang: warning: the language does not cover this task: it guarantees nothing here",
+            err=True,
+        )
         return 1
     return 0
 
@@ -122,11 +142,16 @@ def _data(
     return {
         "words": dict(zip(mapped.words, mapped.states, strict=True)),
         "default": spoken.language.default,
-        "variables": [{"name": v.name, "values": list(v.values)} for v in mapped.valuation.variables],
+        "variables": [
+            {"name": v.name, "values": list(v.values)} for v in mapped.valuation.variables
+        ],
         "formulas": {word: cover_data(formula) for word, formula in formulas.items()},
         "told": {
             "in_order": told.in_order,
-            "rules": [{"word": word, "text": shown(formula) if formula else None} for word, formula in told.rules],
+            "rules": [
+                {"word": word, "text": shown(formula) if formula else None}
+                for word, formula in told.rules
+            ],
         },
         "task": describe(spoken.space, spoken.task),
         "covered": spoken.covered,
@@ -140,18 +165,26 @@ def _words(spoken: Spoken, mapped: Mapped, told: Telling) -> str:
     language = spoken.language
     g = language.guarantee
     proof = "proved minimal" if g.proved_minimal else f"at least {g.lower_bound} needed"
-    tasks = counted(language.tasks["count"], "task") if language.tasks["count"] else "no recorded task"
-    lines = [f"{counted(len(language.words), 'word')} ({g.method}, {proof}) for {tasks} of {', '.join(spoken.model.robots)}."]
+    tasks = (
+        counted(language.tasks["count"], "task") if language.tasks["count"] else "no recorded task"
+    )
+    lines = [
+        f"{counted(len(language.words), 'word')} ({g.method}, {proof}) for {tasks} of {', '.join(spoken.model.robots)}."
+    ]
     if told.in_order:
         lines.append("The first formula that is true in a state gives its word:")
     lines.append(telling_text(told, mapped))
     long = [word for word, formula in told.rules if formula and not formula.fewest]
     if not mapped.word.size:
         return "\n".join([*lines, f"No state is mapped: the word is always {language.default}."])
-    lines.append(f"Exact in all {counted(sum(mapped.states), 'mapped state')}. No optimal plan of these tasks leaves them; "
-                 f"elsewhere the word is {language.default}.")  # fmt: skip
+    lines.append(
+        f"Exact in all {counted(sum(mapped.states), 'mapped state')}. No optimal plan of these tasks leaves them; "
+        f"elsewhere the word is {language.default}."
+    )
     if long:
-        lines.append(f"Fewer terms may suffice for {', '.join(long)}; for the others it is proved that they do not.")
+        lines.append(
+            f"Fewer terms may suffice for {', '.join(long)}; for the others it is proved that they do not."
+        )
     elif told.length > 1:
         lines.append("It is proved that no formula can do with fewer terms.")
     return "\n".join(lines)
@@ -165,14 +198,20 @@ def _task(spoken: Spoken, number: int, sentences: list[TaskSentence], asks: list
     total = Plans.of(spoken.space, spoken.task).count
     steps = int(spoken.space.layer[spoken.start])
     lines = [f"The task {describe(spoken.space, spoken.task)}"]
-    lines.append(f"has {counted(total, 'optimal plan')} of {counted(steps, 'step')} in {counted(number, 'sentence')}.")
+    lines.append(
+        f"has {counted(total, 'optimal plan')} of {counted(steps, 'step')} in {counted(number, 'sentence')}."
+    )
     if asks and spoken.covered:
-        lines.append("Each robot may choose for itself: whatever the others choose, it is an optimal plan.")
+        lines.append(
+            "Each robot may choose for itself: whatever the others choose, it is an optimal plan."
+        )
     for place, sentence in enumerate(sentences[:_SENTENCES_SHOWN]):
         if asks:
             lines += ["", asked_text(asks[place])]
         else:
-            lines.append(f'  "{" ".join(sentence.words)}" leaves {counted(sentence.plans, "plan")} open.')
+            lines.append(
+                f'  "{" ".join(sentence.words)}" leaves {counted(sentence.plans, "plan")} open.'
+            )
     if len(sentences) > _SENTENCES_SHOWN:
         lines.append(f"  .. and {counted(len(sentences) - _SENTENCES_SHOWN, 'more sentence')}")
     return "\n".join(lines)

@@ -33,12 +33,32 @@ if TYPE_CHECKING:
 @domain_argument
 @problem_argument
 @click.argument("sentence")
-@click.option("--to", "target", type=click.Choice(["pddl", "ltlf"]), default="pddl", show_default=True,
-              help="pddl: a planning problem.  ltlf: a temporal formula over plans.")  # fmt: skip
-@click.option("-o", "--output", metavar="PATH", help="pddl: a folder for domain.pddl and problem.pddl; ltlf: a file.")
-@click.option("--limit", type=click.IntRange(min=0), default=2000, show_default=True,
-              help="Beyond this many joint actions robots choose one after another in the PDDL.")  # fmt: skip
-@click.option("--back", metavar="PLAN", help="Do not export: translate a plan of the exported problem into a plan file.")
+@click.option(
+    "--to",
+    "target",
+    type=click.Choice(["pddl", "ltlf"]),
+    default="pddl",
+    show_default=True,
+    help="pddl: a planning problem.  ltlf: a temporal formula over plans.",
+)
+@click.option(
+    "-o",
+    "--output",
+    metavar="PATH",
+    help="pddl: a folder for domain.pddl and problem.pddl; ltlf: a file.",
+)
+@click.option(
+    "--limit",
+    type=click.IntRange(min=0),
+    default=2000,
+    show_default=True,
+    help="Beyond this many joint actions robots choose one after another in the PDDL.",
+)
+@click.option(
+    "--back",
+    metavar="PLAN",
+    help="Do not export: translate a plan of the exported problem into a plan file.",
+)
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
 @model_options
 @limits
@@ -56,8 +76,8 @@ def command(
 ) -> int:
     """Write the task under SENTENCE ("w1 w0") for other programs.
 
-    The optimal plans of the exported PDDL are exactly the plans that fit, one to one; a plan satisfies the LTLf formula
-    exactly if it has the sentence.
+    The optimal plans of the exported PDDL are exactly the plans that fit, one to one; a plan
+    satisfies the LTLf formula exactly if it has the sentence.
 
     Exit 1: no plan fits, or the language does not cover the task and guarantees nothing for it.
     """
@@ -119,7 +139,10 @@ def _data(exported: Exported) -> dict[str, Any]:
         "optimal_cost": exported.cost,
         "robots": list(model.robots),
         "actions": {
-            name: {model.robots[robot]: model.labels[robot][label] if label else None for robot, label in choices}
+            name: {
+                model.robots[robot]: model.labels[robot][label] if label else None
+                for robot, label in choices
+            }
             for name, choices in exported.choices.items()
         },
     }
@@ -139,11 +162,19 @@ def _write_formula(formula: SentenceFormula, output: str | None, as_json: bool) 
         return
     write(formula.formula + "\n", output)
     if output is None or output == "-":
-        click.echo(f"{counted(len(formula.symbols), 'symbol')}; --json says which atom each stands for", err=True)
+        click.echo(
+            f"{counted(len(formula.symbols), 'symbol')}; --json says which atom each stands for",
+            err=True,
+        )
 
 
 def _write_plan(
-    spoken: Spoken, words: tuple[int, ...], exported: Exported, back: str, output: str | None, as_json: bool
+    spoken: Spoken,
+    words: tuple[int, ...],
+    exported: Exported,
+    back: str,
+    output: str | None,
+    as_json: bool,
 ) -> None:
     """A plan of the exported problem, which must be an optimal one, as an ordinary plan file."""
     from coordlang.cli.speaking import write
@@ -157,7 +188,9 @@ def _write_plan(
     try:
         text = sys.stdin.read() if back == "-" else Path(back).read_text()
     except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(f"cannot be read: {getattr(error, 'strerror', error)}", place=place) from None
+        raise BadInput(
+            f"cannot be read: {getattr(error, 'strerror', error)}", place=place
+        ) from None
     only_one_plan(text, place)
     try:
         plan = exported.joint_plan(plan_names(text))
@@ -165,6 +198,9 @@ def _write_plan(
         raise BadInput(error.what, place=place, remedy=error.remedy) from None
     plans = Plans.of(fitting(spoken, words))
     if plans.rank(plan) is None:
-        raise Refuted("this is no optimal plan of the exported problem", place=place,
-                      remedy="Ask the planner for an optimal plan: the one of least total-cost.")  # fmt: skip
+        raise Refuted(
+            "this is no optimal plan of the exported problem",
+            place=place,
+            remedy="Ask the planner for an optimal plan: the one of least total-cost.",
+        )
     write(json.dumps(to_json(plans, [plan])) + "\n" if as_json else to_ipc(plans, plan), output)

@@ -17,7 +17,12 @@ if TYPE_CHECKING:
 
 
 @click.command(name="inspect")
-@click.option("--states", "count_states", is_flag=True, help="Also count the reachable joint states and steps.")
+@click.option(
+    "--states",
+    "count_states",
+    is_flag=True,
+    help="Also count the reachable joint states and steps.",
+)
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
 @model_options
 @task_files
@@ -54,17 +59,28 @@ def _text(found: Inspection) -> str:
     ]
     for robot, schemas in found.subactions.items():
         listed = f": {_counts(schemas)}" if schemas else ""
-        lines.append((f"  {robot}", f"{counted(sum(schemas.values()), 'subaction')}{listed}; {found.idle[robot]}"))
+        lines.append(
+            (
+                f"  {robot}",
+                f"{counted(sum(schemas.values()), 'subaction')}{listed}; {found.idle[robot]}",
+            )
+        )
     lines += [
         ("shared", _counts(found.shared) or "none"),
-        ("no robot named", {"error": "not allowed (--unowned)"}.get(found.unowned, f"--unowned {found.unowned}")),
+        (
+            "no robot named",
+            {"error": "not allowed (--unowned)"}.get(found.unowned, f"--unowned {found.unowned}"),
+        ),
         ("step formulas", _counts(found.step_formulas) or "none"),
         *(("", f"e.g. {example}") for example in found.formulas),
         ("never possible", ", ".join(found.impossible) or "none"),
         ("no effects", ", ".join(found.without_effects) or "none"),
         ("action costs", found.costs),
         ("interference", counted(found.interfering, "pair") + _example(found)),
-        ("fluents", f"{counted(found.facts, 'fact')}: {_counts(found.fluents)}" if found.facts else "none"),
+        (
+            "fluents",
+            f"{counted(found.facts, 'fact')}: {_counts(found.fluents)}" if found.facts else "none",
+        ),
         ("at the start", _counts(found.start) or "none is true"),
         ("statics", _counts(found.statics) or "none"),
         ("never true", ", ".join(found.never) or "none"),

@@ -28,7 +28,9 @@ def witness_data(witness: Miscoordination) -> dict[str, Any]:
 
 
 def show(witness: Miscoordination) -> str:
-    """A miscoordination as a person wants to see it: who follows which plan, step by step, and where it breaks."""
+    """A miscoordination as a person wants to see it: who follows which plan, step by step, and
+    where it breaks.
+    """
     width = max(len(text or "idle") for plan in witness.plans for step in plan for text in step) + 2
     lines = [f"  task: {witness.task}"]
     for robot, plan, states in zip(witness.robots, witness.plans, witness.states, strict=True):
@@ -38,18 +40,28 @@ def show(witness: Miscoordination) -> str:
     for number, (step, state) in enumerate(zip(witness.mixture, witness.mixed_states, strict=True)):
         mark = "  <-- breaks here" if number == witness.step else ""
         lines.append(f"    {state or NO_FACT}")
-        lines.append(f"    {number + 1:>3}  " + "".join(f"{_does(r, t):<{width + 6}}" for r, t in zip(
-            witness.robots, step, strict=True)).rstrip() + mark)  # fmt: skip
+        lines.append(
+            f"    {number + 1:>3}  "
+            + "".join(
+                f"{_does(r, t):<{width + 6}}" for r, t in zip(witness.robots, step, strict=True)
+            ).rstrip()
+            + mark
+        )
     lines.append(f"  step {witness.step + 1} breaks: {witness.reason}")
     return "\n".join(lines)
 
 
 def _table(
-    robots: tuple[str, ...], plan: tuple[tuple[str | None, ...], ...], states: tuple[str, ...], width: int
+    robots: tuple[str, ...],
+    plan: tuple[tuple[str | None, ...], ...],
+    states: tuple[str, ...],
+    width: int,
 ) -> list[str]:
     lines = []
     for number, step in enumerate(plan, 1):
-        texts = "".join(f"{_does(r, t):<{width + 6}}" for r, t in zip(robots, step, strict=True)).rstrip()
+        texts = "".join(
+            f"{_does(r, t):<{width + 6}}" for r, t in zip(robots, step, strict=True)
+        ).rstrip()
         lines.append(f"    {number:>3}  {texts}")
     lines.append(f"         reaches {states[-1] or NO_FACT}")
     return lines

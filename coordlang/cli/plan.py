@@ -57,7 +57,8 @@ def command(
 ) -> int:
     """Find one optimal plan that has SENTENCE ("w1 w0"), by A* that prunes what does not fit.
 
-    With --wish the best sentence of the task is found first.  The nodes expanded with and without the sentence go to stderr.
+    With --wish the best sentence of the task is found first.  The nodes expanded with and without
+    the sentence go to stderr.
     """
     from coordlang.cli.speaking import covered, read_spoken
     from coordlang.use.sentence.best_sentence import best_sentence
@@ -78,7 +79,11 @@ def command(
     understood = understand(spoken, words)
     if as_json:
         data = understood_data(understood, [found.plan], None)
-        data["search"] = {"heuristic": heuristic, **_work(found), "without_sentence": _work(without)}
+        data["search"] = {
+            "heuristic": heuristic,
+            **_work(found),
+            "without_sentence": _work(without),
+        }
         if best:
             data["wishes"] = _fulfilled(read, best)
         click.echo(json.dumps(data))
@@ -87,7 +92,8 @@ def command(
     if best:
         _comment(read, best)
     click.echo(
-        f"A* ({heuristic}) expanded {counted(found.expanded, 'node')}; without the sentence {without.expanded:,}", err=True
+        f"A* ({heuristic}) expanded {counted(found.expanded, 'node')}; without the sentence {without.expanded:,}",
+        err=True,
     )
     return covered(spoken)
 
@@ -107,7 +113,14 @@ def _fulfilled(wishes: list[Wish], best: Wished) -> list[dict[str, Any]]:
         else:
             assert not isinstance(wish, str)
             worst, well = (wish.grades[grade] for grade in value)
-            result.append({"wish": wish.text, "granted": value[0] == 0, "worst_plan": worst, "best_plan": well})
+            result.append(
+                {
+                    "wish": wish.text,
+                    "granted": value[0] == 0,
+                    "worst_plan": worst,
+                    "best_plan": well,
+                }
+            )
     return result
 
 
@@ -115,7 +128,11 @@ def _comment(wishes: list[Wish], best: Wished) -> None:
     """What became of each wish, on stderr."""
     for wish, value in zip(wishes, best.values, strict=True):
         if isinstance(value, int):
-            what = f"{counted(value, 'word')}" if wish == "shortest" else f"leaves {counted(value, 'plan')} open"
+            what = (
+                f"{counted(value, 'word')}"
+                if wish == "shortest"
+                else f"leaves {counted(value, 'plan')} open"
+            )
             click.echo(f"{wish}: {what}", err=True)
         else:
             assert not isinstance(wish, str)

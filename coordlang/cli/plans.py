@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from coordlang.cli.app import check_listing, form_of, limits, model_options, note_single_robot, task_files
+from coordlang.cli.app import (
+    check_listing,
+    form_of,
+    limits,
+    model_options,
+    note_single_robot,
+    task_files,
+)
 
 if TYPE_CHECKING:
     from planners.loading import Loaded
@@ -18,15 +25,25 @@ _DEFAULT_MAX = 10
 
 
 @click.command(name="plans")
-@click.option("--count", "only_count", is_flag=True, help="Print the exact number of optimal plans only.")
 @click.option(
-    "--max", "most", type=click.IntRange(min=0), help=f"List at most this many plans (default: {_DEFAULT_MAX})."
+    "--count", "only_count", is_flag=True, help="Print the exact number of optimal plans only."
 )
 @click.option(
-    "--sample", type=click.IntRange(min=1), metavar="N", help="Draw N plans uniformly instead of the first ones."
+    "--max",
+    "most",
+    type=click.IntRange(min=0),
+    help=f"List at most this many plans (default: {_DEFAULT_MAX}).",
+)
+@click.option(
+    "--sample",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Draw N plans uniformly instead of the first ones.",
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of --sample.")
-@click.option("--format", "form", type=click.Choice(["ipc", "json"]), default="ipc", show_default=True)
+@click.option(
+    "--format", "form", type=click.Choice(["ipc", "json"]), default="ipc", show_default=True
+)
 @click.option("--json", "as_json", is_flag=True, help="Short for --format json.")
 @model_options
 @task_files
@@ -65,7 +82,11 @@ def command(
         click.echo(json.dumps(data))
         return
     for number, plan in enumerate(listed, 1):
-        click.echo(f"; plan {number} of {plans.count}" if not sample else f"; sampled plan {number}")
+        click.echo(
+            f"; plan {number} of {plans.count}" if not sample else f"; sampled plan {number}"
+        )
         click.echo(to_ipc(plans, plan))
     if not sample and len(listed) < plans.count:
-        click.echo(f"{len(listed)} of {plans.count} optimal plans listed; --max N lists more", err=True)
+        click.echo(
+            f"{len(listed)} of {plans.count} optimal plans listed; --max N lists more", err=True
+        )

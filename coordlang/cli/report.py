@@ -28,10 +28,20 @@ if TYPE_CHECKING:
 @domain_argument
 @problems_argument
 @click.option("-o", "--output", required=True, metavar="PAGE", help="The HTML file; - for stdout.")
-@click.option("--tasks-shown", type=click.IntRange(1, 500), default=30, show_default=True, metavar="N",
-              help="Show at most this many tasks: those of PROBLEM.., then candidate tasks, drawn.")  # fmt: skip
-@click.option("--coordinates", metavar="FILE", help="Where the places are drawn (default: coordinates.json beside the "
-              "first PROBLEM, else by their names, else laid out).")  # fmt: skip
+@click.option(
+    "--tasks-shown",
+    type=click.IntRange(1, 500),
+    default=30,
+    show_default=True,
+    metavar="N",
+    help="Show at most this many tasks: those of PROBLEM.., then candidate tasks, drawn.",
+)
+@click.option(
+    "--coordinates",
+    metavar="FILE",
+    help="Where the places are drawn (default: coordinates.json beside the "
+    "first PROBLEM, else by their names, else laid out).",
+)
 @click.option("--seed", type=int, default=0, show_default=True, help="Draws the tasks.")
 @model_options
 @limits
@@ -45,8 +55,9 @@ def command(
     seed: int,
     given: GivenOptions,
 ) -> None:
-    """Write a self-contained HTML page that shows LANGUAGE: its words, and its sentences and plans in the tasks of
-    PROBLEM.. and in some of its candidate tasks."""
+    """Write a self-contained HTML page that shows LANGUAGE: its words, and its sentences and plans
+    in the tasks of PROBLEM.. and in some of its candidate tasks.
+    """
     from coordlang.language.file import check_source, read_language, write_atomically
     from coordlang.report.page import make_report
     from planners.errors import Place
@@ -72,7 +83,10 @@ def command(
     else:
         write_atomically(output, report.html)
     shown = f"{counted(report.tasks, 'task')} of {report.candidates:,}"
-    click.echo(f"{shown}, {len(report.html):,} bytes, written to {'stdout' if output == '-' else output}", err=output == "-")
+    click.echo(
+        f"{shown}, {len(report.html):,} bytes, written to {'stdout' if output == '-' else output}",
+        err=output == "-",
+    )
 
 
 def _beside(problem: str) -> Path:

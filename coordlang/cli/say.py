@@ -24,10 +24,13 @@ from coordlang.cli.app import (
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
 @model_options
 @limits
-def command(language: str, domain: str, problem: str, plan: str, as_json: bool, given: GivenOptions) -> int:
+def command(
+    language: str, domain: str, problem: str, plan: str, as_json: bool, given: GivenOptions
+) -> int:
     """Say an optimal plan: print its sentence, the words on one line.
 
-    PLAN is a plan file, IPC text or JSON, or - for stdin; a JSON file with several plans gives one sentence a line.
+    PLAN is a plan file, IPC text or JSON, or - for stdin; a JSON file with several plans gives one
+    sentence a line.
     """
     from coordlang.cli.speaking import covered, read_spoken
     from coordlang.use.sentence.saying import read_plan_file, say

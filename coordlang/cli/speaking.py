@@ -1,4 +1,6 @@
-"""What the commands that use a language in one task share: reading it, and saying what is not guaranteed."""
+"""What the commands that use a language in one task share: reading it, and saying what is not
+guaranteed.
+"""
 
 from __future__ import annotations
 
@@ -24,10 +26,15 @@ def read_spoken(language: str, domain: str, problem: str, given: GivenOptions) -
 
 
 def covered(spoken: Spoken) -> int:
-    """The exit code of an answer: 1, and a warning on stderr, for a task that the language does not cover."""
+    """The exit code of an answer: 1, and a warning on stderr, for a task that the language does not
+    cover.
+    """
     if spoken.covered:
         return 0
-    click.echo("coordlang: warning: the language does not cover this task: it guarantees nothing here", err=True)
+    click.echo(
+        "coordlang: warning: the language does not cover this task: it guarantees nothing here",
+        err=True,
+    )
     return 1
 
 

@@ -22,10 +22,20 @@ from coordlang.cli.app import (
 @click.command(name="tasks")
 @domain_argument
 @problem_argument
-@click.option("--start", "starts", multiple=True, metavar="PATTERN", help="Atoms in which the start may differ from the "
-              "problem's, as in '(at r1 ?)'.")  # fmt: skip
-@click.option("--goal", "goals", multiple=True, metavar="PATTERN", help="Each goal has one atom of this pattern "
-              "(default: the problem's goal).")  # fmt: skip
+@click.option(
+    "--start",
+    "starts",
+    multiple=True,
+    metavar="PATTERN",
+    help="Atoms in which the start may differ from the problem's, as in '(at r1 ?)'.",
+)
+@click.option(
+    "--goal",
+    "goals",
+    multiple=True,
+    metavar="PATTERN",
+    help="Each goal has one atom of this pattern (default: the problem's goal).",
+)
 @click.option("-o", "--output", required=True, metavar="FILE", help="The task file, - for stdout.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as one JSON object.")
 @model_options
@@ -50,14 +60,20 @@ def command(
 
     check_outputs([("-o", output)], [domain, problem])
     lifted, read = read_files(domain, (problem,))
-    options = replace(given.options(), remember_actions=False)  # tasks start with nothing to remember
+    options = replace(
+        given.options(), remember_actions=False
+    )  # tasks start with nothing to remember
     tasks = varied_tasks(build(lifted, read, options), starts, goals)
     text = tasks_text(tasks)
     if output == "-":
         click.echo(text, nl=False)
     else:
         write_atomically(output, text.encode())
-    figures = {"tasks": len(tasks), "starts": len({t.init for t in tasks}), "goals": len({t.goal for t in tasks})}
+    figures = {
+        "tasks": len(tasks),
+        "starts": len({t.init for t in tasks}),
+        "goals": len({t.goal for t in tasks}),
+    }
     if as_json and output != "-":
         click.echo(json.dumps(figures))
     else:

@@ -35,13 +35,25 @@ _DEFAULT_NODES = 200
 @click.argument("sentence")
 @click.option("--count", "only_count", is_flag=True, help="Print the exact number of plans only.")
 @click.option(
-    "--max", "most", type=click.IntRange(min=0), help=f"List at most this many plans (default: {_DEFAULT_MAX})."
+    "--max",
+    "most",
+    type=click.IntRange(min=0),
+    help=f"List at most this many plans (default: {_DEFAULT_MAX}).",
 )
 @click.option(
-    "--sample", type=click.IntRange(min=1), metavar="N", help="Draw N plans uniformly instead of the first ones."
+    "--sample",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Draw N plans uniformly instead of the first ones.",
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of --sample.")
-@click.option("--format", "form", type=click.Choice(["ipc", "json", "dot", "svg"]), default="ipc", show_default=True)
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["ipc", "json", "dot", "svg"]),
+    default="ipc",
+    show_default=True,
+)
 @click.option("--json", "as_json", is_flag=True, help="Short for --format json.")
 @click.option(
     "--nodes",
@@ -67,9 +79,11 @@ def command(
     output: str | None,
     given: GivenOptions,
 ) -> int:
-    """Understand a sentence ("w1 w0"): the optimal plans that it leaves open, counted, listed, sampled or drawn.
+    """Understand a sentence ("w1 w0"): the optimal plans that it leaves open, counted, listed,
+    sampled or drawn.
 
-    --format dot and svg draw them as one DAG, whose paths they are; json has both the listed plans and the DAG.
+    --format dot and svg draw them as one DAG, whose paths they are; json has both the listed plans
+    and the DAG.
     """
     from coordlang.cli.speaking import covered, read_spoken, write
     from coordlang.use.sentence.understanding import understand
@@ -77,9 +91,13 @@ def command(
     form = form_of(form, as_json)
     check_listing(only_count, most, sample)
     if form in ("dot", "svg") and (only_count or most is not None or sample is not None):
-        raise click.UsageError(f"--format {form} draws the DAG of all plans: leave out --count, --max and --sample")
+        raise click.UsageError(
+            f"--format {form} draws the DAG of all plans: leave out --count, --max and --sample"
+        )
     if nodes is not None and (form == "ipc" or only_count):
-        raise click.UsageError("--nodes cuts the DAG: it belongs to --format dot, svg or json, without --count")
+        raise click.UsageError(
+            "--nodes cuts the DAG: it belongs to --format dot, svg or json, without --count"
+        )
     check_outputs([("-o", output)], [language, domain, problem])
     spoken = read_spoken(language, domain, problem, given)
     understood = understand(spoken, spoken.words_of(sentence))
@@ -96,7 +114,9 @@ def command(
     else:
         write(_listed(understood, listed, bool(sample)), output)
         if not sample and len(listed) < understood.count:
-            click.echo(f"{len(listed)} of {understood.count} plans listed; --max N lists more", err=True)
+            click.echo(
+                f"{len(listed)} of {understood.count} plans listed; --max N lists more", err=True
+            )
     return covered(spoken)
 
 
@@ -112,7 +132,9 @@ def _drawn(understood: Understood, form: str, nodes: int) -> str:
     return to_dot(graph) if form == "dot" else to_svg(graph)
 
 
-def _data(understood: Understood, listed: list[Plan], only_count: bool, sampled: bool, nodes: int | None) -> str:
+def _data(
+    understood: Understood, listed: list[Plan], only_count: bool, sampled: bool, nodes: int | None
+) -> str:
     from coordlang.use.sentence.understanding import dag, understood_data
 
     data = understood_data(understood, listed, None if only_count else dag(understood, nodes))
@@ -126,6 +148,10 @@ def _listed(understood: Understood, listed: list[Plan], sampled: bool) -> str:
 
     parts = []
     for number, plan in enumerate(listed, 1):
-        parts.append(f"; plan {number} of {understood.count}\n" if not sampled else f"; sampled plan {number}\n")
+        parts.append(
+            f"; plan {number} of {understood.count}\n"
+            if not sampled
+            else f"; sampled plan {number}\n"
+        )
         parts.append(to_ipc(understood.plans, plan) + "\n")
     return "".join(parts)

@@ -25,11 +25,22 @@ from coordlang.cli.app import (
 @click.command(name="verify")
 @language_argument
 @planning_files("DOMAIN PROBLEMS...")
-@click.option("--tasks", metavar="all|FILE", help="Check these tasks (default: those that the language file records).")
-@click.option("--lower-bound", "certificate", metavar="CERTIFICATE", help="Also check why fewer words do not suffice "
-              "(a file of `build --certificate`).")
-@click.option("--dimacs", metavar="FILE", help="With --lower-bound: write the formula that was refuted, for any SAT "
-              "solver.")
+@click.option(
+    "--tasks",
+    metavar="all|FILE",
+    help="Check these tasks (default: those that the language file records).",
+)
+@click.option(
+    "--lower-bound",
+    "certificate",
+    metavar="CERTIFICATE",
+    help="Also check why fewer words do not suffice (a file of `build --certificate`).",
+)
+@click.option(
+    "--dimacs",
+    metavar="FILE",
+    help="With --lower-bound: write the formula that was refuted, for any SAT solver.",
+)
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
 @model_options
 @limits
@@ -42,13 +53,19 @@ def command(
     as_json: bool,
     given: GivenOptions,
 ) -> int:
-    """Check by definition that LANGUAGE is a coordination language: all plans of one sentence mix freely.
+    """Check by definition that LANGUAGE is a coordination language: all plans of one sentence mix
+    freely.
 
     Exit 0: it is.  1: it is not, and two plans that miscoordinate are shown.
     """
     from coordlang.certificate import check, read_certificate
     from coordlang.cli.miscoordination import show, witness_data
-    from coordlang.language.file import check_source, read_language, recorded_candidates, write_atomically
+    from coordlang.language.file import (
+        check_source,
+        read_language,
+        recorded_candidates,
+        write_atomically,
+    )
     from coordlang.language.words import WordTable, words_of_states
     from coordlang.verification.by_definition import verify
     from coordlang.verification.overlapping import verify_overlapping
@@ -75,11 +92,19 @@ def command(
     bound = check(proof, candidates, progress) if proof and verdict.holds else None
     clear_progress()
     if as_json:
-        click.echo(json.dumps({
-            "holds": verdict.holds, "tasks": verdict.tasks, "words": len(spoken.words), "nodes": verdict.nodes,
-            "miscoordination": witness_data(verdict.witness) if verdict.witness else None,
-            "lower_bound": bound and bound.lower_bound, "reasons": bound and bound.reasons,
-        }))  # fmt: skip
+        click.echo(
+            json.dumps(
+                {
+                    "holds": verdict.holds,
+                    "tasks": verdict.tasks,
+                    "words": len(spoken.words),
+                    "nodes": verdict.nodes,
+                    "miscoordination": witness_data(verdict.witness) if verdict.witness else None,
+                    "lower_bound": bound and bound.lower_bound,
+                    "reasons": bound and bound.reasons,
+                }
+            )
+        )
     if verdict.witness:
         if not as_json:
             said = " ".join(verdict.witness.sentence or ())

@@ -1,1 +1,3 @@
-"""The paper's tables and figures as recipes: run, kept as data, drawn, and set beside the paper's own values."""
+"""The paper's tables and figures as recipes: run, kept as data, drawn, and set beside the paper's
+own values.
+"""

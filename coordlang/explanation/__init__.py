@@ -1,4 +1,6 @@
-"""A language as a person reads it, and a planner: its words as short formulas over multi-valued variables."""
+"""A language as a person reads it, and a planner: its words as short formulas over multi-valued
+variables.
+"""
 
 from coordlang.explanation.cover import Cover, Literal, Term
 from coordlang.explanation.variables import Variable

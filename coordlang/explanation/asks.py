@@ -30,8 +30,9 @@ Subplan = tuple[str | None, ...]
 class RobotPart:
     """What a sentence leaves to one robot.
 
-    ``subplans`` is the number of its different subplans in the plans that fit (None: too many to count); ``listed`` has
-    all of them if they are few, else it is empty.  ``choices[step]`` is what it does in that step in some of them.
+    ``subplans`` is the number of its different subplans in the plans that fit (None: too many to
+    count); ``listed`` has all of them if they are few, else it is empty.  ``choices[step]`` is what
+    it does in that step in some of them.
     """
 
     robot: str
@@ -44,10 +45,11 @@ class RobotPart:
 class WordChange:
     """The change from the sentence's word ``before`` to the next one, ``after``.
 
-    It happens at the end of step ``earliest`` at the soonest and ``latest`` at the latest (from 1).  ``robots`` are the
-    fewest robots whose subactions decide it: wherever plans make the change, these robots' subactions settle whether a
-    joint step to a mapped state makes it, whatever the others do.  No robots: every such step makes it.  ``ways`` is what
-    they do, one entry each, and the steps in which plans make the change in this way.
+    It happens at the end of step ``earliest`` at the soonest and ``latest`` at the latest (from 1).
+    ``robots`` are the fewest robots whose subactions decide it: wherever plans make the change,
+    these robots' subactions settle whether a joint step to a mapped state makes it, whatever the
+    others do.  No robots: every such step makes it.  ``ways`` is what they do, one entry each, and
+    the steps in which plans make the change in this way.
     """
 
     before: str
@@ -60,7 +62,9 @@ class WordChange:
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """One sentence of one task: the number of ``plans`` that fit, each robot's part, and the changes of word."""
+    """One sentence of one task: the number of ``plans`` that fit, each robot's part, and the
+    changes of word.
+    """
 
     sentence: tuple[str, ...]
     plans: int
@@ -69,11 +73,14 @@ class Asked:
     changes: tuple[WordChange, ...]
 
 
-def asked(fitting: PlanSpace, table: WordTable, formulas: Mapping[str, Cover], few: int = 4) -> Asked:
+def asked(
+    fitting: PlanSpace, table: WordTable, formulas: Mapping[str, Cover], few: int = 4
+) -> Asked:
     """What a sentence asks, from the plan space of the plans that fit it (one task, one sentence).
 
-    ``formulas``: the words' formulas; where several robots could be said to decide a change of word, those that the
-    formula of the next word speaks of are named.  ``few``: up to so many subplans of a robot are listed.
+    ``formulas``: the words' formulas; where several robots could be said to decide a change of
+    word, those that the formula of the next word speaks of are named.  ``few``: up to so many
+    subplans of a robot are listed.
     """
     word = table.of_rows(fitting.rows)[fitting.state]
     place = _places(fitting, word)
@@ -90,7 +97,14 @@ def asked(fitting: PlanSpace, table: WordTable, formulas: Mapping[str, Cover], f
         steps=int(fitting.layer[start]),
         parts=tuple(_part(fitting, robot, few) for robot in range(len(fitting.model.robots))),
         changes=tuple(
-            _change(fitting, table, place, number, pair, _spoken_of(fitting, formulas[table.words[pair[1]]]))
+            _change(
+                fitting,
+                table,
+                place,
+                number,
+                pair,
+                _spoken_of(fitting, formulas[table.words[pair[1]]]),
+            )
             for number, pair in enumerate(pairwise(sentence))
         ),
     )
@@ -103,11 +117,15 @@ def _edges_by_step(space: PlanSpace) -> Iterator[Ints]:
 
 
 def _places(space: PlanSpace, word: Ints) -> Ints:
-    """For each node, how many changes of word lie before it: one number, as all plans have one sentence."""
+    """For each node, how many changes of word lie before it: one number, as all plans have one
+    sentence.
+    """
     place = np.zeros(len(space), np.int64)
     source = space.sources
     for edges in _edges_by_step(space):
-        place[space.target[edges]] = place[source[edges]] + (word[space.target[edges]] != word[source[edges]])
+        place[space.target[edges]] = place[source[edges]] + (
+            word[space.target[edges]] != word[source[edges]]
+        )
     return place
 
 
@@ -115,7 +133,10 @@ def _part(space: PlanSpace, robot: int, few: int) -> RobotPart:
     """Walk over the sets of nodes that one sequence of the robot's own subactions leaves possible."""
     labels = space.model.labels[robot]
     choices = tuple(
-        tuple(own_text(labels[n], space.model.robots[robot]) if n else None for n in np.unique(space.labels[edges, robot]))
+        tuple(
+            own_text(labels[n], space.model.robots[robot]) if n else None
+            for n in np.unique(space.labels[edges, robot])
+        )
         for edges in _edges_by_step(space)
     )
     sets: dict[tuple[int, ...], int] = {(int(space.starts[0]),): 1}
@@ -134,10 +155,17 @@ def _part(space: PlanSpace, robot: int, few: int) -> RobotPart:
     total = sum(sets.values())
     listed = sorted(text for texts in sequences.values() for text in texts) if total <= few else []
     name = space.model.robots[robot]
-    return RobotPart(name, total, tuple(tuple(own_text(labels[n], name) if n else None for n in s) for s in listed), choices)
+    return RobotPart(
+        name,
+        total,
+        tuple(tuple(own_text(labels[n], name) if n else None for n in s) for s in listed),
+        choices,
+    )
 
 
-def _moves(space: PlanSpace, robot: int, nodes: Sequence[int]) -> Iterator[tuple[int, tuple[int, ...]]]:
+def _moves(
+    space: PlanSpace, robot: int, nodes: Sequence[int]
+) -> Iterator[tuple[int, tuple[int, ...]]]:
     """The robot's subactions that lead on from some of the nodes, and where they may lead."""
     array = np.array(nodes)
     edges = ranges(space.first[array], space.first[array + 1] - space.first[array])
@@ -155,7 +183,12 @@ def _spoken_of(space: PlanSpace, formula: Cover) -> list[int]:
 
 
 def _change(
-    space: PlanSpace, table: WordTable, place: Ints, number: int, pair: tuple[int, int], order: Sequence[int]
+    space: PlanSpace,
+    table: WordTable,
+    place: Ints,
+    number: int,
+    pair: tuple[int, int],
+    order: Sequence[int],
 ) -> WordChange:
     source = space.sources
     edges = np.flatnonzero((place[source] == number) & (place[space.target] == number + 1))
@@ -164,7 +197,10 @@ def _change(
     ways: dict[Subplan, set[int]] = defaultdict(set)
     for when, labels in zip(step.tolist(), space.labels[edges].tolist(), strict=True):
         model = space.model
-        does = tuple(own_text(model.labels[r][labels[r]], model.robots[r]) if labels[r] else None for r in robots)
+        does = tuple(
+            own_text(model.labels[r][labels[r]], model.robots[r]) if labels[r] else None
+            for r in robots
+        )
         ways[does].add(when)
     return WordChange(
         before=table.words[pair[0]],
@@ -172,15 +208,19 @@ def _change(
         earliest=int(step.min()),
         latest=int(step.max()),
         robots=tuple(space.model.robots[r] for r in robots),
-        ways=tuple((does, tuple(sorted(when))) for does, when in sorted(ways.items(), key=lambda w: (min(w[1]), str(w)))),
+        ways=tuple(
+            (does, tuple(sorted(when)))
+            for does, when in sorted(ways.items(), key=lambda w: (min(w[1]), str(w)))
+        ),
     )
 
 
 def _deciding(
     space: PlanSpace, table: WordTable, states: Ints, after: int, order: Sequence[int]
 ) -> tuple[int, ...]:
-    """The fewest robots, early ones in ``order`` first, whose subactions decide at each of some states whether the next
-    word is ``after``."""
+    """The fewest robots, early ones in ``order`` first, whose subactions decide at each of some
+    states whether the next word is ``after``.
+    """
     rows = space.rows[states[:_STATES]]
     steps = space.model.successors(rows)
     mapped = find_rows(table.rows, steps.result) >= 0

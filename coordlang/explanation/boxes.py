@@ -1,7 +1,8 @@
 """Boxes over multi-valued points: the prime implicants of a set of points against another.
 
-A *box* allows a set of values for each variable; as a row of bits it has one column for each value of each variable.  A box
-is *prime* for ``off`` points if it holds none of them and no value can be allowed in addition.
+A *box* allows a set of values for each variable; as a row of bits it has one column for each value
+of each variable.  A box is *prime* for ``off`` points if it holds none of them and no value can be
+allowed in addition.
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ Bits = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Points:
-    """Points to hold (``on``) and to avoid (``off``), as values of variables with ``sizes[v]`` values each."""
+    """Points to hold (``on``) and to avoid (``off``), as values of variables with ``sizes[v]``
+    values each.
+    """
 
     sizes: tuple[int, ...]
     on: Ints
@@ -56,9 +59,9 @@ class Points:
 def expand(points: Points, seed: Bits, wanted: Ints, order: Sequence[int] | None = None) -> Bits:
     """A prime box around the box ``seed``, which must hold no ``off`` point.
 
-    Variables are opened one after the other, each to all values that keep the ``off`` points out: in the given
-    order, or else first what takes in most of the ``wanted`` points (and then brings most of them nearest).
-    O(variables² · points).
+    Variables are opened one after the other, each to all values that keep the ``off`` points out:
+    in the given order, or else first what takes in most of the ``wanted`` points (and then brings
+    most of them nearest). O(variables² · points).
     """
     box = seed.copy()
     out_off = points.blocked(box, points.off)
@@ -78,7 +81,8 @@ def expand(points: Points, seed: Bits, wanted: Ints, order: Sequence[int] | None
 
 
 def _opened(points: Points, box: Bits, variable: int, critical: NDArray[np.bool_]) -> Bits:
-    """The values of a variable that can be allowed: not those of ``off`` points that nothing else keeps out.
+    """The values of a variable that can be allowed: not those of ``off`` points that nothing else
+    keeps out.
 
     Each ``off`` point has one value, so what can be allowed one by one can be allowed together.
     """
@@ -89,7 +93,9 @@ def _opened(points: Points, box: Bits, variable: int, critical: NDArray[np.bool_
 
 
 def _most(opened: Mapping[int, Bits], out: Bits, wanted: Ints) -> int:
-    """The variable that takes in most points, those that miss several variables counted by halves; open ones first."""
+    """The variable that takes in most points, those that miss several variables counted by halves;
+    open ones first.
+    """
     near = np.exp2(-out.sum(axis=1, dtype=np.float64))
 
     def gain(v: int) -> tuple[float, bool, int]:

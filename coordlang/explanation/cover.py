@@ -44,7 +44,8 @@ class Literal:
     def conditions(self) -> list[tuple[str, ...]]:
         """The same as a disjunction of conjunctions of ground literals.
 
-        One conjunction where one value is allowed, or where excluding the others says it; else one for each atom.
+        One conjunction where one value is allowed, or where excluding the others says it; else one
+        for each atom.
         """
         if len(self.values) == 1 and None not in self.values:
             return [tuple(self.listed_atoms)]
@@ -63,10 +64,12 @@ Term = tuple[Literal, ...]
 
 @dataclass(frozen=True, slots=True)
 class Cover:
-    """A disjunction of terms that is true in all states of one word and false in those of all other words.
+    """A disjunction of terms that is true in all states of one word and false in those of all other
+    words.
 
-    ``counts[k]`` is the number of the word's states in which ``terms[k]`` is true (one state may satisfy several);
-    ``states`` is the number of the word's states.  ``fewest``: it is proved that no disjunction of fewer terms does it.
+    ``counts[k]`` is the number of the word's states in which ``terms[k]`` is true (one state may
+    satisfy several); ``states`` is the number of the word's states.  ``fewest``: it is proved that
+    no disjunction of fewer terms does it.
     """
 
     terms: tuple[Term, ...]
@@ -76,8 +79,12 @@ class Cover:
 
     @property
     def length(self) -> int:
-        """How long the formula is: values that its text mentions, and one more for each term after the first."""
-        return sum(literal.length for term in self.terms for literal in term) + max(0, len(self.terms) - 1)
+        """How long the formula is: values that its text mentions, and one more for each term after
+        the first.
+        """
+        return sum(literal.length for term in self.terms for literal in term) + max(
+            0, len(self.terms) - 1
+        )
 
     def holds(self, atoms: Iterable[str]) -> bool:
         """Whether it is true in a state given by its true atoms."""
@@ -85,10 +92,12 @@ class Cover:
         return any(all(literal.holds(true) for literal in term) for term in self.terms)
 
     def conditions(self) -> list[tuple[str, ...]]:
-        """The same as a disjunction of conjunctions of ground atoms and negated atoms, as PDDL text.
+        """The same as a disjunction of conjunctions of ground atoms and negated atoms, as PDDL
+        text.
 
-        ``[()]`` is true, ``[]`` false.  Exact wherever the variables' invariants hold, so in all mapped states, and in
-        reachable ones as far as looked at (`coordlang.explanation.variables`).
+        ``[()]`` is true, ``[]`` false.  Exact wherever the variables' invariants hold, so in all
+        mapped states, and in reachable ones as far as looked at
+        (`coordlang.explanation.variables`).
         """
         found: dict[tuple[str, ...], None] = {}
         for term in self.terms:

@@ -1,8 +1,9 @@
-"""The fewest boxes that hold some points and avoid others: two-level minimisation with multi-valued variables.
+"""The fewest boxes that hold some points and avoid others: two-level minimisation with multi-valued
+variables.
 
-The way of espresso (Rudell and Sangiovanni-Vincentelli 1987): expand points to prime boxes, take an irredundant cover,
-reduce and expand again.  Where it is small enough, a SAT solver then looks for a cover with one box less until it proves that
-there is none.
+The way of espresso (Rudell and Sangiovanni-Vincentelli 1987): expand points to prime boxes, take an
+irredundant cover, reduce and expand again.  Where it is small enough, a SAT solver then looks for a
+cover with one box less until it proves that there is none.
 """
 
 from __future__ import annotations
@@ -34,8 +35,9 @@ _CLIQUE = 400
 class Boxes:
     """Prime boxes that together hold all ``on`` points, the largest first.
 
-    ``least[k]`` is the smallest box around the points that no earlier box holds: every box between ``least[k]`` and
-    ``prime[k]`` does as well.  ``fewest``: it is proved that fewer boxes do not suffice.
+    ``least[k]`` is the smallest box around the points that no earlier box holds: every box between
+    ``least[k]`` and ``prime[k]`` does as well.  ``fewest``: it is proved that fewer boxes do not
+    suffice.
     """
 
     prime: Bits
@@ -44,7 +46,8 @@ class Boxes:
 
 
 def minimise(points: Points, quick: bool = False) -> Boxes:
-    """The fewest prime boxes found that hold all ``on`` points and no ``off`` point, each with few variables limited.
+    """The fewest prime boxes found that hold all ``on`` points and no ``off`` point, each with few
+    variables limited.
 
     ``quick``: one pass, no proof.  Deterministic.  ``on`` and ``off`` must be disjoint.
     """
@@ -52,7 +55,11 @@ def minimise(points: Points, quick: bool = False) -> Boxes:
     if not len(points.on):
         return Boxes(np.zeros((0, width), np.bool_), np.zeros((0, width), np.bool_), True)
     if not len(points.off):
-        return Boxes(np.ones((1, width), np.bool_), points.supercube(np.arange(len(points.on)))[None, :], True)
+        return Boxes(
+            np.ones((1, width), np.bool_),
+            points.supercube(np.arange(len(points.on)))[None, :],
+            True,
+        )
     boxes = _irredundant(points, np.array(_pass(points, None)))
     if quick:
         return _least(points, _shorten(points, boxes), False)
@@ -88,7 +95,9 @@ def _rank(boxes: Bits) -> tuple[int, int]:
 
 
 def _pass(points: Points, random: Random | None) -> list[Bits]:
-    """Prime boxes that hold every ``on`` point: greedy ones, or some in random orders of the variables."""
+    """Prime boxes that hold every ``on`` point: greedy ones, or some in random orders of the
+    variables.
+    """
     left = np.arange(len(points.on))
     if random:
         order = list(range(len(left)))
@@ -143,7 +152,8 @@ def _apart(points: Points, boxes: Bits) -> list[int]:
 
 
 def _fewer(points: Points, number: int, needed: Sequence[int]) -> Bits | None:
-    """Boxes, ``number`` of them; an empty table if it is proved that there are none; None if that was too much work.
+    """Boxes, ``number`` of them; an empty table if it is proved that there are none; None if that
+    was too much work.
 
     Variables of the SAT problem: box t allows column c; box t holds the ``on`` point i.
     """
@@ -181,7 +191,9 @@ def _fewer(points: Points, number: int, needed: Sequence[int]) -> Bits | None:
 
 
 def _shorten(points: Points, boxes: Bits) -> Bits:
-    """Each box again, around the points that only it holds: few variables limited, then prime again."""
+    """Each box again, around the points that only it holds: few variables limited, then prime
+    again.
+    """
     boxes = boxes.copy()
     for _ in range(2):
         held = points.inside(boxes, points.on)
@@ -215,11 +227,18 @@ def _said(least: Bits, most: Bits) -> int:
 
 
 def _freed(points: Points, seed: Bits) -> Bits:
-    """The box with as few variables limited as keep all ``off`` points out, in total or (many variables) greedily."""
+    """The box with as few variables limited as keep all ``off`` points out, in total or (many
+    variables) greedily.
+    """
     packed = np.unique(np.packbits(points.blocked(seed, points.off), axis=1), axis=0)
     outside = np.unpackbits(packed, axis=1, count=len(points.sizes)).astype(np.bool_)
-    kept = _hitting(outside, [_said(seed[s : s + n], seed[s : s + n])
-                              for s, n in zip(points.offset.tolist(), points.sizes, strict=True)])  # fmt: skip
+    kept = _hitting(
+        outside,
+        [
+            _said(seed[s : s + n], seed[s : s + n])
+            for s, n in zip(points.offset.tolist(), points.sizes, strict=True)
+        ],
+    )
     box = seed.copy()
     for v, (start, size) in enumerate(zip(points.offset.tolist(), points.sizes, strict=True)):
         if v not in kept:
@@ -228,14 +247,18 @@ def _freed(points: Points, seed: Bits) -> Bits:
 
 
 def _hitting(rows: NDArray[np.bool_], weights: Sequence[int]) -> set[int]:
-    """Columns of which every row has one: the fewest, and of these the least weight; greedily if there are too many."""
+    """Columns of which every row has one: the fewest, and of these the least weight; greedily if
+    there are too many.
+    """
     count = rows.shape[1]
     tried = 0
     for size in range(count + 1):
         tried += comb(count, size)
         if tried > _SUBSETS:
             break
-        fitting = [c for c in combinations(range(count), size) if rows[:, list(c)].any(axis=1).all()]
+        fitting = [
+            c for c in combinations(range(count), size) if rows[:, list(c)].any(axis=1).all()
+        ]
         if fitting:
             return set(min(fitting, key=lambda c: (sum(weights[v] for v in c), c)))
     chosen: list[int] = []
@@ -258,4 +281,3 @@ def _least(points: Points, boxes: Bits, fewest: bool) -> Boxes:
     first = np.argmax(held, axis=0)  # the first box that holds each point
     least = [points.supercube(np.flatnonzero(first == number)) for number in range(len(prime))]
     return Boxes(prime, np.array(least), fewest)
-

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from coordlang.explanation.cover import Cover
 from coordlang.explanation.words import Mapped, cover
 
-#: Formulas of up to this length need no order, and those of over that length are beyond reading in any order.
+#: Formulas of up to this length need no order, and those of over that length are beyond reading in
+#: any order.
 _SHORT, _LONG = 3, 300
 #: An order is worth it where it takes at most this part of the length.
 _SHORTER = 0.6
@@ -19,8 +20,8 @@ _TRIED = 4
 class Telling:
     """The words with their formulas, in the order in which they are told.
 
-    A formula None says "every other state".  ``in_order``: each formula speaks only of the states that no earlier one
-    holds; otherwise each is exact by itself, in all mapped states.
+    A formula None says "every other state".  ``in_order``: each formula speaks only of the states
+    that no earlier one holds; otherwise each is exact by itself, in all mapped states.
     """
 
     rules: tuple[tuple[str, Cover | None], ...]
@@ -28,12 +29,16 @@ class Telling:
 
     @property
     def length(self) -> int:
-        """Values that are mentioned, terms after the first of a formula, and one for "every other state"."""
+        """Values that are mentioned, terms after the first of a formula, and one for "every other
+        state".
+        """
         return sum(cover.length if cover else 1 for _, cover in self.rules)
 
 
 def telling(mapped: Mapped, formulas: dict[str, Cover], each: bool = False) -> Telling:
-    """The shorter way to tell the words; with ``each`` every one by a formula of its own, exact by itself."""
+    """The shorter way to tell the words; with ``each`` every one by a formula of its own, exact by
+    itself.
+    """
     if each or len(formulas) < 2:
         return Telling(tuple(formulas.items()), False)
     apart = _apart(formulas)
@@ -53,7 +58,9 @@ def _apart(formulas: dict[str, Cover]) -> Telling:
 
 
 def _in_order(mapped: Mapped, formulas: dict[str, Cover]) -> Telling:
-    """Always next: the word with the shortest formula against the words still to come (of the few that look shortest)."""
+    """Always next: the word with the shortest formula against the words still to come (of the few
+    that look shortest).
+    """
     left = dict(formulas)
     rules: list[tuple[str, Cover | None]] = []
     while len(left) > 1:

@@ -17,7 +17,9 @@ _ALTERNATIVES = 4
 
 
 def literal_text(literal: Literal) -> str:
-    """``at(r2) = c``, ``at(r2) != c``, ``at(r2) in {a, b}``, ``at(r2) not in {a, b}``, ``free(r1)``, ``not free(r1)``."""
+    """``at(r2) = c``, ``at(r2) != c``, ``at(r2) in {a, b}``, ``at(r2) not in {a, b}``,
+    ``free(r1)``, ``not free(r1)``.
+    """
     variable, negative = literal.variable, literal.is_negative
     if variable.is_fact:
         return variable.name if literal.values == {variable.values[0]} else f"not {variable.name}"
@@ -71,7 +73,8 @@ def cover_data(cover: Cover) -> dict[str, Any]:
                 "text": term_text(term),
                 "states": count,
                 "literals": [
-                    {"variable": literal.variable.name, "values": list(literal.listed)} for literal in term
+                    {"variable": literal.variable.name, "values": list(literal.listed)}
+                    for literal in term
                 ],
             }
             for term, count in zip(cover.terms, cover.counts, strict=True)
@@ -93,8 +96,12 @@ def telling_text(told: Telling, mapped: Mapped) -> str:
         else:
             lines.append(head)
             width = max(len(term_text(term)) for term in terms[:_TERMS])
-            for number, (term, count) in enumerate(zip(terms[:_TERMS], formula.counts, strict=False)):
-                lines.append(f"      {'or ' if number else '   '}{term_text(term):{min(width, 70)}}  [{count}]")
+            for number, (term, count) in enumerate(
+                zip(terms[:_TERMS], formula.counts, strict=False)
+            ):
+                lines.append(
+                    f"      {'or ' if number else '   '}{term_text(term):{min(width, 70)}}  [{count}]"
+                )
             if len(terms) > _TERMS:
                 lines.append(f"      .. and {len(terms) - _TERMS} more terms")
     return "\n".join(lines)
@@ -104,7 +111,10 @@ def asked_text(asked: Asked) -> str:
     """What a sentence asks, in plain sentences."""
     lines = [f'"{" ".join(asked.sentence)}" leaves {counted(asked.plans, "plan")} open.']
     lines += [line for part in asked.parts for line in _part_lines(part, asked.steps)]
-    lines += [f"  {change.before} -> {change.after} {_when(change)}: {_cause(change)}." for change in asked.changes]
+    lines += [
+        f"  {change.before} -> {change.after} {_when(change)}: {_cause(change)}."
+        for change in asked.changes
+    ]
     return "\n".join(lines)
 
 
@@ -112,9 +122,14 @@ def _part_lines(part: RobotPart, steps: int) -> list[str]:
     if not steps:
         return [f"  {part.robot} has nothing to do."]
     if part.subplans == 1:
-        return [f"  {part.robot}: {_sequence(part.listed[0] if part.listed else [own[0] for own in part.choices])}."]
+        return [
+            f"  {part.robot}: {_sequence(part.listed[0] if part.listed else [own[0] for own in part.choices])}."
+        ]
     if part.listed:
-        return [f"  {part.robot} may choose:", *(f"    {_sequence(subplan)}" for subplan in part.listed)]
+        return [
+            f"  {part.robot} may choose:",
+            *(f"    {_sequence(subplan)}" for subplan in part.listed),
+        ]
     number = f"{part.subplans:,}" if part.subplans is not None else "very many"
     lines = [f"  {part.robot} has {number} ways:"]
     step = 0
@@ -142,7 +157,11 @@ def _sequence(subplan: Sequence[str | None]) -> str:
 
 def _alternatives(texts: Sequence[str]) -> str:
     rest = len(texts) - _ALTERNATIVES
-    return " or ".join(texts) if rest <= 0 else f"{', '.join(texts[:_ALTERNATIVES])} or one of {rest} others"
+    return (
+        " or ".join(texts)
+        if rest <= 0
+        else f"{', '.join(texts[:_ALTERNATIVES])} or one of {rest} others"
+    )
 
 
 def _when(change: WordChange) -> str:
@@ -158,8 +177,12 @@ def _cause(change: WordChange) -> str:
         return "whatever the robots do"
     if len(change.robots) == 1:
         return f"{change.robots[0]} decides it by {_alternatives([own or 'waiting' for (own,), _ in change.ways])}"
-    together = [" and ".join(f"{robot} {own or 'wait'}" for robot, own in zip(change.robots, does, strict=True))
-                for does, _ in change.ways]  # fmt: skip
+    together = [
+        " and ".join(
+            f"{robot} {own or 'wait'}" for robot, own in zip(change.robots, does, strict=True)
+        )
+        for does, _ in change.ways
+    ]
     rest = len(together) - _ALTERNATIVES
     more = f"; or in {counted(rest, 'other way')}" if rest > 0 else ""
     return f"{' and '.join(change.robots)} decide it together: {'; or '.join(together[:_ALTERNATIVES])}{more}"
@@ -175,7 +198,11 @@ def asked_data(asked: Asked) -> dict[str, Any]:
     return {
         "steps": asked.steps,
         "robots": [
-            {"robot": part.robot, "subplans": part.subplans, "listed": [list(subplan) for subplan in part.listed]}
+            {
+                "robot": part.robot,
+                "subplans": part.subplans,
+                "listed": [list(subplan) for subplan in part.listed],
+            }
             for part in asked.parts
         ],
         "changes": [
@@ -185,7 +212,9 @@ def asked_data(asked: Asked) -> dict[str, Any]:
                 "earliest": change.earliest,
                 "latest": change.latest,
                 "decided_by": list(change.robots),
-                "ways": [{"subactions": list(does), "steps": list(when)} for does, when in change.ways],
+                "ways": [
+                    {"subactions": list(does), "steps": list(when)} for does, when in change.ways
+                ],
             }
             for change in asked.changes
         ],

@@ -1,8 +1,10 @@
-"""PDDL fluents -> multi-valued variables: ``at(r2) = c3`` in the place of one truth value for each atom.
+"""PDDL fluents -> multi-valued variables: ``at(r2) = c3`` in the place of one truth value for each
+atom.
 
-A group of atoms of which at most one is true in every state is one variable: in the mapped states, and in those that can be
-reached from them as far as looked at.  Groups are those atoms that agree in some arguments, the *key*: ``(at r2 a),
-(at r2 b), ..`` have the key ``r2`` and the values ``a, b, ..``.
+A group of atoms of which at most one is true in every state is one variable: in the mapped states,
+and in those that can be reached from them as far as looked at.  Groups are those atoms that agree
+in some arguments, the *key*: ``(at r2 a), (at r2 b), ..`` have the key ``r2`` and the values ``a,
+b, ..``.
 """
 
 from __future__ import annotations
@@ -29,9 +31,9 @@ _AT_ONCE = 200
 class Variable:
     """A multi-valued variable.
 
-    ``values`` are ground atoms, each standing for "this one of the variable's atoms is true", or None: none of them is.
-    ``texts`` has for each value what a person reads as subject and value: ``at(r2)`` and ``c3``; a subject alone is a fact,
-    as ``free(r1)`` with an empty value.
+    ``values`` are ground atoms, each standing for "this one of the variable's atoms is true", or
+    None: none of them is. ``texts`` has for each value what a person reads as subject and value:
+    ``at(r2)`` and ``c3``; a subject alone is a fact, as ``free(r1)`` with an empty value.
     """
 
     name: str
@@ -50,21 +52,26 @@ class Variable:
 
 @dataclass(frozen=True, slots=True)
 class Valuation:
-    """A table of states as values of variables: ``value[s, v]`` is the place of variable v's value in its ``values``."""
+    """A table of states as values of variables: ``value[s, v]`` is the place of variable v's value
+    in its ``values``.
+    """
 
     variables: tuple[Variable, ...]
     value: Ints
 
 
 def valuation(model: JointModel, rows: Rows) -> Valuation:
-    """States as values of as few multi-valued variables as the invariants give, robots' own ones first.
+    """States as values of as few multi-valued variables as the invariants give, robots' own ones
+    first.
 
-    A variable takes at least two values in ``rows``; facts that never change there are left out.  Any two different states
-    differ in some variable.
+    A variable takes at least two values in ``rows``; facts that never change there are left out.
+    Any two different states differ in some variable.
     """
     atoms, holds = truth(model, rows)
     _, everywhere = truth(model, _surroundings(model, rows))
-    some, every = (set(np.flatnonzero(which).tolist()) for which in (holds.any(axis=0), holds.all(axis=0)))
+    some, every = (
+        set(np.flatnonzero(which).tolist()) for which in (holds.any(axis=0), holds.all(axis=0))
+    )
     variables: list[Variable] = []
     columns: list[Ints] = []
     for group in _groups([_parse(atom) for atom in atoms], everywhere, model.robots):
@@ -82,12 +89,16 @@ def valuation(model: JointModel, rows: Rows) -> Valuation:
 
 
 def truth(model: JointModel, rows: Rows) -> tuple[tuple[str, ...], NDArray[np.bool_]]:
-    """All atoms of the model, remembered actions too, and which are true in each state: (atoms, (states, atoms))."""
+    """All atoms of the model, remembered actions too, and which are true in each state: (atoms,
+    (states, atoms)).
+    """
     codec = model.codec
     atoms = list(codec.facts)
     holds = [codec.truth(rows)]
     if codec.memory is not None:
-        for robot, labels, last in zip(codec.robots, codec.memory, rows[:, codec.fact_words :].T, strict=True):
+        for robot, labels, last in zip(
+            codec.robots, codec.memory, rows[:, codec.fact_words :].T, strict=True
+        ):
             atoms += [f"(last {robot} {label})" for label in ("none", *labels)]
             holds.append(last[:, None] == np.arange(len(labels) + 1, dtype=np.uint64)[None, :])
     return tuple(atoms), np.hstack(holds)
@@ -119,7 +130,9 @@ class _Atom:
 
 @dataclass(frozen=True, slots=True)
 class _Group:
-    """Atoms that make one variable: numbers of atoms, the key's arguments, and each atom's (predicate, other arguments)."""
+    """Atoms that make one variable: numbers of atoms, the key's arguments, and each atom's
+    (predicate, other arguments).
+    """
 
     key: tuple[str, ...]
     atoms: list[int]
@@ -143,8 +156,12 @@ def _parse(atom: str) -> _Atom:
 _Shape = tuple[str, tuple[int, ...]]
 
 
-def _groups(atoms: Sequence[_Atom], holds: NDArray[np.bool_], robots: Sequence[str]) -> list[_Group]:
-    """A partition of the atoms into groups that are never true together, larger and exact ones first."""
+def _groups(
+    atoms: Sequence[_Atom], holds: NDArray[np.bool_], robots: Sequence[str]
+) -> list[_Group]:
+    """A partition of the atoms into groups that are never true together, larger and exact ones
+    first.
+    """
     mutex = _never_together(holds)
     shapes = _shapes(atoms)
     candidates: list[tuple[tuple[object, ...], tuple[_Shape, ...], _Group]] = []
@@ -153,7 +170,11 @@ def _groups(atoms: Sequence[_Atom], holds: NDArray[np.bool_], robots: Sequence[s
             members = [number for shape in family for number in shapes[shape].get(key, ())]
             if len(members) < 2 or not _exclusive(members, mutex):
                 continue
-            rest = [_rest(atoms[number], shape[1]) for shape in family for number in shapes[shape].get(key, ())]
+            rest = [
+                _rest(atoms[number], shape[1])
+                for shape in family
+                for number in shapes[shape].get(key, ())
+            ]
             exact = bool(holds[:, members].any(axis=1).all())
             owner = min((robots.index(k) for k in key if k in robots), default=len(robots))
             rank = (not exact, owner == len(robots), -len(members), len(family), family, owner, key)
@@ -187,7 +208,9 @@ def _shapes(atoms: Sequence[_Atom]) -> dict[_Shape, dict[tuple[str, ...], list[i
     for number, atom in enumerate(atoms):
         for size in range(len(atom.args) + 1):
             for positions in combinations(range(len(atom.args)), size):
-                shapes[atom.predicate, positions][tuple(atom.args[p] for p in positions)].append(number)
+                shapes[atom.predicate, positions][tuple(atom.args[p] for p in positions)].append(
+                    number
+                )
     return shapes
 
 
@@ -198,10 +221,13 @@ def _exclusive(members: Sequence[int], mutex: NDArray[np.bool_]) -> bool:
 
 
 def _families(
-    shapes: dict[_Shape, dict[tuple[str, ...], list[int]]], mutex: NDArray[np.bool_], holds: NDArray[np.bool_]
+    shapes: dict[_Shape, dict[tuple[str, ...], list[int]]],
+    mutex: NDArray[np.bool_],
+    holds: NDArray[np.bool_],
 ) -> list[tuple[_Shape, ...]]:
-    """Single shapes; and two or three shapes of different predicates that are one variable only together, as
-    ``(holds r b)`` and ``(free r)`` are: of these exactly one is true for each key."""
+    """Single shapes; and two or three shapes of different predicates that are one variable only
+    together, as ``(holds r b)`` and ``(free r)`` are: of these exactly one is true for each key.
+    """
     single = sorted(shapes)
     families: list[tuple[_Shape, ...]] = [(shape,) for shape in single]
     open_ends = [
@@ -213,10 +239,15 @@ def _families(
     ]
     for size in (2, 3):
         for family in combinations(open_ends, size):
-            if len({predicate for predicate, _ in family}) < size or len({len(key) for _, key in family}) > 1:
+            if (
+                len({predicate for predicate, _ in family}) < size
+                or len({len(key) for _, key in family}) > 1
+            ):
                 continue
             keys = {key for shape in family for key in shapes[shape]}
-            unions = [[n for shape in family for n in shapes[shape].get(key, ())] for key in sorted(keys)]
+            unions = [
+                [n for shape in family for n in shapes[shape].get(key, ())] for key in sorted(keys)
+            ]
             if all(_exclusive(u, mutex) and holds[:, u].any(axis=1).all() for u in unions):
                 families.append(family)
     return families
@@ -244,5 +275,8 @@ def _variable(group: _Group, used: Sequence[int], atoms: Sequence[str], none: bo
 
 def _value(key: tuple[str, ...], others: tuple[str, ...]) -> str:
     """The other arguments in short; a remembered subaction without the robot, which the key names."""
-    said = [" ".join(w for w in o[1:-1].split() if w not in key) if o.startswith("(") else o for o in others]
+    said = [
+        " ".join(w for w in o[1:-1].split() if w not in key) if o.startswith("(") else o
+        for o in others
+    ]
     return said[0] if len(said) == 1 else f"({', '.join(said)})" if said else ""

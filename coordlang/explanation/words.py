@@ -19,7 +19,8 @@ from planners.joint.states import Rows, find_rows, unique_rows
 
 @dataclass(frozen=True, slots=True)
 class Mapped:
-    """The states that formulas must be exact on: their values and word numbers, ``states`` in each word.
+    """The states that formulas must be exact on: their values and word numbers, ``states`` in each
+    word.
 
     For all other states the formulas say nothing: several may be true there, or none.
     """
@@ -45,12 +46,15 @@ def mapped_states(language: Language, model: JointModel, also: Rows | None = Non
     return Mapped(table.words, valuation(model, rows), word)
 
 
-def word_formulas(language: Language, model: JointModel, also: Rows | None = None) -> dict[str, Cover]:
+def word_formulas(
+    language: Language, model: JointModel, also: Rows | None = None
+) -> dict[str, Cover]:
     """Each word as a disjunction of few short terms over multi-valued variables.
 
-    In every mapped state exactly one of the formulas is true, that of its word.  States that the language does not map are
-    on no optimal plan of a candidate task: what the formulas say there is left open, unless the states are given as
-    ``also`` (a table of rows), for tasks that are no candidates.
+    In every mapped state exactly one of the formulas is true, that of its word.  States that the
+    language does not map are on no optimal plan of a candidate task: what the formulas say there is
+    left open, unless the states are given as ``also`` (a table of rows), for tasks that are no
+    candidates.
 
     Raises `BadInput` for a language of another model.
     """
@@ -62,16 +66,27 @@ def all_covers(mapped: Mapped) -> dict[str, Cover]:
     return {word: cover(mapped, number) for number, word in enumerate(mapped.words)}
 
 
-def cover(mapped: Mapped, word: int, against: Sequence[int] | None = None, quick: bool = False) -> Cover:
-    """The formula of a word that is false in all states of the words ``against`` (default: of all others)."""
+def cover(
+    mapped: Mapped, word: int, against: Sequence[int] | None = None, quick: bool = False
+) -> Cover:
+    """The formula of a word that is false in all states of the words ``against`` (default: of all
+    others).
+    """
     value = mapped.valuation.value
     mine = mapped.word == word
     other = ~mine if against is None else np.isin(mapped.word, list(against)) & ~mine
     variables = mapped.valuation.variables
     points = Points(tuple(len(v.values) for v in variables), value[mine], value[other])
     boxes = minimise(points, quick)
-    terms = tuple(_term(mapped, points, least, prime) for least, prime in zip(boxes.least, boxes.prime, strict=True))
-    counts = points.inside(_box_of(mapped, terms), points.on).sum(axis=1) if terms else np.zeros(0, np.int64)
+    terms = tuple(
+        _term(mapped, points, least, prime)
+        for least, prime in zip(boxes.least, boxes.prime, strict=True)
+    )
+    counts = (
+        points.inside(_box_of(mapped, terms), points.on).sum(axis=1)
+        if terms
+        else np.zeros(0, np.int64)
+    )
     return Cover(terms, tuple(int(c) for c in counts), int(mine.sum()), boxes.fewest)
 
 
@@ -83,7 +98,8 @@ def _term(mapped: Mapped, points: Points, least: Sequence[bool], prime: Sequence
         if all(prime[start + p] for p in places):
             continue
         choices = [
-            Literal(variable, frozenset(variable.values[p] for p in places if box[start + p])) for box in (least, prime)
+            Literal(variable, frozenset(variable.values[p] for p in places if box[start + p]))
+            for box in (least, prime)
         ]
         literals.append(min(choices, key=lambda c: (c.length, c.is_negative)))
     return tuple(literals)
@@ -93,9 +109,11 @@ def _box_of(mapped: Mapped, terms: Sequence[Term]) -> Bits:
     rows = []
     for term in terms:
         values = {literal.variable.name: literal.values for literal in term}
-        rows.append([
-            value in values.get(variable.name, variable.values)
-            for variable in mapped.valuation.variables
-            for value in variable.values
-        ])  # fmt: skip
+        rows.append(
+            [
+                value in values.get(variable.name, variable.values)
+                for variable in mapped.valuation.variables
+                for value in variable.values
+            ]
+        )
     return np.array(rows, np.bool_)

@@ -14,9 +14,10 @@ class _Twice(Exception):
 def duplicate_key(data: bytes, large: bytes | memoryview, entries: int) -> str | None:
     """A key that an object of a JSON text holds twice, or None.
 
-    ``large`` is the text of one big object of texts in ``data``, as it stands there, and ``entries`` the number of different
-    keys in it: where it has four quotation marks for each of them, no key occurs twice and it is not read again.  Raises
-    `RecursionError` for a text that is nested too deeply.
+    ``large`` is the text of one big object of texts in ``data``, as it stands there, and
+    ``entries`` the number of different keys in it: where it has four quotation marks for each of
+    them, no key occurs twice and it is not read again.  Raises `RecursionError` for a text that is
+    nested too deeply.
     """
     start = data.find(large)
     end = start + len(large)

@@ -21,7 +21,13 @@ from msgspec import UNSET
 from coordlang.language.duplicate_keys import duplicate_key
 from coordlang.language.record import FORMAT, VERSION, LanguageRecord, TasksRecord
 from coordlang.language.words import Guarantee, Language
-from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems, from_recorded
+from coordlang.tasks.candidates import (
+    Candidates,
+    all_pairs,
+    from_listed,
+    from_problems,
+    from_recorded,
+)
 from coordlang.tasks.task_file import ListedTask, task_data
 from planners.errors import BadInput, Place, UsageError
 from planners.joint.model import show
@@ -44,7 +50,11 @@ def signed(language: Language, candidates: Candidates, producer: Mapping[str, An
             "cost": loaded.options.cost,
             "unowned": loaded.options.robots.unowned,
             "remember_actions": loaded.options.remember_actions,
-            "idle": [r for r, keeps in zip(loaded.model.robots, loaded.model.keeps_idle, strict=True) if keeps],
+            "idle": [
+                r
+                for r, keeps in zip(loaded.model.robots, loaded.model.keeps_idle, strict=True)
+                if keeps
+            ],
             "problem_sha256": problem.source.sha256,
             "world_sha256": world_sha256(loaded.domain, problem),
         },
@@ -55,7 +65,9 @@ def signed(language: Language, candidates: Candidates, producer: Mapping[str, An
 
 def world_sha256(domain: Domain, problem: Problem) -> str:
     """A hash of what the problems of one language share: objects, static facts, function values."""
-    lines = [f"{name} - {' '.join(sorted(types))}" for name, types in sorted(problem.objects.items())]
+    lines = [
+        f"{name} - {' '.join(sorted(types))}" for name, types in sorted(problem.objects.items())
+    ]
     lines += sorted(show(atom) for atom in static_atoms(domain, problem))
     lines += sorted(f"{show(atom)} = {value!r}" for atom, value in problem.values.items())
     return sha256("\n".join(lines).encode()).hexdigest()
@@ -98,7 +110,9 @@ def write_atomically(path: str | Path, data: bytes) -> None:
     """Write beside, then rename.  Raises `UsageError` when the place cannot be written."""
     target = Path(os.path.realpath(path))
     try:
-        if target.exists() and not target.is_file():  # a device or a pipe: written to, never replaced
+        if (
+            target.exists() and not target.is_file()
+        ):  # a device or a pipe: written to, never replaced
             if target.is_dir():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
             with open(path, "wb") as file:
@@ -116,7 +130,8 @@ def write_atomically(path: str | Path, data: bytes) -> None:
             raise
     except OSError as error:
         raise UsageError(
-            f"{path} cannot be written: {error.strerror}", remedy="Name a file in a folder that you may write to."
+            f"{path} cannot be written: {error.strerror}",
+            remedy="Name a file in a folder that you may write to.",
         ) from None
 
 
@@ -129,7 +144,8 @@ def _umask() -> int:
 def read_language(path: str | Path) -> Language:
     """Read a language file.
 
-    Raises `BadInput` for a file that is missing, cut off, no language, of another version, or that contradicts itself.
+    Raises `BadInput` for a file that is missing, cut off, no language, of another version, or that
+    contradicts itself.
     """
     place = Place(str(path))
     try:
@@ -150,12 +166,19 @@ def language_from_bytes(data: bytes, place: Place) -> Language:
         record = msgspec.json.decode(data, type=LanguageRecord)
         twice = duplicate_key(data, memoryview(head.states), len(record.states))
     except msgspec.ValidationError as error:
-        raise BadInput(f"this is no language file: {error}", place=place,
-                       remedy="`coordlang schema` prints what a language file holds.") from None  # fmt: skip
+        raise BadInput(
+            f"this is no language file: {error}",
+            place=place,
+            remedy="`coordlang schema` prints what a language file holds.",
+        ) from None
     except RecursionError as error:
         raise BadInput(f"this is no JSON that can be read: {error}", place=place) from None
     if twice is not None:
-        raise BadInput(f"the key {twice!r} occurs twice", place=place, remedy="Of two entries one would be lost.")
+        raise BadInput(
+            f"the key {twice!r} occurs twice",
+            place=place,
+            remedy="Of two entries one would be lost.",
+        )
     _check_words(record, place)
     robots = [] if record.robots is UNSET else record.robots
     if len(set(robots)) < len(robots) or (not robots and record.robots is not UNSET):
@@ -185,14 +208,25 @@ def _check_words(record: LanguageRecord, place: Place) -> None:
         raise BadInput("the words must be different, and at least one", place=place)
     for word in record.words:
         if word.split() != [word]:
-            raise BadInput(f"{word!r} is no word", place=place, remedy="Words are not empty and have no blanks in them.")
+            raise BadInput(
+                f"{word!r} is no word",
+                place=place,
+                remedy="Words are not empty and have no blanks in them.",
+            )
     if not {*record.states.values(), record.default} <= words:
-        key, word = next((k, w) for k, w in [*record.states.items(), ("default", record.default)] if w not in words)
+        key, word = next(
+            (k, w)
+            for k, w in [*record.states.items(), ("default", record.default)]
+            if w not in words
+        )
         raise BadInput(f"{word!r} (of {key!r}) is not among the words", place=place)
     for key, further in record.also.items():
         good = bool(further) and len(set(further)) == len(further)
         if not good or key not in record.states or not set(further) <= words - {record.states[key]}:
-            raise BadInput(f"'also' of {key!r} must hold further words of a state that 'states' has", place=place)
+            raise BadInput(
+                f"'also' of {key!r} must hold further words of a state that 'states' has",
+                place=place,
+            )
 
 
 def _guarantee(record: LanguageRecord, place: Place) -> Guarantee:
@@ -203,7 +237,8 @@ def _guarantee(record: LanguageRecord, place: Place) -> Guarantee:
     g = record.guarantee
     if g.size != size or not 1 <= g.lower_bound <= g.size:
         raise BadInput(
-            f"the guarantee (size {g.size}, lower bound {g.lower_bound}) contradicts the {size} words", place=place
+            f"the guarantee (size {g.size}, lower bound {g.lower_bound}) contradicts the {size} words",
+            place=place,
         )
     if g.proved_minimal != (g.lower_bound == g.size):
         raise BadInput("'proved_minimal' contradicts the lower bound", place=place)
@@ -227,7 +262,10 @@ def _head(data: bytes, place: Place) -> _Head:
     if head.format != FORMAT:
         raise BadInput(f"format {head.format!r}, expected {FORMAT!r}", place=place)
     if head.version != VERSION:
-        raise BadInput(f"language file version {head.version!r}; this program reads version {VERSION}", place=place)
+        raise BadInput(
+            f"language file version {head.version!r}; this program reads version {VERSION}",
+            place=place,
+        )
     return head
 
 
@@ -252,12 +290,18 @@ def options_of(
             said = flag if value is True else f"{flag} {value}"
             told = f"without {flag}" if recorded[flag] is False else f"with {flag} {recorded[flag]}"
             raise UsageError(
-                f"{said} contradicts the language file, which was built {told}", remedy=f"Leave out {flag}."
+                f"{said} contradicts the language file, which was built {told}",
+                remedy=f"Leave out {flag}.",
             )
-    own = tuple(r for r in language.robots or robots if r != ENVIRONMENT or recorded["--unowned"] != "environment")
+    own = tuple(
+        r
+        for r in language.robots or robots
+        if r != ENVIRONMENT or recorded["--unowned"] != "environment"
+    )
     if robots and set(robots) != set(own):
         raise UsageError(
-            f"--robots contradicts the language file: its robots are {', '.join(own)}", remedy="Leave out --robots."
+            f"--robots contradicts the language file: its robots are {', '.join(own)}",
+            remedy="Leave out --robots.",
         )
     idle = model.get("idle")
     return ModelOptions(
@@ -304,7 +348,11 @@ def recorded_candidates(
         if kind == "all":
             candidates = all_pairs(domain, problems, options)
             if candidates.count != language.tasks["count"]:
-                have = f"{problems[0].source.name} has" if len(problems) == 1 else f"these {len(problems)} problems have"
+                have = (
+                    f"{problems[0].source.name} has"
+                    if len(problems) == 1
+                    else f"these {len(problems)} problems have"
+                )
                 raise BadInput(
                     f"the language records {language.tasks['count']:,} tasks, but {have} {candidates.count:,} pairs of "
                     "reachable states",

@@ -1,13 +1,14 @@
 """How much a language leaves open, and how much it need not say.
 
-*Flexibility* of a task: draw one of its N optimal plans uniformly and say its sentence.  With ``n_s`` plans that have the
-sentence s, ``n_s`` plans are then open.  The expectation is ``E = sum_s n_s^2 / N``; 1 where the sentence gives every plan
-away, N where one sentence holds all of them.
+*Flexibility* of a task: draw one of its N optimal plans uniformly and say its sentence.  With
+``n_s`` plans that have the sentence s, ``n_s`` plans are then open.  The expectation is ``E = sum_s
+n_s^2 / N``; 1 where the sentence gives every plan away, N where one sentence holds all of them.
 
-*Communication saving* of a plan: ``1 - len(sentence) / len(state sequence)``, the share of its states that need no word.  The
-paper's figures on GWB7, 33.3 % over the 784 plans whose sentence is shorter and 27.3 % over all 956, agree with each other
-only if a plan whose sentence is not shorter saves nothing (33.3 % * 784 / 956 = 27.3 %).  Measured against the joint
-*actions* of the plan, one fewer than its states, such a plan would save less than nothing.
+*Communication saving* of a plan: ``1 - len(sentence) / len(state sequence)``, the share of its
+states that need no word.  The paper's figures on GWB7, 33.3 % over the 784 plans whose sentence is
+shorter and 27.3 % over all 956, agree with each other only if a plan whose sentence is not shorter
+saves nothing (33.3 % * 784 / 956 = 27.3 %).  Measured against the joint *actions* of the plan, one
+fewer than its states, such a plan would save less than nothing.
 """
 
 from __future__ import annotations
@@ -32,13 +33,15 @@ MANY = 10**300
 
 @dataclass(frozen=True, slots=True)
 class Flexibility:
-    """Measures of a partition, one entry for each candidate task (the tasks of all plan spaces, in their order).
+    """Measures of a partition, one entry for each candidate task (the tasks of all plan spaces, in
+    their order).
 
-    ``plans``: N, exact.  ``expected``: plans left open in expectation over a plan drawn uniformly.  ``first``: plans left
-    open by the sentence of the first plan in our order.  ``most``: plans left open by the sentence that leaves most.
-    ``words`` and ``first_words``: words of a sentence, in expectation and for the first plan.  ``steps``: joint steps of the
-    task's plans.  Numbers of plans are floats with a relative error below 1e-12; a task with more than `MANY` counts as
-    one with so many.
+    ``plans``: N, exact.  ``expected``: plans left open in expectation over a plan drawn uniformly.
+    ``first``: plans left open by the sentence of the first plan in our order.  ``most``: plans left
+    open by the sentence that leaves most. ``words`` and ``first_words``: words of a sentence, in
+    expectation and for the first plan.  ``steps``: joint steps of the task's plans.  Numbers of
+    plans are floats with a relative error below 1e-12; a task with more than `MANY` counts as one
+    with so many.
     """
 
     plans: tuple[int, ...]
@@ -68,10 +71,10 @@ class Flexibility:
 def flexibility(spaces: Sequence[PlanSpace], words: Sequence[Ints]) -> Flexibility:
     """Measure a partition; ``words[k]`` holds the word number of each node of ``spaces[k]``.
 
-    Backward over the plan graphs: for every node the sentences of the plans from it with the share of the plans that
-    each holds, for all tasks at once.  Shares are sums of products of positive numbers, so 64-bit floats lose nothing
-    that matters, however many plans there are.  O(edges * sentences of a node).  Raises `OutOfMemory` when the
-    sentences become too many to hold.
+    Backward over the plan graphs: for every node the sentences of the plans from it with the share
+    of the plans that each holds, for all tasks at once.  Shares are sums of products of positive
+    numbers, so 64-bit floats lose nothing that matters, however many plans there are.  O(edges *
+    sentences of a node).  Raises `OutOfMemory` when the sentences become too many to hold.
     """
     parts = [_measure(space, word) for space, word in zip(spaces, words, strict=True)]
     return Flexibility(
@@ -86,7 +89,9 @@ def flexibility(spaces: Sequence[PlanSpace], words: Sequence[Ints]) -> Flexibili
 
 
 def edge_shares(space: PlanSpace, counted: Sequence[int]) -> Floats:
-    """For each edge the share of its source's plans that go over it; ``counted`` is `planners.search.plans.counts`."""
+    """For each edge the share of its source's plans that go over it; ``counted`` is
+    `planners.search.plans.counts`.
+    """
     source, target = space.sources, space.target
     if max(counted, default=0) < 2**53:
         number = np.array(counted, np.float64)
@@ -106,7 +111,9 @@ class _Sentences:
         """The numbers of the sentences ``word`` + ``rest``."""
         size = int(word.max(initial=0)) + 1
         different, inverse = np.unique(rest * size + word, return_inverse=True)
-        return np.array([self._one(code % size, code // size) for code in different.tolist()], np.int64)[inverse]
+        return np.array(
+            [self._one(code % size, code // size) for code in different.tolist()], np.int64
+        )[inverse]
 
     def _one(self, word: int, rest: int) -> int:
         number = self._number.setdefault((word, rest), len(self._length))
@@ -125,7 +132,8 @@ def _measure(space: PlanSpace, word: Ints) -> Flexibility:
     sentences = _Sentences()
     source_of_edge = space.sources
     first_sentence = np.zeros(len(space), np.int64)
-    # Of the layer below: sorted by node, bounds of each node's entries, sentence and share of each entry.
+    # Of the layer below: sorted by node, bounds of each node's entries, sentence and share of each
+    # entry.
     node, said, share = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
     starts = np.unique(space.starts)
     together, most, words, first = (np.zeros(len(space)) for _ in range(4))
@@ -171,7 +179,9 @@ def _measure(space: PlanSpace, word: Ints) -> Flexibility:
 
 
 def _said(sentences: _Sentences, word: Ints, source: Ints, target: Ints, rest: Ints) -> Ints:
-    """The sentences from ``source``, given those from ``target`` on: a word more where it is a new one."""
+    """The sentences from ``source``, given those from ``target`` on: a word more where it is a new
+    one.
+    """
     result = rest.copy()
     fresh = word[source] != word[target]
     if fresh.any():
@@ -183,7 +193,9 @@ def _summed(node: Ints, said: Ints, share: Floats) -> tuple[Ints, Ints, Floats]:
     """Entries of one node and sentence added up, sorted by node."""
     size = int(said.max(initial=0)) + 1
     code, inverse = np.unique(node * size + said, return_inverse=True)
-    total: Floats = np.bincount(inverse.reshape(-1), share, minlength=len(code)).astype(np.float64, copy=False)
+    total: Floats = np.bincount(inverse.reshape(-1), share, minlength=len(code)).astype(
+        np.float64, copy=False
+    )
     return code // size, code % size, total
 
 

@@ -1,7 +1,7 @@
 """State keys, many at a time: texts as in a language file <-> rows of bits.
 
-A key is what `planners.joint.states.StateCodec.key` gives: the true atoms, sorted, joined by one space.  Both ways are array
-operations on blocks of keys, for languages of millions of states.
+A key is what `planners.joint.states.StateCodec.key` gives: the true atoms, sorted, joined by one
+space.  Both ways are array operations on blocks of keys, for languages of millions of states.
 """
 
 from __future__ import annotations
@@ -20,7 +20,9 @@ _BETWEEN = ") ("
 
 
 def read_keys(codec: StateCodec, keys: Iterable[str]) -> tuple[Rows, Ints]:
-    """The rows of keys, and the positions of those that are no key of a state (their rows mean nothing)."""
+    """The rows of keys, and the positions of those that are no key of a state (their rows mean
+    nothing).
+    """
     atoms, place, value = _atoms(codec)
     number = {atom[1:-1]: n for n, atom in enumerate(atoms)}
     blocks, wrong, start = [], [], 0
@@ -42,7 +44,9 @@ def _read(
     bad = np.array([key != "" and not (key[0] == "(" and key[-1] == ")") for key in keys])
     counts = np.fromiter(map(len, parts), np.int64, len(parts))
     source = np.repeat(np.arange(len(keys)), counts)
-    found = np.fromiter(map(number.get, chain.from_iterable(parts), repeat(-1)), np.int64, len(source))
+    found = np.fromiter(
+        map(number.get, chain.from_iterable(parts), repeat(-1)), np.int64, len(source)
+    )
     bad[source[found < 0]] = True
     follows = source[1:] == source[:-1]
     bad[source[1:][follows & (found[1:] <= found[:-1])]] = True  # not sorted, or twice
@@ -68,8 +72,14 @@ def keys_of(codec: StateCodec, rows: Rows) -> list[str]:
         state, bit = np.nonzero(np.unpackbits(words.view(np.uint8), axis=1, bitorder="little"))
         atom = fact_number[bit]
         if codec.memory is not None:
-            last = [np.flatnonzero(place == codec.fact_words + robot) for robot in range(len(codec.robots))]
-            said = [mine[np.argsort(value[mine])][block[:, place[mine[0]]].astype(np.int64)] for mine in last]
+            last = [
+                np.flatnonzero(place == codec.fact_words + robot)
+                for robot in range(len(codec.robots))
+            ]
+            said = [
+                mine[np.argsort(value[mine])][block[:, place[mine[0]]].astype(np.int64)]
+                for mine in last
+            ]
             state = np.concatenate((state, np.tile(np.arange(len(block)), len(last))))
             atom = np.concatenate((atom, *said))
             order = np.lexsort((atom, state))
@@ -81,10 +91,17 @@ def keys_of(codec: StateCodec, rows: Rows) -> list[str]:
 
 
 def _atoms(codec: StateCodec) -> tuple[tuple[str, ...], Ints, Rows]:
-    """All atoms of the model, remembered actions too, sorted; for each its word in a row, and its bit or value there."""
+    """All atoms of the model, remembered actions too, sorted; for each its word in a row, and its
+    bit or value there.
+    """
     listed = [(fact, n // 64, 1 << n % 64) for n, fact in enumerate(codec.facts)]
-    for robot, (name, labels) in enumerate(zip(codec.robots, codec.memory or (), strict=codec.memory is not None)):
-        listed += [(f"(last {name} {label})", codec.fact_words + robot, n) for n, label in enumerate(("none", *labels))]
+    for robot, (name, labels) in enumerate(
+        zip(codec.robots, codec.memory or (), strict=codec.memory is not None)
+    ):
+        listed += [
+            (f"(last {name} {label})", codec.fact_words + robot, n)
+            for n, label in enumerate(("none", *labels))
+        ]
     listed.sort()
     return (
         tuple(atom for atom, _, _ in listed),

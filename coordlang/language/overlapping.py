@@ -1,11 +1,14 @@
-"""Overlapping words: a state may have several words, a plan several sentences, and the speaker chooses among them.
+"""Overlapping words: a state may have several words, a plan several sentences, and the speaker
+chooses among them.
 
-``words[s]`` is the set of words of state s, never empty.  A *reading* of a plan takes one of the words of each of its states;
-repeated neighbours are collapsed, and what remains is a sentence of the plan.  ``P(S)`` are the optimal plans of the task
-that have the sentence S.  S is *usable* for the task if ``P(S)`` is RC-free.  The words are a coordination language iff every
-optimal plan of every candidate task has a usable sentence (the paper's general definition; with one word for each state it
-is the one for partitions).  A speaker says a usable sentence of his plan that leaves most plans open, so a task's
-flexibility is ``E = (1/N) sum over plans x of max { |P(S)| : S usable, S a sentence of x }``.
+``words[s]`` is the set of words of state s, never empty.  A *reading* of a plan takes one of the
+words of each of its states; repeated neighbours are collapsed, and what remains is a sentence of
+the plan.  ``P(S)`` are the optimal plans of the task that have the sentence S.  S is *usable* for
+the task if ``P(S)`` is RC-free.  The words are a coordination language iff every optimal plan of
+every candidate task has a usable sentence (the paper's general definition; with one word for each
+state it is the one for partitions).  A speaker says a usable sentence of his plan that leaves most
+plans open, so a task's flexibility is ``E = (1/N) sum over plans x of max { |P(S)| : S usable, S a
+sentence of x }``.
 """
 
 from __future__ import annotations
@@ -49,9 +52,10 @@ def _longer(sentences: Iterable[Sentence], words: Iterable[int]) -> set[Sentence
 class Readings:
     """The sentences of all plans from every node of a plan space.
 
-    ``classes[node]`` counts the plans from the node by the set of their sentences; sets are numbers, see `sentences`.
-    Computed backward over the plan graph, one pass for all tasks.  Plans with one set of sentences are never told apart, so
-    there are few classes however many plans there are.
+    ``classes[node]`` counts the plans from the node by the set of their sentences; sets are
+    numbers, see `sentences`. Computed backward over the plan graph, one pass for all tasks.  Plans
+    with one set of sentences are never told apart, so there are few classes however many plans
+    there are.
     """
 
     def __init__(self, space: PlanSpace, words: Overlap) -> None:
@@ -69,7 +73,9 @@ class Readings:
         return self._sets[number]
 
     def update(self, nodes: Iterable[int], words: Overlap) -> None:
-        """Read these nodes anew, in the order of their numbers; `TooManySentences` leaves some of them as they were."""
+        """Read these nodes anew, in the order of their numbers; `TooManySentences` leaves some of
+        them as they were.
+        """
         for node in nodes:
             self.classes[node] = self._read(node, words[self._state[node]])
 
@@ -86,7 +92,9 @@ class Readings:
                     self._before[number, words] = here
                 total[here] = total.get(here, 0) + plans
         if len(total) > _MOST_SETS:
-            raise TooManySentences(f"the plans of a task have more than {_MOST_SETS:,} sets of sentences")
+            raise TooManySentences(
+                f"the plans of a task have more than {_MOST_SETS:,} sets of sentences"
+            )
         return total
 
     def _intern(self, sentences: frozenset[Sentence]) -> int:
@@ -104,7 +112,9 @@ class Readings:
         return number
 
     def expected(self, node: int) -> float:
-        """E of a task from the node that does not require coordination: all its sentences are usable."""
+        """E of a task from the node that does not require coordination: all its sentences are
+        usable.
+        """
         plans = self.plans(node)
         classes = self.classes[node].items()
         open_plans = sum(count * max(plans[s] for s in self._sets[read]) for read, count in classes)

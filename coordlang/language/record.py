@@ -26,7 +26,9 @@ class DomainRecord(msgspec.Struct):
     name: Annotated[str, Meta(description="The domain's name.")]
     sha256: Annotated[
         str | None,
-        Meta(description="The SHA-256 of the text of the domain file; a file without it is not held to one text."),
+        Meta(
+            description="The SHA-256 of the text of the domain file; a file without it is not held to one text."
+        ),
     ] = None
 
 
@@ -40,27 +42,39 @@ class ModelRecord(msgspec.Struct):
     ] = False
     idle: Annotated[
         list[str] | None,
-        Meta(description="The robots that may idle without an action of their own; without it: found from the model."),
+        Meta(
+            description="The robots that may idle without an action of their own; without it: found from the model."
+        ),
     ] = None
     problem_sha256: Annotated[
-        str | None, Meta(description="The SHA-256 of the text of the (first) problem file; for information.")
+        str | None,
+        Meta(description="The SHA-256 of the text of the (first) problem file; for information."),
     ] = None
     world_sha256: Annotated[
-        str | None, Meta(description="The SHA-256 of objects with their types, static facts and function values.")
+        str | None,
+        Meta(
+            description="The SHA-256 of objects with their types, static facts and function values."
+        ),
     ] = None
 
 
 class TaskRecord(msgspec.Struct):
     """One candidate task."""
 
-    init: Annotated[list[str], Meta(description="The fluents that are true at the start, as PDDL atoms.")]
-    goal: Annotated[list[str], Meta(description="PDDL literals or formulas that must all hold at the end.")]
+    init: Annotated[
+        list[str], Meta(description="The fluents that are true at the start, as PDDL atoms.")
+    ]
+    goal: Annotated[
+        list[str], Meta(description="PDDL literals or formulas that must all hold at the end.")
+    ]
 
 
 class TasksRecord(msgspec.Struct):
     """The candidate tasks that the language is guaranteed for."""
 
-    kind: Annotated[Kind, Meta(description="All pairs of states, those of problems, or those of a task file.")]
+    kind: Annotated[
+        Kind, Meta(description="All pairs of states, those of problems, or those of a task file.")
+    ]
     count: Annotated[int, Meta(description="How many they are.", ge=0)]
     tasks: Annotated[list[TaskRecord] | None, Meta(description="The tasks; not for 'all'.")] = None
 
@@ -91,36 +105,48 @@ class LanguageRecord(msgspec.Struct):
     words: Annotated[list[Word], Meta(description="The words.", extra_json_schema=_SOME)]
     states: Annotated[
         dict[str, str],
-        Meta(description="State key -> word.  A key lists the true fluents, sorted, joined by one space."),
+        Meta(
+            description="State key -> word.  A key lists the true fluents, sorted, joined by one space."
+        ),
     ]
     default: Annotated[str, Meta(description="The word of every state that is not listed.")]
     robots: Annotated[
         list[str] | UnsetType,
-        Meta(description="The robots, in the order of joint actions; without it: as the domain says.",
-             extra_json_schema=_SOME),
-    ] = UNSET  # fmt: skip
+        Meta(
+            description="The robots, in the order of joint actions; without it: as the domain says.",
+            extra_json_schema=_SOME,
+        ),
+    ] = UNSET
     domain: DomainRecord | UnsetType = UNSET
     model: ModelRecord = msgspec.field(default_factory=ModelRecord)
     tasks: TasksRecord | UnsetType = UNSET
     guarantee: GuaranteeRecord | UnsetType = UNSET
     producer: Annotated[
         dict[str, Any],
-        Meta(description="Version, arguments, seed, seconds; the only part that may differ between two runs."),
+        Meta(
+            description="Version, arguments, seed, seconds; the only part that may differ between two runs."
+        ),
     ] = {}
     also: Annotated[
         dict[str, list[str]],
-        Meta(description="Further words of states, where words overlap; without it this is a language all the same."),
+        Meta(
+            description="Further words of states, where words overlap; without it this is a language all the same."
+        ),
     ] = {}
 
 
 def json_schema() -> dict[str, Any]:
     """The JSON Schema of language files.
 
-    What it cannot say, readers check besides: words of ``states``, ``default`` and ``also`` are among ``words``, the
-    guarantee fits their number, and no key occurs twice.
+    What it cannot say, readers check besides: words of ``states``, ``default`` and ``also`` are
+    among ``words``, the guarantee fits their number, and no key occurs twice.
     """
     schema: dict[str, Any] = msgspec.json.schema(LanguageRecord)
     properties = schema["$defs"]["LanguageRecord"]["properties"]
     for name, value in (("format", FORMAT), ("version", VERSION)):
         properties[name] = {"const": value, "description": properties[name]["description"]}
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "coordlang language", **schema}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "coordlang language",
+        **schema,
+    }

@@ -1,4 +1,6 @@
-"""The sentences of a task: how many plans each leaves open, and what it asks of each robot step by step."""
+"""The sentences of a task: how many plans each leaves open, and what it asks of each robot step by
+step.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +20,8 @@ _MOST = 100_000
 class TaskSentence:
     """One sentence of a task.
 
-    ``plans`` is the exact number of optimal plans with it; ``choices[step][robot]`` the texts of what the robot may do
-    in that step (None: idle), over all plans with the sentence.
+    ``plans`` is the exact number of optimal plans with it; ``choices[step][robot]`` the texts of
+    what the robot may do in that step (None: idle), over all plans with the sentence.
     """
 
     words: tuple[str, ...]
@@ -36,7 +38,9 @@ def task_sentences(space: PlanSpace, task: int, table: WordTable) -> list[TaskSe
     start = int(space.starts[task])
     below = sentence_counts(space, start, word, _MOST)
     result = [
-        TaskSentence(tuple(table.words[w] for w in words), plans, _choices(space, start, word, below, words))
+        TaskSentence(
+            tuple(table.words[w] for w in words), plans, _choices(space, start, word, below, words)
+        )
         for words, plans in below[start].items()
     ]
     return sorted(result, key=lambda s: (-s.plans, s.words))
@@ -45,11 +49,11 @@ def task_sentences(space: PlanSpace, task: int, table: WordTable) -> list[TaskSe
 def sentence_counts(
     space: PlanSpace, start: int, word: Sequence[int], most: int
 ) -> dict[int, Counter[tuple[int, ...]]]:
-    """For each node on the plans from ``start``: sentence (word numbers) of the rest, the node's own word first -> number of
-    plans.
+    """For each node on the plans from ``start``: sentence (word numbers) of the rest, the node's
+    own word first -> number of plans.
 
-    ``word`` is the word number of each node.  O(edges * sentences).  Raises `OutOfMemory` when a node has more than ``most``
-    sentences.
+    ``word`` is the word number of each node.  O(edges * sentences).  Raises `OutOfMemory` when a
+    node has more than ``most`` sentences.
     """
     counts: dict[int, Counter[tuple[int, ...]]] = {}
     for node in sorted(_nodes_from(space, start)):

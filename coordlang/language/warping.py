@@ -1,8 +1,9 @@
 """When do two state sequences have one sentence?  Warping paths, and the shortest of them.
 
-Key fact (proved in docs/concepts.md): ``u`` and ``v`` have the same sentence under ``f`` iff there is a *warping path*:
-cells ``(i, j)`` from ``(0, 0)`` to the last indices, steps ``(1, 0)``, ``(0, 1)``, ``(1, 1)``, with ``f(u_i) = f(v_j)`` on
-every cell.  So whoever wants the sentences to differ must separate ``u_i`` from ``v_j`` on some cell of *every* warping path.
+Key fact (proved in docs/concepts.md): ``u`` and ``v`` have the same sentence under ``f`` iff there
+is a *warping path*: cells ``(i, j)`` from ``(0, 0)`` to the last indices, steps ``(1, 0)``, ``(0,
+1)``, ``(1, 1)``, with ``f(u_i) = f(v_j)`` on every cell.  So whoever wants the sentences to differ
+must separate ``u_i`` from ``v_j`` on some cell of *every* warping path.
 """
 
 from __future__ import annotations
@@ -22,8 +23,11 @@ def pair(a: int, b: int) -> Pair:
     return (a, b) if a < b else (b, a)
 
 
-def warping_clause(u: Sequence[int], v: Sequence[int], word: Mapping[int, int] | Sequence[int]) -> Clause | None:
-    """The non-identical pairs on a warping path of ``u`` and ``v`` under ``word`` with the fewest non-identical cells.
+def warping_clause(
+    u: Sequence[int], v: Sequence[int], word: Mapping[int, int] | Sequence[int]
+) -> Clause | None:
+    """The non-identical pairs on a warping path of ``u`` and ``v`` under ``word`` with the fewest
+    non-identical cells.
 
     None if the two sentences differ.  O(|u| |v|).
     """
@@ -35,7 +39,9 @@ def warping_clause(u: Sequence[int], v: Sequence[int], word: Mapping[int, int] |
 def warping_path(
     u: Sequence[int], v: Sequence[int], joined: Sequence[Sequence[bool]]
 ) -> list[tuple[int, int]] | None:
-    """A warping path over cells with ``joined[i][j]`` that has the fewest non-identical cells; None if there is none."""
+    """A warping path over cells with ``joined[i][j]`` that has the fewest non-identical cells; None
+    if there is none.
+    """
     best = [[_NO_PATH] * len(v) for _ in u]
     for i, a in enumerate(u):
         for j, b in enumerate(v):
@@ -64,8 +70,11 @@ def _before(best: list[list[int]], i: int, j: int) -> tuple[int, int, int]:
     )
 
 
-def separation_clause(sequences: Sequence[Sequence[int]], word: Mapping[int, int] | Sequence[int]) -> Clause | None:
-    """The clause of a failing tuple of plans: the union of warping paths from the first to each other one.
+def separation_clause(
+    sequences: Sequence[Sequence[int]], word: Mapping[int, int] | Sequence[int]
+) -> Clause | None:
+    """The clause of a failing tuple of plans: the union of warping paths from the first to each
+    other one.
 
     None if not all of them have one sentence.
     """

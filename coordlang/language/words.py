@@ -19,7 +19,9 @@ from planners.joint.states import Rows, find_rows, unique_rows
 
 @dataclass(frozen=True, slots=True)
 class Guarantee:
-    """What is known of a language: how it was made, its size, and the proved lower bound on the size of any."""
+    """What is known of a language: how it was made, its size, and the proved lower bound on the
+    size of any.
+    """
 
     method: str
     size: int
@@ -31,9 +33,10 @@ class Guarantee:
 class Language:
     """A partition ``f: states -> words`` (the paper, section 4), with what is needed to use it.
 
-    ``states`` maps state keys (see `planners.joint.states.StateCodec`) to words; all other states have the word ``default``.
-    ``domain``, ``model``, ``tasks`` and ``producer`` are recorded as in a language file (docs/formats.md).  ``also`` maps
-    states to further words where words overlap (`coordlang.language.overlapping`); without it this is still a language.
+    ``states`` maps state keys (see `planners.joint.states.StateCodec`) to words; all other states
+    have the word ``default``. ``domain``, ``model``, ``tasks`` and ``producer`` are recorded as in
+    a language file (docs/formats.md).  ``also`` maps states to further words where words overlap
+    (`coordlang.language.overlapping`); without it this is still a language.
     """
 
     words: tuple[str, ...]
@@ -67,11 +70,15 @@ class WordTable:
         """Raises `BadInput` for a state that the model cannot have."""
         if not language.states:
             none = np.zeros((0, model.codec.width), np.uint64)
-            return cls(language.words, none, np.zeros(0, np.int64), language.words.index(language.default))
+            return cls(
+                language.words, none, np.zeros(0, np.int64), language.words.index(language.default)
+            )
         number = {word: n for n, word in enumerate(language.words)}
         table, place = unique_rows(_rows(model, language.states))
         word = np.zeros(len(table), np.int64)
-        word[place] = np.fromiter(map(number.__getitem__, language.states.values()), np.int64, len(place))
+        word[place] = np.fromiter(
+            map(number.__getitem__, language.states.values()), np.int64, len(place)
+        )
         return cls(language.words, table, word, number[language.default])
 
     def of_rows(self, rows: Rows) -> Ints:
@@ -83,7 +90,9 @@ class WordTable:
 
 
 def words_of_states(language: Language, model: JointModel, rows: Rows) -> list[frozenset[int]]:
-    """All words of each state of a table: its own one and those of ``also``.  Raises `BadInput` as `WordTable.of` does."""
+    """All words of each state of a table: its own one and those of ``also``.  Raises `BadInput` as
+    `WordTable.of` does.
+    """
     own = WordTable.of(language, model).of_rows(rows).tolist()
     words = [frozenset((word,)) for word in own]
     number = {word: n for n, word in enumerate(language.words)}
@@ -118,7 +127,9 @@ def _refuse(model: JointModel, key: str) -> NoReturn:
 
 
 def sentence(words: Iterable[int]) -> tuple[int, ...]:
-    """The words of a state sequence, repeated neighbours collapsed (the paper's task state compression, TSC)."""
+    """The words of a state sequence, repeated neighbours collapsed (the paper's task state
+    compression, TSC).
+    """
     result: list[int] = []
     for word in words:
         if not result or result[-1] != word:
@@ -129,7 +140,8 @@ def sentence(words: Iterable[int]) -> tuple[int, ...]:
 def name_words(
     model: JointModel, rows: Rows, partition: Mapping[int, int]
 ) -> tuple[tuple[str, ...], dict[str, str], str]:
-    """Words ``w0, w1, ..`` for a partition of state numbers: (words, state key -> word, default word).
+    """Words ``w0, w1, ..`` for a partition of state numbers: (words, state key -> word, default
+    word).
 
     Words are named in the order of their first state; the default is the word with most states.
     """
@@ -138,6 +150,11 @@ def name_words(
         order.setdefault(partition[state], len(order))
     words = tuple(f"w{n}" for n in range(max(1, len(order))))
     keys = keys_of(model.codec, rows[sorted(partition)]) if partition else []
-    states = {key: words[order[partition[state]]] for key, state in zip(keys, sorted(partition), strict=True)}
-    counts: Sequence[int] = np.bincount([order[w] for w in partition.values()], minlength=len(words)).tolist()
+    states = {
+        key: words[order[partition[state]]]
+        for key, state in zip(keys, sorted(partition), strict=True)
+    }
+    counts: Sequence[int] = np.bincount(
+        [order[w] for w in partition.values()], minlength=len(words)
+    ).tolist()
     return words, dict(sorted(states.items())), words[counts.index(max(counts))]

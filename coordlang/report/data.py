@@ -1,6 +1,7 @@
 """What a report page needs, as one JSON object.
 
-States, labels and facts are numbers into tables; numbers of plans are strings, since they may be larger than 2^53.
+States, labels and facts are numbers into tables; numbers of plans are strings, since they may be
+larger than 2^53.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ from coordlang.use.sentence.spoken import Spoken
 from planners.joint.model import JointModel, own_text
 from planners.joint.states import find_rows, split_atoms
 
-#: States of the language beyond which their graph is not drawn, they are not listed, formulas are not sought.
+#: States of the language beyond which their graph is not drawn, they are not listed, formulas are
+#: not sought.
 _STATES_DRAWN = 400
 _STATE_LINES = 6_000
 _STATES_LISTED = 12_000
@@ -38,9 +40,14 @@ _PLACES = 600
 
 
 def page_data(
-    language: Language, selection: Selection, parts: Sequence[TaskPart], known: Mapping[str, Point] | None = None
+    language: Language,
+    selection: Selection,
+    parts: Sequence[TaskPart],
+    known: Mapping[str, Point] | None = None,
 ) -> dict[str, Any]:
-    """The page's data for a language and the parts to be shown; ``known``: coordinates of places from a file."""
+    """The page's data for a language and the parts to be shown; ``known``: coordinates of places
+    from a file.
+    """
     first = parts[0].shown.spoken
     model = first.model
     tables = Tables(model, first.table)
@@ -61,7 +68,8 @@ def page_data(
         **_map(world, known),
         "facts": [{"text": fact, "role": _role(fact, world)} for fact in facts],
         "labels": [
-            [_label(model, world, robot, text) for text in own] for robot, own in enumerate(tables.labels)
+            [_label(model, world, robot, text) for text in own]
+            for robot, own in enumerate(tables.labels)
         ],
         "states": [[number[atom] for atom in split_atoms(key)] for key in tables.states],
         "state_words": tables.words,
@@ -78,7 +86,9 @@ def page_data(
 
 
 def _listed_states(language: Language, tables: Tables) -> int:
-    """Enter the language's states, the first numbers, unless they are too many; how many were entered."""
+    """Enter the language's states, the first numbers, unless they are too many; how many were
+    entered.
+    """
     keys = sorted(language.states)
     atoms = len(split_atoms(keys[0])) * len(keys) if keys else 0
     if len(keys) > _STATES_LISTED or atoms > _ATOMS_LISTED:
@@ -89,14 +99,20 @@ def _listed_states(language: Language, tables: Tables) -> int:
 
 
 def _words(language: Language, model: JointModel) -> dict[str, Any]:
-    """The words in their own order, and ``told``: their numbers in the order in which their formulas are to be read.
+    """The words in their own order, and ``told``: their numbers in the order in which their
+    formulas are to be read.
 
-    ``terms``: those of the formula, None if none was sought; ``rest``: the formula is "every other state".
+    ``terms``: those of the formula, None if none was sought; ``rest``: the formula is "every other
+    state".
     """
     sizes = language.sizes()
     explained = 0 < len(language.states) <= _STATES_EXPLAINED
     mapped = mapped_states(language, model) if explained else None
-    told = telling(mapped, all_covers(mapped)) if mapped else Telling(tuple((w, None) for w in language.words), False)
+    told = (
+        telling(mapped, all_covers(mapped))
+        if mapped
+        else Telling(tuple((w, None) for w in language.words), False)
+    )
     words = {}
     for word, cover in told.rules:
         terms = cover.terms if cover else ()
@@ -111,7 +127,10 @@ def _words(language: Language, model: JointModel) -> dict[str, Any]:
         }
     return {
         "words": [words[word] for word in language.words],
-        "told": {"in_order": told.in_order, "order": [language.words.index(word) for word, _ in told.rules]},
+        "told": {
+            "in_order": told.in_order,
+            "order": [language.words.index(word) for word, _ in told.rules],
+        },
     }
 
 
@@ -121,8 +140,13 @@ def _map(world: World, known: Mapping[str, Point] | None) -> dict[str, Any]:
     layout = place_layout(world.places, [link.ends for link in world.links], known)
     number = {name: k for k, name in enumerate(world.places)}
     return {
-        "places": [{"name": name, "x": layout.points[name][0], "y": layout.points[name][1]} for name in world.places],
-        "links": [[number[a], number[b], int(link.moves)] for link in world.links for a, b in [link.ends]],
+        "places": [
+            {"name": name, "x": layout.points[name][0], "y": layout.points[name][1]}
+            for name in world.places
+        ],
+        "links": [
+            [number[a], number[b], int(link.moves)] for link in world.links for a, b in [link.ends]
+        ],
         "grid": layout.is_grid,
     }
 
@@ -159,7 +183,9 @@ def _label(model: JointModel, world: World, robot: int, text: str | None) -> dic
 
 
 def _state_graph(spoken: Spoken) -> dict[str, Any] | None:
-    """The language's states, in the order of their keys, and the joint steps between them (either way)."""
+    """The language's states, in the order of their keys, and the joint steps between them (either
+    way).
+    """
     model, table = spoken.model, spoken.table
     keys = [model.codec.key(row) for row in table.rows]
     place = np.argsort(np.array(keys, object), kind="stable")

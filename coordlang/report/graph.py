@@ -1,4 +1,6 @@
-"""The graph of a task's plans as it is drawn and played: all of it, or plans drawn from it where it is too large."""
+"""The graph of a task's plans as it is drawn and played: all of it, or plans drawn from it where it
+is too large.
+"""
 
 from __future__ import annotations
 
@@ -31,9 +33,9 @@ _SUBSETS = 200_000
 class Graph:
     """A part of a plan space, closed under being on a plan from the start to the goal.
 
-    ``nodes`` are plan-space nodes, by step and in the order in which they are drawn; ``order`` (nodes) is the place in
-    the step's column.  ``edges`` are plan-space edges, sorted by source in ``nodes`` and labels.  ``complete``: it is the
-    whole plan space.
+    ``nodes`` are plan-space nodes, by step and in the order in which they are drawn; ``order``
+    (nodes) is the place in the step's column.  ``edges`` are plan-space edges, sorted by source in
+    ``nodes`` and labels.  ``complete``: it is the whole plan space.
     """
 
     nodes: Ints
@@ -44,8 +46,9 @@ class Graph:
 
 @dataclass(frozen=True, slots=True)
 class ShownSentence:
-    """A sentence (word numbers), the exact number of plans it leaves open, and that of each robot's own subplans among
-    them (None: too many to count)."""
+    """A sentence (word numbers), the exact number of plans it leaves open, and that of each robot's
+    own subplans among them (None: too many to count).
+    """
 
     words: tuple[int, ...]
     plans: int
@@ -54,7 +57,9 @@ class ShownSentence:
 
 @dataclass(frozen=True, slots=True)
 class ShownSentences:
-    """``listed`` sentences, those that leave most open first; ``total`` of the task, None if they are too many."""
+    """``listed`` sentences, those that leave most open first; ``total`` of the task, None if they
+    are too many.
+    """
 
     listed: tuple[ShownSentence, ...]
     total: int | None
@@ -73,13 +78,17 @@ def plan_graph(spoken: Spoken, seed: int) -> Graph:
     number = np.full(len(space), -1)
     number[nodes] = np.arange(len(nodes))
     sizes = np.bincount(makespan - space.layer[nodes], minlength=makespan + 1).tolist()
-    order = layer_orders(sizes, list(zip(number[source].tolist(), number[space.target[edges]].tolist(), strict=True)))
+    order = layer_orders(
+        sizes, list(zip(number[source].tolist(), number[space.target[edges]].tolist(), strict=True))
+    )
     ranked = np.lexsort((order, makespan - space.layer[nodes]))
     nodes = nodes[ranked]
     kept = np.zeros(len(space.target), np.bool_)
     kept[edges] = True
     all_edges = ranges(space.first[nodes], np.diff(space.first)[nodes])
-    return Graph(nodes, tuple(order[k] for k in ranked.tolist()), all_edges[kept[all_edges]], complete)
+    return Graph(
+        nodes, tuple(order[k] for k in ranked.tolist()), all_edges[kept[all_edges]], complete
+    )
 
 
 def _drawn(space: PlanSpace, seed: int) -> Ints:
@@ -98,7 +107,9 @@ def _edges_of(space: PlanSpace, start: int, plan: Sequence[Sequence[int]]) -> li
     node, path = start, []
     for labels in plan:
         low, high = int(space.first[node]), int(space.first[node + 1])
-        path.append(low + int(np.flatnonzero((space.labels[low:high] == np.array(labels)).all(axis=1))[0]))
+        path.append(
+            low + int(np.flatnonzero((space.labels[low:high] == np.array(labels)).all(axis=1))[0])
+        )
         node = int(space.target[path[-1]])
     return path
 
@@ -108,18 +119,26 @@ def shown_sentences(spoken: Spoken, graph: Graph, seed: int) -> ShownSentences:
     all_of_them = _count_sentences(spoken) if len(spoken.space.target) <= EDGES else None
     if all_of_them is None:
         said = _drawn_sentences(spoken, graph, seed)
-        plans = {words: counts(fits)[int(fits.starts[0])] for words in said for fits in [fitting(spoken, words)]}
+        plans = {
+            words: counts(fits)[int(fits.starts[0])]
+            for words in said
+            for fits in [fitting(spoken, words)]
+        }
     else:
         plans = all_of_them
     ranked = sorted(plans.items(), key=lambda entry: (-entry[1], entry[0]))[:SENTENCES]
-    listed = tuple(ShownSentence(words, number, _own_counts(spoken, words)) for words, number in ranked)
+    listed = tuple(
+        ShownSentence(words, number, _own_counts(spoken, words)) for words, number in ranked
+    )
     return ShownSentences(listed, None if all_of_them is None else len(all_of_them))
 
 
 def _count_sentences(spoken: Spoken) -> dict[tuple[int, ...], int] | None:
     """Sentence -> number of plans; None if a node has too many."""
     try:
-        return sentence_counts(spoken.space, spoken.start, spoken.word.tolist(), _ALL_SENTENCES)[spoken.start]
+        return sentence_counts(spoken.space, spoken.start, spoken.word.tolist(), _ALL_SENTENCES)[
+            spoken.start
+        ]
     except OutOfMemory:
         return None
 

@@ -1,4 +1,5 @@
-"""Where places, states and plan-space nodes are drawn: files of coordinates, names that tell them, or graph layout.
+"""Where places, states and plan-space nodes are drawn: files of coordinates, names that tell them,
+or graph layout.
 
 Everything here is deterministic: the same input gives the same coordinates.
 """
@@ -42,18 +43,27 @@ class Layout:
 def place_layout(
     names: Sequence[str], links: Sequence[tuple[str, str]], known: Mapping[str, Point] | None = None
 ) -> Layout:
-    """Points for places: as a file of coordinates says (``known``), else as their names say, else by their links."""
-    points = known if known is not None and all(name in known for name in names) else from_names(names, links)
+    """Points for places: as a file of coordinates says (``known``), else as their names say, else
+    by their links.
+    """
+    points = (
+        known
+        if known is not None and all(name in known for name in names)
+        else from_names(names, links)
+    )
     if points is None:
         number = {name: k for k, name in enumerate(names)}
         table = graph_layout(len(names), [(number[a], number[b]) for a, b in links])
         points = {name: (float(x), float(y)) for name, (x, y) in zip(names, table, strict=True)}
         return Layout(points, False)
-    return Layout({name: points[name] for name in names}, _is_grid([points[name] for name in names]))
+    return Layout(
+        {name: points[name] for name in names}, _is_grid([points[name] for name in names])
+    )
 
 
 def read_coordinates(path: str | Path) -> dict[str, Point]:
-    """A file of coordinates, ``{"coordinates": {"depot": [0, 0], "town": [1, 0]}}``: x to the right, y down.
+    """A file of coordinates, ``{"coordinates": {"depot": [0, 0], "town": [1, 0]}}``: x to the
+    right, y down.
 
     Raises `BadInput` for anything else.
     """
@@ -72,17 +82,24 @@ def read_coordinates(path: str | Path) -> dict[str, Point]:
         if not (
             isinstance(pair, list)
             and len(pair) == 2
-            and all(isinstance(v, int | float) and not isinstance(v, bool) and math.isfinite(v) for v in pair)
+            and all(
+                isinstance(v, int | float) and not isinstance(v, bool) and math.isfinite(v)
+                for v in pair
+            )
             and all(abs(v) < 1e6 for v in pair)
         ):
-            raise BadInput(f"{name!r}: expected two numbers [X, Y], not {json.dumps(pair)}", place=place)
+            raise BadInput(
+                f"{name!r}: expected two numbers [X, Y], not {json.dumps(pair)}", place=place
+            )
         points[name.lower()] = (float(pair[0]), float(pair[1]))
     if len(set(points.values())) < len(points):
         raise BadInput("two places have the same coordinates", place=place)
     return points
 
 
-_PAIR = re.compile(r"(?P<stem>.*?)(?P<first>\d+)(?P<between>[^0-9]+)(?P<second>\d+)(?P<end>[^0-9]*)")
+_PAIR = re.compile(
+    r"(?P<stem>.*?)(?P<first>\d+)(?P<between>[^0-9]+)(?P<second>\d+)(?P<end>[^0-9]*)"
+)
 
 
 def from_names(names: Sequence[str], links: Sequence[tuple[str, str]]) -> dict[str, Point] | None:
@@ -117,7 +134,8 @@ def _is_grid(points: Sequence[Point]) -> bool:
 
 
 def graph_layout(number: int, links: Sequence[tuple[int, int]]) -> Floats:
-    """Points (number, 2) of an undirected graph: stress majorisation (Gansner, Koren, North 2004) of path lengths.
+    """Points (number, 2) of an undirected graph: stress majorisation (Gansner, Koren, North 2004)
+    of path lengths.
 
     Starts from classical scaling.  The longer axis lies along x.  O(number^3).
     """
@@ -147,7 +165,9 @@ def _path_lengths(number: int, links: Sequence[tuple[int, int]]) -> Floats:
 
 
 def _scaled(wanted: Floats) -> Floats:
-    """Classical multidimensional scaling, with a little noise so that no two points start in one place."""
+    """Classical multidimensional scaling, with a little noise so that no two points start in one
+    place.
+    """
     number = len(wanted)
     centre = np.eye(number) - 1 / number
     values, vectors = np.linalg.eigh(-centre @ (wanted**2) @ centre / 2)
@@ -175,7 +195,9 @@ def _majorise(points: Floats, wanted: Floats) -> Floats:
 
 
 def _upright(points: Floats) -> Floats:
-    """Turned so that the longer axis lies along x and the first point is on the left and above the middle."""
+    """Turned so that the longer axis lies along x and the first point is on the left and above the
+    middle.
+    """
     points = points - points.mean(axis=0)
     _, _, axes = np.linalg.svd(points, full_matrices=False)
     points = points @ axes.T
@@ -187,7 +209,9 @@ def _upright(points: Floats) -> Floats:
 
 
 def spread(points: Floats, least: float) -> Floats:
-    """Points moved apart where two are nearer than ``least``, each as little as a few rounds of pushing do."""
+    """Points moved apart where two are nearer than ``least``, each as little as a few rounds of
+    pushing do.
+    """
     points = points.copy()
     for _ in range(_PUSHES):
         apart = points[:, None, :] - points[None, :, :]
@@ -201,22 +225,32 @@ def spread(points: Floats, least: float) -> Floats:
         number = np.arange(len(points))
         apart[same] = 0.0
         apart[..., 0] += np.where(same, np.sign(number[None, :] - number[:, None]), 0)
-        push = apart / np.maximum(np.where(same, 1.0, distance), 1e-9)[..., None] * (missing / 2)[..., None]
+        push = (
+            apart
+            / np.maximum(np.where(same, 1.0, distance), 1e-9)[..., None]
+            * (missing / 2)[..., None]
+        )
         points += 0.8 * push.sum(axis=1)
     points -= points.min(axis=0)
     return points
 
 
 def layer_orders(sizes: Sequence[int], edges: Sequence[tuple[int, int]]) -> list[int]:
-    """The place of each node within its layer, by the barycentre heuristic (Sugiyama, Tagawa, Toda 1981).
+    """The place of each node within its layer, by the barycentre heuristic (Sugiyama, Tagawa, Toda
+    1981).
 
-    Nodes are numbered layer by layer, ``sizes[k]`` in layer k; edges lead from a layer to the next one.
+    Nodes are numbered layer by layer, ``sizes[k]`` in layer k; edges lead from a layer to the next
+    one.
     """
     bounds = np.cumsum([0, *sizes])
     layer_of = np.repeat(np.arange(len(sizes)), sizes)
     ends = np.array(sorted(set(edges)), np.int64).reshape(-1, 2)
     # From 0 to 1 over the layer, so that layers of different sizes compare.
-    place = np.concatenate([(np.arange(s) + 0.5) / max(s, 1) for s in sizes]) if len(sizes) else np.zeros(0)
+    place = (
+        np.concatenate([(np.arange(s) + 0.5) / max(s, 1) for s in sizes])
+        if len(sizes)
+        else np.zeros(0)
+    )
     by_source = [ends[layer_of[ends[:, 0]] == k] for k in range(len(sizes))]
     for sweep in range(_SWEEPS):
         order = range(1, len(sizes)) if sweep % 2 == 0 else range(len(sizes) - 2, -1, -1)

@@ -49,8 +49,9 @@ def make_report(
 ) -> Report:
     """The report of a language: the same arguments give the same bytes.
 
-    Shows the problems' tasks and candidate tasks drawn with ``seed``, at most ``tasks_shown``, fewer if the page would
-    become larger than 5 MB.  Raises what `coordlang.report.shown.select_tasks` raises.
+    Shows the problems' tasks and candidate tasks drawn with ``seed``, at most ``tasks_shown``,
+    fewer if the page would become larger than 5 MB.  Raises what
+    `coordlang.report.shown.select_tasks` raises.
     """
     selection = select_tasks(language, domain, problems, tasks_shown, seed, options, place)
     parts = [task_part(shown, seed) for shown in selection.tasks]
@@ -68,22 +69,39 @@ def make_report(
 
 
 def _render(
-    language: Language, domain: Domain, problems: Sequence[Problem], data: Mapping[str, Any], seed: int
+    language: Language,
+    domain: Domain,
+    problems: Sequence[Problem],
+    data: Mapping[str, Any],
+    seed: int,
 ) -> bytes:
     import jinja2
     from markupsafe import Markup
 
     here = files("coordlang.report")
-    scripts = sorted(entry.name for entry in (here / "script").iterdir() if entry.name.endswith(".js"))
+    scripts = sorted(
+        entry.name for entry in (here / "script").iterdir() if entry.name.endswith(".js")
+    )
     parts = ((here / "script" / name).read_text("utf-8") for name in scripts)
-    js = "\n".join(("'use strict';", "const DATA = JSON.parse(document.getElementById('data').textContent);", *parts))
+    js = "\n".join(
+        (
+            "'use strict';",
+            "const DATA = JSON.parse(document.getElementById('data').textContent);",
+            *parts,
+        )
+    )
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
     template = environment.from_string((here / "template.html").read_text("utf-8"))
     largest = max((word["size"] for word in data["words"]), default=1) or 1
     words = [
-        {**word, "number": number, "share": round(100 * word["size"] / largest, 1), "default": number == data["default"]}
+        {
+            **word,
+            "number": number,
+            "share": round(100 * word["size"] / largest, 1),
+            "default": number == data["default"],
+        }
         for number in data["told"]["order"]
         for word in [data["words"][number]]
     ]
@@ -117,15 +135,27 @@ def _figures(language: Language) -> list[tuple[str, str, str]]:
     g = language.guarantee
     kind = {"all": "all pairs of states", "problems": "of the problems", "file": "of a task file"}
     return [
-        ("Words", _number(g.size), "proved minimal" if g.proved_minimal else f"at least {g.lower_bound} needed"),
-        ("Tasks", _number(int(language.tasks.get("count", 0))), kind.get(str(language.tasks.get("kind")), "")),
+        (
+            "Words",
+            _number(g.size),
+            "proved minimal" if g.proved_minimal else f"at least {g.lower_bound} needed",
+        ),
+        (
+            "Tasks",
+            _number(int(language.tasks.get("count", 0))),
+            kind.get(str(language.tasks.get("kind")), ""),
+        ),
         ("States", _number(len(language.states)), "on optimal plans of these tasks"),
         ("Method", g.method, ""),
     ]
 
 
 def _about(
-    language: Language, domain: Domain, problems: Sequence[Problem], data: Mapping[str, Any], seed: int
+    language: Language,
+    domain: Domain,
+    problems: Sequence[Problem],
+    data: Mapping[str, Any],
+    seed: int,
 ) -> list[tuple[str, str]]:
     model = language.model
     checked = [task["verified"] for task in data["tasks"]]
@@ -135,7 +165,10 @@ def _about(
         ("Optimal means", str(model.get("cost", "makespan"))),
         ("Domain, SHA-256", str(domain.source.sha256)[:16]),
         ("Last actions are part of the state", "yes" if model.get("remember_actions") else "no"),
-        ("Tasks of this page verified anew", f"{sum(v is not None for v in checked)} of {len(checked)}"),
+        (
+            "Tasks of this page verified anew",
+            f"{sum(v is not None for v in checked)} of {len(checked)}",
+        ),
         ("Seed of the drawn tasks", str(seed)),
     ]
 
@@ -161,4 +194,3 @@ def _number(number: int) -> str:
 def _listed(names: Sequence[str]) -> str:
     """``r1``, ``r1 and r2``, ``r1, r2 and r3``."""
     return " and ".join(part for part in (", ".join(names[:-1]), names[-1]) if part)
-

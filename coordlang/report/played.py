@@ -1,4 +1,6 @@
-"""A miscoordination as it is played: what the robots do together, to the break and, where they can, beyond it."""
+"""A miscoordination as it is played: what the robots do together, to the break and, where they can,
+beyond it.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +14,11 @@ from coordlang.use.sentence.spoken import Spoken
 
 @dataclass(frozen=True, slots=True)
 class Played:
-    """``states`` (keys) that the mixture passes through, the start first, as far as its steps are possible.
+    """``states`` (keys) that the mixture passes through, the start first, as far as its steps are
+    possible.
 
-    ``stops``: the number of the first step that is not possible (None: all are), and ``why`` it is not.  ``reaches``: does
-    the last state satisfy the goal?
+    ``stops``: the number of the first step that is not possible (None: all are), and ``why`` it is
+    not.  ``reaches``: does the last state satisfy the goal?
     """
 
     states: tuple[str, ...]

@@ -1,4 +1,6 @@
-"""Which tasks a report shows: those of the given problems, then candidate tasks of the language, drawn if they are many."""
+"""Which tasks a report shows: those of the given problems, then candidate tasks of the language,
+drawn if they are many.
+"""
 
 from __future__ import annotations
 
@@ -28,8 +30,9 @@ _REQUIRING = 0.75
 class ShownTask:
     """A task that is shown.
 
-    ``name`` is that of its problem, None for a candidate task of the language.  ``witness``: plans that miscoordinate, None
-    if there are none.  ``decided`` is False where the memory did not suffice to find out.
+    ``name`` is that of its problem, None for a candidate task of the language.  ``witness``: plans
+    that miscoordinate, None if there are none.  ``decided`` is False where the memory did not
+    suffice to find out.
     """
 
     name: str | None
@@ -40,8 +43,9 @@ class ShownTask:
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """The tasks shown.  ``looked`` tasks were drawn for it, ``requiring`` of which require coordination; ``complete``: all
-    candidate tasks are shown."""
+    """The tasks shown.  ``looked`` tasks were drawn for it, ``requiring`` of which require
+    coordination; ``complete``: all candidate tasks are shown.
+    """
 
     tasks: tuple[ShownTask, ...]
     looked: int
@@ -58,10 +62,11 @@ def select_tasks(
     options: ModelOptions | None = None,
     place: Place | None = None,
 ) -> Selection:
-    """At most ``number`` tasks: the problems' own first, then candidate tasks drawn without repetition.
+    """At most ``number`` tasks: the problems' own first, then candidate tasks drawn without
+    repetition.
 
-    Of those drawn, tasks that require coordination are preferred, up to three quarters.  Raises `UsageError` if the
-    problems alone are more, `ProvedImpossible` for an unsolvable one.
+    Of those drawn, tasks that require coordination are preferred, up to three quarters.  Raises
+    `UsageError` if the problems alone are more, `ProvedImpossible` for an unsolvable one.
     """
     if len(problems) > number:
         raise UsageError(
@@ -76,7 +81,9 @@ def select_tasks(
     wanted = round(room * _REQUIRING)
     looked, complete = 0, True
     for spoken in _candidates(first, domain, problems[0], Random(seed), place):
-        if (len(drawn[1]) >= wanted and len(drawn[0]) + len(drawn[1]) >= room) or looked >= _TRIES * room:
+        if (
+            len(drawn[1]) >= wanted and len(drawn[0]) + len(drawn[1]) >= room
+        ) or looked >= _TRIES * room:
             complete = False
             break
         if _identity(spoken) in known:
@@ -107,10 +114,14 @@ def _identity(spoken: Spoken) -> tuple[str, str]:
 def _candidates(
     first: Spoken, domain: Domain, problem: Problem, random: Random, place: Place | None
 ) -> Iterator[Spoken]:
-    """The language's candidate tasks in random order.  Under ``--tasks all`` endless repetition is cut off."""
+    """The language's candidate tasks in random order.  Under ``--tasks all`` endless repetition is
+    cut off.
+    """
     language = first.language
-    tasks = _pairs(first, random) if language.tasks.get("kind") == "all" else _recorded(
-        first, domain, problem, random, place
+    tasks = (
+        _pairs(first, random)
+        if language.tasks.get("kind") == "all"
+        else _recorded(first, domain, problem, random, place)
     )
     for number, (init, goal) in enumerate(tasks):
         try:
@@ -132,7 +143,9 @@ def _recorded(
 
 
 def _pairs(first: Spoken, random: Random) -> Iterator[tuple[Rows, Goal]]:
-    """Ordered pairs of different mapped states: under ``--tasks all`` every state of a candidate task is mapped."""
+    """Ordered pairs of different mapped states: under ``--tasks all`` every state of a candidate
+    task is mapped.
+    """
     codec = first.model.codec
     rows = first.table.rows
     rows = rows[(rows[:, codec.fact_words :] == 0).all(axis=1)]
@@ -143,4 +156,3 @@ def _pairs(first: Spoken, random: Random) -> Iterator[tuple[Rows, Goal]]:
         a, b = divmod(code, number - 1)
         b += b >= a
         yield rows[a], FullState(tuple(int(w) for w in rows[b][: codec.fact_words]))
-

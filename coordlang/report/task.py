@@ -31,8 +31,8 @@ _VERIFIED = 20_000
 class TaskPart:
     """Everything about one shown task.
 
-    ``violation`` shows plans of one sentence that miscoordinate: the language is none.  ``verified`` is None where that was
-    not checked.
+    ``violation`` shows plans of one sentence that miscoordinate: the language is none.
+    ``verified`` is None where that was not checked.
     """
 
     shown: ShownTask
@@ -71,7 +71,9 @@ def _verified(spoken: Spoken) -> tuple[bool | None, Miscoordination | None]:
 
 
 class Tables:
-    """States and labels that the page mentions, numbered in the order in which they are first mentioned."""
+    """States and labels that the page mentions, numbered in the order in which they are first
+    mentioned.
+    """
 
     def __init__(self, model: JointModel, table: WordTable) -> None:
         self.model = model
@@ -114,11 +116,18 @@ def task_data(part: TaskPart, tables: Tables) -> dict[str, Any]:
         "complete": graph.complete,
         "all_nodes": len(space),
         "all_edges": len(space.target),
-        "nodes": {"state": [tables.state(key) for key in keys], "step": step, "order": list(graph.order)},
+        "nodes": {
+            "state": [tables.state(key) for key in keys],
+            "step": step,
+            "order": list(graph.order),
+        },
         "first": first.tolist(),
         "target": place[space.target[graph.edges]].tolist(),
         "labels": [
-            [tables.label(robot, model.labels[robot][number] if number else None) for number in labels[:, robot].tolist()]
+            [
+                tables.label(robot, model.labels[robot][number] if number else None)
+                for number in labels[:, robot].tolist()
+            ]
             for robot in range(len(model.robots))
         ],
         "sentences": [
@@ -135,12 +144,15 @@ def task_data(part: TaskPart, tables: Tables) -> dict[str, Any]:
     }
 
 
-def _witness_data(witness: Miscoordination | None, played: Played | None, tables: Tables) -> dict[str, Any] | None:
+def _witness_data(
+    witness: Miscoordination | None, played: Played | None, tables: Tables
+) -> dict[str, Any] | None:
     if witness is None or played is None:
         return None
     return {
         "plans": [
-            [[tables.label(robot, text) for robot, text in enumerate(step)] for step in plan] for plan in witness.plans
+            [[tables.label(robot, text) for robot, text in enumerate(step)] for step in plan]
+            for plan in witness.plans
         ],
         "states": [[tables.state(key) for key in states] for states in witness.states],
         "breaks": witness.step,
@@ -159,18 +171,32 @@ def told(part: TaskPart, world: World) -> dict[str, Any]:
     init = model.codec.decode(space.rows[space.state[part.shown.spoken.start]])
     text = goal_text(model, space.goals[space.goal[part.shown.spoken.start]])
     goal = split_atoms(text)
-    start_of = {role[1]: role[2] for role in (world.roles.get(a, ("",)) for a in init) if role[0] == "at"}
-    goals = {role[1]: role[2] for role in (world.roles.get(a, ("",)) for a in goal) if role[0] == "at"}
-    moves = [f"{t} {start_of[t]} → {p}" for t, p in _in_order(goals.items(), world) if t in start_of and start_of[t] != p]
+    start_of = {
+        role[1]: role[2] for role in (world.roles.get(a, ("",)) for a in init) if role[0] == "at"
+    }
+    goals = {
+        role[1]: role[2] for role in (world.roles.get(a, ("",)) for a in goal) if role[0] == "at"
+    }
+    moves = [
+        f"{t} {start_of[t]} → {p}"
+        for t, p in _in_order(goals.items(), world)
+        if t in start_of and start_of[t] != p
+    ]
     arrives = [f"{t} at {p}" for t, p in _in_order(goals.items(), world) if t not in start_of]
-    others = [a.strip("()") if a.count("(") == 1 else a for a in goal
-              if world.roles.get(a, ("",))[0] != "at" and a not in init]  # fmt: skip
+    others = [
+        a.strip("()") if a.count("(") == 1 else a
+        for a in goal
+        if world.roles.get(a, ("",))[0] != "at" and a not in init
+    ]
     stays = [f"{t} back at {p}" for t, p in _in_order(goals.items(), world) if start_of.get(t) == p]
     said = moves + arrives + others
     return {
         "title": ", ".join(said or stays) or "nothing to do",
         "goal_text": text,
-        "goals": [[world.things.index(t), world.places.index(p)] for t, p in _in_order(goals.items(), world)],
+        "goals": [
+            [world.things.index(t), world.places.index(p)]
+            for t, p in _in_order(goals.items(), world)
+        ],
     }
 
 

@@ -1,7 +1,8 @@
 """What of a domain can be drawn: places, the things in them, and what each atom says about them.
 
-Nothing is asked of the user.  *Places* are what some action moves a thing from and to: it makes ``(at r1 a)`` false and
-``(at r1 b)`` true.  Links are what moves join, and what static atoms relate.
+Nothing is asked of the user.  *Places* are what some action moves a thing from and to: it makes
+``(at r1 a)`` false and ``(at r1 b)`` true.  Links are what moves join, and what static atoms
+relate.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from planners.joint.model import JointModel, show
 from planners.pddl.lifted import TRUE, Atom
 from planners.pddl.robots import natural
 
-#: What an atom says: ("at", thing, place), ("with", thing, thing), ("mark", place, text), ("about", thing, text), ("other",).
+#: What an atom says: ("at", thing, place), ("with", thing, thing), ("mark", place, text), ("about",
+#: thing, text), ("other",).
 Role = tuple[str, ...]
 
 
@@ -29,7 +31,9 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """The things (robots first), the places and their links, and the role of every atom (by its text)."""
+    """The things (robots first), the places and their links, and the role of every atom (by its
+    text).
+    """
 
     things: tuple[str, ...]
     places: tuple[str, ...]
@@ -41,18 +45,33 @@ class World:
         text = model.labels[robot][label]
         found: list[set[tuple[str, str]]] = []
         for action in model.actions:
-            mine = action.parts[robot] == text if action.parts else robot in action.owners and action.label == text
+            mine = (
+                action.parts[robot] == text
+                if action.parts
+                else robot in action.owners and action.label == text
+            )
             if not mine:
                 continue
-            brought = {role[1:3] for role in (self.roles.get(show(e.atom), ("",)) for e in action.effects
-                                                if e.adds and e.condition == TRUE) if role[0] == "at"}  # fmt: skip
-            found.append({(t, p) for t, p in brought if not action.parts or t == model.robots[robot]})
+            brought = {
+                role[1:3]
+                for role in (
+                    self.roles.get(show(e.atom), ("",))
+                    for e in action.effects
+                    if e.adds and e.condition == TRUE
+                )
+                if role[0] == "at"
+            }
+            found.append(
+                {(t, p) for t, p in brought if not action.parts or t == model.robots[robot]}
+            )
         return tuple(sorted(set.intersection(*found))) if found else ()
 
 
 @dataclass(frozen=True, slots=True)
 class _Shape:
-    """Atoms of one predicate seen as "thing in place": the argument that is the place, and the thing's (None: no thing)."""
+    """Atoms of one predicate seen as "thing in place": the argument that is the place, and the
+    thing's (None: no thing).
+    """
 
     predicate: str
     arity: int
@@ -66,14 +85,18 @@ class _Shape:
 
 
 def find_world(model: JointModel, states: Sequence[Sequence[str]]) -> World:
-    """The world of a model.  ``states`` are known states as lists of true atoms: no thing may be in two places in one."""
+    """The world of a model.  ``states`` are known states as lists of true atoms: no thing may be in
+    two places in one.
+    """
     atoms = {show(atom): atom for atom in _fluents(model)}
     shapes = [shape for shape in _shapes(atoms.values()) if _moves(shape, model.actions)]
     places = _places(shapes, atoms.values(), model.robots)
     shapes += [
         shape
         for shape in _shapes(atoms.values())
-        if shape not in shapes and _is_about(shape, atoms.values(), places) and _comes_and_goes(shape, model.actions)
+        if shape not in shapes
+        and _is_about(shape, atoms.values(), places)
+        and _comes_and_goes(shape, model.actions)
     ]
     owner = {shape: _owner(shape, model) for shape in shapes if shape.thing is None}
     roles: dict[str, Role] = {}
@@ -90,7 +113,9 @@ def find_world(model: JointModel, states: Sequence[Sequence[str]]) -> World:
     for text, atom in atoms.items():
         if text not in roles:
             roles[text] = _other_role(atom, places, placed | {*model.robots})
-    things = {r[1] for r in roles.values() if r[0] == "at"} | {t for r in roles.values() if r[0] == "with" for t in r[1:]}
+    things = {r[1] for r in roles.values() if r[0] == "at"} | {
+        t for r in roles.values() if r[0] == "with" for t in r[1:]
+    }
     others = sorted(things - {*model.robots}, key=natural)
     named = sorted(places, key=natural)
     return World((*model.robots, *others), tuple(named), tuple(_links(model, shapes, named)), roles)
@@ -131,15 +156,20 @@ def _moves(shape: _Shape, actions: Iterable[GroundAction]) -> bool:
 def _places(shapes: list[_Shape], atoms: Iterable[Atom], robots: Sequence[str]) -> set[str]:
     """What the moving shapes have in their place argument; other shapes are dropped.
 
-    No places are robots (between which parcels are handed over) and things (blocks on blocks).  What moves without a name
-    (``(stops floor)``) moves among the places of others, if there are any.
+    No places are robots (between which parcels are handed over) and things (blocks on blocks).
+    What moves without a name (``(stops floor)``) moves among the places of others, if there are
+    any.
     """
     places: set[str] = set()
     kept = []
     for shape in shapes:
         read = [at for at in (shape.read(atom) for atom in atoms) if at]
         mine, things = {p for _, p in read}, {t for t, _ in read if t}
-        if mine & {*things, *robots} or (shape.thing is None and places and not mine <= places) or things & places:
+        if (
+            mine & {*things, *robots}
+            or (shape.thing is None and places and not mine <= places)
+            or things & places
+        ):
             continue
         kept.append(shape)
         places |= mine
@@ -158,16 +188,26 @@ def _comes_and_goes(shape: _Shape, actions: Iterable[GroundAction]) -> bool:
 
 
 def _owner(shape: _Shape, model: JointModel) -> str | None:
-    """Whose place it is that moves without a name: the one robot's that moves it, else it is a thing of its own."""
-    owners = {action.owners for action in model.actions if any(True for _ in _changes(shape, action))}
+    """Whose place it is that moves without a name: the one robot's that moves it, else it is a
+    thing of its own.
+    """
+    owners = {
+        action.owners for action in model.actions if any(True for _ in _changes(shape, action))
+    }
     if model.is_joint_action or len(owners) != 1:
         return shape.predicate.removesuffix("-at").removeprefix("at-")
     (only,) = owners
-    return model.robots[only[0]] if len(only) == 1 else shape.predicate.removesuffix("-at").removeprefix("at-")
+    return (
+        model.robots[only[0]]
+        if len(only) == 1
+        else shape.predicate.removesuffix("-at").removeprefix("at-")
+    )
 
 
 def _drop_ambiguous(roles: dict[str, Role], states: Sequence[Sequence[str]]) -> None:
-    """A thing in two places at once is not *in* a place: atoms of such a predicate say something else."""
+    """A thing in two places at once is not *in* a place: atoms of such a predicate say something
+    else.
+    """
     bad: set[tuple[str, str]] = set()
     for state in states:
         seen: dict[str, str] = {}
@@ -192,7 +232,9 @@ def _other_role(atom: Atom, places: set[str], things: set[str]) -> Role:
             return "mark", one, atom.predicate
         case (one,):
             return "about", one, atom.predicate
-        case (one, two) if one not in places and two not in places and (one in things or two in things):
+        case (one, two) if (
+            one not in places and two not in places and (one in things or two in things)
+        ):
             return "with", one, two
         case (one, two) if one in things and two in places:
             return "about", one, f"{atom.predicate} {two}"
@@ -216,5 +258,3 @@ def _links(model: JointModel, shapes: Iterable[_Shape], places: Sequence[str]) -
     }
     for a, b in sorted(moved | related):
         yield Link((a, b), (a, b) in moved)
-
-

@@ -1,1 +1,3 @@
-"""Where coordination is required: composition walks, first and last differences, miscoordination shown."""
+"""Where coordination is required: composition walks, first and last differences, miscoordination
+shown.
+"""

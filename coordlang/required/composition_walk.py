@@ -1,9 +1,10 @@
 """Required coordination (RC) by composition walk: polynomial, never by listing plans.
 
-Plans ``pi_1 .. pi_n``, one for each robot, introduce RC iff their *mixture* - robot i does its part of ``pi_i``, step by
-step - is not an optimal plan (the paper, section 3; for two robots, iff one of the two recombinations is not).  The walk
-goes through n plans in step and carries the state that the mixture has reached: nodes ``(x_1 .. x_n, y)``.  An edge of it
-*fails* when the mixed joint action is not an edge of the plan space in ``y``.  All starts and goals walk at once, layer by
+Plans ``pi_1 .. pi_n``, one for each robot, introduce RC iff their *mixture* - robot i does its part
+of ``pi_i``, step by step - is not an optimal plan (the paper, section 3; for two robots, iff one of
+the two recombinations is not).  The walk goes through n plans in step and carries the state that
+the mixture has reached: nodes ``(x_1 .. x_n, y)``.  An edge of it *fails* when the mixed joint
+action is not an edge of the plan space in ``y``.  All starts and goals walk at once, layer by
 layer, in numpy.
 """
 
@@ -38,8 +39,8 @@ FAILED = -1
 class Moves:
     """Edges of a walk out of a table of nodes.
 
-    ``source`` (k) numbers in the table, ``edges`` (k, robots) the plan-space edge that each plan takes, ``mixed`` (k) the
-    plan-space node that the mixture reaches, `FAILED` where it breaks.
+    ``source`` (k) numbers in the table, ``edges`` (k, robots) the plan-space edge that each plan
+    takes, ``mixed`` (k) the plan-space node that the mixture reaches, `FAILED` where it breaks.
     """
 
     source: Ints
@@ -51,8 +52,9 @@ class Moves:
 class Divergences:
     """First differences of sets of plans that introduce RC.
 
-    ``last`` (k): the last shared state; ``following`` (k, robots): the different next states, sorted, filled up with -1.
-    States are numbers in the plan space's table.  With two robots a row is ``alpha* = {last, s1, s2}``.
+    ``last`` (k): the last shared state; ``following`` (k, robots): the different next states,
+    sorted, filled up with -1. States are numbers in the plan space's table.  With two robots a row
+    is ``alpha* = {last, s1, s2}``.
     """
 
     last: Ints
@@ -66,8 +68,8 @@ class Divergences:
 class Walk:
     """What a composition walk found.
 
-    ``requires`` (plan-space nodes): do some plans from this node introduce RC?  ``divergences``: where such plans part
-    first.  ``nodes`` and ``edges`` count the walk's work.
+    ``requires`` (plan-space nodes): do some plans from this node introduce RC?  ``divergences``:
+    where such plans part first.  ``nodes`` and ``edges`` count the walk's work.
     """
 
     requires: Bools
@@ -78,12 +80,15 @@ class Walk:
 
 @dataclass(frozen=True, slots=True)
 class _Layer:
-    """One layer of the walk: its nodes, which of them fail at once, and the pairs (node, node of the next layer)."""
+    """One layer of the walk: its nodes, which of them fail at once, and the pairs (node, node of
+    the next layer).
+    """
 
     nodes: Ints
     fails: Bools
     links: Ints
-    # Moves out of diagonal nodes (p, .., p; p) to different next nodes: (p, next nodes .., child or FAILED).
+    # Moves out of diagonal nodes (p, .., p; p) to different next nodes: (p, next nodes .., child or
+    # FAILED).
     parting: Ints
 
     def point_to(self, place: Ints) -> None:
@@ -96,12 +101,12 @@ class _Layer:
 def walk(space: PlanSpace) -> Walk:
     """Walk from every node ``p`` of the plan space with all plans and the mixture in ``p``.
 
-    Where no plans are inseparable (`inseparable`), the divergences at ``p`` depend on ``p`` only, whatever was done
-    before: the proof is in docs/concepts.md.
+    Where no plans are inseparable (`inseparable`), the divergences at ``p`` depend on ``p`` only,
+    whatever was done before: the proof is in docs/concepts.md.
 
-    Complexity: per goal at most (nodes of a layer)^(robots + 1) walk nodes, in grid-like domains about ^2; each has
-    (optimal joint actions)^robots edges.  Raises `OutOfMemory` or `OutOfTime` with an estimate as soon as a part of a layer
-    shows that the rest of it will not fit.
+    Complexity: per goal at most (nodes of a layer)^(robots + 1) walk nodes, in grid-like domains
+    about ^2; each has (optimal joint actions)^robots edges.  Raises `OutOfMemory` or `OutOfTime`
+    with an estimate as soon as a part of a layer shows that the rest of it will not fit.
     """
     index = EdgeIndex.of(space)
     layers: list[_Layer] = []
@@ -117,7 +122,9 @@ def walk(space: PlanSpace) -> Walk:
         return _backward(space, layers)
 
 
-def moves(space: PlanSpace, index: EdgeIndex, nodes: Ints, *, together: bool = False) -> Iterator[Moves]:
+def moves(
+    space: PlanSpace, index: EdgeIndex, nodes: Ints, *, together: bool = False
+) -> Iterator[Moves]:
     """All moves of n plans and their mixture out of walk nodes ``(x_1 .. x_n, y)``, in chunks.
 
     With ``together`` only those in which all plans reach the same node.
@@ -143,12 +150,18 @@ def moves(space: PlanSpace, index: EdgeIndex, nodes: Ints, *, together: bool = F
                 edges = [old[same] for old in edges]
             edges.append(edge)
             prefix = index.follow(robot, prefix, space.labels[edge, robot])
-        mixed = np.where(prefix >= 0, space.target[np.maximum(prefix, 0)], FAILED) if len(prefix) else prefix
+        mixed = (
+            np.where(prefix >= 0, space.target[np.maximum(prefix, 0)], FAILED)
+            if len(prefix)
+            else prefix
+        )
         yield Moves(source, np.stack(edges, axis=1), mixed)
 
 
 def edges_out_of(space: PlanSpace, nodes: Ints) -> NDArray[np.float64]:
-    """How many edges of the walk leave each of its nodes: one for every choice of the plans' next steps."""
+    """How many edges of the walk leave each of its nodes: one for every choice of the plans' next
+    steps.
+    """
     degree = np.diff(space.first)
     product: NDArray[np.float64] = np.prod(degree[nodes[:, :-1]].astype(np.float64), axis=1)
     return product
@@ -172,7 +185,9 @@ def _check_size(sizes: NDArray[np.float64], robots: int) -> None:
 
 
 def _forward(space: PlanSpace, index: EdgeIndex, layers: list[_Layer]) -> None:
-    """Walk down from the highest layer into ``layers``; every plan-space node starts at its own layer."""
+    """Walk down from the highest layer into ``layers``; every plan-space node starts at its own
+    layer.
+    """
     columns = space.labels.shape[1] + 1
     spans = space.layers
     arriving = np.zeros((0, columns), np.int64)
@@ -194,7 +209,9 @@ def _forward(space: PlanSpace, index: EdgeIndex, layers: list[_Layer]) -> None:
         layers.append(layer)
 
 
-def _expand(space: PlanSpace, index: EdgeIndex, table: Ints, below: slice, held: int) -> tuple[_Layer, Ints]:
+def _expand(
+    space: PlanSpace, index: EdgeIndex, table: Ints, below: slice, held: int
+) -> tuple[_Layer, Ints]:
     """One layer's moves.  A node that fails at once needs no children, unless it is diagonal."""
     columns = table.shape[1]
     bounds = [below.stop - below.start] * columns
@@ -211,7 +228,9 @@ def _expand(space: PlanSpace, index: EdgeIndex, table: Ints, below: slice, held:
         fails[move.source[broken]] = True
         follow = ~broken & (~fails[move.source] | diagonal[move.source])
         target = space.target[move.edges]
-        fresh, number = unique_tuples(np.column_stack((target[follow], move.mixed[follow])) - below.start, bounds)
+        fresh, number = unique_tuples(
+            np.column_stack((target[follow], move.mixed[follow])) - below.start, bounds
+        )
         child = np.full(len(move.source), FAILED, np.int64)
         child[follow] = number + count
         links.append(np.unique(np.column_stack((move.source[follow], child[follow])), axis=0))
@@ -221,7 +240,13 @@ def _expand(space: PlanSpace, index: EdgeIndex, table: Ints, below: slice, held:
         parting.append(np.column_stack((table[move.source[parts], 0], target[parts], child[parts])))
         if len(move.source):
             done = int(move.source[-1])
-            _check_rest(held, (*links, *children, *parting), ends[done] / ends[-1], ends, perf_counter() - begin)
+            _check_rest(
+                held,
+                (*links, *children, *parting),
+                ends[done] / ends[-1],
+                ends,
+                perf_counter() - begin,
+            )
     nodes, number = unique_tuples(np.concatenate(children), bounds)
     layer = _Layer(table, fails, np.concatenate(links), np.concatenate(parting))
     layer.point_to(number)
@@ -262,7 +287,9 @@ def _backward(space: PlanSpace, layers: Sequence[_Layer]) -> Walk:
 
 
 def unique_divergences(found: Divergences) -> Divergences:
-    """Each divergence once, sorted, and none that another one implies (same last state, fewer next states)."""
+    """Each divergence once, sorted, and none that another one implies (same last state, fewer next
+    states).
+    """
     bound = int(max(found.last.max(initial=0), found.following.max(initial=0))) + 2
     table = np.column_stack((found.last, found.following)) + 1
     table, _ = unique_tuples(table, [bound] * table.shape[1])
@@ -278,7 +305,9 @@ def _implied(table: Ints) -> Bools:
     known: dict[int, set[frozenset[int]]] = {}
     for last, states in sets:
         known.setdefault(last, set()).add(states)
-    return np.array([any(other < states for other in known[last]) for last, states in sets], np.bool_)
+    return np.array(
+        [any(other < states for other in known[last]) for last, states in sets], np.bool_
+    )
 
 
 def _sorted_different(states: Ints) -> Ints:
@@ -294,9 +323,11 @@ def _sorted_different(states: Ints) -> Ints:
 def _check_rest(
     held: int, parts: Sequence[Ints], progress: float, ends: NDArray[np.float64], seconds: float
 ) -> None:
-    """Stop when the part of a layer that is done shows that the rest of it does not fit: memory and time are linear in it.
+    """Stop when the part of a layer that is done shows that the rest of it does not fit: memory and
+    time are linear in it.
 
-    ``ends``: walk edges out of the layer's first nodes, summed up; ``seconds`` were spent on the part that is done.
+    ``ends``: walk edges out of the layer's first nodes, summed up; ``seconds`` were spent on the
+    part that is done.
     """
     used = sum(part.nbytes for part in parts)
     size = f"{len(ends):,} nodes and {ends[-1]:,.0f} edges ({100 * progress:.2g} % of it done)"

@@ -1,4 +1,6 @@
-"""Where plans that introduce RC part: ``alpha*`` over all candidate tasks, and what must be told apart."""
+"""Where plans that introduce RC part: ``alpha*`` over all candidate tasks, and what must be told
+apart.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,8 @@ from planners.search.plan_space import PlanSpace
 class Alphas:
     """The first differences of all candidate tasks (the paper's ``alpha*``, each once).
 
-    ``requiring`` counts the tasks that require coordination; ``nodes`` and ``edges`` are the composition walks' work.
+    ``requiring`` counts the tasks that require coordination; ``nodes`` and ``edges`` are the
+    composition walks' work.
     """
 
     divergences: Divergences
@@ -61,19 +64,24 @@ class Separation:
 def separations(divergences: Divergences) -> list[tuple[Separation, ...]]:
     """For each divergence its alternatives (Theorem 3, alpha part).
 
-    With two robots there is one: all three pairs of ``alpha*``.  With n robots any two of the different next states will
-    do, together with the last shared state.
+    With two robots there is one: all three pairs of ``alpha*``.  With n robots any two of the
+    different next states will do, together with the last shared state.
     """
     rows = zip(divergences.last.tolist(), divergences.following.tolist(), strict=True)
     return [alternatives(last, [s for s in row if s >= 0]) for last, row in rows]
 
 
 def alternatives(shared: int, others: Iterable[int]) -> tuple[Separation, ...]:
-    """The ways to separate plans at a difference: any two of the different states ``others``, with the shared state
-    (-1: there is none, the plans end in different states)."""
+    """The ways to separate plans at a difference: any two of the different states ``others``, with
+    the shared state (-1: there is none, the plans end in different states).
+    """
     states = sorted(set(others))
     return tuple(
-        Separation(frozenset({pair(a, b)} if shared < 0 else {pair(shared, a), pair(shared, b), pair(a, b)}))
+        Separation(
+            frozenset(
+                {pair(a, b)} if shared < 0 else {pair(shared, a), pair(shared, b), pair(a, b)}
+            )
+        )
         for n, b in enumerate(states)
         for a in states[:n]
     )

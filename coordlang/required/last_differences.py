@@ -1,13 +1,15 @@
-"""Theorem 3 in full: plans that introduce RC must be separated where they first part or where they last meet.
+"""Theorem 3 in full: plans that introduce RC must be separated where they first part or where they
+last meet.
 
-Each tuple of plans that introduce RC has a *first difference* ``alpha = (p; s_1 .. s_n)``, the last shared state and the
-next ones, and a *last difference* ``beta = (t_1 .. t_n; q)``, or ends in different goal states.  A partition is a
-coordination language if for every such tuple some two different ``s_i, s_j`` and ``p`` lie in three different words, or
-some two different ``t_i, t_j`` and ``q`` do, or two of the different goal states lie in different words
-(docs/concepts.md).
+Each tuple of plans that introduce RC has a *first difference* ``alpha = (p; s_1 .. s_n)``, the last
+shared state and the next ones, and a *last difference* ``beta = (t_1 .. t_n; q)``, or ends in
+different goal states.  A partition is a coordination language if for every such tuple some two
+different ``s_i, s_j`` and ``p`` lie in three different words, or some two different ``t_i, t_j``
+and ``q`` do, or two of the different goal states lie in different words (docs/concepts.md).
 
-The relation of all alphas with all betas is written down only where it is small (`SeparationWalk.every`).  Else the
-composition walk is kept, and asked for pairs that a partition leaves unseparated.
+The relation of all alphas with all betas is written down only where it is small
+(`SeparationWalk.every`).  Else the composition walk is kept, and asked for pairs that a partition
+leaves unseparated.
 """
 
 from __future__ import annotations
@@ -36,11 +38,12 @@ _LINKS = 1_000_000
 
 @dataclass(slots=True)
 class _Layer:
-    """Walk nodes ``(x_1 .. x_n, y)`` with as many joint steps to go, and what links them to the layer below.
+    """Walk nodes ``(x_1 .. x_n, y)`` with as many joint steps to go, and what links them to the
+    layer below.
 
-    ``x`` (k, robots) are plan-space nodes, ``meets``, ``parts`` (links) say whether a link leads from different nodes to one,
-    or from one node shared by all plans and their mixture to different ones.  ``tail`` (k): can the plans stay together
-    from here and still fail?
+    ``x`` (k, robots) are plan-space nodes, ``meets``, ``parts`` (links) say whether a link leads
+    from different nodes to one, or from one node shared by all plans and their mixture to different
+    ones.  ``tail`` (k): can the plans stay together from here and still fail?
     """
 
     x: Ints
@@ -54,8 +57,8 @@ class _Layer:
 class SeparationWalk:
     """The composition walk of one plan space, kept whole, from every node of the plan space.
 
-    Memory is that of the walk's links, of which only those are kept that lead to a failure.  Raises `OutOfMemory`
-    before the memory budget is used up.
+    Memory is that of the walk's links, of which only those are kept that lead to a failure.  Raises
+    `OutOfMemory` before the memory budget is used up.
     """
 
     def __init__(self, space: PlanSpace) -> None:
@@ -72,14 +75,19 @@ class SeparationWalk:
         return sum(len(layer.source) for layer in self._layers)
 
     def unseparated(self, word: Ints, random: np.random.Generator) -> Iterator[Constraint]:
-        """Constraints that ``word`` (a word number for each state of the table) breaks: for every unseparated first
-        difference of plans that introduce RC, one of their unseparated last differences, drawn at random.
+        """Constraints that ``word`` (a word number for each state of the table) breaks: for every
+        unseparated first difference of plans that introduce RC, one of their unseparated last
+        differences, drawn at random.
 
         None at all: the partition satisfies Theorem 3 for these tasks.  O(links).
         """
         state = self._space.state
-        ending = np.zeros(0, np.int64)  # per node: a link (of any layer, numbered through) or goal node that ends badly
-        endings: list[Ints] = []  # rows (q, t_1 .. t_n), or (-1, t_1 .. t_n) for different goal states
+        ending = np.zeros(
+            0, np.int64
+        )  # per node: a link (of any layer, numbered through) or goal node that ends badly
+        endings: list[
+            Ints
+        ] = []  # rows (q, t_1 .. t_n), or (-1, t_1 .. t_n) for different goal states
         offset = 0
         for number, layer in enumerate(self._layers):
             x = state[layer.x]
@@ -95,7 +103,9 @@ class SeparationWalk:
             if layer.parts.any():
                 rows = np.flatnonzero(layer.parts & (ending[layer.child] >= 0))
                 rows = rows[~_separated(word, first[rows, 0], after[rows])]
-                yield from self._constraints(first[rows, 0], after[rows], endings, ending[layer.child[rows]])
+                yield from self._constraints(
+                    first[rows, 0], after[rows], endings, ending[layer.child[rows]]
+                )
             last = np.flatnonzero(layer.meets & below.tail[layer.child])
             last = last[~_separated(word, after[last, 0], first[last])]
             endings.append(np.column_stack((after[last, 0], first[last])))
@@ -108,7 +118,8 @@ class SeparationWalk:
             ending[source[order]] = value[order]
 
     def every(self, most: int) -> set[Constraint] | None:
-        """All constraints of these tasks: each first difference with each last difference that can follow.
+        """All constraints of these tasks: each first difference with each last difference that can
+        follow.
 
         None if there may be more than ``most``.  O(links x last differences / word size).
         """
@@ -125,7 +136,8 @@ class SeparationWalk:
         return found
 
     def _differences(self) -> tuple[dict[tuple[int, ...], int], list[tuple[int, ...]]]:
-        """First differences with the last ones that can follow, as a set of bits: their numbers in the second list.
+        """First differences with the last ones that can follow, as a set of bits: their numbers in
+        the second list.
 
         A difference is the shared state (-1: none) and then the different ones, sorted.
         """
@@ -134,13 +146,20 @@ class SeparationWalk:
         firsts: dict[tuple[int, ...], int] = {}
         x = state[self._layers[0].x]
         following = [
-            1 << number.setdefault((-1, *sorted(row)), len(number)) if len(set(row)) > 1 else 0 for row in x.tolist()
+            1 << number.setdefault((-1, *sorted(row)), len(number)) if len(set(row)) > 1 else 0
+            for row in x.tolist()
         ]
         for below, layer in pairwise(self._layers):
             here, after = state[layer.x[layer.source]], state[below.x[layer.child]]
             meets = layer.meets & below.tail[layer.child]
             ends = [0] * len(layer.x)
-            links = zip(layer.source.tolist(), layer.child.tolist(), layer.parts.tolist(), meets.tolist(), strict=True)
+            links = zip(
+                layer.source.tolist(),
+                layer.child.tolist(),
+                layer.parts.tolist(),
+                meets.tolist(),
+                strict=True,
+            )
             for link, (source, child, parts, meet) in enumerate(links):
                 more = following[child]
                 if parts and more:
@@ -175,7 +194,9 @@ def ordered(alternatives: Iterable[Separation]) -> Constraint:
 
 
 def _separated(word: Ints, shared: Ints, others: Ints) -> Bools:
-    """For each difference whether some two of ``others`` (k, robots) and ``shared`` (k) lie in three words."""
+    """For each difference whether some two of ``others`` (k, robots) and ``shared`` (k) lie in
+    three words.
+    """
     good = np.zeros(len(shared), np.bool_)
     common = word[shared]
     for i, j in combinations(range(others.shape[1]), 2):
@@ -194,8 +215,12 @@ def _walk(space: PlanSpace) -> list[_Layer]:
     arriving = np.zeros((0, robots + 1), np.int64)
     spans = space.layers
     for number in range(len(spans) - 1, -1, -1):
-        starting = np.repeat(np.arange(spans[number].start, spans[number].stop)[:, None], robots + 1, axis=1)
-        table, place = unique_tuples(np.concatenate((starting, arriving)), [failed + 1] * (robots + 1))
+        starting = np.repeat(
+            np.arange(spans[number].start, spans[number].stop)[:, None], robots + 1, axis=1
+        )
+        table, place = unique_tuples(
+            np.concatenate((starting, arriving)), [failed + 1] * (robots + 1)
+        )
         if links:
             links[-1] = (links[-1][0], place[len(starting) :][links[-1][1]])
         tables.append(table)
@@ -211,7 +236,9 @@ def _walk(space: PlanSpace) -> list[_Layer]:
 
 
 def _links(space: PlanSpace, index: EdgeIndex, table: Ints) -> tuple[Ints, Ints, Ints]:
-    """Links out of a table of nodes: (source, different children, number of each link's child among them)."""
+    """Links out of a table of nodes: (source, different children, number of each link's child among
+    them).
+    """
     robots = table.shape[1] - 1
     failed = len(space)
     bounds = [failed + 1] * (robots + 1)
@@ -233,7 +260,9 @@ def _links(space: PlanSpace, index: EdgeIndex, table: Ints) -> tuple[Ints, Ints,
     return np.concatenate(sources), merged, place[np.concatenate(numbers)]
 
 
-def _pruned(space: PlanSpace, tables: Sequence[Ints], links: Sequence[tuple[Ints, Ints]]) -> list[_Layer]:
+def _pruned(
+    space: PlanSpace, tables: Sequence[Ints], links: Sequence[tuple[Ints, Ints]]
+) -> list[_Layer]:
     """Only what can end in a failed mixture."""
     robots = tables[0].shape[1] - 1
     failed = len(space)

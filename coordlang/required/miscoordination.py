@@ -23,9 +23,10 @@ Step = tuple[str | None, ...]
 class Miscoordination:
     """Plans of one task that introduce RC: ``plans[i]`` is what robot i follows.
 
-    ``states[i]`` are the states that plan i passes through (keys); ``mixture`` the joint steps of the mixture up to and
-    with the one that breaks, ``mixed_states`` the states before each of them; ``step`` the number of the breaking step
-    (from 0) and ``reason`` why it breaks.  ``sentence`` is the plans' common sentence where a language was checked.
+    ``states[i]`` are the states that plan i passes through (keys); ``mixture`` the joint steps of
+    the mixture up to and with the one that breaks, ``mixed_states`` the states before each of them;
+    ``step`` the number of the breaking step (from 0) and ``reason`` why it breaks.  ``sentence`` is
+    the plans' common sentence where a language was checked.
     """
 
     task: str
@@ -40,13 +41,17 @@ class Miscoordination:
 
 
 def miscoordination(space: PlanSpace, task: int) -> Miscoordination | None:
-    """The plans of a task whose mixture breaks earliest, or None if the task requires no coordination."""
+    """The plans of a task whose mixture breaks earliest, or None if the task requires no
+    coordination.
+    """
     trail = _trail(space, np.array([space.starts[task]]), together=False)
     return describe_failure(space, trail) if trail is not None else None
 
 
 class Inseparable(ProvedImpossible):
-    """Two plans introduce RC but pass through the same states: no state-based language can tell them apart."""
+    """Two plans introduce RC but pass through the same states: no state-based language can tell
+    them apart.
+    """
 
     def __init__(self, witness: Miscoordination) -> None:
         super().__init__(
@@ -84,7 +89,9 @@ class Trail:
 
 
 def _trail(space: PlanSpace, starts: Ints, *, together: bool) -> Trail | None:
-    """Breadth first through the layers, until a mixture breaks; of several breaks the first in order."""
+    """Breadth first through the layers, until a mixture breaks; of several breaks the first in
+    order.
+    """
     walked = [0, 0]
 
     def so_far() -> str:
@@ -94,12 +101,16 @@ def _trail(space: PlanSpace, starts: Ints, *, together: bool) -> Trail | None:
         return _walk_to_a_break(space, starts, walked, together=together)
 
 
-def _walk_to_a_break(space: PlanSpace, starts: Ints, walked: list[int], *, together: bool) -> Trail | None:
+def _walk_to_a_break(
+    space: PlanSpace, starts: Ints, walked: list[int], *, together: bool
+) -> Trail | None:
     """See `_trail`; ``walked`` counts layers and nodes."""
     robots = space.labels.shape[1]
     index = EdgeIndex.of(space)
     table = np.zeros((0, robots + 1), np.int64)
-    history: list[tuple[Ints, Ints, Ints]] = []  # per layer: nodes, parents, the edges that led there
+    history: list[
+        tuple[Ints, Ints, Ints]
+    ] = []  # per layer: nodes, parents, the edges that led there
     parents, came = np.zeros(0, np.int64), np.zeros((0, robots), np.int64)
     for number in range(len(space.layers) - 1, 0, -1):
         fresh = starts[space.layer[starts] == number]
@@ -135,8 +146,12 @@ def _retrace(history: list[tuple[Ints, Ints, Ints]], row: int, last: tuple[int, 
     raise AssertionError("a walk starts somewhere")
 
 
-def describe_failure(space: PlanSpace, trail: Trail, sentence: tuple[str, ...] | None = None) -> Miscoordination:
-    """A trail in words: the plans completed to the goal, the mixture up to its breaking step, and why it breaks."""
+def describe_failure(
+    space: PlanSpace, trail: Trail, sentence: tuple[str, ...] | None = None
+) -> Miscoordination:
+    """A trail in words: the plans completed to the goal, the mixture up to its breaking step, and
+    why it breaks.
+    """
     model = space.model
     robots = len(model.robots)
     paths = [_complete(space, [step[i] for step in trail.edges]) for i in range(robots)]
@@ -188,7 +203,9 @@ def _key(space: PlanSpace, node: int) -> str:
 
 
 def _reason(space: PlanSpace, node: int, labels: tuple[int, ...]) -> str:
-    """Why the mixed joint action is no optimal step in a state: not applicable, or it wastes something."""
+    """Why the mixed joint action is no optimal step in a state: not applicable, or it wastes
+    something.
+    """
     model = space.model
     row = space.rows[space.state[node]]
     steps = model.successors(row[None, :])

@@ -15,7 +15,15 @@ from planners.joint.states import Rows, find_rows, unique_rows
 from planners.loading import Loaded, ModelOptions, PlanningTask, build
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.robots import fluent_predicates
-from planners.search.plan_space import PlanSpace, TaskGroup, joined, plan_spaces, search, search_each, solvable
+from planners.search.plan_space import (
+    PlanSpace,
+    TaskGroup,
+    joined,
+    plan_spaces,
+    search,
+    search_each,
+    solvable,
+)
 from planners.search.reachable import explore
 
 Kind = Literal["problems", "all", "file"]
@@ -25,10 +33,11 @@ Kind = Literal["problems", "all", "file"]
 class Candidates:
     """The candidate tasks ``T`` over one joint model.
 
-    ``kind`` "problems": the problems' own tasks; "all": every ordered pair of different reachable states;
-    "file": ``listed``.  ``spaces`` are their optimal plans, in batches over one common table of states; ``count`` is
-    the number of tasks.  ``states`` is the number of reachable states where the whole space was explored, else None.
-    ``skipped`` names tasks that were left out because they have no plan.
+    ``kind`` "problems": the problems' own tasks; "all": every ordered pair of different reachable
+    states; "file": ``listed``.  ``spaces`` are their optimal plans, in batches over one common
+    table of states; ``count`` is the number of tasks.  ``states`` is the number of reachable states
+    where the whole space was explored, else None. ``skipped`` names tasks that were left out
+    because they have no plan.
     """
 
     kind: Kind
@@ -61,7 +70,8 @@ def from_problems(
 ) -> Candidates:
     """The tasks of the given problems.
 
-    Raises `ProvedImpossible` for an unsolvable one, naming it; with ``skip_unsolvable`` only if there is no other.
+    Raises `ProvedImpossible` for an unsolvable one, naming it; with ``skip_unsolvable`` only if
+    there is no other.
     """
     loaded = build(domain, problems, options)
     listed: list[ListedTask] = []
@@ -79,7 +89,9 @@ def from_problems(
     return Candidates("problems", loaded, tuple(listed), (joined(spaces),), None, tuple(skipped))
 
 
-def all_pairs(domain: Domain, problems: Sequence[Problem], options: ModelOptions | None = None) -> Candidates:
+def all_pairs(
+    domain: Domain, problems: Sequence[Problem], options: ModelOptions | None = None
+) -> Candidates:
     """Every ordered pair of different states reachable in the problem, the second from the first.
 
     Goals are full states.
@@ -89,19 +101,25 @@ def all_pairs(domain: Domain, problems: Sequence[Problem], options: ModelOptions
     if loaded.model.remembers:
         return _all_pairs_remembering(loaded, inits)
     space = explore(loaded.model, inits)
-    spaces = tuple(plan_spaces(space, [TaskGroup(goal) for goal in _full_states(loaded.model, space.rows)]))
+    spaces = tuple(
+        plan_spaces(space, [TaskGroup(goal) for goal in _full_states(loaded.model, space.rows)])
+    )
     return Candidates("all", loaded, (), spaces, len(space))
 
 
 def _all_pairs_remembering(loaded: Loaded, inits: Rows) -> Candidates:
-    """The same pairs of states as without ``--remember-actions``; every task starts with no action to remember."""
+    """The same pairs of states as without ``--remember-actions``; every task starts with no action
+    to remember.
+    """
     model = loaded.model
     forgetting = replace(model, codec=replace(model.codec, memory=None))
     base = explore(forgetting, inits[:, : model.codec.fact_words])
     zeros = np.zeros((len(base), len(model.robots)), np.uint64)
     starts = np.hstack((base.rows, zeros))
     groups = []
-    for space in plan_spaces(base, [TaskGroup(goal) for goal in _full_states(forgetting, base.rows)]):
+    for space in plan_spaces(
+        base, [TaskGroup(goal) for goal in _full_states(forgetting, base.rows)]
+    ):
         goal_of_task, state = space.goal[space.starts], space.state[space.starts]
         for number, goal in enumerate(space.goals):
             mine = state[goal_of_task == number]
@@ -131,8 +149,8 @@ def from_listed(
     ProvedImpossible
         A task without a plan; with ``skip_unsolvable`` only if no other task is left.
     BadInput
-        An empty list, an atom that the problem does not have, or an initial state that the problem's initial
-        state does not reach (such a state is taken for a mistake).
+        An empty list, an atom that the problem does not have, or an initial state that the
+        problem's initial state does not reach (such a state is taken for a mistake).
     """
     if not listed:
         raise BadInput("the list of tasks is empty", place=place, remedy="Give at least one task.")
@@ -160,14 +178,19 @@ def from_listed(
     grouped = [TaskGroup(goal, np.stack(rows)) for goal, rows in groups.items()]
 
     def solved(kept: Sequence[TaskGroup]) -> list[bool]:
-        served = {(g.goal, tuple(row.tolist())) for g in kept if g.inits is not None for row in g.inits}
+        served = {
+            (g.goal, tuple(row.tolist())) for g in kept if g.inits is not None for row in g.inits
+        }
         return [(goal, tuple(model.state(init).tolist())) in served for init, goal in ground]
 
     skipped: list[str] = []
     if skip_unsolvable and (kept := solvable(space, grouped)):
         good = solved(kept)
-        skipped = [f"task {n} ({_init_text(t)} -> {_goal_text(t)})"
-                   for n, (t, ok) in enumerate(zip(listed, good, strict=True), 1) if not ok]  # fmt: skip
+        skipped = [
+            f"task {n} ({_init_text(t)} -> {_goal_text(t)})"
+            for n, (t, ok) in enumerate(zip(listed, good, strict=True), 1)
+            if not ok
+        ]
         listed = [task for task, ok in zip(listed, good, strict=True) if ok]
         grouped = kept
     try:
@@ -197,10 +220,15 @@ def from_recorded(
     options: ModelOptions | None = None,
     place: Place | None = None,
 ) -> Candidates:
-    """Problems' tasks as a language file records them: searched one by one, without the rest of the space."""
+    """Problems' tasks as a language file records them: searched one by one, without the rest of the
+    space.
+    """
     ground = ground_tasks(domain, problems[0], listed, place)
     loaded = build(domain, problems, options, inits=[init for init, _ in ground])
-    tasks = [PlanningTask(f"{n}", loaded.model.state(init), goal) for n, (init, goal) in enumerate(ground, 1)]
+    tasks = [
+        PlanningTask(f"{n}", loaded.model.state(init), goal)
+        for n, (init, goal) in enumerate(ground, 1)
+    ]
     return Candidates("problems", loaded, tuple(listed), (search_each(loaded.model, tasks),), None)
 
 
@@ -222,4 +250,6 @@ def _as_listed(domain: Domain, problem: Problem, task: PlanningTask) -> ListedTa
 def require_solvable(candidates: Candidates) -> None:
     """Raise `ProvedImpossible` when there is no task at all to build a language for."""
     if candidates.count == 0:
-        raise ProvedImpossible("there is no candidate task: no reachable state leads to another one")
+        raise ProvedImpossible(
+            "there is no candidate task: no reachable state leads to another one"
+        )

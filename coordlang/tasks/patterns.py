@@ -1,9 +1,10 @@
 """Varied candidate tasks of one problem: other starts and other goals, said by patterns.
 
-A *pattern* is an atom in which ``?`` stands for any one name, as ``(at r1 ?)``.  The *starts* are the problem's initial
-state and every reachable state that differs from it in atoms of the start patterns only.  The *goals* are the
-conjunctions of one atom of each goal pattern that some reachable state satisfies.  The *tasks* are all pairs of the two
-in which the goal can be reached and does not hold already.
+A *pattern* is an atom in which ``?`` stands for any one name, as ``(at r1 ?)``.  The *starts* are
+the problem's initial state and every reachable state that differs from it in atoms of the start
+patterns only.  The *goals* are the conjunctions of one atom of each goal pattern that some
+reachable state satisfies.  The *tasks* are all pairs of the two in which the goal can be reached
+and does not hold already.
 """
 
 from __future__ import annotations
@@ -26,11 +27,14 @@ from planners.search.reachable import Space, explore
 _BATCH = 2_000_000
 
 
-def varied_tasks(loaded: Loaded, starts: Sequence[str], goals: Sequence[str]) -> tuple[ListedTask, ...]:
-    """The tasks that the patterns describe, sorted.  Without ``goals`` the problem's own goal is the only one.
+def varied_tasks(
+    loaded: Loaded, starts: Sequence[str], goals: Sequence[str]
+) -> tuple[ListedTask, ...]:
+    """The tasks that the patterns describe, sorted.  Without ``goals`` the problem's own goal is
+    the only one.
 
-    Raises `UsageError` for a pattern that no fact of the model matches, `ProvedImpossible` if there is no such task.
-    O(reachable joint steps x goals).
+    Raises `UsageError` for a pattern that no fact of the model matches, `ProvedImpossible` if there
+    is no such task. O(reachable joint steps x goals).
     """
     model = loaded.model
     space = explore(model, loaded.tasks[0].init[None, :])
@@ -48,15 +52,25 @@ def varied_tasks(loaded: Loaded, starts: Sequence[str], goals: Sequence[str]) ->
     size = max(1, _BATCH // len(space))
     for first in range(0, len(reached), size):
         far = distances(space, np.stack(reached[first : first + size]))[:, here]
-        pairs += [(int(start), int(goal) + first) for goal, start in zip(*np.nonzero(far > 0), strict=True)]
+        pairs += [
+            (int(start), int(goal) + first)
+            for goal, start in zip(*np.nonzero(far > 0), strict=True)
+        ]
     if not pairs:
         raise ProvedImpossible(
             f"there is no such task: none of {len(here):,} starts reaches one of {len(texts):,} goals that it is not at"
         )
-    return tuple(sorted((ListedTask(keys[s], texts[g]) for s, g in pairs), key=lambda task: (task.init, task.goal)))
+    return tuple(
+        sorted(
+            (ListedTask(keys[s], texts[g]) for s, g in pairs),
+            key=lambda task: (task.init, task.goal),
+        )
+    )
 
 
-def _starts(space: Space, facts: NDArray[np.bool_], init: NDArray[np.uint64], patterns: Sequence[str]) -> Ints:
+def _starts(
+    space: Space, facts: NDArray[np.bool_], init: NDArray[np.uint64], patterns: Sequence[str]
+) -> Ints:
     free = np.zeros(facts.shape[1], np.bool_)
     for pattern in patterns:
         free[_matching(space, pattern)] = True
@@ -64,7 +78,9 @@ def _starts(space: Space, facts: NDArray[np.bool_], init: NDArray[np.uint64], pa
     return np.flatnonzero((facts == own)[:, ~free].all(axis=1))
 
 
-def _goals(space: Space, facts: NDArray[np.bool_], patterns: Sequence[str]) -> list[tuple[int, ...]]:
+def _goals(
+    space: Space, facts: NDArray[np.bool_], patterns: Sequence[str]
+) -> list[tuple[int, ...]]:
     matching = [_matching(space, pattern) for pattern in patterns]
     columns = sorted({f for found in matching for f in found})
     goals: set[tuple[int, ...]] = set()

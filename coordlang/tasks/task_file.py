@@ -27,7 +27,9 @@ VERSION = 1
 
 @dataclass(frozen=True, slots=True)
 class ListedTask:
-    """A task as a task file lists it: true fluents at the start, literals (or formulas) at the end, as PDDL text."""
+    """A task as a task file lists it: true fluents at the start, literals (or formulas) at the end,
+    as PDDL text.
+    """
 
     init: tuple[str, ...]
     goal: tuple[str, ...]
@@ -37,7 +39,9 @@ def read_task_file(path: str | Path) -> tuple[ListedTask, ...]:
     """Read a task file (docs/formats.md).  Raises `BadInput` for anything else."""
     place = Place(str(path))
     try:
-        data = json.loads(sys.stdin.read() if str(path) == "-" else Path(path).read_text("utf-8-sig"))
+        data = json.loads(
+            sys.stdin.read() if str(path) == "-" else Path(path).read_text("utf-8-sig")
+        )
     except OSError as error:
         raise BadInput(f"cannot be read: {error.strerror}", place=place) from None
     except (ValueError, RecursionError) as error:
@@ -50,7 +54,9 @@ def tasks_from_data(data: Any, place: Place) -> tuple[ListedTask, ...]:
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise BadInput(f'expected a task file: {{"format": "{FORMAT}", ..}}', place=place)
     if data.get("version") != VERSION or data.get("version") is True:
-        raise BadInput(f"task file version {data.get('version')!r}, expected {VERSION}", place=place)
+        raise BadInput(
+            f"task file version {data.get('version')!r}, expected {VERSION}", place=place
+        )
     tasks = data.get("tasks")
     if not isinstance(tasks, list):
         raise BadInput("expected a list 'tasks'", place=place)
@@ -79,7 +85,11 @@ def ground_tasks(
     return [
         (
             _read_init(domain, problem, task, place),
-            ground_goal(domain, problem, And(tuple(_read_text(domain, problem, text, place) for text in task.goal))),
+            ground_goal(
+                domain,
+                problem,
+                And(tuple(_read_text(domain, problem, text, place) for text in task.goal)),
+            ),
         )
         for task in listed
     ]
@@ -92,7 +102,9 @@ def goal_text(model: JointModel, goal: Goal) -> str:
         row[: model.codec.fact_words] = goal.words
         atoms = model.codec.decode(row)
         return " ".join(a for a in atoms if not (model.remembers and a.startswith("(last ")))
-    return " ".join(formula_text(part) for part in (goal.parts if isinstance(goal, And) else (goal,)))
+    return " ".join(
+        formula_text(part) for part in (goal.parts if isinstance(goal, And) else (goal,))
+    )
 
 
 def goal_atoms(goal: Goal) -> tuple[str, ...]:
@@ -129,10 +141,14 @@ def _listed(entry: Any, number: int, place: Place) -> ListedTask:
 
 def _names(domain: Domain, problem: Problem, text: str, place: Place | None) -> Names:
     document = parse(Source(place.file if place else "task", text))
-    return Names(document, frozenset(domain.types), domain.predicates, {}, {}, frozenset(problem.objects))
+    return Names(
+        document, frozenset(domain.types), domain.predicates, {}, {}, frozenset(problem.objects)
+    )
 
 
-def _read_init(domain: Domain, problem: Problem, task: ListedTask, place: Place | None) -> frozenset[Atom]:
+def _read_init(
+    domain: Domain, problem: Problem, task: ListedTask, place: Place | None
+) -> frozenset[Atom]:
     fluents = fluent_predicates(domain)
     atoms = set()
     for text in task.init:

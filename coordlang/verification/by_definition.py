@@ -1,9 +1,10 @@
 """Is it a coordination language?  Checked by definition, in code of its own.
 
-Shares the joint model and the plan spaces with the builders, nothing else.  Walks n plans of a task in step and carries
-``(x_1 .. x_n, y or failed)`` and the *leads*: the words by which the sentence of plan 1 is ahead of that of plan i, or
-behind it (one must be a prefix of the other, else the sentences differ for good).  A violation is a walk that ends failed
-with all leads empty: n plans with one sentence whose mixture is no optimal plan.
+Shares the joint model and the plan spaces with the builders, nothing else.  Walks n plans of a task
+in step and carries ``(x_1 .. x_n, y or failed)`` and the *leads*: the words by which the sentence
+of plan 1 is ahead of that of plan i, or behind it (one must be a prefix of the other, else the
+sentences differ for good).  A violation is a walk that ends failed with all leads empty: n plans
+with one sentence whose mixture is no optimal plan.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ _CHUNK = 500_000
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """``holds``: is it a coordination language for these tasks?  If not, ``witness`` shows one miscoordination.
+    """``holds``: is it a coordination language for these tasks?  If not, ``witness`` shows one
+    miscoordination.
 
     ``tasks`` were checked with ``nodes`` nodes of the walk.
     """
@@ -41,7 +43,8 @@ class Verdict:
 def verify(table: WordTable, spaces: Sequence[PlanSpace]) -> Verdict:
     """Check a partition against the definition, for all tasks of ``spaces``.
 
-    Every plan has a sentence under a partition, so RC-freeness of the plans of each sentence is all there is to check.
+    Every plan has a sentence under a partition, so RC-freeness of the plans of each sentence is all
+    there is to check.
     """
     nodes = tasks = 0
     for space in spaces:
@@ -77,11 +80,17 @@ class _Leads:
         self._after: dict[tuple[int, int, int], int] = {}
 
     def extend(self, lead: Ints, first: Ints, other: Ints) -> Ints:
-        """Leads after plan 1 said ``first`` and the other plan said ``other`` (-1: nothing new); -1 where they differ."""
+        """Leads after plan 1 said ``first`` and the other plan said ``other`` (-1: nothing new); -1
+        where they differ.
+        """
         combined = np.column_stack((lead, first, other))
         different, inverse = np.unique(combined, axis=0, return_inverse=True)
         result = [self._one(*row) for row in different.tolist()]
-        return np.array(result, np.int64)[inverse.reshape(-1)] if len(result) else np.zeros(0, np.int64)
+        return (
+            np.array(result, np.int64)[inverse.reshape(-1)]
+            if len(result)
+            else np.zeros(0, np.int64)
+        )
 
     def _one(self, lead: int, first: int, other: int) -> int:
         key = (lead, first, other)
@@ -108,10 +117,11 @@ class _Leads:
 class _View:
     """What one robot's plan can still do and say from a node, and nothing else of the node.
 
-    Two nodes of a layer with one goal are one *view* of robot i if they have the same word, and robot i the same moves,
-    each to the same view.  Plans are mixed by their robots' labels and compared by their words, so no walk can tell such
-    nodes apart.  ``of`` (nodes) is the number of each node's view; per view ``word``, and ``first`` delimits its moves in
-    ``label`` and ``child`` (a view).
+    Two nodes of a layer with one goal are one *view* of robot i if they have the same word, and
+    robot i the same moves, each to the same view.  Plans are mixed by their robots' labels and
+    compared by their words, so no walk can tell such nodes apart.  ``of`` (nodes) is the number of
+    each node's view; per view ``word``, and ``first`` delimits its moves in ``label`` and ``child``
+    (a view).
     """
 
     of: Ints
@@ -132,14 +142,20 @@ class _View:
         sources = space.sources
         for span in space.layers:
             low, high = int(space.first[span.start]), int(space.first[span.stop])
-            move = space.labels[low:high, robot].astype(np.int64) * size + of[space.target[low:high]]
+            move = (
+                space.labels[low:high, robot].astype(np.int64) * size + of[space.target[low:high]]
+            )
             source = sources[low:high] - span.start
             pairs, _ = unique_rows(np.column_stack((source, move)).astype(np.uint64))
             degree = np.bincount(pairs[:, 0].astype(np.int64), minlength=span.stop - span.start)
             ends = np.cumsum(degree)
             for moves in np.unique(degree):
                 node = np.flatnonzero(degree == moves)
-                own = pairs[(ends[node] - moves)[:, None] + np.arange(moves), 1] if moves else np.zeros((len(node), 0))
+                own = (
+                    pairs[(ends[node] - moves)[:, None] + np.arange(moves), 1]
+                    if moves
+                    else np.zeros((len(node), 0))
+                )
                 here = node + span.start
                 table = np.column_stack((word[here], space.goal[here], own)).astype(np.uint64)
                 different, inverse = unique_rows(table)
@@ -166,12 +182,17 @@ class _Check:
         self._failed = len(space)  # in place of y
         self._views = [_View.of_robot(space, robot, word) for robot in range(self.robots)]
         self._leads = _Leads()
-        # A mixture is looked up robot by robot: (number of the labels so far, label) has a number of its own.
-        self._radix = [int(space.labels[:, robot].max(initial=0)) + 1 for robot in range(self.robots)]
+        # A mixture is looked up robot by robot: (number of the labels so far, label) has a number
+        # of its own.
+        self._radix = [
+            int(space.labels[:, robot].max(initial=0)) + 1 for robot in range(self.robots)
+        ]
         self._names: list[Ints] = []
         name = np.zeros(len(space.labels), np.int64)
         for robot in range(self.robots):
-            different, name = np.unique(name * self._radix[robot] + space.labels[:, robot], return_inverse=True)
+            different, name = np.unique(
+                name * self._radix[robot] + space.labels[:, robot], return_inverse=True
+            )
             self._names.append(different)
         self._edge_key = space.sources * (len(self._names[-1]) + 1) + name
         self._edge_order = np.argsort(self._edge_key)
@@ -225,8 +246,13 @@ class _Check:
         for number in range(int(self.space.layer[start]), 0, -1):
             table = self._with_starts(table, np.array([start]), number)
             walked += len(table)
-            found = [np.column_stack((source, moves, child)) for source, moves, child in self._moves(table)]
-            joined = np.concatenate(found) if found else np.zeros((0, 3 * self.robots + 1), np.int64)
+            found = [
+                np.column_stack((source, moves, child))
+                for source, moves, child in self._moves(table)
+            ]
+            joined = (
+                np.concatenate(found) if found else np.zeros((0, 3 * self.robots + 1), np.int64)
+            )
             table, first = np.unique(joined[:, 1 + self.robots :], axis=0, return_index=True)
             history.append((joined[first, 0], joined[first, 1 : 1 + self.robots]))
         bad = self._violations(table)
@@ -236,7 +262,10 @@ class _Check:
         for parent, moves in reversed(history):
             steps.append(moves[row].tolist())
             row = int(parent[row])
-        plans = [self._edges(robot, start, [step[robot] for step in reversed(steps)]) for robot in range(self.robots)]
+        plans = [
+            self._edges(robot, start, [step[robot] for step in reversed(steps)])
+            for robot in range(self.robots)
+        ]
         return Trail(start, tuple(zip(*plans, strict=True))), walked
 
     def _edges(self, robot: int, node: int, moves: list[int]) -> list[int]:
@@ -246,7 +275,11 @@ class _Check:
         for move in moves:
             own = range(int(space.first[node]), int(space.first[node + 1]))
             wanted = int(view.label[move]), int(view.child[move])
-            edge = next(e for e in own if (int(space.labels[e, robot]), int(view.of[space.target[e]])) == wanted)
+            edge = next(
+                e
+                for e in own
+                if (int(space.labels[e, robot]), int(view.of[space.target[e]])) == wanted
+            )
             edges.append(edge)
             node = int(space.target[edge])
         return edges
@@ -268,7 +301,9 @@ class _Check:
         sizes = np.ones(len(table))
         for robot, view in enumerate(self._views):
             sizes *= np.diff(view.first)[table[:, robot]]
-        cuts = np.searchsorted(np.cumsum(sizes), np.arange(_CHUNK, sizes.sum() + _CHUNK, _CHUNK)) + 1
+        cuts = (
+            np.searchsorted(np.cumsum(sizes), np.arange(_CHUNK, sizes.sum() + _CHUNK, _CHUNK)) + 1
+        )
         bounds = np.unique(np.concatenate(([0], np.minimum(cuts, len(table)))))
         if 100 * sizes.max(initial=0) > memory_left():
             raise _too_large(f"a state with {sizes.max():,.0f} combinations of moves")

@@ -1,10 +1,12 @@
 """Are overlapping words a coordination language?  Checked by definition, in code of its own.
 
-For every candidate task every optimal plan must have a usable sentence: one whose plans are RC-free.  Shares with the builder
-the joint model, the plan spaces and the words, nothing else.  Where all plans of a task are RC-free together, so is every
-part of them, and there is nothing to look for.  Where no words overlap on the plans of a task, `coordlang.verification.by_definition` decides.
-For any other task the sentences are listed, and n plans with one of them are walked in step with their mixture, as it is
-done there; a plan is carried with the *places* in the sentence that it may have reached.
+For every candidate task every optimal plan must have a usable sentence: one whose plans are
+RC-free.  Shares with the builder the joint model, the plan spaces and the words, nothing else.
+Where all plans of a task are RC-free together, so is every part of them, and there is nothing to
+look for.  Where no words overlap on the plans of a task, `coordlang.verification.by_definition`
+decides. For any other task the sentences are listed, and n plans with one of them are walked in
+step with their mixture, as it is done there; a plan is carried with the *places* in the sentence
+that it may have reached.
 """
 
 from __future__ import annotations
@@ -28,29 +30,40 @@ from planners.search.plan_space import PlanSpace
 _MOST = 2_000_000
 
 _Places = frozenset[int]
-#: A walk node: where each plan is, where their mixture is (-1: it broke), the places of each plan in the sentence.
+#: A walk node: where each plan is, where their mixture is (-1: it broke), the places of each plan
+#: in the sentence.
 _Node = tuple[tuple[int, ...], int, tuple[_Places, ...]]
 #: How a walk node was reached: the one before, and the edges taken.
 _Came = tuple[_Node, tuple[int, ...]]
 
 
-def verify_overlapping(names: Sequence[str], words: Sequence[frozenset[int]], spaces: Sequence[PlanSpace]) -> Verdict:
-    """Check overlapping words against the definition; ``words`` by the state numbers of ``spaces``, ``names`` of the words.
+def verify_overlapping(
+    names: Sequence[str], words: Sequence[frozenset[int]], spaces: Sequence[PlanSpace]
+) -> Verdict:
+    """Check overlapping words against the definition; ``words`` by the state numbers of ``spaces``,
+    ``names`` of the words.
 
-    The witness of a violation is a plan without usable sentence (that of the first robot), with one of its sentences and
-    plans that have it and miscoordinate.
+    The witness of a violation is a plan without usable sentence (that of the first robot), with one
+    of its sentences and plans that have it and miscoordinate.
     """
     nodes = tasks = 0
     for space in spaces:
         tasks += len(space.starts)
         check = _Check(space, words)
         starts = np.unique(space.starts)
-        # A guess at what is left to look at; that the others are RC-free altogether is checked here and now.
+        # A guess at what is left to look at; that the others are RC-free altogether is checked here
+        # and now.
         guessed = walk(space).requires[starts]
-        together = verify(_table(space, ("",), np.zeros(len(space.rows), np.int64)), [_from(space, starts[~guessed])])
+        together = verify(
+            _table(space, ("",), np.zeros(len(space.rows), np.int64)),
+            [_from(space, starts[~guessed])],
+        )
         left = starts if not together.holds else starts[guessed]
         several = _overlap_after(space, np.array([len(own) > 1 for own in words], np.bool_))[left]
-        alone = verify(_table(space, names, np.array([min(own) for own in words])), [_from(space, left[~several])])
+        alone = verify(
+            _table(space, names, np.array([min(own) for own in words])),
+            [_from(space, left[~several])],
+        )
         nodes += together.nodes + alone.nodes
         if not alone.holds:
             return Verdict(False, tasks, nodes, alone.witness)
@@ -97,7 +110,9 @@ class _Check:
         self.nodes = 0
 
     def uncovered(self, start: int, names: Sequence[str]) -> Miscoordination | None:
-        """A plan of the task without usable sentence, shown by one of its sentences; None if all plans have one."""
+        """A plan of the task without usable sentence, shown by one of its sentences; None if all
+        plans have one.
+        """
         failing: dict[Sentence, Trail | None] = {}
         for sentences in self._sets(start):
             tried = sorted(sentences, key=lambda s: (len(s), s))
@@ -124,7 +139,9 @@ class _Check:
             for node, begun in layer:
                 for edge in self._edges(node):
                     target = self._target[edge]
-                    longer = frozenset(b if b[-1] == w else (*b, w) for b in begun for w in self._words[target])
+                    longer = frozenset(
+                        b if b[-1] == w else (*b, w) for b in begun for w in self._words[target]
+                    )
                     after.add((target, longer))
             self._count(len(after))
             layer = after
@@ -139,7 +156,10 @@ class _Check:
             after: dict[_Node, _Came] = {}
             for node in layer:
                 for edges in self._moves(node[0], node[2], sentence):
-                    places = tuple(self._places(p, self._target[e], sentence) for p, e in zip(node[2], edges, strict=True))
+                    places = tuple(
+                        self._places(p, self._target[e], sentence)
+                        for p, e in zip(node[2], edges, strict=True)
+                    )
                     plans = tuple(self._target[e] for e in edges)
                     after.setdefault((plans, self._mixed(node[1], edges), places), (node, edges))
             self._count(len(after))
@@ -150,11 +170,17 @@ class _Check:
                 return Trail(start, _steps(history, node))
         return None
 
-    def _moves(self, plans: tuple[int, ...], places: tuple[_Places, ...], sentence: Sentence) -> list[tuple[int, ...]]:
+    def _moves(
+        self, plans: tuple[int, ...], places: tuple[_Places, ...], sentence: Sentence
+    ) -> list[tuple[int, ...]]:
         """Every combination of edges after which all plans may still have the sentence."""
         combined: list[tuple[int, ...]] = [()]
         for node, own in zip(plans, places, strict=True):
-            good = [edge for edge in self._edges(node) if self._places(own, self._target[edge], sentence)]
+            good = [
+                edge
+                for edge in self._edges(node)
+                if self._places(own, self._target[edge], sentence)
+            ]
             combined = [(*edges, edge) for edges in combined for edge in good]
         return combined
 
@@ -162,7 +188,10 @@ class _Check:
         """Where in the sentence a plan may be after a step: in the same word or in the next one."""
         words = self._words[target]
         return frozenset(
-            place for here in places for place in (here, here + 1) if place < len(sentence) and sentence[place] in words
+            place
+            for here in places
+            for place in (here, here + 1)
+            if place < len(sentence) and sentence[place] in words
         )
 
     def _mixed(self, y: int, edges: tuple[int, ...]) -> int:
@@ -170,7 +199,9 @@ class _Check:
         if y < 0:
             return -1
         labels = tuple(self._labels[edge][robot] for robot, edge in enumerate(edges))
-        return next((self._target[edge] for edge in self._edges(y) if self._labels[edge] == labels), -1)
+        return next(
+            (self._target[edge] for edge in self._edges(y) if self._labels[edge] == labels), -1
+        )
 
     def _count(self, nodes: int) -> None:
         self.nodes += nodes

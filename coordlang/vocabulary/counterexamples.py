@@ -1,7 +1,8 @@
 """Tuples of plans that refute a candidate partition: many at a time, those that differ least first.
 
-The same walk as verification makes, written for the builders: it keeps, for every node, the way to a violation with the
-fewest steps at which the plans are in different states.  Such pairs give short clauses.
+The same walk as verification makes, written for the builders: it keeps, for every node, the way to
+a violation with the fewest steps at which the plans are in different states.  Such pairs give short
+clauses.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ _AGAIN = 40
 
 @dataclass(frozen=True, slots=True)
 class Counterexample:
-    """A failing tuple of plans with one sentence: plan-space edges, step by step, and the states of each plan."""
+    """A failing tuple of plans with one sentence: plan-space edges, step by step, and the states of
+    each plan.
+    """
 
     start: int
     edges: tuple[tuple[int, ...], ...]
@@ -41,7 +44,9 @@ class _Leads:
         self._after: dict[tuple[int, int, int], int] = {}
 
     def after(self, lead: Ints, first: Ints, other: Ints) -> Ints:
-        """The leads when plan 1 said ``first`` and the other one ``other`` (-1: nothing); -1 where they part."""
+        """The leads when plan 1 said ``first`` and the other one ``other`` (-1: nothing); -1 where
+        they part.
+        """
         if not len(lead):
             return lead
         table = np.column_stack((lead, first + 1, other + 1))
@@ -83,10 +88,12 @@ class _Layer:
 def counterexamples(
     space: PlanSpace, index: EdgeIndex, word: Ints, most: int, starts: Ints | None = None
 ) -> Iterator[Counterexample]:
-    """Failing tuples of plans with one sentence under ``word`` (word of each plan-space node), about ``most`` of them.
+    """Failing tuples of plans with one sentence under ``word`` (word of each plan-space node),
+    about ``most`` of them.
 
-    For each node that all plans and their mixture share, the rest of plans that begin alike: those that differ at the
-    fewest steps, and then others.  None at all: ``word`` is a language for these tasks.
+    For each node that all plans and their mixture share, the rest of plans that begin alike: those
+    that differ at the fewest steps, and then others.  None at all: ``word`` is a language for these
+    tasks.
     """
     layers = _forward(space, index, word, np.unique(space.starts) if starts is None else starts)
     _backward(space, layers)
@@ -94,7 +101,9 @@ def counterexamples(
 
 
 def _forward(space: PlanSpace, index: EdgeIndex, word: Ints, starts: Ints) -> list[_Layer]:
-    """``layers[k]`` has k joint steps to go.  A node is (x_1 .. x_n, y or failed, leads), failed as ``len(space)``."""
+    """``layers[k]`` has k joint steps to go.  A node is (x_1 .. x_n, y or failed, leads), failed as
+    ``len(space)``.
+    """
     robots = space.labels.shape[1]
     leads = _Leads()
     spans = space.layers
@@ -105,8 +114,11 @@ def _forward(space: PlanSpace, index: EdgeIndex, word: Ints, starts: Ints) -> li
         fresh = np.zeros((len(here), 2 * robots), np.int64)
         fresh[:, : robots + 1] = here[:, None]
         both = np.concatenate((fresh, arriving))
-        bounds = [len(space)] * robots + [len(space) + 1] + [int(both[:, k].max(initial=0)) + 1
-                                                             for k in range(robots + 1, 2 * robots)]  # fmt: skip
+        bounds = (
+            [len(space)] * robots
+            + [len(space) + 1]
+            + [int(both[:, k].max(initial=0)) + 1 for k in range(robots + 1, 2 * robots)]
+        )
         nodes, place = unique_tuples(both, bounds)
         if layers:
             layers[-1].child = place[len(fresh) :]
@@ -137,7 +149,9 @@ def _expand(
         lead = nodes[move.source, robots + 1 :].copy()
         keep = np.ones(len(lead), np.bool_)
         for other in range(1, robots):
-            lead[keep, other - 1] = leads.after(lead[keep, other - 1], said[keep, 0], said[keep, other])
+            lead[keep, other - 1] = leads.after(
+                lead[keep, other - 1], said[keep, 0], said[keep, other]
+            )
             keep &= lead[:, other - 1] >= 0
         mixed = np.where(move.mixed == FAILED, failed, move.mixed)
         sources.append(move.source[keep])
@@ -157,7 +171,9 @@ def _expand(
 
 
 def _backward(space: PlanSpace, layers: list[_Layer]) -> None:
-    """For each node the fewest differing steps on a way to a violation, and the move that begins it."""
+    """For each node the fewest differing steps on a way to a violation, and the move that begins
+    it.
+    """
     robots = space.labels.shape[1]
     goal = layers[0]
     bad = (goal.nodes[:, robots] == len(space)) & (goal.nodes[:, robots + 1 :] == 0).all(axis=1)
@@ -198,7 +214,9 @@ def _retrace(space: PlanSpace, layers: list[_Layer], most: int) -> Iterator[Coun
 def _follow(
     space: PlanSpace, layers: list[_Layer], number: int, row: int, random: Random | None
 ) -> Counterexample:
-    """One way from a node to a violation: the best one, or at each node any move that still leads to one."""
+    """One way from a node to a violation: the best one, or at each node any move that still leads
+    to one.
+    """
     robots = space.labels.shape[1]
     start = int(layers[number].nodes[row, 0])
     edges = []
@@ -211,6 +229,7 @@ def _follow(
         edges.append(tuple(layer.edges[move].tolist()))
         row = int(layer.child[move])
     states = tuple(
-        (int(space.state[start]), *(int(space.state[space.target[step[i]]]) for step in edges)) for i in range(robots)
+        (int(space.state[start]), *(int(space.state[space.target[step[i]]]) for step in edges))
+        for i in range(robots)
     )
     return Counterexample(start, tuple(edges), states)

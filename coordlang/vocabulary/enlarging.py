@@ -1,8 +1,9 @@
 """A partition that is a language -> overlapping words that leave more plans open.
 
-A state with a further word gives plans through it further sentences, and sentences further plans.  Where no coordination
-is required every sentence is usable, and flexibility only grows; where it is, some sentence may lose its usability.  So
-words are added one after another, each kept if every plan still has a usable sentence and the average E rises.
+A state with a further word gives plans through it further sentences, and sentences further plans.
+Where no coordination is required every sentence is usable, and flexibility only grows; where it is,
+some sentence may lose its usability.  So words are added one after another, each kept if every plan
+still has a usable sentence and the average E rises.
 """
 
 from __future__ import annotations
@@ -22,13 +23,15 @@ from planners.limits import STOPPING, stop_clock
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans, counts
 
-#: A task that requires coordination and has more plans than this keeps the sentences of the partition.
+#: A task that requires coordination and has more plans than this keeps the sentences of the
+#: partition.
 MOST_PLANS = 1_000
 
 
 @dataclass(frozen=True, slots=True)
 class Enlarged:
-    """Overlapping words: ``words`` of every state, ``expected`` E of each task, ``before`` that of the partition.
+    """Overlapping words: ``words`` of every state, ``expected`` E of each task, ``before`` that of
+    the partition.
 
     ``tried`` enlargements, ``stopped`` the error that ended the search early or None.
     """
@@ -45,11 +48,14 @@ class Enlarged:
         return sum(len(words) - 1 for words in self.words.values())
 
 
-def enlarge(spaces: Sequence[PlanSpace], requires: Sequence[Bools], partition: Mapping[int, int]) -> Enlarged:
+def enlarge(
+    spaces: Sequence[PlanSpace], requires: Sequence[Bools], partition: Mapping[int, int]
+) -> Enlarged:
     """Enlarge the words of ``partition``, which must be a language for the tasks of ``spaces``.
 
-    ``requires`` says of the nodes of each space whether coordination is required (`coordlang.required.composition_walk.walk`).
-    Anytime: out of time, or interrupted, it returns what it has.
+    ``requires`` says of the nodes of each space whether coordination is required
+    (`coordlang.required.composition_walk.walk`). Anytime: out of time, or interrupted, it returns
+    what it has.
     """
     search = _Search(spaces, requires, partition)
     before = search.expected
@@ -64,7 +70,9 @@ def enlarge(spaces: Sequence[PlanSpace], requires: Sequence[Bools], partition: M
 
 @dataclass(frozen=True, slots=True)
 class _Coordinated:
-    """A task that requires coordination, its plans listed: the states of each, and each robot's part of it."""
+    """A task that requires coordination, its plans listed: the states of each, and each robot's
+    part of it.
+    """
 
     states: tuple[tuple[int, ...], ...]
     parts: tuple[tuple[tuple[int, ...], ...], ...]
@@ -91,18 +99,25 @@ class _Coordinated:
 
     def _mix(self, members: Sequence[int]) -> bool:
         """Is every mixture of these plans optimal?"""
-        own = [sorted({self.parts[m][robot] for m in members}) for robot in range(len(self.parts[0]))]
-        return prod(map(len, own)) <= len(self.optimal) and all(mixed in self.optimal for mixed in product(*own))
+        own = [
+            sorted({self.parts[m][robot] for m in members}) for robot in range(len(self.parts[0]))
+        ]
+        return prod(map(len, own)) <= len(self.optimal) and all(
+            mixed in self.optimal for mixed in product(*own)
+        )
 
 
 class _Search:
-    def __init__(self, spaces: Sequence[PlanSpace], requires: Sequence[Bools], partition: Mapping[int, int]) -> None:
+    def __init__(
+        self, spaces: Sequence[PlanSpace], requires: Sequence[Bools], partition: Mapping[int, int]
+    ) -> None:
         self.words: dict[int, frozenset[int]] = {s: frozenset((w,)) for s, w in partition.items()}
         self.tried = 0
         self._all = sorted(set(partition.values()))
         self._spaces = spaces
         self._readings = [Readings(space, self.words) for space in spaces]
-        # (plan space, node, its plans where coordination is required), and the states that must keep their words.
+        # (plan space, node, its plans where coordination is required), and the states that must
+        # keep their words.
         self._tasks: list[tuple[int, int, _Coordinated | None]] = []
         self._fixed: set[int] = set()
         for which, (space, required) in enumerate(zip(spaces, requires, strict=True)):
@@ -126,7 +141,11 @@ class _Search:
 
     def _measure(self, number: int) -> float:
         which, node, coordinated = self._tasks[number]
-        return self._readings[which].expected(node) if coordinated is None else coordinated.expected(self.words)
+        return (
+            self._readings[which].expected(node)
+            if coordinated is None
+            else coordinated.expected(self.words)
+        )
 
     def _add(self, state: int, word: int) -> bool:
         """Give a state a further word if that is a language and leaves more plans open on average."""

@@ -1,4 +1,6 @@
-"""The paper's brute force: all partitions by increasing size, judged by the definition.  For tiny inputs."""
+"""The paper's brute force: all partitions by increasing size, judged by the definition.  For tiny
+inputs.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,10 @@ def exhaustive(job: Job) -> Outcome:
         for words in _partitions(len(job.states), size):
             tried += 1
             word = dict(zip(job.states, words, strict=True))
-            if not any(len({sentence(word[s] for s in states) for states in plans}) == 1 for plans in failing):
+            if not any(
+                len({sentence(word[s] for s in states) for states in plans}) == 1
+                for plans in failing
+            ):
                 return Outcome(word, size, {"partitions": tried, "failing_mixtures": len(failing)})
     raise AssertionError("states all apart are a language where no plans are inseparable")
 
@@ -40,7 +45,10 @@ def _failing(job: Job) -> Iterator[_Failing]:
             states = [tuple(plans.states(plan)) for plan in listed]
             for chosen in product(range(len(listed)), repeat=robots):
                 steps = zip(*(listed[k] for k in chosen), strict=True)
-                if tuple(tuple(own[i] for i, own in enumerate(step)) for step in steps) not in optimal:
+                if (
+                    tuple(tuple(own[i] for i, own in enumerate(step)) for step in steps)
+                    not in optimal
+                ):
                     yield tuple(states[k] for k in chosen)
 
 

@@ -1,9 +1,11 @@
 """Among languages with equally many words, one whose sentences leave many plans open.
 
-Maximises the average of E = sum_s n_s^2 / N over the candidate tasks (`coordlang.language.flexibility`) by simulated annealing over
-partitions, with the clauses that counterexamples give (`coordlang.language.warping`) as constraints.  A partition may violate clauses
-on the way, at a price; one that violates none and is better than the best is searched for counterexamples, which give new
-clauses with their images under the model's symmetries.  What has none is verified by definition before it counts.
+Maximises the average of E = sum_s n_s^2 / N over the candidate tasks
+(`coordlang.language.flexibility`) by simulated annealing over partitions, with the clauses that
+counterexamples give (`coordlang.language.warping`) as constraints.  A partition may violate clauses
+on the way, at a price; one that violates none and is better than the best is searched for
+counterexamples, which give new clauses with their images under the model's symmetries.  What has
+none is verified by definition before it counts.
 """
 
 from __future__ import annotations
@@ -29,7 +31,8 @@ from planners.limits import STOPPING, stop_clock
 from planners.search.plan_space import PlanSpace
 from planners.search.tuples import EdgeIndex
 
-#: Moves of the first cooling, for each state and word and at least; each cooling that pays is followed by one twice as long.
+#: Moves of the first cooling, for each state and word and at least; each cooling that pays is
+#: followed by one twice as long.
 _MOVES, _LEAST = 10, 1_000
 #: Coolings without a better language before the search ends, and what counts as better.
 _PATIENCE, _BETTER = 3, 1.001
@@ -43,16 +46,19 @@ _STAGE, _DEARER, _CHEAPER = 250, 1.3, 0.9
 _VERIFY = 8
 #: Counterexamples taken at a time, from so many tasks at most.
 _MOST, _TASKS = 200, 1_500
-#: Edges summed over before the search ends, whatever it still finds (and what a move costs besides).
+#: Edges summed over before the search ends, whatever it still finds (and what a move costs
+#: besides).
 _WORK, _MOVE = 600_000_000, 2_000
 
 
 def flexible(job: Job, found: Outcome) -> Outcome:
-    """A language with as many words as ``found`` has, at least as flexible; its bound on the number of words is kept.
+    """A language with as many words as ``found`` has, at least as flexible; its bound on the number
+    of words is kept.
 
-    Anytime: out of time or memory, or interrupted, the best verified language so far is returned, with the error in
-    ``stopped``.  ``figures`` then also hold ``flexibility`` (plans left open, averaged over tasks), ``flexibility_before``
-    (that of ``found``), ``flexibility_bound`` (which no language exceeds) and ``communication_saving``.
+    Anytime: out of time or memory, or interrupted, the best verified language so far is returned,
+    with the error in ``stopped``.  ``figures`` then also hold ``flexibility`` (plans left open,
+    averaged over tasks), ``flexibility_before`` (that of ``found``), ``flexibility_bound`` (which
+    no language exceeds) and ``communication_saving``.
     """
     search = _Search(job, found)
     stopped: BaseException | None = None
@@ -74,16 +80,29 @@ class _Search:
         self._moves = self._better = 0
 
     def outcome(self, stopped: BaseException | None) -> Outcome:
-        figures = {**self._found.figures, "moves": self._moves, "improvements": self._better, **self._measures()}
+        figures = {
+            **self._found.figures,
+            "moves": self._moves,
+            "improvements": self._better,
+            **self._measures(),
+        }
         return Outcome(self.best, self._found.lower_bound, figures, stopped, self._found.evidence)
 
     def _measures(self) -> dict[str, float]:
-        """What is known of the flexibility; nothing where there are too many sentences to measure it."""
+        """What is known of the flexibility; nothing where there are too many sentences to measure
+        it.
+        """
         try:
-            before, after = (_measured(self._job, partition) for partition in (self._found.partition, self.best))
+            before, after = (
+                _measured(self._job, partition) for partition in (self._found.partition, self.best)
+            )
         except OutOfMemory:
             return {}
-        bound = float(self._bound.mean()) if self._bound is not None else sum(after.plans) / len(after.plans)
+        bound = (
+            float(self._bound.mean())
+            if self._bound is not None
+            else sum(after.plans) / len(after.plans)
+        )
         return {
             "flexibility": after.value,
             "flexibility_first_plan": float(after.first.mean()),
@@ -107,7 +126,11 @@ class _Search:
         annealing.begin(self.best)
         length, stale = max(_LEAST, _MOVES * len(job.states) * words), 0
         most = float(self._bound.mean())
-        while stale < _PATIENCE and annealing.work < _WORK and annealing.best_value < most * (1 - 1e-9):
+        while (
+            stale < _PATIENCE
+            and annealing.work < _WORK
+            and annealing.best_value < most * (1 - 1e-9)
+        ):
             before = annealing.best_value
             for share in annealing.cool(length):
                 self._moves = annealing.moves
@@ -179,7 +202,12 @@ class _Annealing:
     """Simulated annealing: the energy is the flexibility less the price of violated clauses."""
 
     def __init__(
-        self, job: Job, clauses: _Clauses, words: int, bound: Floats, verified: Callable[[Ints], None]
+        self,
+        job: Job,
+        clauses: _Clauses,
+        words: int,
+        bound: Floats,
+        verified: Callable[[Ints], None],
     ) -> None:
         self._states, self._clauses, self._words, self._bound = job.states, clauses, words, bound
         self._verified = verified
@@ -205,12 +233,16 @@ class _Annealing:
         self._of = self._word.tolist()
         self._expected = self._objective.expected(self._word)
         self.value = self.best_value = float(self._expected.mean())
-        self._violated = {n for n in range(len(self._clauses)) if self._clauses.violated(n, self._of)}
+        self._violated = {
+            n for n in range(len(self._clauses)) if self._clauses.violated(n, self._of)
+        }
         self._typical = self._cost_of_one_state()
         self._price = _PRICE * self._typical
 
     def _cost_of_one_state(self) -> float:
-        """What it typically costs that one state has another word than all others: the unit of heat and price."""
+        """What it typically costs that one state has another word than all others: the unit of heat
+        and price.
+        """
         word = np.zeros_like(self._word)
         most = self._objective.expected(word)
         costs = []
@@ -246,7 +278,9 @@ class _Annealing:
                     self._price *= _CHEAPER
                 feasible = 0
                 last = number == moves - 1
-                if self._pending is not None and (last or number % (_VERIFY * _STAGE) == _VERIFY * _STAGE - 1):
+                if self._pending is not None and (
+                    last or number % (_VERIFY * _STAGE) == _VERIFY * _STAGE - 1
+                ):
                     self._verified(self._pending)
                     self._pending = None
                 yield number / moves
@@ -283,7 +317,9 @@ class _Annealing:
             self.best_value, self._pending = self.value, self._word.copy()
 
     def _draw(self) -> dict[int, int]:
-        """A random change: one state, the states that a symmetry takes one to, or two states exchange their words."""
+        """A random change: one state, the states that a symmetry takes one to, or two states
+        exchange their words.
+        """
         kind = self._random.random()
         state = self._random.choice(self._states)
         if kind < 0.6 or (kind < 0.8 and not self._symmetries):
@@ -310,15 +346,25 @@ class _Annealing:
 def _measured(job: Job, partition: Partition) -> Flexibility:
     word = np.zeros(len(job.candidates.rows), np.int64)
     word[list(partition)] = list(partition.values())
-    return flexibility(job.candidates.spaces, [word[space.state] for space in job.candidates.spaces])
+    return flexibility(
+        job.candidates.spaces, [word[space.state] for space in job.candidates.spaces]
+    )
 
 
-def _parts(spaces: Sequence[PlanSpace], requires: Sequence[Bools]) -> list[tuple[PlanSpace, EdgeIndex, Ints]]:
-    """The tasks that require coordination, in parts that are searched for counterexamples one after the other."""
+def _parts(
+    spaces: Sequence[PlanSpace], requires: Sequence[Bools]
+) -> list[tuple[PlanSpace, EdgeIndex, Ints]]:
+    """The tasks that require coordination, in parts that are searched for counterexamples one after
+    the other.
+    """
     parts = []
     for space, required in zip(spaces, requires, strict=True):
         index = EdgeIndex.of(space)
         starts = np.unique(space.starts[required[space.starts]])
         count = 1 + len(starts) // _TASKS
-        parts += [(space, index, mine) for n in range(count) if len(mine := starts[space.goal[starts] % count == n])]
+        parts += [
+            (space, index, mine)
+            for n in range(count)
+            if len(mine := starts[space.goal[starts] % count == n])
+        ]
     return parts

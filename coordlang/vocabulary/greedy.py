@@ -16,9 +16,9 @@ def greedy(job: Job) -> Outcome:
 def fill(states: Sequence[int], constraints: Sequence[tuple[Separation, ...]]) -> dict[int, int]:
     """A partition of ``states`` that satisfies every constraint: state -> word number, from 0.
 
-    A constraint is a tuple of alternatives, at least one of which must hold; each is a set of pairs to separate.  States
-    are tried in the given order, which decides the number of words: the result is a language, not a smallest one
-    (the paper, Algorithm 1).
+    A constraint is a tuple of alternatives, at least one of which must hold; each is a set of pairs
+    to separate.  States are tried in the given order, which decides the number of words: the result
+    is a language, not a smallest one (the paper, Algorithm 1).
 
     O(words * (states + constraints)).
     """
@@ -51,7 +51,9 @@ def fill(states: Sequence[int], constraints: Sequence[tuple[Separation, ...]]) -
 
 
 class _Choices:
-    """Constraints with several alternatives: merging two states rules out those that keep them apart."""
+    """Constraints with several alternatives: merging two states rules out those that keep them
+    apart.
+    """
 
     def __init__(self) -> None:
         self._alive: list[set[Separation]] = []

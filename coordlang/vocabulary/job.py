@@ -18,11 +18,13 @@ Partition = Mapping[int, int]
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A partition to find: of ``states`` (numbers in ``candidates.rows``; those on optimal plans), for ``candidates``.
+    """A partition to find: of ``states`` (numbers in ``candidates.rows``; those on optimal plans),
+    for ``candidates``.
 
-    ``incumbent`` is a partition that is known to be a language, what an anytime method returns in the worst case.
-    ``check`` verifies a partition by definition and raises if it is none; an anytime method calls it for every better
-    one that it finds, because when it is stopped there is no time left.  ``alpha_only`` is for `separating`.
+    ``incumbent`` is a partition that is known to be a language, what an anytime method returns in
+    the worst case. ``check`` verifies a partition by definition and raises if it is none; an
+    anytime method calls it for every better one that it finds, because when it is stopped there is
+    no time left.  ``alpha_only`` is for `separating`.
     """
 
     candidates: Candidates
@@ -42,7 +44,9 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """Why a clause is necessary: plans of ``space`` whose mixture fails, or their image under a symmetry."""
+    """Why a clause is necessary: plans of ``space`` whose mixture fails, or their image under a
+    symmetry.
+    """
 
     space: PlanSpace
     example: Counterexample
@@ -53,9 +57,10 @@ class Evidence:
 class Outcome:
     """A partition with what is proved of it.
 
-    ``lower_bound``: no partition with fewer words is a coordination language.  ``figures`` are the work done.  ``stopped``
-    is the error that ended the search early, None if it came to its end.  ``evidence`` are the necessary clauses that were
-    met, of which no partition into ``lower_bound - 1`` words satisfies all (nothing for methods that meet none).
+    ``lower_bound``: no partition with fewer words is a coordination language.  ``figures`` are the
+    work done.  ``stopped`` is the error that ended the search early, None if it came to its end.
+    ``evidence`` are the necessary clauses that were met, of which no partition into ``lower_bound -
+    1`` words satisfies all (nothing for methods that meet none).
     """
 
     partition: Partition

@@ -1,9 +1,10 @@
 """The least number of words, with proof: counterexamples in, SAT out.
 
-Loop for K words: find a partition that satisfies all clauses so far; look for plans of one sentence whose mixture fails;
-each such tuple gives a clause that every language must satisfy (`coordlang.language.warping`).  No partition left: K words do not
-suffice.  No counterexample left: a language.  Numbers of words are tried from below, and from above where that takes long,
-with the same clauses, until the two meet.
+Loop for K words: find a partition that satisfies all clauses so far; look for plans of one sentence
+whose mixture fails; each such tuple gives a clause that every language must satisfy
+(`coordlang.language.warping`).  No partition left: K words do not suffice.  No counterexample left:
+a language.  Numbers of words are tried from below, and from above where that takes long, with the
+same clauses, until the two meet.
 """
 
 from __future__ import annotations
@@ -19,7 +20,16 @@ import numpy as np
 from coordlang.language.warping import Clause, pair, separation_clause
 from coordlang.vocabulary.counterexamples import counterexamples
 from coordlang.vocabulary.job import Evidence, Job, Outcome, Partition
-from coordlang.vocabulary.sat import Colouring, Effort, Problems, Undecided, by_demand, close_in, most_asked, reduce
+from coordlang.vocabulary.sat import (
+    Colouring,
+    Effort,
+    Problems,
+    Undecided,
+    by_demand,
+    close_in,
+    most_asked,
+    reduce,
+)
 from coordlang.vocabulary.separating import quickly as separated
 from coordlang.vocabulary.symmetry import Symmetry, closed, symmetries
 from planners.errors import OutOfMemory
@@ -28,13 +38,16 @@ from planners.limits import STOPPING, stop_clock
 from planners.search.plan_space import PlanSpace
 from planners.search.tuples import EdgeIndex
 
-#: Tasks are searched for counterexamples in parts, one after another: at least so many, of at most so many tasks.
+#: Tasks are searched for counterexamples in parts, one after another: at least so many, of at most
+#: so many tasks.
 _PARTS, _TASKS = 8, 1_500
 #: Edges of the composition walk up to which separating words are looked for first.
 _WALKED = 500_000
-#: Conflicts within which most partitions are found; after so many the solver is likely on the way to a proof.
+#: Conflicts within which most partitions are found; after so many the solver is likely on the way
+#: to a proof.
 _EASY = 5_000
-#: Comparisons of clauses to find which are implied, a second's work: of the others the solver finds it.
+#: Comparisons of clauses to find which are implied, a second's work: of the others the solver finds
+#: it.
 _COMPARED = 5_000_000
 #: Pairs of states by which one of symmetric partitions is told: enough to tell most apart.
 _LEADING = 20
@@ -45,8 +58,8 @@ _MOST = 200
 def minimal(job: Job) -> Outcome:
     """A language with the fewest words among all partitions.
 
-    Anytime: out of time or memory, or interrupted, it returns the best language found with the lower bound proved so
-    far and says so in ``stopped``.
+    Anytime: out of time or memory, or interrupted, it returns the best language found with the
+    lower bound proved so far and says so in ``stopped``.
     """
     search = _Search(job)
     try:
@@ -56,7 +69,9 @@ def minimal(job: Job) -> Outcome:
         if search.best is None:
             raise
         # Without its traceback, which holds on to all that the search had in memory.
-        return Outcome(search.best, search.lower, search.figures(), error.with_traceback(None), search.evidence)
+        return Outcome(
+            search.best, search.lower, search.figures(), error.with_traceback(None), search.evidence
+        )
     finally:
         search.close()
     assert search.best is not None
@@ -78,7 +93,9 @@ def refute(job: Job, size: int) -> Mapping[Clause, Evidence]:
 
 
 class _Search:
-    """Closes in on the least number of words: ``lower`` is proved to be needed, ``best`` is a language."""
+    """Closes in on the least number of words: ``lower`` is proved to be needed, ``best`` is a
+    language.
+    """
 
     def __init__(self, job: Job) -> None:
         self._job = job
@@ -88,7 +105,8 @@ class _Search:
         self._found = 0
         self._clauses: list[Clause] = []
         self._problems = Problems(self._start, Colouring.add)
-        #: Of symmetric partitions these allow one: proofs are ten times shorter, but partitions harder to find.
+        #: Of symmetric partitions these allow one: proofs are ten times shorter, but partitions
+        #: harder to find.
         self._led = Problems(self._start_led, Colouring.add)
         self.evidence: dict[Clause, Evidence] = {}
         self._symmetries: list[tuple[Symmetry, list[int]]] = []
@@ -106,8 +124,13 @@ class _Search:
         parts = self._prepare()
         self._fill()
         filled = self.best
-        close_in(lambda: (self.lower, self._upper), lambda size, effort: self._decide(size, parts, effort))
-        if self.best is filled:  # it separates more than a language must: one that does not leaves more open
+        close_in(
+            lambda: (self.lower, self._upper),
+            lambda size, effort: self._decide(size, parts, effort),
+        )
+        if (
+            self.best is filled
+        ):  # it separates more than a language must: one that does not leaves more open
             self._decide(self.lower, parts, Effort())
 
     def _fill(self) -> None:
@@ -121,7 +144,10 @@ class _Search:
 
     def exceeds(self, size: int) -> bool:
         """Whether every partition that is a language has more words than ``size``."""
-        return self._decide(size, self._prepare(), Effort(sys.maxsize, sys.maxsize)) and self.lower > size
+        return (
+            self._decide(size, self._prepare(), Effort(sys.maxsize, sys.maxsize))
+            and self.lower > size
+        )
 
     def close(self) -> None:
         """Give back what the solvers hold."""
@@ -130,14 +156,16 @@ class _Search:
 
     def _prepare(self) -> list[_Part]:
         self._symmetries = [(s, s.states.tolist()) for s in symmetries(self._job.candidates)]
-        # A group only: then the clauses, which have all their images, contradict each other without the preference too,
-        # and a certificate can do without it.
+        # A group only: then the clauses, which have all their images, contradict each other without
+        # the preference too, and a certificate can do without it.
         if closed([s.states for s, _ in self._symmetries]):
             self._group = [states for _, states in self._symmetries]
         return _parts(self._job.candidates.spaces, Random(self._job.seed))
 
     def _decide(self, size: int, parts: Sequence[_Part], effort: Effort) -> bool:
-        """Find a language with ``size`` words or prove that there is none; False if the effort was not enough."""
+        """Find a language with ``size`` words or prove that there is none; False if the effort was
+        not enough.
+        """
         try:
             partition = self._refine(size, parts, effort)
         except Undecided:

@@ -1,9 +1,11 @@
-"""The flexibility of partitions that differ in few states, measured again and again: the inner loop of `flexible`.
+"""The flexibility of partitions that differ in few states, measured again and again: the inner loop
+of `flexible`.
 
-The same sum as `coordlang.language.flexibility`, E = sum_s n_s^2 / N for every task.  Two things make it fast.  Sentences are told
-apart by 63-bit hashes, not by tables.  And when some states change their words, only the tasks with plans through them
-are measured, each over its own part of the plan graph.  A collision of hashes can only mislead the search: what is
-reported is measured by `coordlang.language.flexibility`.
+The same sum as `coordlang.language.flexibility`, E = sum_s n_s^2 / N for every task.  Two things
+make it fast.  Sentences are told apart by 63-bit hashes, not by tables.  And when some states
+change their words, only the tasks with plans through them are measured, each over its own part of
+the plan graph.  A collision of hashes can only mislead the search: what is reported is measured by
+`coordlang.language.flexibility`.
 """
 
 from __future__ import annotations
@@ -20,15 +22,18 @@ from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
 
 _MIX = np.uint64(0x9E3779B97F4A7C15)
-#: Edges kept in parts of plan graphs, one part for each state; beyond, parts are cut out anew each time.
+#: Edges kept in parts of plan graphs, one part for each state; beyond, parts are cut out anew each
+#: time.
 _KEEP = 20_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class _Layer:
-    """Nodes ``low:high`` of a part; its edges go from ``source`` to ``target``, both counted from their layers' first node.
+    """Nodes ``low:high`` of a part; its edges go from ``source`` to ``target``, both counted from
+    their layers' first node.
 
-    ``state`` of each node; of each edge ``leaving`` and ``entering`` the states at its ends, ``share`` of the source's plans.
+    ``state`` of each node; of each edge ``leaving`` and ``entering`` the states at its ends,
+    ``share`` of the source's plans.
     """
 
     low: int
@@ -43,7 +48,9 @@ class _Layer:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """Some tasks of a plan space: the layers of their plan graph, the node of each task and its number of plans."""
+    """Some tasks of a plan space: the layers of their plan graph, the node of each task and its
+    number of plans.
+    """
 
     tasks: Ints
     layers: tuple[_Layer, ...]
@@ -65,14 +72,23 @@ class _Part:
             else:
                 node, said, share = _sentences_above(layer, first, said, share, word, code)
             first = np.searchsorted(node, np.arange(layer.high - layer.low + 1))
-            together[layer.low : layer.high] = np.bincount(node, share * share, layer.high - layer.low)
+            together[layer.low : layer.high] = np.bincount(
+                node, share * share, layer.high - layer.low
+            )
         return self.plans * together[self.start]
 
 
 def _sentences_above(
-    layer: _Layer, first: Ints, said: NDArray[np.uint64], share: Floats, word: Ints, code: NDArray[np.uint64]
+    layer: _Layer,
+    first: Ints,
+    said: NDArray[np.uint64],
+    share: Floats,
+    word: Ints,
+    code: NDArray[np.uint64],
 ) -> tuple[Ints, NDArray[np.uint64], Floats]:
-    """Entries (node, sentence, share of its plans) of a layer from those of the layer below, sorted by node."""
+    """Entries (node, sentence, share of its plans) of a layer from those of the layer below, sorted
+    by node.
+    """
     leaving, entering = word[layer.leaving], word[layer.entering]
     source, weight = layer.source, layer.share
     if len(first) - 1 == len(said):  # one sentence for every node below
@@ -83,7 +99,9 @@ def _sentences_above(
         leaving, entering = np.repeat(leaving, number), np.repeat(entering, number)
         source, weight = np.repeat(source, number), np.repeat(weight, number)
     rest = said[entry]
-    new = np.where(leaving != entering, (rest ^ (rest >> np.uint64(29))) * _MIX + code[leaving], rest)
+    new = np.where(
+        leaving != entering, (rest ^ (rest >> np.uint64(29))) * _MIX + code[leaving], rest
+    )
     order = np.lexsort((new, source))
     source, new = source[order], new[order]
     fresh = np.ones(len(order), np.bool_)
@@ -93,12 +111,19 @@ def _sentences_above(
 
 
 class Objective:
-    """Flexibility of partitions of the states of ``spaces``: one number for each task, in the order of the spaces."""
+    """Flexibility of partitions of the states of ``spaces``: one number for each task, in the order
+    of the spaces.
+    """
 
     def __init__(self, spaces: Sequence[PlanSpace], words: int) -> None:
-        self._spaces = [_Measured(space, sum(len(s.starts) for s in spaces[:k])) for k, space in enumerate(spaces)]
+        self._spaces = [
+            _Measured(space, sum(len(s.starts) for s in spaces[:k]))
+            for k, space in enumerate(spaces)
+        ]
         self._code = np.random.default_rng(0).integers(1, 2**63, words, np.uint64)
-        self._all = [space.part(np.ones(len(space.space.starts), np.bool_)) for space in self._spaces]
+        self._all = [
+            space.part(np.ones(len(space.space.starts), np.bool_)) for space in self._spaces
+        ]
         self._of_state: dict[int, list[_Part]] = {}
         self._kept = 0
         #: Edges over which was summed so far: the work done.
@@ -109,9 +134,13 @@ class Objective:
         return np.concatenate([self._one(part, word) for part in self._all])
 
     def update(self, expected: Floats, word: Ints, changed: Sequence[int]) -> Floats:
-        """E of every task when ``changed`` states have got other words than ``expected`` was measured with."""
+        """E of every task when ``changed`` states have got other words than ``expected`` was
+        measured with.
+        """
         parts = [self._through(state) for state in changed]
-        if sum(part.edges for own in parts for part in own) >= sum(part.edges for part in self._all):
+        if sum(part.edges for own in parts for part in own) >= sum(
+            part.edges for part in self._all
+        ):
             return self.expected(word)
         result = expected.copy()
         for own in parts:
@@ -120,7 +149,9 @@ class Objective:
         return result
 
     def room(self, expected: Floats, bound: Floats, changed: Sequence[int]) -> float:
-        """How much the average can rise at most when ``changed`` states get other words; ``bound`` of each task's E."""
+        """How much the average can rise at most when ``changed`` states get other words; ``bound``
+        of each task's E.
+        """
         tasks = {id(part): part.tasks for state in changed for part in self._through(state)}
         if not tasks:
             return 0.0
@@ -134,7 +165,12 @@ class Objective:
     def _through(self, state: int) -> list[_Part]:
         """The tasks with plans through a state."""
         if state not in self._of_state:
-            parts = [p for space in self._spaces for p in [space.part(space.passing(state))] if len(p.tasks)]
+            parts = [
+                p
+                for space in self._spaces
+                for p in [space.part(space.passing(state))]
+                if len(p.tasks)
+            ]
             if self._kept > _KEEP:
                 return parts
             self._kept += sum(part.edges for part in parts)
@@ -162,7 +198,9 @@ class _Measured:
         self._share = edge_shares(space, counted)
         self._source = space.sources
         self._spans = space.layers
-        self._plans = np.array([float(min(counted[n], MANY)) for n in space.starts.tolist()], np.float64)
+        self._plans = np.array(
+            [float(min(counted[n], MANY)) for n in space.starts.tolist()], np.float64
+        )
 
     def passing(self, state: int) -> NDArray[np.bool_]:
         """Which tasks have plans through a state."""

@@ -1,12 +1,13 @@
 """One two-robot language for each pair of robots: cheaper for n > 2 robots, and not enough.
 
-Two plans introduce RC *for robots i and j* if some mixture of the two, in which i follows one plan, j the other one and every
-further robot one of the two, is not optimal.  A partition is a language for the pair if no two optimal plans with one
-sentence introduce RC for it.  With a language for every pair, and a sentence in each of them, any *two* plans that fit all
-sentences mix freely.  Three plans need not: docs/concepts.md shows some.
+Two plans introduce RC *for robots i and j* if some mixture of the two, in which i follows one plan,
+j the other one and every further robot one of the two, is not optimal.  A partition is a language
+for the pair if no two optimal plans with one sentence introduce RC for it.  With a language for
+every pair, and a sentence in each of them, any *two* plans that fit all sentences mix freely.
+Three plans need not: docs/concepts.md shows some.
 
-A mixture of two plans divides the robots into two sides.  Seen as two robots, the sides are a plan space with merged
-labels, and all that is known of two robots applies.
+A mixture of two plans divides the robots into two sides.  Seen as two robots, the sides are a plan
+space with merged labels, and all that is known of two robots applies.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ _MOST = 200
 
 @dataclass(frozen=True, slots=True)
 class PairLanguage:
-    """A smallest language for pairs of robots: ``words`` of the states, ``size`` how many; ``pairs`` by robots' numbers.
+    """A smallest language for pairs of robots: ``words`` of the states, ``size`` how many;
+    ``pairs`` by robots' numbers.
 
     ``nodes`` and ``edges`` of the composition walks, ``clauses`` that were met.
     """
@@ -45,7 +47,9 @@ class PairLanguage:
 
 
 def divided(space: PlanSpace, side: Sequence[int]) -> PlanSpace:
-    """The plan space of two robots: those in ``side`` as the first one, all others as the second one."""
+    """The plan space of two robots: those in ``side`` as the first one, all others as the second
+    one.
+    """
     others = [robot for robot in range(space.labels.shape[1]) if robot not in side]
     merged = []
     for robots in (list(side), others):
@@ -72,8 +76,9 @@ def _named(side: tuple[int, ...], robots: int) -> tuple[int, ...]:
 def pair_languages(spaces: Sequence[PlanSpace]) -> list[PairLanguage]:
     """A smallest language for every pair of robots, over the states of ``spaces``.
 
-    For each pair 2^(n - 2) divisions of the n robots, each with walks of two plans: nodes ``(x_1, x_2, y)``, at most L^3 in a
-    layer of L states, whatever n is; one language for all robots walks ``(x_1 .. x_n, y)``.
+    For each pair 2^(n - 2) divisions of the n robots, each with walks of two plans: nodes ``(x_1,
+    x_2, y)``, at most L^3 in a layer of L states, whatever n is; one language for all robots walks
+    ``(x_1 .. x_n, y)``.
     """
     robots = spaces[0].labels.shape[1]
     return [language_for(spaces, [pair]) for pair in combinations(range(robots), 2)]
@@ -88,7 +93,8 @@ def language_for(spaces: Sequence[PlanSpace], pairs: Sequence[tuple[int, int]]) 
     divisions = sorted({_named(side, robots) for i, j in pairs for side in sides(robots, i, j)})
     views = [divided(space, side) for space in spaces for side in divisions]
     for view, space in zip(views, [space for space in spaces for _ in divisions], strict=True):
-        # Plans of two robots are plans of all: what is wrong with the former is wrong with the latter.
+        # Plans of two robots are plans of all: what is wrong with the former is wrong with the
+        # latter.
         if not separable(view) and (witness := inseparable(space)) is not None:
             raise Inseparable(witness)
     walks = [walk(view) for view in views]
@@ -104,19 +110,29 @@ def language_for(spaces: Sequence[PlanSpace], pairs: Sequence[tuple[int, int]]) 
     while True:
         words = _words(states, searched, clauses, size)
         if words is not None:
-            return PairLanguage(tuple(pairs), words, len(set(words.values())), nodes, edges, len(clauses))
+            return PairLanguage(
+                tuple(pairs), words, len(set(words.values())), nodes, edges, len(clauses)
+            )
         size += 1
 
 
 def _words(
-    states: Sequence[int], searched: Sequence[tuple[PlanSpace, EdgeIndex, np.ndarray]], clauses: list[Clause], size: int
+    states: Sequence[int],
+    searched: Sequence[tuple[PlanSpace, EdgeIndex, np.ndarray]],
+    clauses: list[Clause],
+    size: int,
 ) -> dict[int, int] | None:
-    """A partition into ``size`` words without counterexample, or None if there is none; new clauses are added to the list."""
+    """A partition into ``size`` words without counterexample, or None if there is none; new clauses
+    are added to the list.
+    """
     colouring = Colouring(by_demand(states, clauses), size)
     try:
         for clause in clauses:
             colouring.add(clause)
-        word = np.zeros(max(len(view.rows) for view, _, _ in searched) if searched else max(states) + 1, np.int64)
+        word = np.zeros(
+            max(len(view.rows) for view, _, _ in searched) if searched else max(states) + 1,
+            np.int64,
+        )
         while (partition := colouring.solve()) is not None:
             word[list(partition)] = list(partition.values())
             fresh = _violated(searched, word)
@@ -130,7 +146,9 @@ def _words(
         colouring.delete()
 
 
-def _violated(searched: Sequence[tuple[PlanSpace, EdgeIndex, np.ndarray]], word: np.ndarray) -> list[Clause]:
+def _violated(
+    searched: Sequence[tuple[PlanSpace, EdgeIndex, np.ndarray]], word: np.ndarray
+) -> list[Clause]:
     found = set()
     for view, index, starts in searched:
         for example in counterexamples(view, index, word[view.state], _MOST, starts):
@@ -141,20 +159,30 @@ def _violated(searched: Sequence[tuple[PlanSpace, EdgeIndex, np.ndarray]], word:
 
 
 def together(languages: Sequence[PairLanguage]) -> dict[int, int]:
-    """The partition by all pairs' words at once: plans with one sentence under it have one sentence in each language."""
+    """The partition by all pairs' words at once: plans with one sentence under it have one sentence
+    in each language.
+    """
     number: dict[tuple[int, ...], int] = {}
     states = sorted(languages[0].words)
-    return {s: number.setdefault(tuple(language.words[s] for language in languages), len(number)) for s in states}
+    return {
+        s: number.setdefault(tuple(language.words[s] for language in languages), len(number))
+        for s in states
+    }
 
 
 def unsafe_pair(spaces: Sequence[PlanSpace], words: Sequence[int]) -> tuple[int, int] | None:
-    """A pair of robots for which the partition ``words`` (by state number) is no language; None if there is none."""
+    """A pair of robots for which the partition ``words`` (by state number) is no language; None if
+    there is none.
+    """
     robots = spaces[0].labels.shape[1]
     word = np.array(words, np.int64)
     for i, j in combinations(range(robots), 2):
         for side in sides(robots, i, j):
             for space in spaces:
                 view = divided(space, side)
-                if next(counterexamples(view, EdgeIndex.of(view), word[view.state], 1), None) is not None:
+                if (
+                    next(counterexamples(view, EdgeIndex.of(view), word[view.state], 1), None)
+                    is not None
+                ):
                     return i, j
     return None

@@ -19,10 +19,11 @@ _GROWN = 2
 
 
 class Colouring:
-    """An incremental SAT problem: give each of ``states`` one of ``size`` words so that every clause holds.
+    """An incremental SAT problem: give each of ``states`` one of ``size`` words so that every
+    clause holds.
 
-    Variables: state has word, pair is separated.  Words are interchangeable; the symmetry is broken by the order of
-    ``states``: a state may take word w only if an earlier state has word w - 1.
+    Variables: state has word, pair is separated.  Words are interchangeable; the symmetry is broken
+    by the order of ``states``: a state may take word w only if an earlier state has word w - 1.
     """
 
     def __init__(self, states: Sequence[int], size: int, solver: str = "cadical153") -> None:
@@ -52,11 +53,15 @@ class Colouring:
             return
         self._solver.add_clause([self._all_separate(pairs) for pairs in alternatives])
 
-    def prefer_one_of_each(self, symmetries: Sequence[Sequence[int]], pairs: Sequence[Pair]) -> None:
-        """Of partitions that are images of each other, allow the one that separates the first of ``pairs`` (and of such
-        the one that separates the second, ..): a lex-leader constraint over so many pairs.
+    def prefer_one_of_each(
+        self, symmetries: Sequence[Sequence[int]], pairs: Sequence[Pair]
+    ) -> None:
+        """Of partitions that are images of each other, allow the one that separates the first of
+        ``pairs`` (and of such the one that separates the second, ..): a lex-leader constraint over
+        so many pairs.
 
-        ``symmetries`` map states to states.  No proof is lost if every requirement's images are required as well.
+        ``symmetries`` map states to states.  No proof is lost if every requirement's images are
+        required as well.
         """
         for symmetry in symmetries:
             equal = 0  # a variable that holds if a partition and its image agree on all pairs so far; 0: there is none
@@ -72,7 +77,8 @@ class Colouring:
                 self._solver.add_clause([*before, -here, -there, equal])
 
     def solve(self, conflicts: int | None = None) -> dict[int, int] | None:
-        """A partition (state -> word), or None if there is none: a proof that ``size`` words do not suffice.
+        """A partition (state -> word), or None if there is none: a proof that ``size`` words do not
+        suffice.
 
         Raises `Undecided` after about so many ``conflicts`` of the solver.
         """
@@ -141,7 +147,8 @@ class Colouring:
 
 
 class Problems(Generic[Requirement]):
-    """The colouring problem of each number of words, kept as long as it is undecided: a solver goes on where it stopped.
+    """The colouring problem of each number of words, kept as long as it is undecided: a solver goes
+    on where it stopped.
 
     ``start`` makes a problem with all requirements that are known; ``require`` adds one.
     """
@@ -157,7 +164,8 @@ class Problems(Generic[Requirement]):
     def of(self, size: int, known: Sequence[Requirement]) -> Colouring:
         """The problem with ``size`` words under all ``known`` requirements, a list that only grows.
 
-        When it has grown much, the problem starts afresh: the order of its states was that of few requirements.
+        When it has grown much, the problem starts afresh: the order of its states was that of few
+        requirements.
         """
         kept = self._kept.get(size)
         if kept is None or len(known) > _GROWN * kept.first:
@@ -185,11 +193,14 @@ class _Kept:
 
 
 class Undecided(Exception):
-    """The effort allowed was used up: a number of words is not decided yet, and others may be easier."""
+    """The effort allowed was used up: a number of words is not decided yet, and others may be
+    easier.
+    """
 
 
 def solved(solver: Any, assumptions: Sequence[int] = (), conflicts: int | None = None) -> bool:
-    """Whether a python-sat solver's clauses can be satisfied.  Raises `Undecided` after so many ``conflicts``.
+    """Whether a python-sat solver's clauses can be satisfied.  Raises `Undecided` after so many
+    ``conflicts``.
 
     In slices: the solver hears no signal (time limit, Ctrl-C), so it must come back now and then.
     """
@@ -198,7 +209,9 @@ def solved(solver: Any, assumptions: Sequence[int] = (), conflicts: int | None =
         solver.conf_budget(_SLICE)
         try:
             answer = solver.solve_limited(assumptions=list(assumptions))
-        except Exception as error:  # python-sat catches SIGINT itself and raises an error of its own
+        except (
+            Exception
+        ) as error:  # python-sat catches SIGINT itself and raises an error of its own
             if "interrupt" in str(error).lower():
                 raise KeyboardInterrupt from None
             raise
@@ -211,8 +224,9 @@ def solved(solver: Any, assumptions: Sequence[int] = (), conflicts: int | None =
 def close_in(bounds: Callable[[], tuple[int, int]], decide: Callable[[int, Effort], bool]) -> None:
     """Decide numbers of words until the bounds (proved to be needed, known to suffice) meet.
 
-    From below as long as that is quick; what is slow is first closed in from above, to have a good language early.
-    ``decide`` moves a bound, or returns False when the effort was not enough, which then is doubled.
+    From below as long as that is quick; what is slow is first closed in from above, to have a good
+    language early. ``decide`` moves a bound, or returns False when the effort was not enough, which
+    then is doubled.
     """
     effort = Effort()
     while (span := bounds())[0] < span[1]:
@@ -260,7 +274,9 @@ def most_asked(clauses: Iterable[Clause], most: int) -> list[Pair]:
 
 
 def by_demand(states: Iterable[int], clauses: Iterable[Clause]) -> list[int]:
-    """States in the order of how much the clauses ask of them: a good order to break the symmetry of words."""
+    """States in the order of how much the clauses ask of them: a good order to break the symmetry
+    of words.
+    """
     demand: dict[int, float] = {}
     for clause in clauses:
         for states_of_pair in clause:

@@ -1,7 +1,9 @@
-"""The least partition that satisfies Theorem 3 - alpha or beta, or with ``alpha_only`` alpha - with proof, by SAT.
+"""The least partition that satisfies Theorem 3 - alpha or beta, or with ``alpha_only`` alpha - with
+proof, by SAT.
 
-Between `greedy`, which satisfies alpha, and `minimal`, which is least among all languages: separating words tell RC plans
-apart where they part or where they meet, so a sentence can be understood without looking at whole plans.
+Between `greedy`, which satisfies alpha, and `minimal`, which is least among all languages:
+separating words tell RC plans apart where they part or where they meet, so a sentence can be
+understood without looking at whole plans.
 """
 
 from __future__ import annotations
@@ -31,14 +33,16 @@ _SHORT = Effort(20, 2_000)
 def separating(job: Job) -> Outcome:
     """A separating partition with the fewest words.
 
-    ``figures["separating_lower_bound"]`` is the proved bound on separating partitions; other languages may have fewer
-    words.  Anytime, like `minimal`.
+    ``figures["separating_lower_bound"]`` is the proved bound on separating partitions; other
+    languages may have fewer words.  Anytime, like `minimal`.
     """
     return _searched(job, _AlphaOnly(job) if job.alpha_only else _AlphaOrBeta(job), _Search.run)
 
 
 def quickly(job: Job) -> Outcome:
-    """A separating partition with fewer words than the job's incumbent, as far as a short search finds one; else that."""
+    """A separating partition with fewer words than the job's incumbent, as far as a short search
+    finds one; else that.
+    """
     return _searched(job, _AlphaOrBeta(job), _short)
 
 
@@ -53,7 +57,9 @@ def _searched(job: Job, search: _Search, run: Callable[[_Search], None]) -> Outc
     try:
         run(search)
     except STOPPING as error:
-        if not isinstance(error, OutOfMemory):  # a walk was too large to keep: there may be other work to do, in time
+        if not isinstance(
+            error, OutOfMemory
+        ):  # a walk was too large to keep: there may be other work to do, in time
             stop_clock()
         if search.best is None:
             raise
@@ -65,7 +71,9 @@ def _searched(job: Job, search: _Search, run: Callable[[_Search], None]) -> Outc
 
 
 class _Search:
-    """Closes in on the least number of words from below; subclasses know where constraints come from."""
+    """Closes in on the least number of words from below; subclasses know where constraints come
+    from.
+    """
 
     def __init__(self, job: Job) -> None:
         self._job = job
@@ -74,7 +82,8 @@ class _Search:
         self._constraints: list[Constraint] = []
         self._problems = Problems(self._start, _require)
         self._rounds = 0
-        #: States that need words of their own; naming these first leaves fewest symmetries to search.
+        #: States that need words of their own; naming these first leaves fewest symmetries to
+        #: search.
         self._first: list[int] = []
 
     @property
@@ -96,7 +105,9 @@ class _Search:
         raise NotImplementedError
 
     def decide(self, size: int, effort: Effort) -> bool:
-        """Find a separating partition with ``size`` words, or prove that there is none; False: not with this effort."""
+        """Find a separating partition with ``size`` words, or prove that there is none; False: not
+        with this effort.
+        """
         for _ in range(effort.rounds):
             self._job.progress(
                 f"trying {size} words, {self.lower} to {self.upper} needed: round {self._rounds}, "
@@ -123,7 +134,9 @@ class _Search:
     def _start(self, size: int, known: Sequence[Constraint]) -> Colouring:
         order = by_demand(self._job.states, (s.pairs for c in known for s in c))
         # On these problems quicker than the other solver, by a third and more.
-        colouring = Colouring([*self._first, *(s for s in order if s not in set(self._first))], size, "glucose4")
+        colouring = Colouring(
+            [*self._first, *(s for s in order if s not in set(self._first))], size, "glucose4"
+        )
         for constraint in known:
             _require(colouring, constraint)
         return colouring
@@ -161,8 +174,9 @@ class _AlphaOnly(_Search):
 
 
 class _AlphaOrBeta(_Search):
-    """All constraints where they are few: the more the solver knows, the shorter its proofs.  Else they are asked of the
-    composition walks, with their images under the model's symmetries."""
+    """All constraints where they are few: the more the solver knows, the shorter its proofs.  Else
+    they are asked of the composition walks, with their images under the model's symmetries.
+    """
 
     def prepare(self) -> None:
         job = self._job
@@ -179,7 +193,10 @@ class _AlphaOrBeta(_Search):
         """A first separating partition, greedily: broken constraints in, until none is."""
         job = self._job
         for _ in range(_FILLED):
-            filled = fill(by_demand(job.states, (s.pairs for c in self._constraints for s in c)), self._constraints)
+            filled = fill(
+                by_demand(job.states, (s.pairs for c in self._constraints for s in c)),
+                self._constraints,
+            )
             fresh = list(self._broken(filled))
             if not fresh:
                 if len(set(filled.values())) < self.upper:
@@ -212,12 +229,15 @@ def _require(colouring: Colouring, constraint: Constraint) -> None:
 
 def _image(constraint: Constraint, permutation: Sequence[int]) -> Constraint:
     return ordered(
-        Separation(frozenset(pair(permutation[a], permutation[b]) for a, b in s.pairs)) for s in constraint
+        Separation(frozenset(pair(permutation[a], permutation[b]) for a, b in s.pairs))
+        for s in constraint
     )
 
 
 def _clique(edges: Iterable[Pair]) -> list[int]:
-    """A large clique, the best that greedy search finds from any state: its states need words of their own."""
+    """A large clique, the best that greedy search finds from any state: its states need words of
+    their own.
+    """
     near: dict[int, set[int]] = {}
     for a, b in sorted(edges):
         near.setdefault(a, set()).add(b)

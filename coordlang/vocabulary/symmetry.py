@@ -1,8 +1,9 @@
-"""Symmetries of a joint model: permutations of its states that map plans to plans and tasks to tasks.
+"""Symmetries of a joint model: permutations of its states that map plans to plans and tasks to
+tasks.
 
-Found from the PDDL objects (permutations that keep the static facts), not from any geometry, and checked on the ground
-actions, the states and the tasks before use.  The image of a failing tuple of plans fails too, so the image of
-a necessary clause is necessary.
+Found from the PDDL objects (permutations that keep the static facts), not from any geometry, and
+checked on the ground actions, the states and the tasks before use.  The image of a failing tuple of
+plans fails too, so the image of a necessary clause is necessary.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ Renaming = Mapping[str, str]
 
 #: More symmetries than this are not used: each multiplies the clauses.
 MOST = 64
-#: Assignments of one object to another, and renamings, that are tried before giving up on finding more.
+#: Assignments of one object to another, and renamings, that are tried before giving up on finding
+#: more.
 _TRIED = 200_000
 _RENAMED = 2_000
 
@@ -46,7 +48,9 @@ class Symmetry:
         """The number of the robot that robot ``number`` goes to."""
         return robots.index(self.renaming.get(robots[number], robots[number]))
 
-    def joint_action(self, robots: Sequence[str], texts: Sequence[str | None]) -> tuple[str | None, ...]:
+    def joint_action(
+        self, robots: Sequence[str], texts: Sequence[str | None]
+    ) -> tuple[str | None, ...]:
         """The image of a joint action, given and returned as each robot's text."""
         image: list[str | None] = [None] * len(robots)
         for number, text in enumerate(texts):
@@ -60,7 +64,8 @@ def state_symmetries(candidates: Candidates) -> list[Ints]:
 
 
 def symmetries(candidates: Candidates) -> list[Symmetry]:
-    """Permutations of the state numbers in ``candidates.rows``, without the identity (at most `MOST`).
+    """Permutations of the state numbers in ``candidates.rows``, without the identity (at most
+    `MOST`).
 
     Empty under ``--remember-actions``, or where the search finds none: symmetries only save work.
     """
@@ -86,7 +91,9 @@ def symmetries(candidates: Candidates) -> list[Symmetry]:
 
 
 def closed(permutations: Sequence[Ints]) -> bool:
-    """Whether the permutations and the identity are a group: one after another is one of them again."""
+    """Whether the permutations and the identity are a group: one after another is one of them
+    again.
+    """
     if not permutations:
         return True
     known = {p.tobytes() for p in (np.arange(len(permutations[0])), *permutations)}
@@ -100,14 +107,17 @@ def _used(model: JointModel) -> set[str]:
 
 
 def _renamings(domain: Domain, problem: Problem, used: set[str]) -> Iterator[Renaming]:
-    """Permutations of the ``used`` objects that keep types, the static facts about them and the domain's constants.
+    """Permutations of the ``used`` objects that keep types, the static facts about them and the
+    domain's constants.
 
-    Backtracking over objects in the order in which facts join them, each among those that look alike; it gives up after
-    `_TRIED` assignments.
+    Backtracking over objects in the order in which facts join them, each among those that look
+    alike; it gives up after `_TRIED` assignments.
     """
     fluents = fluent_predicates(domain)
     statics = {
-        (a.predicate, *a.args) for a in problem.init if a.predicate not in fluents and used.issuperset(a.args)
+        (a.predicate, *a.args)
+        for a in problem.init
+        if a.predicate not in fluents and used.issuperset(a.args)
     }
     looks = _looks(domain, problem, statics, used)
     order = _joined_order(looks, statics)
@@ -145,8 +155,12 @@ def _alike(name: str, looks: dict[str, int], image: dict[str, str]) -> list[str]
     return [other for other in looks if looks[other] == looks[name] and other not in taken]
 
 
-def _looks(domain: Domain, problem: Problem, statics: set[tuple[str, ...]], used: set[str]) -> dict[str, int]:
-    """A number for each object, equal for those that types and static facts cannot tell apart (colour refinement)."""
+def _looks(
+    domain: Domain, problem: Problem, statics: set[tuple[str, ...]], used: set[str]
+) -> dict[str, int]:
+    """A number for each object, equal for those that types and static facts cannot tell apart
+    (colour refinement).
+    """
     start = {
         name: (name if name in domain.constants else "", tuple(sorted(types)))
         for name, types in problem.objects.items()
@@ -159,7 +173,9 @@ def _looks(domain: Domain, problem: Problem, statics: set[tuple[str, ...]], used
             colours = tuple(looks[arg] for arg in fact[1:])
             for place, arg in enumerate(fact[1:]):
                 seen[arg].append((fact[0], place, *colours))
-        finer = _numbered({name: (looks[name], tuple(sorted(seen[name], key=str))) for name in looks})
+        finer = _numbered(
+            {name: (looks[name], tuple(sorted(seen[name], key=str))) for name in looks}
+        )
         if len(set(finer.values())) == len(set(looks.values())):
             return finer
         looks = finer
@@ -167,11 +183,15 @@ def _looks(domain: Domain, problem: Problem, statics: set[tuple[str, ...]], used
 
 def _numbered(keys: Mapping[str, object]) -> dict[str, int]:
     numbers: dict[object, int] = {}
-    return {name: numbers.setdefault(keys[name], len(numbers)) for name in sorted(keys, key=natural)}
+    return {
+        name: numbers.setdefault(keys[name], len(numbers)) for name in sorted(keys, key=natural)
+    }
 
 
 def _joined_order(objects: Iterable[str], statics: set[tuple[str, ...]]) -> list[str]:
-    """Objects so that each, where possible, shares a fact with an earlier one: mistakes are then met early."""
+    """Objects so that each, where possible, shares a fact with an earlier one: mistakes are then
+    met early.
+    """
     near: dict[str, set[str]] = {name: set() for name in objects}
     for fact in statics:
         for arg in fact[1:]:
@@ -187,7 +207,9 @@ def _joined_order(objects: Iterable[str], statics: set[tuple[str, ...]]) -> list
 
 
 def _keeps_actions(model: JointModel, renaming: Renaming) -> bool:
-    """Whether ground actions go to ground actions of the same cost, and robots to robots that idle alike."""
+    """Whether ground actions go to ground actions of the same cost, and robots to robots that idle
+    alike.
+    """
     if model.is_joint_action:
         if any(renaming.get(robot, robot) != robot for robot in model.robots):
             return False
@@ -196,7 +218,9 @@ def _keeps_actions(model: JointModel, renaming: Renaming) -> bool:
         if sorted(images) != sorted(model.robots):
             return False
         idle = dict(zip(model.robots, model.keeps_idle, strict=True))
-        if any(idle[robot] != idle[image] for robot, image in zip(model.robots, images, strict=True)):
+        if any(
+            idle[robot] != idle[image] for robot, image in zip(model.robots, images, strict=True)
+        ):
             return False
     costs = {(a.schema, a.args): a.cost for a in model.actions}
     return all(
@@ -277,4 +301,3 @@ def _canonical(goal: Goal, renaming: Renaming) -> object:
 def _rename_text(atom: str, renaming: Renaming) -> str:
     name, *args = atom[1:-1].split(" ")
     return "(" + " ".join((name, *(renaming.get(arg, arg) for arg in args))) + ")"
-

@@ -1,4 +1,5 @@
-"""Two robots modelled in unified-planning: all their plans, a language for them, planning under a sentence.
+"""Two robots modelled in unified-planning: all their plans, a language for them, planning under a
+sentence.
 
 Run it as a script, or cell by cell (``# %%``) in an editor or as a notebook.
 """
@@ -36,14 +37,21 @@ free = Fluent("free", BoolType(), c=cell)
 move = InstantaneousAction("move", r=robot, a=cell, b=cell)
 for condition in (at(move.r, move.a), near(move.a, move.b), free(move.b)):
     move.add_precondition(condition)
-for fluent, value in ((at(move.r, move.a), False), (at(move.r, move.b), True), (free(move.b), False), (free(move.a), True)):
+for fluent, value in (
+    (at(move.r, move.a), False),
+    (at(move.r, move.b), True),
+    (free(move.b), False),
+    (free(move.a), True),
+):
     move.add_effect(fluent, value)
 
 problem = Problem("crossing")
 for fluent in (at, near, free):
     problem.add_fluent(fluent, default_initial_value=False)
 problem.add_action(move)
-left, middle, right, aside = (problem.add_object(name, cell) for name in ("left", "middle", "right", "aside"))
+left, middle, right, aside = (
+    problem.add_object(name, cell) for name in ("left", "middle", "right", "aside")
+)
 r1, r2 = (problem.add_object(name, robot) for name in ("r1", "r2"))
 for place in (left, right, aside):
     problem.set_initial_value(near(place, middle), True)
@@ -59,7 +67,10 @@ problem.add_quality_metric(MinimizeMakespan())
 # %% Every optimal plan, one after another.
 with AnytimePlanner(name="coordlang") as planner:
     for result in planner.get_solutions(problem):
-        steps = [str(action) for action in result.plan.convert_to(PlanKind.SEQUENTIAL_PLAN, problem).actions]
+        steps = [
+            str(action)
+            for action in result.plan.convert_to(PlanKind.SEQUENTIAL_PLAN, problem).actions
+        ]
         print(result.status.name, steps)
 
 # %% A language, so that both robots know which plans the other one may follow.
@@ -72,8 +83,19 @@ print(language.words, dict(language.sizes()))
 spoken = next(speak_candidates(language, candidates))
 for sentence in task_sentences(spoken.space, 0, spoken.table):
     text = " ".join(sentence.words)
-    with OneshotPlanner(name="coordlang", params={"language": language, "sentence": text}) as planner:
+    with OneshotPlanner(
+        name="coordlang", params={"language": language, "sentence": text}
+    ) as planner:
         result = planner.solve(problem)
-    with PlanValidator(name="coordlang", params={"language": language, "sentence": text}) as validator:
+    with PlanValidator(
+        name="coordlang", params={"language": language, "sentence": text}
+    ) as validator:
         verdict = validator.validate(problem, result.plan)
-    print(repr(text), "leaves", result.metrics["plans"], "open;", result.status.name, verdict.status.name)
+    print(
+        repr(text),
+        "leaves",
+        result.metrics["plans"],
+        "open;",
+        result.status.name,
+        verdict.status.name,
+    )

@@ -1,1 +1,3 @@
-"""The independent twin: the rules of joint steps once more, and a plan checker that uses nothing else."""
+"""The independent twin: the rules of joint steps once more, and a plan checker that uses nothing
+else.
+"""

@@ -1,8 +1,9 @@
-"""The rules of joint steps, read literally: one state and one step at a time, over states that are plain sets of atoms.
+"""The rules of joint steps, read literally: one state and one step at a time, over states that are
+plain sets of atoms.
 
-The independent twin of grounding and composition (docs/pddl.md has the rules): nothing is shared with them, only the
-lifted nouns and the robots.  Formulas are never rewritten; they are read in negation normal form by carrying their
-polarity downwards.
+The independent twin of grounding and composition (docs/pddl.md has the rules): nothing is shared
+with them, only the lifted nouns and the robots.  Formulas are never rewritten; they are read in
+negation normal form by carrying their polarity downwards.
 """
 
 from __future__ import annotations
@@ -43,10 +44,12 @@ Literal = tuple[Atom | StepAtom, bool]
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """What a formula is read against: the state before the step, the subactions of the step, and who acts.
+    """What a formula is read against: the state before the step, the subactions of the step, and
+    who acts.
 
-    A negative action formula never speaks of the robots in ``acting`` (empty for conditions of effects and goals).
-    ``step`` None leaves the step open: every literal about it then counts as true.
+    A negative action formula never speaks of the robots in ``acting`` (empty for conditions of
+    effects and goals). ``step`` None leaves the step open: every literal about it then counts as
+    true.
     """
 
     state: State
@@ -56,7 +59,9 @@ class Moment:
 
 @dataclass(frozen=True, slots=True)
 class Instance:
-    """A schema with arguments, and the robots that must choose it together; ``name`` is what formulas call it."""
+    """A schema with arguments, and the robots that must choose it together; ``name`` is what
+    formulas call it.
+    """
 
     schema: Schema
     name: StepAtom
@@ -93,17 +98,23 @@ class Rules:
     _touched: dict[StepAtom, Touched] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, domain: Domain, problem: Problem, team: Team, allow_idle: Sequence[bool] | None = None) -> Rules:
+    def of(
+        cls, domain: Domain, problem: Problem, team: Team, allow_idle: Sequence[bool] | None = None
+    ) -> Rules:
         idle = tuple(allow_idle) if allow_idle is not None else (True,) * len(team.robots)
         schemas = {schema.name: schema for schema in domain.schemas}
-        return cls(domain, problem, team, idle, fluent_predicates(domain), schemas, domain.is_joint_action)
+        return cls(
+            domain, problem, team, idle, fluent_predicates(domain), schemas, domain.is_joint_action
+        )
 
-    # -- joint steps -----------------------------------------------------------------------------------------
+    # -- joint steps
+    # -----------------------------------------------------------------------------------------
 
     def broken_rule(self, state: State, labels: Labels) -> str | None:
         """The first rule that the step breaks, in words; None for a legal step.
 
-        Raises `BadInput` where two applicable joint actions with these subactions have different results.
+        Raises `BadInput` where two applicable joint actions with these subactions have different
+        results.
         """
         if len(labels) != len(self.team.robots):
             return f"the step has {len(labels)} entries for {len(self.team.robots)} robots"
@@ -137,7 +148,9 @@ class Rules:
         return self._instances[label]
 
     def possible(self, state: State, label: str) -> bool:
-        """Whether some step could hold the subaction in a state, as far as its own precondition says."""
+        """Whether some step could hold the subaction in a state, as far as its own precondition
+        says.
+        """
         found = self._known(label)
         moment = Moment(state, None, found.owners)
         return self.holds(found.schema.precondition, found.binding, True, moment)
@@ -166,7 +179,9 @@ class Rules:
         return Instance(schema, StepAtom(schema.name, args), binding, owners)
 
     def _wrong_choice(self, chosen: Sequence[Instance | None]) -> str | None:
-        """Idling where it is not allowed, somebody else's action, a shared action that not all its owners chose."""
+        """Idling where it is not allowed, somebody else's action, a shared action that not all its
+        owners chose.
+        """
         robots = self.team.robots
         for robot, action in enumerate(chosen):
             if action is None:
@@ -226,7 +241,9 @@ class Rules:
                 for binding in self._matches(constraint, action):
                     groups.setdefault(binding, []).append(action)
             for binding, group in groups.items():
-                if len(group) < constraint.low or (constraint.high is not None and len(group) > constraint.high):
+                if len(group) < constraint.low or (
+                    constraint.high is not None and len(group) > constraint.high
+                ):
                     bounds = f"{constraint.low} to {constraint.high if constraint.high is not None else 'any number'}"
                     doing = ", ".join(action.text for action in group)
                     return f"constraint {constraint.name} {' '.join(binding)} takes {bounds} together: {doing}"
@@ -243,21 +260,32 @@ class Rules:
             for name, positions in constraint.actions
             if name == action.schema.name
             for binding in [tuple(action.name.args[p] for p in positions)]
-            if all(v in self.objects(p.types) for v, p in zip(binding, constraint.parameters, strict=True))
+            if all(
+                v in self.objects(p.types)
+                for v, p in zip(binding, constraint.parameters, strict=True)
+            )
         }
 
     def _joined(self, one: Instance, other: Instance) -> bool:
-        """Linked by the network: of one constraint that takes two or more, or of two that depend on each other."""
+        """Linked by the network: of one constraint that takes two or more, or of two that depend on
+        each other.
+        """
         by_name = {constraint.name: constraint for constraint in self.domain.constraints}
         pairs = [(c.name, c.name) for c in self.domain.constraints if c.low > 1]
         pairs += [pair for v, w in self.domain.dependences for pair in ((v, w), (w, v))]
-        return any(self._matches(by_name[v], one) & self._matches(by_name[w], other) for v, w in pairs)
+        return any(
+            self._matches(by_name[v], one) & self._matches(by_name[w], other) for v, w in pairs
+        )
 
     def touched(self, action: Instance) -> Touched:
-        """Conditional effects count as if they fired and their conditions as required; adding wins over deleting."""
+        """Conditional effects count as if they fired and their conditions as required; adding wins
+        over deleting.
+        """
         if action.name in self._touched:
             return self._touched[action.name]
-        needs = set(self._required(action.schema.precondition, action.binding, True, action.owners) or ())
+        needs = set(
+            self._required(action.schema.precondition, action.binding, True, action.owners) or ()
+        )
         changes: dict[bool, set[Atom]] = {True: set(), False: set()}
         for effect in action.schema.effects:
             for binding in self._bindings(effect.variables, action.binding):
@@ -265,7 +293,9 @@ class Rules:
                 if required is not None:
                     needs |= required
                     changes[effect.adds].add(_atom(effect.atom, binding))
-        touched = Touched(frozenset(needs), frozenset(changes[True]), frozenset(changes[False] - changes[True]))
+        touched = Touched(
+            frozenset(needs), frozenset(changes[True]), frozenset(changes[False] - changes[True])
+        )
         self._touched[action.name] = touched
         return touched
 
@@ -281,7 +311,8 @@ class Rules:
                         changes[effect.adds].add(_atom(effect.atom, binding))
         return (state - changes[False]) | changes[True]
 
-    # -- joint-action PDDL -----------------------------------------------------------------------------------
+    # -- joint-action PDDL
+    # -----------------------------------------------------------------------------------
 
     def _joint_action(self, state: State, labels: Labels) -> tuple[str | None, State]:
         """What is wrong with these subactions, or None and the state after them."""
@@ -302,7 +333,10 @@ class Rules:
             )
         for result in results:
             return None, result
-        parts = ", ".join(f"{robot} {label or 'idle'}" for robot, label in zip(self.team.robots, labels, strict=True))
+        parts = ", ".join(
+            f"{robot} {label or 'idle'}"
+            for robot, label in zip(self.team.robots, labels, strict=True)
+        )
         return reason or f"no joint action of the domain has the parts {parts}", state
 
     def _whole_actions(self, labels: Labels) -> Iterator[Instance]:
@@ -312,18 +346,25 @@ class Rules:
             if binding is None:
                 continue
             domains = [
-                tuple(o for o in self.objects(p.types) if binding.get(p.name, o) == o) for p in schema.parameters
+                tuple(o for o in self.objects(p.types) if binding.get(p.name, o) == o)
+                for p in schema.parameters
             ]
             for args in product(*domains):
                 yield self.bind(schema, args)
 
     def _match_parts(self, schema: Schema, labels: Labels) -> Binding | None:
-        """The parameters that the labels determine, or None if the labels are not the schema's parts."""
-        templates: dict[str, tuple[Term, ...] | None] = {part.robot: part.template for part in schema.parts}
+        """The parameters that the labels determine, or None if the labels are not the schema's
+        parts.
+        """
+        templates: dict[str, tuple[Term, ...] | None] = {
+            part.robot: part.template for part in schema.parts
+        }
         binding: Binding = {}
         for robot, label in zip(self.team.robots, labels, strict=True):
             template = templates.get(robot)  # a missing line means idle
-            words = None if label is None else label.lower().replace("(", " ").replace(")", " ").split()
+            words = (
+                None if label is None else label.lower().replace("(", " ").replace(")", " ").split()
+            )
             if template is None and words is None:
                 continue
             if template is None or words is None or len(template) != len(words):
@@ -334,7 +375,8 @@ class Rules:
                     return None
         return binding
 
-    # -- formulas --------------------------------------------------------------------------------------------
+    # -- formulas
+    # --------------------------------------------------------------------------------------------
 
     def holds(self, formula: Formula, binding: Binding, positive: bool, moment: Moment) -> bool:
         """Whether a formula (negated unless ``positive``) holds."""
@@ -371,7 +413,8 @@ class Rules:
     def _required(
         self, formula: Formula, binding: Binding, positive: bool, acting: tuple[int, ...]
     ) -> frozenset[Literal] | None:
-        """The literals left after statics, equalities and types are simplified; None if that makes it false.
+        """The literals left after statics, equalities and types are simplified; None if that makes
+        it false.
 
         A formula that this makes true requires nothing, whatever stands inside.
         """
@@ -395,7 +438,9 @@ class Rules:
         literals = [part for part in left if not isinstance(part, bool)]
         return frozenset().union(*literals) if literals else neutral
 
-    def _fixed(self, formula: Formula, binding: Binding, positive: bool, acting: tuple[int, ...]) -> bool | None:
+    def _fixed(
+        self, formula: Formula, binding: Binding, positive: bool, acting: tuple[int, ...]
+    ) -> bool | None:
         """The value of a literal that no state and no step can change; None for the others."""
         match formula:
             case Truth(value):
@@ -419,13 +464,17 @@ class Rules:
                 remedy="A joint action already says what every robot does: use predicates only.",
             )
         args = _ground(formula, binding).args
-        if not all(a in self.objects(p.types) for p, a in zip(schema.parameters, args, strict=True)):
+        if not all(
+            a in self.objects(p.types) for p, a in zip(schema.parameters, args, strict=True)
+        ):
             return not positive  # no such subaction exists
         if not positive and set(self.team.owners(schema, args)) & set(acting):
             return True  # as if the domain had said "(or (= ?o ?r) (not ..))"
         return None
 
-    def _branches(self, formula: Formula, binding: Binding) -> Iterable[tuple[Formula, Binding]] | None:
+    def _branches(
+        self, formula: Formula, binding: Binding
+    ) -> Iterable[tuple[Formula, Binding]] | None:
         """The parts of a connective or quantifier; None for a literal."""
         match formula:
             case And(parts) | Or(parts):
@@ -453,7 +502,8 @@ class Rules:
                 return f"{binding.get(left, left)} and {binding.get(right, right)} {what}"
         return "its condition is never true"
 
-    # -- objects ---------------------------------------------------------------------------------------------
+    # -- objects
+    # ---------------------------------------------------------------------------------------------
 
     def objects(self, types: tuple[str, ...]) -> tuple[str, ...]:
         """The objects of one of these types."""

@@ -1,6 +1,7 @@
 """Independent plan checker: is this sequence of joint steps a plan?
 
-Reads `planners.check.rules`, the rules of joint steps taken literally, and nothing of grounding, composition or search.
+Reads `planners.check.rules`, the rules of joint steps taken literally, and nothing of grounding,
+composition or search.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ __all__ = ["Instance", "Labels", "Moment", "Rules", "State", "Verdict", "validat
 class Verdict:
     """Whether a plan is one.
 
-    ``makespan`` is its number of joint steps.  For an invalid plan ``step`` is the first step that breaks a rule (from
-    0; the makespan if only the goal fails) and ``reason`` says which, in words.
+    ``makespan`` is its number of joint steps.  For an invalid plan ``step`` is the first step that
+    breaks a rule (from 0; the makespan if only the goal fails) and ``reason`` says which, in words.
     """
 
     valid: bool
@@ -39,19 +40,24 @@ def validate(
     goal: Formula | None = None,
     allow_idle: Sequence[bool] | None = None,
 ) -> Verdict:
-    """Check that every step is a legal joint step where it is taken and that the goal holds at the end.
+    """Check that every step is a legal joint step where it is taken and that the goal holds at the
+    end.
 
     Parameters
     ----------
     plan
-        ``plan[k][i]`` is the subaction of robot ``i`` in step ``k``, such as ``"(move r1 a b)"``, or None if it idles.
-        In joint-action PDDL it is the filled-in template of the subaction comment.
+        ``plan[k][i]`` is the subaction of robot ``i`` in step ``k``, such as ``"(move r1 a b)"``,
+        or None if it idles. In joint-action PDDL it is the filled-in template of the subaction
+        comment.
     init, goal
-        Another task than the problem's own: its true fluents (statics come from the problem) and its goal.
+        Another task than the problem's own: its true fluents (statics come from the problem) and
+        its goal.
     allow_idle
-        For each robot whether it may idle without an action of its own (`JointModel.keeps_idle`); None: all may.
+        For each robot whether it may idle without an action of its own (`JointModel.keeps_idle`);
+        None: all may.
 
-    Raises `BadInput` where two applicable joint actions with the same subactions have different results.
+    Raises `BadInput` where two applicable joint actions with the same subactions have different
+    results.
     """
     rules = Rules.of(domain, problem, team, allow_idle)
     state = rules.fluents_of(problem.init if init is None else init)
@@ -62,6 +68,10 @@ def validate(
         state = rules.result(state, labels)
     wanted = problem.goal if goal is None else goal
     if not rules.holds(wanted, {}, True, Moment(state)):
-        reason = f"the goal does not hold at the end: {rules.why_not(wanted, {}, True, Moment(state))}"
+        reason = (
+            f"the goal does not hold at the end: {rules.why_not(wanted, {}, True, Moment(state))}"
+        )
         return Verdict(False, len(plan), len(plan), reason)
-    return Verdict(True, len(plan), None, "every step is a joint step and the goal holds at the end")
+    return Verdict(
+        True, len(plan), None, "every step is a joint step and the goal holds at the end"
+    )

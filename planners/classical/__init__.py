@@ -1,14 +1,17 @@
 """A joint model and one task as a plain ground planning task, for the planners of others.
 
-Two forms.  *Explicit*: one plain action per joint action.  *Select-then-apply*, of linear size: the robots choose one
-after another, what they chose is checked, and only then the effects happen, one robot after another; all choices and
-checks see the state before the step, and only the first choice of a step pays for it.
+Two forms.  *Explicit*: one plain action per joint action.  *Select-then-apply*, of linear size: the
+robots choose one after another, what they chose is checked, and only then the effects happen, one
+robot after another; all choices and checks see the state before the step, and only the first choice
+of a step pays for it.
 
-In both forms the optimal plans stand one to one for the optimal joint plans (sequences of the robots' labels): cases and
-formulas are decided in one order, so that nothing can be done in two ways.
+In both forms the optimal plans stand one to one for the optimal joint plans (sequences of the
+robots' labels): cases and formulas are decided in one order, so that nothing can be done in two
+ways.
 
-This is the cross-check of `planners.joint.composition`, `planners.joint.interference` and `planners.joint.joint_actions`, so it shares their
-input and nothing else: interference, formulas about the joint step and conditional effects are worked out anew here.
+This is the cross-check of `planners.joint.composition`, `planners.joint.interference` and
+`planners.joint.joint_actions`, so it shares their input and nothing else: interference, formulas
+about the joint step and conditional effects are worked out anew here.
 """
 
 from __future__ import annotations
@@ -24,23 +27,38 @@ from planners.classical.writer import Writer, state_literals
 from planners.joint.model import Goal, JointModel, show
 from planners.loading import PlanningTask
 
-__all__ = ["LONGEST", "Condition", "Form", "PlainAction", "PlainTask", "action_names", "compile_plain", "to_pddl"]
+__all__ = [
+    "LONGEST",
+    "Condition",
+    "Form",
+    "PlainAction",
+    "PlainTask",
+    "action_names",
+    "compile_plain",
+    "to_pddl",
+]
 
 
-def compile_plain(model: JointModel, task: PlanningTask, limit: int = 2000, longest: int = LONGEST) -> PlainTask:
-    """The plain form of a task: explicit with at most ``limit`` plain actions, else select-then-apply.
+def compile_plain(
+    model: JointModel, task: PlanningTask, limit: int = 2000, longest: int = LONGEST
+) -> PlainTask:
+    """The plain form of a task: explicit with at most ``limit`` plain actions, else
+    select-then-apply.
 
     Parameters
     ----------
     limit
-        0 asks for select-then-apply.  Joint-action PDDL, whose ground actions are plain actions already, may exceed it.
+        0 asks for select-then-apply.  Joint-action PDDL, whose ground actions are plain actions
+        already, may exceed it.
     longest
         The makespan, in joint steps, up to which `PlainTask.cost` has to be sure.
     """
     team = choosers_of(model)
     step_cost = team.dearest * longest + 1
     out, form = _written(team, model, task.goal, step_cost, limit)
-    true = {out.fact(atom) for atom, holds in state_literals(model, task.init.tolist()).items() if holds}
+    true = {
+        out.fact(atom) for atom, holds in state_literals(model, task.init.tolist()).items() if holds
+    }
     return PlainTask(
         name=task.name,
         form=form,
@@ -53,7 +71,9 @@ def compile_plain(model: JointModel, task: PlanningTask, limit: int = 2000, long
     )
 
 
-def _written(team: Choosers, model: JointModel, goal: Goal, step_cost: int, limit: int) -> tuple[Writer, Form]:
+def _written(
+    team: Choosers, model: JointModel, goal: Goal, step_cost: int, limit: int
+) -> tuple[Writer, Form]:
     if model.is_joint_action and limit:
         limit = max(limit, 4 * len(model.actions))
     if limit:

@@ -17,9 +17,10 @@ from planners.pddl.lifted import Atom, Not, StepAtom
 class Choosers:
     """Who chooses what: for joint-action PDDL there is one chooser, of whole joint actions.
 
-    ``seconds`` is the second cost of each action, ``clashes`` the actions of others that cannot share a step with it.
-    ``covered_by``: in joint-action PDDL, the cheaper (or earlier) actions with the same parts.  Where one of them is
-    applicable too, both are one joint action, and it stands for both.
+    ``seconds`` is the second cost of each action, ``clashes`` the actions of others that cannot
+    share a step with it. ``covered_by``: in joint-action PDDL, the cheaper (or earlier) actions
+    with the same parts.  Where one of them is applicable too, both are one joint action, and it
+    stands for both.
     """
 
     choosers: tuple[str, ...]
@@ -45,17 +46,36 @@ def choosers_of(model: JointModel) -> Choosers:
     if model.is_joint_action:
         nothing = (frozenset[int](),) * len(actions)
         return Choosers(
-            ("team",), (False,), actions, ((0,),) * len(actions), seconds, nothing, _covered_by(actions, seconds)
+            ("team",),
+            (False,),
+            actions,
+            ((0,),) * len(actions),
+            seconds,
+            nothing,
+            _covered_by(actions, seconds),
         )
     owners = tuple(action.owners for action in actions)
-    return Choosers(model.robots, model.keeps_idle, actions, owners, seconds, clashes(actions), ((),) * len(actions))
+    return Choosers(
+        model.robots,
+        model.keeps_idle,
+        actions,
+        owners,
+        seconds,
+        clashes(actions),
+        ((),) * len(actions),
+    )
 
 
-def _covered_by(actions: Sequence[GroundAction], seconds: Sequence[int]) -> tuple[tuple[int, ...], ...]:
+def _covered_by(
+    actions: Sequence[GroundAction], seconds: Sequence[int]
+) -> tuple[tuple[int, ...], ...]:
     groups: dict[tuple[str | None, ...], list[int]] = defaultdict(list)
     for number in sorted(range(len(actions)), key=lambda n: (seconds[n], n)):
         groups[actions[number].parts].append(number)
-    return tuple(tuple(groups[action.parts][: groups[action.parts].index(n)]) for n, action in enumerate(actions))
+    return tuple(
+        tuple(groups[action.parts][: groups[action.parts].index(n)])
+        for n, action in enumerate(actions)
+    )
 
 
 def second_cost(model: JointModel, action: GroundAction) -> int:
@@ -63,14 +83,19 @@ def second_cost(model: JointModel, action: GroundAction) -> int:
         return action.cost
     if model.cost == "makespan":
         return 0
-    return sum(part is not None for part in action.parts) if model.is_joint_action else int(not action.does_nothing)
+    return (
+        sum(part is not None for part in action.parts)
+        if model.is_joint_action
+        else int(not action.does_nothing)
+    )
 
 
 def clashes(actions: Sequence[GroundAction]) -> tuple[frozenset[int], ...]:
     """For each action the others that cannot share a joint step with it (design.md, section 4).
 
-    In terms of literals ``(atom, value)``: two actions interfere when one writes the contrary of what the other writes
-    or reads; the latter is forgiven when a positive formula links them.  Besides, a formula may forbid the other.
+    In terms of literals ``(atom, value)``: two actions interfere when one writes the contrary of
+    what the other writes or reads; the latter is forgiven when a positive formula links them.
+    Besides, a formula may forbid the other.
     """
     number = {StepAtom(a.schema, a.args): n for n, a in enumerate(actions)}
     writers, readers = defaultdict(set), defaultdict(set)

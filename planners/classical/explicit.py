@@ -17,7 +17,9 @@ class TooManyError(Exception):
 
 
 def explicit(team: Choosers, model: JointModel, goal: Goal, step_cost: int, limit: int) -> Writer:
-    """One plain action per joint action, or one per case where it has disjunctions or conditional effects."""
+    """One plain action per joint action, or one per case where it has disjunctions or conditional
+    effects.
+    """
     out = Writer(fact_atoms(model))
     for step in _joint_steps(team, limit):
         for known, adds, deletes in _cases_of(team, model, step):
@@ -39,7 +41,9 @@ def explicit(team: Choosers, model: JointModel, goal: Goal, step_cost: int, limi
 
 
 def _joint_steps(team: Choosers, limit: int) -> Iterator[tuple[int, ...]]:
-    """The sets of actions that may share a step as far as owners and interference say; `TooManyError` beyond a limit."""
+    """The sets of actions that may share a step as far as owners and interference say;
+    `TooManyError` beyond a limit.
+    """
     partial: list[tuple[int, ...]] = [()]
     for robot, idle in enumerate(team.may_idle):
         first = [n for n, owners in enumerate(team.owners) if owners[0] == robot]
@@ -59,26 +63,42 @@ def _joint_steps(team: Choosers, limit: int) -> Iterator[tuple[int, ...]]:
 
 
 def _name(team: Choosers, step: Sequence[int]) -> str:
-    """The label tuple: ground actions of joint-action PDDL that do the same with the same labels are one."""
+    """The label tuple: ground actions of joint-action PDDL that do the same with the same labels
+    are one.
+    """
     chosen = {robot: team.actions[n].label for n in step for robot in team.owners[n]}
-    parts = next((team.actions[n].parts for n in step), ()) or [chosen.get(r) for r in range(len(team.choosers))]
+    parts = next((team.actions[n].parts for n in step), ()) or [
+        chosen.get(r) for r in range(len(team.choosers))
+    ]
     return " ".join(part or "idle" for part in parts)
 
 
-def _cases_of(team: Choosers, model: JointModel, step: Sequence[int]) -> Iterator[tuple[Known, set[Atom], set[Atom]]]:
-    """The disjoint cases (what is known, adds, deletes) in which a joint action is applicable, however it turns out."""
+def _cases_of(
+    team: Choosers, model: JointModel, step: Sequence[int]
+) -> Iterator[tuple[Known, set[Atom], set[Atom]]]:
+    """The disjoint cases (what is known, adds, deletes) in which a joint action is applicable,
+    however it turns out.
+    """
     chosen = {StepAtom(team.actions[n].schema, team.actions[n].args) for n in step}
     on_state = state_reader(model)
 
     def value(leaf: Leaf) -> Formula:
         return Truth(leaf in chosen) if isinstance(leaf, StepAtom) else on_state(leaf)
 
-    effects = [effect for n in step for effect in team.actions[n].effects if on_state(effect.atom) != FALSE]
+    effects = [
+        effect for n in step for effect in team.actions[n].effects if on_state(effect.atom) != FALSE
+    ]
     conditions = [put(effect.condition, value) for effect in effects]
     wanted = [put(team.actions[n].precondition, value) for n in step]
-    wanted += [negated(put(team.actions[other].precondition, value)) for n in step for other in team.covered_by[n]]
+    wanted += [
+        negated(put(team.actions[other].precondition, value))
+        for n in step
+        for other in team.covered_by[n]
+    ]
     for known in _split({}, wanted, conditions):
-        fired = [e for e, c in zip(effects, conditions, strict=True) if put(c, _lookup(known)) == TRUE]
+        fired = [
+            e for e, c in zip(effects, conditions, strict=True) if put(c, _lookup(known)) == TRUE
+        ]
         adds = {e.atom for e in fired if e.adds}
         yield known, adds, {e.atom for e in fired if not e.adds} - adds
 
@@ -87,8 +107,12 @@ def _lookup(known: Known) -> Callable[[Leaf], Formula]:
     return lambda leaf: Truth(known[leaf]) if isinstance(leaf, Atom) and leaf in known else leaf
 
 
-def _split(known: Known, formulas: Sequence[Formula], conditions: Sequence[Formula]) -> Iterator[dict[Atom, bool]]:
-    """Disjoint conjunctions of literals that together say ``formulas`` and each decide all ``conditions``."""
+def _split(
+    known: Known, formulas: Sequence[Formula], conditions: Sequence[Formula]
+) -> Iterator[dict[Atom, bool]]:
+    """Disjoint conjunctions of literals that together say ``formulas`` and each decide all
+    ``conditions``.
+    """
     found = literals_of(joined(And, (put(f, _lookup(known)) for f in formulas)))
     if found is None:
         return
@@ -97,7 +121,9 @@ def _split(known: Known, formulas: Sequence[Formula], conditions: Sequence[Formu
     if literals and rest:
         yield from _split(known, rest, conditions)
         return
-    open_formulas = rest or [c for c in (put(c, _lookup(known)) for c in conditions) if not isinstance(c, Truth)]
+    open_formulas = rest or [
+        c for c in (put(c, _lookup(known)) for c in conditions) if not isinstance(c, Truth)
+    ]
     if not open_formulas:
         yield dict(known)
         return

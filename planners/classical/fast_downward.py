@@ -1,7 +1,8 @@
-"""The independent cross-check: the optimal cost of a task by Fast Downward, through unified-planning.
+"""The independent cross-check: the optimal cost of a task by Fast Downward, through
+unified-planning.
 
-unified-planning runs in a child process of its own group and in a directory of its own, so that nothing of it is left
-behind, whatever happens: no file, no output, no process.
+unified-planning runs in a child process of its own group and in a directory of its own, so that
+nothing of it is left behind, whatever happens: no file, no output, no process.
 """
 
 from __future__ import annotations
@@ -31,21 +32,28 @@ _GREATEST = 2**31 - 1
 _TAIL = 1500
 #: numpy, which unified-planning imports, would reserve memory for a thread per processor.
 _ENVIRONMENT = {"PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-#: How Python, the loader and numpy say that a limit of the calling process leaves them too little memory.
-_NO_MEMORY = re.compile("MemoryError|out of memory|allocat|failed to map|start new thread", re.IGNORECASE)
+#: How Python, the loader and numpy say that a limit of the calling process leaves them too little
+#: memory.
+_NO_MEMORY = re.compile(
+    "MemoryError|out of memory|allocat|failed to map|start new thread", re.IGNORECASE
+)
 
 
 class FastDownwardFailed(CoordlangError):
-    """Fast Downward gave no answer: the cost that was to be checked is neither confirmed nor refuted."""
+    """Fast Downward gave no answer: the cost that was to be checked is neither confirmed nor
+    refuted.
+    """
 
     exit_code = 3
 
 
 @dataclass(frozen=True, slots=True)
 class FastDownwardAnswer:
-    """What Fast Downward says of a task: its optimal cost (makespan, second component), None if it is unsolvable.
+    """What Fast Downward says of a task: its optimal cost (makespan, second component), None if it
+    is unsolvable.
 
-    ``actions`` is the number of plain actions that it got, in the form ``form``; ``seconds`` are wall time.
+    ``actions`` is the number of plain actions that it got, in the form ``form``; ``seconds`` are
+    wall time.
     """
 
     cost: tuple[int, int] | None
@@ -67,7 +75,8 @@ def optimal_cost(
     Parameters
     ----------
     time_limit, memory_limit
-        Seconds of wall time for all of it; bytes of address space for Fast Downward's translator and its search.
+        Seconds of wall time for all of it; bytes of address space for Fast Downward's translator
+        and its search.
     limit
         See `planners.classical.compile_plain`.
 
@@ -86,13 +95,20 @@ def optimal_cost(
         total = _solve(plain, left, time_limit, memory_limit)
         cost = None if total is None else plain.cost(total)
         if total is None or cost is not None:
-            return FastDownwardAnswer(cost, plain.form, len(plain.actions), time.monotonic() - start)
-        # No optimal plan has more steps than this one seems to have, so the second round is the last.
+            return FastDownwardAnswer(
+                cost, plain.form, len(plain.actions), time.monotonic() - start
+            )
+        # No optimal plan has more steps than this one seems to have, so the second round is the
+        # last.
         longest = total // plain.step_cost
 
 
-def total_cost(plain: PlainTask, *, time_limit: float | None = None, memory_limit: int | None = None) -> int | None:
-    """The total cost of an optimal plan of a plain task by Fast Downward, None if there is none; see `optimal_cost`."""
+def total_cost(
+    plain: PlainTask, *, time_limit: float | None = None, memory_limit: int | None = None
+) -> int | None:
+    """The total cost of an optimal plan of a plain task by Fast Downward, None if there is none;
+    see `optimal_cost`.
+    """
     return _solve(plain, time_limit, time_limit, memory_limit)
 
 
@@ -109,7 +125,9 @@ def as_json(plain: PlainTask, memory_limit: int | None) -> str:
     )
 
 
-def _solve(plain: PlainTask, left: float | None, time_limit: float | None, memory_limit: int | None) -> int | None:
+def _solve(
+    plain: PlainTask, left: float | None, time_limit: float | None, memory_limit: int | None
+) -> int | None:
     """The cost of an optimal plan of a plain task, None if there is no plan."""
     with tempfile.TemporaryDirectory(prefix="coordlang-") as name:
         directory = Path(name)
@@ -118,7 +136,8 @@ def _solve(plain: PlainTask, left: float | None, time_limit: float | None, memor
             code = _run(directory, left)
         except subprocess.TimeoutExpired:
             raise OutOfTime(
-                f"Fast Downward found no answer in {time_limit:g} s", remedy="Use a larger --time-limit."
+                f"Fast Downward found no answer in {time_limit:g} s",
+                remedy="Use a larger --time-limit.",
             ) from None
         result = directory / "result.json"
         if not result.exists():
@@ -131,8 +150,10 @@ def _solve(plain: PlainTask, left: float | None, time_limit: float | None, memor
         case "solved":
             total = int(answer["total"])
             if total + plain.step_cost > _GREATEST:
-                raise FastDownwardFailed(f"a cost of {total} is too large for Fast Downward's 32-bit integers",
-                                         remedy="Check with --cost makespan.")  # fmt: skip
+                raise FastDownwardFailed(
+                    f"a cost of {total} is too large for Fast Downward's 32-bit integers",
+                    remedy="Check with --cost makespan.",
+                )
             return total
         case "unsolvable":
             return None
@@ -142,16 +163,25 @@ def _solve(plain: PlainTask, left: float | None, time_limit: float | None, memor
 
 
 def _run(directory: Path, left: float | None) -> int:
-    """Run the worker in a directory; its exit code.  However this ends, the worker and its children are gone."""
+    """Run the worker in a directory; its exit code.  However this ends, the worker and its children
+    are gone.
+    """
     home = str(Path(__file__).resolve().parents[2])
     path = os.pathsep.join(p for p in (home, os.environ.get("PYTHONPATH")) if p)
     process = None
     with (directory / "stderr").open("wb") as errors:
         try:
             process = subprocess.Popen(
-                [sys.executable, "-m", "planners.classical.fast_downward_worker", "task.json", "result.json"],
+                [
+                    sys.executable,
+                    "-m",
+                    "planners.classical.fast_downward_worker",
+                    "task.json",
+                    "result.json",
+                ],
                 cwd=directory,
-                # What the worker's libraries put into a temporary directory goes away with this one.
+                # What the worker's libraries put into a temporary directory goes away with this
+                # one.
                 env={**os.environ, **_ENVIRONMENT, "PYTHONPATH": path, "TMPDIR": str(directory)},
                 stdin=subprocess.PIPE,  # ends when we do, even by a signal: then the worker ends its group
                 stdout=subprocess.DEVNULL,
@@ -175,7 +205,8 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 def _crash(what: str, said: str) -> CoordlangError:
     """The error for a process that gave no answer, with the end of what it said."""
-    # A limit of this process holds for all below it, and libraries crash in many ways when they meet it.
+    # A limit of this process holds for all below it, and libraries crash in many ways when they
+    # meet it.
     limited = resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
     if limited or _NO_MEMORY.search(said):
         return _out_of_memory()
@@ -183,4 +214,6 @@ def _crash(what: str, said: str) -> CoordlangError:
 
 
 def _out_of_memory() -> OutOfMemory:
-    return OutOfMemory("Fast Downward needs more memory than it may use", remedy="Use a larger --memory-limit.")
+    return OutOfMemory(
+        "Fast Downward needs more memory than it may use", remedy="Use a larger --memory-limit."
+    )

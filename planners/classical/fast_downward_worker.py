@@ -1,7 +1,9 @@
-"""The child process of `planners.classical.fast_downward`: one plain task solved by Fast Downward through unified-planning.
+"""The child process of `planners.classical.fast_downward`: one plain task solved by Fast Downward
+through unified-planning.
 
-``python -m planners.classical.fast_downward_worker TASK RESULT`` reads the task (JSON, see `planners.classical.fast_downward.as_json`) and
-writes one JSON object: ``{"status": .., "total": cost of the plan or null, "log": the end of what Fast Downward said}``.
+``python -m planners.classical.fast_downward_worker TASK RESULT`` reads the task (JSON, see
+`planners.classical.fast_downward.as_json`) and writes one JSON object: ``{"status": .., "total":
+cost of the plan or null, "log": the end of what Fast Downward said}``.
 """
 
 from __future__ import annotations
@@ -17,15 +19,17 @@ from typing import Any
 
 from planners.limits import limit_memory
 
-#: The exit codes with which Fast Downward's translator and search say that they proved it.  unified-planning takes
-#: other codes for a proof too, 1 among them, with which the driver ends when Python cannot even start.
+#: The exit codes with which Fast Downward's translator and search say that they proved it.
+#: unified-planning takes other codes for a proof too, 1 among them, with which the driver ends when
+#: Python cannot even start.
 _UNSOLVABLE = (10, 11)
 
 
 class _FastDownward(subprocess.Popen[bytes]):
     """Fast Downward with a memory limit, and in our process group.
 
-    unified-planning would give it a session of its own, and then nobody could end it together with us.
+    unified-planning would give it a session of its own, and then nobody could end it together with
+    us.
     """
 
     memory_limit: int | None = None
@@ -63,8 +67,9 @@ def solve(task: dict[str, Any]) -> dict[str, Any]:
     subprocess.Popen = _FastDownward  # type: ignore[assignment, misc]
     problem, costs = build(task)
     with OneshotPlanner(name="fast-downward-opt") as planner:
-        # A search for invariants among facts without arguments takes seconds and gains nothing: 0.05 s without it
-        # where it took 7 s.  The engine that promises optimality has no parameter for it.
+        # A search for invariants among facts without arguments takes seconds and gains nothing:
+        # 0.05 s without it where it took 7 s.  The engine that promises optimality has no parameter
+        # for it.
         planner._fd_translate_options = ["--invariant-generation-max-time", "0"]
         answer = planner.solve(problem)
     log = "".join(message.message for message in answer.log_messages or ())
@@ -75,7 +80,11 @@ def solve(task: dict[str, Any]) -> dict[str, Any]:
         outcome = "unsolvable"
     else:
         outcome = "memory" if answer.status == Status.MEMOUT else f"ended with exit code {code}"
-    total = sum(costs[step.action.name] for step in answer.plan.actions) if outcome == "solved" else None
+    total = (
+        sum(costs[step.action.name] for step in answer.plan.actions)
+        if outcome == "solved"
+        else None
+    )
     return {"status": outcome, "total": total, "log": log[-2000:]}
 
 

@@ -27,7 +27,9 @@ def conjuncts(formula: Formula) -> tuple[Formula, ...]:
 
 
 def put(formula: Formula, value: Callable[[Leaf], Formula]) -> Formula:
-    """A formula with its leaves replaced, truth values simplified away, conjunctions in conjunctions flattened."""
+    """A formula with its leaves replaced, truth values simplified away, conjunctions in
+    conjunctions flattened.
+    """
     match formula:
         case Atom() | StepAtom():
             return value(formula)
@@ -68,12 +70,16 @@ def negated(formula: Formula) -> Formula:
 
 
 def literals_of(formula: Formula) -> tuple[dict[Atom, bool], list[Formula]] | None:
-    """The literals that a formula demands and its other conjuncts, or None if it contradicts itself at once."""
+    """The literals that a formula demands and its other conjuncts, or None if it contradicts itself
+    at once.
+    """
     known: dict[Atom, bool] = {}
     rest: list[Formula] = []
     for part in conjuncts(formula):
         atom, positive = (part.part, False) if isinstance(part, Not) else (part, True)
-        if part == FALSE or (isinstance(atom, Atom) and known.setdefault(atom, positive) != positive):
+        if part == FALSE or (
+            isinstance(atom, Atom) and known.setdefault(atom, positive) != positive
+        ):
             return None
         if part != TRUE and not isinstance(atom, Atom):
             rest.append(part)

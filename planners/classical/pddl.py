@@ -12,7 +12,8 @@ from planners.classical.task import Condition, PlainTask
 def to_pddl(plain: PlainTask) -> tuple[str, str]:
     """Domain and problem text of a plain task: STRIPS with negative preconditions and action costs.
 
-    Facts become predicates without arguments; a comment keeps what each predicate and action stands for.
+    Facts become predicates without arguments; a comment keeps what each predicate and action stands
+    for.
     """
     facts = _safe_names(plain.facts)
     actions = action_names(plain)
@@ -26,7 +27,9 @@ def to_pddl(plain: PlainTask) -> tuple[str, str]:
         "  (:functions (total-cost) - number)",
     ]
     for safe, action in zip(actions, plain.actions, strict=True):
-        changes = [f"({facts[n]})" for n in action.adds] + [f"(not ({facts[n]}))" for n in action.deletes]
+        changes = [f"({facts[n]})" for n in action.adds] + [
+            f"(not ({facts[n]}))" for n in action.deletes
+        ]
         domain += [
             f"  ; {action.name}",
             f"  (:action {safe}",
@@ -58,7 +61,9 @@ def _all_of(names: Sequence[str], conditions: Iterable[Condition]) -> str:
 
 
 def _safe_names(texts: Iterable[str]) -> list[str]:
-    """For each text a PDDL name of its own: letters, digits, ``-`` and ``_``, beginning with a letter."""
+    """For each text a PDDL name of its own: letters, digits, ``-`` and ``_``, beginning with a
+    letter.
+    """
     taken: dict[str, int] = defaultdict(int)
     used: set[str] = set()
     names = []
@@ -75,4 +80,6 @@ def _safe_names(texts: Iterable[str]) -> list[str]:
 
 
 #: Names that are words of PDDL itself.
-_RESERVED = frozenset(["and", "or", "not", "imply", "forall", "exists", "when", "either", "object", "total-cost"])
+_RESERVED = frozenset(
+    ["and", "or", "not", "imply", "forall", "exists", "when", "either", "object", "total-cost"]
+)

@@ -12,7 +12,9 @@ from planners.pddl.lifted import FALSE, TRUE, And, Atom, Formula, Not, Or, StepA
 
 
 def select_then_apply(team: Choosers, model: JointModel, goal: Goal, step_cost: int) -> Writer:
-    """Stages of a step: all choose; all check; all undo (rarely); all apply.  Robots without work skip a stage."""
+    """Stages of a step: all choose; all check; all undo (rarely); all apply.  Robots without work
+    skip a stage.
+    """
     out = Writer(fact_atoms(model))
     value = _of_choices(team, model)
     choices = [_Choice(team, n, value) for n in range(len(team.actions))]
@@ -44,7 +46,11 @@ def select_then_apply(team: Choosers, model: JointModel, goal: Goal, step_cost: 
 
 
 def _carry_out(
-    out: Writer, team: Choosers, choice: _Choice, robot: int, stage: Mapping[tuple[str, int], tuple[Atom, Atom]]
+    out: Writer,
+    team: Choosers,
+    choice: _Choice,
+    robot: int,
+    stage: Mapping[tuple[str, int], tuple[Atom, Atom]],
 ) -> None:
     """Check, undo and apply of a chosen subaction; of a shared one the first owner does all."""
     here, after = stage["apply", robot]
@@ -60,10 +66,12 @@ def _carry_out(
 
 
 class _Choice:
-    """A subaction of its first owner: what is read when it is chosen, checked afterwards, and done at last.
+    """A subaction of its first owner: what is read when it is chosen, checked afterwards, and done
+    at last.
 
-    ``literals`` is None if they contradict each other.  ``groups`` are its conditional effects by condition.  ``early``
-    are the atoms that it may both delete and conditionally add: their deletes come before all adds of the step.
+    ``literals`` is None if they contradict each other.  ``groups`` are its conditional effects by
+    condition.  ``early`` are the atoms that it may both delete and conditionally add: their deletes
+    come before all adds of the step.
     """
 
     def __init__(self, team: Choosers, number: int, value: Callable[[Leaf], Formula]) -> None:
@@ -76,7 +84,10 @@ class _Choice:
             if isinstance(part, Not) and isinstance(part.part, StepAtom):
                 continue  # among the clashes
             (later if isinstance(part, And | Or | StepAtom) else now).append(put(part, value))
-        later += [negated(put(team.actions[other].precondition, value)) for other in team.covered_by[number]]
+        later += [
+            negated(put(team.actions[other].precondition, value))
+            for other in team.covered_by[number]
+        ]
         found = literals_of(joined(And, now))
         self.literals = None if found is None else found[0]
         self.checks = joined(And, later)
@@ -100,7 +111,9 @@ class _Choice:
 
 
 def _of_choices(team: Choosers, model: JointModel) -> Callable[[Leaf], Formula]:
-    """The meaning of leaves on the plain facts: that a subaction is done means that its first owner has chosen it."""
+    """The meaning of leaves on the plain facts: that a subaction is done means that its first owner
+    has chosen it.
+    """
     on_state = state_reader(model)
     who = {
         StepAtom(action.schema, action.args): _chosen(team, owners[0], action.label)
@@ -118,10 +131,17 @@ def _simple(team: Choosers, robot: int, kind: str) -> Atom:
 
 
 def _choose(
-    out: Writer, team: Choosers, choice: _Choice | None, robot: int, stage: tuple[Atom, Atom], step_cost: int,
+    out: Writer,
+    team: Choosers,
+    choice: _Choice | None,
+    robot: int,
+    stage: tuple[Atom, Atom],
+    step_cost: int,
     kinds: Sequence[str],
-) -> None:  # fmt: skip
-    """One robot's choosing of a subaction (or of idling), unless an earlier robot's choice forbids it."""
+) -> None:
+    """One robot's choosing of a subaction (or of idling), unless an earlier robot's choice forbids
+    it.
+    """
     here, after = stage
     label = choice.label if choice else "idle"
     known = {here: True}
@@ -143,7 +163,11 @@ def _choose(
         known[choice.chosen] = True
         deletes.add(_calls(team, first, robot))
     for kind in kinds:
-        if not choice or robot != first or not (choice.has_checks if kind == "check" else choice.early):
+        if (
+            not choice
+            or robot != first
+            or not (choice.has_checks if kind == "check" else choice.early)
+        ):
             adds.add(_simple(team, robot, kind))
     out.action(f"choose {team.choosers[robot]} {label}", known, adds, deletes, cost)
 
@@ -166,7 +190,15 @@ def _check(out: Writer, choice: _Choice, here: Atom, after: Atom) -> None:
         here = end
     for k, (condition, _) in enumerate(choice.groups):
         end = after if k + 1 == len(choice.groups) else out.place()
-        out.route(f"{name} fires {k} or not", condition, here, end, known, (choice.fires(k),), otherwise=end)
+        out.route(
+            f"{name} fires {k} or not",
+            condition,
+            here,
+            end,
+            known,
+            (choice.fires(k),),
+            otherwise=end,
+        )
         here = end
 
 
@@ -188,7 +220,9 @@ def _perform(out: Writer, choice: _Choice, here: Atom, after: Atom, *, early: bo
         adds, deletes = part(*effects)
         fires = choice.fires(k)
         done = set() if early else {fires}
-        out.action(f"{name} fired {k}", {here: True, fires: True}, adds | {end}, deletes | done | {here})
+        out.action(
+            f"{name} fired {k}", {here: True, fires: True}, adds | {end}, deletes | done | {here}
+        )
         out.action(f"{name} not fired {k}", {here: True, fires: False}, {end}, {here})
 
 

@@ -19,7 +19,9 @@ LONGEST = 100
 
 @dataclass(frozen=True, slots=True)
 class PlainAction:
-    """A ground STRIPS action with negative preconditions; facts by number, ``adds`` and ``deletes`` are disjoint."""
+    """A ground STRIPS action with negative preconditions; facts by number, ``adds`` and ``deletes``
+    are disjoint.
+    """
 
     name: str
     preconditions: tuple[Condition, ...]
@@ -32,8 +34,9 @@ class PlainAction:
 class PlainTask:
     """A ground planning task.
 
-    ``facts`` are texts; facts of the model are its PDDL atoms.  A plan of total cost ``step_cost * m + s`` stands for
-    a joint plan of makespan ``m`` and second cost ``s``; ``dearest`` is the most that one joint step adds to ``s``.
+    ``facts`` are texts; facts of the model are its PDDL atoms.  A plan of total cost ``step_cost *
+    m + s`` stands for a joint plan of makespan ``m`` and second cost ``s``; ``dearest`` is the most
+    that one joint step adds to ``s``.
     """
 
     name: str
@@ -46,10 +49,12 @@ class PlainTask:
     dearest: int
 
     def cost(self, total: int) -> tuple[int, int] | None:
-        """An optimal total cost as (makespan, second cost); None if ``step_cost`` is too small to be sure.
+        """An optimal total cost as (makespan, second cost); None if ``step_cost`` is too small to
+        be sure.
 
-        A plan of ``k`` steps costs from ``step_cost * k`` to ``(step_cost + dearest) * k``, which is less than
-        ``step_cost * m`` for every ``k < m`` when ``step_cost > dearest * m``: then no plan has fewer than ``m`` steps.
+        A plan of ``k`` steps costs from ``step_cost * k`` to ``(step_cost + dearest) * k``, which
+        is less than ``step_cost * m`` for every ``k < m`` when ``step_cost > dearest * m``: then no
+        plan has fewer than ``m`` steps.
         """
         makespan, second = divmod(total, self.step_cost)
         return (makespan, second) if self.step_cost > self.dearest * makespan else None

@@ -27,11 +27,15 @@ class Writer:
     def conditions(self, known: Known) -> tuple[Condition, ...]:
         return tuple(sorted((self.fact(atom), value) for atom, value in known.items()))
 
-    def action(self, name: str, known: Known, adds: Iterable[Atom], deletes: Iterable[Atom], cost: int = 0) -> None:
+    def action(
+        self, name: str, known: Known, adds: Iterable[Atom], deletes: Iterable[Atom], cost: int = 0
+    ) -> None:
         """An action; an atom that it both adds and deletes is added."""
         plus = {self.fact(atom) for atom in adds}
         minus = {self.fact(atom) for atom in deletes} - plus
-        new = PlainAction(name, self.conditions(known), tuple(sorted(plus)), tuple(sorted(minus)), cost)
+        new = PlainAction(
+            name, self.conditions(known), tuple(sorted(plus)), tuple(sorted(minus)), cost
+        )
         if new not in self._seen:
             self._seen.add(new)
             self.actions.append(new)
@@ -51,20 +55,26 @@ class Writer:
         gain: tuple[Atom, ...] = (),
         otherwise: Atom | None = None,
     ) -> None:
-        """Zero-cost actions that lead from ``start`` to ``end`` (and add ``gain``) exactly if ``formula`` holds.
+        """Zero-cost actions that lead from ``start`` to ``end`` (and add ``gain``) exactly if
+        ``formula`` holds.
 
-        With ``otherwise`` they lead there if it does not hold.  Formulas are evaluated from left to right, as in a
-        programming language, so that there is one way in every state, and the size is linear.
+        With ``otherwise`` they lead there if it does not hold.  Formulas are evaluated from left to
+        right, as in a programming language, so that there is one way in every state, and the size
+        is linear.
         """
         if isinstance(formula, And | Or) and formula.parts:
             if isinstance(formula, And) and otherwise is None:
                 self._route_conjunction(name, formula, start, end, known, gain)
                 return
             here = start
-            for left, part in zip(range(len(formula.parts) - 1, -1, -1), formula.parts, strict=True):
+            for left, part in zip(
+                range(len(formula.parts) - 1, -1, -1), formula.parts, strict=True
+            ):
                 after = self.place() if left else None
                 if isinstance(formula, And):
-                    self.route(name, part, here, after or end, known, () if left else gain, otherwise)
+                    self.route(
+                        name, part, here, after or end, known, () if left else gain, otherwise
+                    )
                 else:
                     self.route(name, part, here, end, known, gain, after or otherwise)
                 here = after or here
@@ -78,27 +88,38 @@ class Writer:
     ) -> None:
         """Of what must hold all literals are tested at once."""
         found = literals_of(formula)
-        if found is None or any(known.get(atom, value) != value for atom, value in found[0].items()):
+        if found is None or any(
+            known.get(atom, value) != value for atom, value in found[0].items()
+        ):
             return
         literals, forks = found
         here = start
         if literals or not forks:
             here = self.place() if forks else end
-            self.action(name, {**known, **literals, start: True}, (here, *(() if forks else gain)), (start,))
+            self.action(
+                name, {**known, **literals, start: True}, (here, *(() if forks else gain)), (start,)
+            )
         for left, fork in zip(range(len(forks) - 1, -1, -1), forks, strict=True):
             after = self.place() if left else end
             self.route(name, fork, here, after, known, () if left else gain)
             here = after
 
-    def _test(self, name: str, literal: Formula, start: Atom, gain: tuple[Atom, ...], known: Known) -> None:
+    def _test(
+        self, name: str, literal: Formula, start: Atom, gain: tuple[Atom, ...], known: Known
+    ) -> None:
         """An action that is possible exactly if a literal (or truth value) holds."""
         found = literals_of(literal)
-        if found is None or any(known.get(atom, value) != value for atom, value in found[0].items()):
+        if found is None or any(
+            known.get(atom, value) != value for atom, value in found[0].items()
+        ):
             return
         self.action(name, {**known, **found[0], start: True}, gain, (start,))
 
+
 def own_fact(kind: str, *args: str) -> Atom:
-    """A fact of the compilation: its predicate contains a space, so that no name of the user's can be the same."""
+    """A fact of the compilation: its predicate contains a space, so that no name of the user's can
+    be the same.
+    """
     assert " " in kind
     return Atom(kind, args)
 

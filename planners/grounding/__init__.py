@@ -1,5 +1,14 @@
-"""Lifted actions -> ground actions: Tarski finds the reachable arguments, we evaluate the rest exactly."""
+"""Lifted actions -> ground actions: Tarski finds the reachable arguments, we evaluate the rest
+exactly.
+"""
 
-from planners.grounding.instantiate import FEWER, GroundAction, GroundEffect, ground_actions, ground_goal, label
+from planners.grounding.instantiate import (
+    FEWER,
+    GroundAction,
+    GroundEffect,
+    ground_actions,
+    ground_goal,
+    label,
+)
 
 __all__ = ["FEWER", "GroundAction", "GroundEffect", "ground_actions", "ground_goal", "label"]

@@ -1,4 +1,6 @@
-"""Ground actions: arguments put in, static atoms, equalities and types evaluated, the rest in negation normal form."""
+"""Ground actions: arguments put in, static atoms, equalities and types evaluated, the rest in
+negation normal form.
+"""
 
 from __future__ import annotations
 
@@ -49,10 +51,11 @@ class GroundEffect:
 class GroundAction:
     """A ground action in negation normal form over fluent atoms and step atoms.
 
-    ``owners`` are the indices of the robots that choose it together; for joint-action PDDL they are all robots and
-    ``parts`` holds each robot's own label (None: idle).  ``cost`` is the PDDL action cost.  ``does_nothing`` says that
-    the action is as good as idling: it has no effect, no cost that is counted, and no formula or network names it.
-    ``links`` are the actions that a concurrency network joins it with: they are meant to be done together.
+    ``owners`` are the indices of the robots that choose it together; for joint-action PDDL they are
+    all robots and ``parts`` holds each robot's own label (None: idle).  ``cost`` is the PDDL action
+    cost.  ``does_nothing`` says that the action is as good as idling: it has no effect, no cost
+    that is counted, and no formula or network names it. ``links`` are the actions that a
+    concurrency network joins it with: they are meant to be done together.
     """
 
     schema: str
@@ -78,7 +81,8 @@ def label(name: str, args: Iterable[str]) -> str:
 def ground_actions(
     domain: Domain, problem: Problem, team: Team, *, also: Iterable[Atom] = (), costs: bool = False
 ) -> tuple[GroundAction, ...]:
-    """All ground actions that may ever be applied, sorted by schema (in domain order) and arguments.
+    """All ground actions that may ever be applied, sorted by schema (in domain order) and
+    arguments.
 
     Parameters
     ----------
@@ -95,10 +99,14 @@ def ground_actions(
     grounder = _Grounder(domain, problem, team)
     world = f"{len(domain.schemas):,} action schemas over {len(problem.objects):,} objects"
     with reaching(lambda: f"looking for the applicable instances of {world}", FEWER):
-        reachable = reachable_arguments(domain, problem.objects, sorted({*problem.init, *also}, key=str))
+        reachable = reachable_arguments(
+            domain, problem.objects, sorted({*problem.init, *also}, key=str)
+        )
     total = sum(map(len, reachable.values()))
     actions: list[GroundAction] = []
-    with reaching(lambda: f"{len(actions):,} of at most {total:,} ground actions, of {world}", FEWER):
+    with reaching(
+        lambda: f"{len(actions):,} of at most {total:,} ground actions, of {world}", FEWER
+    ):
         for schema in domain.schemas:
             for args in reachable[schema.name]:
                 action = grounder.action(schema, args, costs)
@@ -127,7 +135,9 @@ class _Grounder:
         for fact in self._statics:
             for position, arg in enumerate(fact.args):
                 self._facts.setdefault((fact.predicate, position, arg), []).append(fact.args)
-        self._guards: dict[int, tuple[Formula, tuple[Atom, ...]]] = {}  # by identity; the formula stays alive here
+        self._guards: dict[
+            int, tuple[Formula, tuple[Atom, ...]]
+        ] = {}  # by identity; the formula stays alive here
         self._atoms: dict[tuple[str, tuple[str, ...]], Atom] = {}
 
     def action(self, schema: Schema, args: tuple[str, ...], costs: bool) -> GroundAction | None:
@@ -158,10 +168,13 @@ class _Grounder:
             does_nothing=not effects and schema.name not in self._named and not (costs and cost),
         )
 
-    def formula(self, f: Formula, binding: Binding, positive: bool, acting: tuple[int, ...] = ()) -> Formula:
+    def formula(
+        self, f: Formula, binding: Binding, positive: bool, acting: tuple[int, ...] = ()
+    ) -> Formula:
         """``f`` (negated unless ``positive``) with arguments put in.
 
-        ``acting`` are the robots whose precondition this is: a negative step atom never speaks of them.
+        ``acting`` are the robots whose precondition this is: a negative step atom never speaks of
+        them.
         """
         match f:
             case Truth(value):
@@ -175,7 +188,9 @@ class _Grounder:
                 same = binding.get(left, left) == binding.get(right, right)
                 return TRUE if same == positive else FALSE
             case StepAtom(action, args):
-                return self._step_atom(action, tuple(binding.get(a, a) for a in args), positive, acting)
+                return self._step_atom(
+                    action, tuple(binding.get(a, a) for a in args), positive, acting
+                )
             case Not(part):
                 return self.formula(part, binding, not positive, acting)
             case And(parts) | Or(parts):
@@ -184,12 +199,15 @@ class _Grounder:
             case Forall(variables, part) | Exists(variables, part):
                 guards = self._guards_of(f)
                 ground = (
-                    self.formula(part, inner, positive, acting) for inner in self._bindings(variables, binding, guards)
+                    self.formula(part, inner, positive, acting)
+                    for inner in self._bindings(variables, binding, guards)
                 )
                 return _join(ground, conjunction=isinstance(f, Forall) == positive)
         raise AssertionError(f)
 
-    def _step_atom(self, action: str, args: tuple[str, ...], positive: bool, acting: tuple[int, ...]) -> Formula:
+    def _step_atom(
+        self, action: str, args: tuple[str, ...], positive: bool, acting: tuple[int, ...]
+    ) -> Formula:
         schema = self._schemas[action]
         if self._domain.is_joint_action:
             raise BadInput(
@@ -221,8 +239,9 @@ class _Grounder:
         return atom
 
     def _guards_of(self, f: Forall | Exists) -> tuple[Atom, ...]:
-        """Static atoms without which an instance of the quantified part is no matter: false under ``exists``, true under
-        ``forall``."""
+        """Static atoms without which an instance of the quantified part is no matter: false under
+        ``exists``, true under ``forall``.
+        """
         if id(f) not in self._guards:
             part = f.part if isinstance(f, Exists) else _negated(f.part)
             self._guards[id(f)] = f, self._static_atoms(part)
@@ -240,9 +259,11 @@ class _Grounder:
     def _bindings(
         self, variables: tuple[Variable, ...], binding: Binding, guards: tuple[Atom, ...] = ()
     ) -> Iterator[Binding]:
-        """Values for the variables, in the order of the objects; without such as make one of the guards false.
+        """Values for the variables, in the order of the objects; without such as make one of the
+        guards false.
 
-        The first guard that leaves the fewest facts is looked up; the others are left to the formula.
+        The first guard that leaves the fewest facts is looked up; the others are left to the
+        formula.
         """
         if not variables:
             yield binding
@@ -250,7 +271,9 @@ class _Grounder:
         names = [v.name for v in variables]
         members = [self._objects(v.types) for v in variables]
         outer = {name: value for name, value in binding.items() if name not in names}
-        known = [one for guard in guards if (one := self._facts_of(guard, outer, names)) is not None]
+        known = [
+            one for guard in guards if (one := self._facts_of(guard, outer, names)) is not None
+        ]
         rows: Iterable[tuple[str, ...]] = product(*members)
         if known:
             rows = self._unified(*min(known, key=lambda one: len(one[1])), outer, names, members)
@@ -260,7 +283,9 @@ class _Grounder:
     def _facts_of(
         self, guard: Atom, outer: Binding, names: Sequence[str]
     ) -> tuple[Atom, list[tuple[str, ...]]] | None:
-        """A guard with the facts that may match it, if an argument is known by which to look them up."""
+        """A guard with the facts that may match it, if an argument is known by which to look them
+        up.
+        """
         known = [(n, outer.get(arg, arg)) for n, arg in enumerate(guard.args) if arg not in names]
         lists = [self._facts.get((guard.predicate, n, value), []) for n, value in known]
         return (guard, min(lists, key=len)) if lists else None
@@ -284,10 +309,19 @@ class _Grounder:
                 if wanted != value:
                     break
             else:
-                options = [(values[n],) if n in values else tuple(own) for n, own in zip(names, members, strict=True)]
+                options = [
+                    (values[n],) if n in values else tuple(own)
+                    for n, own in zip(names, members, strict=True)
+                ]
                 rows.update(product(*options))
-        typed = (row for row in rows if all(value in own for value, own in zip(row, members, strict=True)))
-        return sorted(typed, key=lambda row: [own[value] for value, own in zip(row, members, strict=True)])
+        typed = (
+            row
+            for row in rows
+            if all(value in own for value, own in zip(row, members, strict=True))
+        )
+        return sorted(
+            typed, key=lambda row: [own[value] for value, own in zip(row, members, strict=True)]
+        )
 
     def _objects(self, types: tuple[str, ...]) -> dict[str, int]:
         """The objects of some types, numbered in their order."""

@@ -1,4 +1,6 @@
-"""Concurrency networks -> formulas about the joint step, in the preconditions of the ground actions they bind."""
+"""Concurrency networks -> formulas about the joint step, in the preconditions of the ground actions
+they bind.
+"""
 
 from __future__ import annotations
 
@@ -15,11 +17,14 @@ from planners.pddl.robots import objects_of
 _Groups = dict[tuple[str, tuple[str, ...]], list[GroundAction]]
 
 
-def apply_network(domain: Domain, problem: Problem, actions: Sequence[GroundAction]) -> tuple[GroundAction, ...]:
+def apply_network(
+    domain: Domain, problem: Problem, actions: Sequence[GroundAction]
+) -> tuple[GroundAction, ...]:
     """The same actions with the network's constraints as conjuncts of their preconditions.
 
-    At least ``low``: some ``low - 1`` others of the group, of different robots.  At most ``high``: not any ``high`` others.
-    (v, w) dependent: whoever is in w needs somebody in v with the same binding, who may be itself.
+    At least ``low``: some ``low - 1`` others of the group, of different robots.  At most ``high``:
+    not any ``high`` others. (v, w) dependent: whoever is in w needs somebody in v with the same
+    binding, who may be itself.
     """
     if not domain.constraints:
         return tuple(actions)
@@ -34,19 +39,24 @@ def apply_network(domain: Domain, problem: Problem, actions: Sequence[GroundActi
                 groups.setdefault((constraint.name, binding), []).append(action)
                 keys.setdefault(action, []).append((constraint.name, binding))
     return tuple(
-        _bound(domain, by_name, groups, action, keys[action]) if action in keys else action for action in actions
+        _bound(domain, by_name, groups, action, keys[action]) if action in keys else action
+        for action in actions
     )
 
 
 def _check_types(domain: Domain, problem: Problem, constraint: Constraint) -> None:
-    """Raise `BadInput` for a position whose type excludes the parameter's: the constraint would never match."""
+    """Raise `BadInput` for a position whose type excludes the parameter's: the constraint would
+    never match.
+    """
     schemas = {schema.name: schema for schema in domain.schemas}
     types = {"object", *domain.types}
     for (name, positions), offset in zip(constraint.actions, constraint.offsets, strict=True):
         for parameter, position in zip(constraint.parameters, positions, strict=True):
             argument = schemas[name].parameters[position]
             asked = {*parameter.types}, {*argument.types}
-            common = any(all("object" in a or a & domain.supertypes(t) for a in asked) for t in types)
+            common = any(
+                all("object" in a or a & domain.supertypes(t) for a in asked) for t in types
+            )
             if common or set(objects_of(domain, problem, parameter.types)) & {
                 *objects_of(domain, problem, argument.types)
             }:  # an object of two types

@@ -1,8 +1,10 @@
-"""The arguments with which each action can ever be applied, by Tarski's reachability program (clingo).
+"""The arguments with which each action can ever be applied, by Tarski's reachability program
+(clingo).
 
-Tarski gets a relaxed core of the domain: one sort, types as static predicates, the positive atoms of each
-conjunctive precondition, and add effects.  What is left out (negation, disjunction, quantifiers, inequality, other
-robots' actions) only makes the answer larger; `planners.grounding.instantiate` evaluates it exactly.
+Tarski gets a relaxed core of the domain: one sort, types as static predicates, the positive atoms
+of each conjunctive precondition, and add effects.  What is left out (negation, disjunction,
+quantifiers, inequality, other robots' actions) only makes the answer larger;
+`planners.grounding.instantiate` evaluates it exactly.
 """
 
 from __future__ import annotations
@@ -60,9 +62,14 @@ def reachable_arguments(
 
 
 def _failure(error: Exception) -> CoordlangError:
-    """Tarski's error as ours: clingo out of memory (it may also be killed for it), or anything else."""
+    """Tarski's error as ours: clingo out of memory (it may also be killed for it), or anything
+    else.
+    """
     text = str(error)
-    if any(sign in text for sign in ("ran out of memory", "MemoryError", "bad_alloc", "exited with code -")):
+    if any(
+        sign in text
+        for sign in ("ran out of memory", "MemoryError", "bad_alloc", "exited with code -")
+    ):
         return OutOfMemory(
             "grounding needs more memory than it may use",
             remedy="Use fewer objects, or a larger --memory-limit.",
@@ -93,7 +100,8 @@ class _Core:
             self._constants[name] = self._lang.constant(symbol, self._sort)
             self.objects[symbol] = name
         self._object_types = {
-            name: frozenset(t for own in types for t in domain.supertypes(own)) for name, types in objects.items()
+            name: frozenset(t for own in types for t in domain.supertypes(own))
+            for name, types in objects.items()
         }
         self.actions: dict[str, str] = {}
 
@@ -122,10 +130,14 @@ class _Core:
     def _predicate(self, name: str, arity: int) -> Any:
         key = (name, arity)
         if key not in self._symbols:
-            self._symbols[key] = self._lang.predicate(f"p{len(self._symbols)}", *[self._sort] * arity)
+            self._symbols[key] = self._lang.predicate(
+                f"p{len(self._symbols)}", *[self._sort] * arity
+            )
         return self._symbols[key]
 
-    def _declare(self, variables: Iterable[Variable], into: dict[str, Any], *, always: bool = False) -> list[Any]:
+    def _declare(
+        self, variables: Iterable[Variable], into: dict[str, Any], *, always: bool = False
+    ) -> list[Any]:
         """Tarski variables for ours, and the atoms that hold them to their types.
 
         Tarski itself restricts parameters to objects; other variables need an atom ``always``.

@@ -31,7 +31,8 @@ class Composition:
     keeps_idle
         For each robot whether it may do nothing at all.
 
-    ``tables[i, j]`` (i < j) says which labels of two robots may share a step (`planners.joint.interference`).
+    ``tables[i, j]`` (i < j) says which labels of two robots may share a step
+    (`planners.joint.interference`).
     """
 
     def __init__(
@@ -47,9 +48,14 @@ class Composition:
         self._keeps_idle = tuple(keeps_idle)
         self._choices: list[list[GroundAction | None]] = [[None, *own] for own in subactions]
         self.tables = {
-            (i, j): compatible(self._choices[i], self._choices[j], i, j) for j in range(len(robots)) for i in range(j)
+            (i, j): compatible(self._choices[i], self._choices[j], i, j)
+            for j in range(len(robots))
+            for i in range(j)
         }
-        self._robot = [_Subactions(own, codec, evaluator, number, cost) for number, own in enumerate(subactions)]
+        self._robot = [
+            _Subactions(own, codec, evaluator, number, cost)
+            for number, own in enumerate(subactions)
+        ]
 
     def steps(self, rows: Rows) -> Steps:
         """All joint steps applicable in the states of a table, sorted by source and labels."""
@@ -68,7 +74,9 @@ class Composition:
         )
 
     def choices(self, rows: Rows) -> list[tuple[Ints, Ints]]:
-        """For each robot the labels whose conditions on the state hold, by state: (first index, labels), CSR."""
+        """For each robot the labels whose conditions on the state hold, by state: (first index,
+        labels), CSR.
+        """
         return [self._options(robot, number, rows) for number, robot in enumerate(self._robot)]
 
     def why_not(self, row: Rows, labels: Sequence[int]) -> str:
@@ -96,7 +104,9 @@ class Composition:
         both = np.array([labels], np.int32)
         for action in chosen:
             if action and not self._evaluator.holds(action.precondition, rows, here, both)[0]:
-                return f"{action.label} needs another subaction in the same step, and nobody does it"
+                return (
+                    f"{action.label} needs another subaction in the same step, and nobody does it"
+                )
         return "this is a joint step"
 
     def _options(self, robot: _Subactions, number: int, rows: Rows) -> tuple[Ints, Ints]:
@@ -153,7 +163,9 @@ class Composition:
             for label, effects in robot.conditional.items():
                 there = np.flatnonzero(own == label)
                 for effect in effects if len(there) else ():
-                    fires = there[self._evaluator.holds(effect.condition, rows, source[there], labels[there])]
+                    fires = there[
+                        self._evaluator.holds(effect.condition, rows, source[there], labels[there])
+                    ]
                     number = self._evaluator.facts.get(effect.atom)
                     if number is not None:
                         into = adds if effect.adds else deletes
@@ -212,8 +224,12 @@ class _Subactions:
                 keep[there] &= self._evaluator.holds(formula, rows, row[there])
         return row[keep], operator[keep]
 
-    def drop_unmet(self, fits: NDArray[np.bool_], robot: int, rows: Rows, source: Ints, labels: Labels) -> None:
-        """Clear ``fits`` where this robot's subaction has a formula about the joint step that is not met."""
+    def drop_unmet(
+        self, fits: NDArray[np.bool_], robot: int, rows: Rows, source: Ints, labels: Labels
+    ) -> None:
+        """Clear ``fits`` where this robot's subaction has a formula about the joint step that is
+        not met.
+        """
         asks = np.flatnonzero(self._has_step_formula[labels[:, robot]])
         if not len(asks):
             return
@@ -224,11 +240,13 @@ class _Subactions:
                 fits[there] &= self._evaluator.holds(formula, rows, source[there], labels[there])
 
 
-def split(precondition: Formula, evaluator: Evaluator) -> tuple[list[tuple[int, bool]], list[Formula]]:
+def split(
+    precondition: Formula, evaluator: Evaluator
+) -> tuple[list[tuple[int, bool]], list[Formula]]:
     """Literals (fact number, positive) and the rest of a precondition.
 
-    Negative step literals are left out (the compatibility table has them), and negative literals on facts that are
-    never true.
+    Negative step literals are left out (the compatibility table has them), and negative literals on
+    facts that are never true.
     """
     literals: list[tuple[int, bool]] = []
     rest: list[Formula] = []
@@ -260,4 +278,3 @@ def _text(formula: Formula) -> str:
         case Not(part):
             return f"(not {_text(part)})"
     return "a formula of its precondition"
-

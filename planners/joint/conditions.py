@@ -24,8 +24,12 @@ class Evaluator:
     facts: dict[Atom, int]
     subactions: dict[StepAtom, tuple[int, int]]
 
-    def holds(self, formula: Formula, rows: Rows, which: Ints, labels: Labels | None = None) -> NDArray[np.bool_]:
-        """For each ``k``: does ``formula`` hold in ``rows[which[k]]`` when the robots do ``labels[k]``?"""
+    def holds(
+        self, formula: Formula, rows: Rows, which: Ints, labels: Labels | None = None
+    ) -> NDArray[np.bool_]:
+        """For each ``k``: does ``formula`` hold in ``rows[which[k]]`` when the robots do
+        ``labels[k]``?
+        """
         match formula:
             case Truth(value):
                 return np.full(len(which), value)
@@ -35,7 +39,9 @@ class Evaluator:
                     return np.zeros(len(which), np.bool_)
                 return test_bits(rows, which, np.full(len(which), number))
             case StepAtom():
-                assert labels is not None, "a formula about the joint step where only the state is known"
+                assert labels is not None, (
+                    "a formula about the joint step where only the state is known"
+                )
                 where = self.subactions.get(formula)
                 if where is None:
                     return np.zeros(len(which), np.bool_)

@@ -16,10 +16,10 @@ from planners.pddl.lifted import And, Atom, Formula, Not, Or, StepAtom
 class Footprint:
     """What an action touches, as the interference rule reads it.
 
-    Every literal left after grounding counts as required, also inside disjunctions and effect conditions;
-    conditional effects count as if they fired; an atom both deleted and added counts as added.  ``partners`` are the
-    actions that a positive literal of a precondition or effect condition or a network names, ``excluded`` those that its
-    precondition as a whole forbids.
+    Every literal left after grounding counts as required, also inside disjunctions and effect
+    conditions; conditional effects count as if they fired; an atom both deleted and added counts as
+    added.  ``partners`` are the actions that a positive literal of a precondition or effect
+    condition or a network names, ``excluded`` those that its precondition as a whole forbids.
     """
 
     requires_true: frozenset[Atom]
@@ -38,10 +38,13 @@ def footprint(action: GroundAction) -> Footprint:
     adds = frozenset(e.atom for e in action.effects if e.adds)
     return Footprint(
         requires_true=frozenset(a for a, positive in literals if positive and isinstance(a, Atom)),
-        requires_false=frozenset(a for a, positive in literals if not positive and isinstance(a, Atom)),
+        requires_false=frozenset(
+            a for a, positive in literals if not positive and isinstance(a, Atom)
+        ),
         adds=adds,
         deletes=frozenset(e.atom for e in action.effects if not e.adds) - adds,
-        partners=action.links | {a for a, positive in literals if positive and isinstance(a, StepAtom)},
+        partners=action.links
+        | {a for a, positive in literals if positive and isinstance(a, StepAtom)},
         excluded=frozenset(
             part.part
             for part in conjuncts(action.precondition)
@@ -90,7 +93,10 @@ def conflict(a: GroundAction, b: GroundAction) -> str | None:
 
 def _linked(a: GroundAction, b: GroundAction, first: Footprint, second: Footprint) -> bool:
     """Two actions meant to be done together: one names the other in a positive literal."""
-    return StepAtom(b.schema, b.args) in first.partners or StepAtom(a.schema, a.args) in second.partners
+    return (
+        StepAtom(b.schema, b.args) in first.partners
+        or StepAtom(a.schema, a.args) in second.partners
+    )
 
 
 def _show(atoms: frozenset[Atom]) -> str:
@@ -103,8 +109,8 @@ def compatible(
 ) -> NDArray[np.bool_]:
     """Table: may robot ``i`` do ``left[a]`` while robot ``j`` does ``right[b]``?  None is idling.
 
-    A shared subaction of both goes only with itself; one that only names other robots goes with idling too.
-    O(pairs that touch one atom) beside the table itself.
+    A shared subaction of both goes only with itself; one that only names other robots goes with
+    idling too. O(pairs that touch one atom) beside the table itself.
     """
     prints = [[footprint(a) if a else None for a in side] for side in (left, right)]
     hard, soft = ([("adds", "deletes")], [("requires_true", "deletes"), ("requires_false", "adds")])
@@ -112,8 +118,18 @@ def compatible(
     numbers = {StepAtom(b.schema, b.args): n for n, b in enumerate(right) if b}
     rows = {StepAtom(a.schema, a.args): n for n, a in enumerate(left) if a}
     named = [
-        *((row, numbers[p]) for row, one in enumerate(prints[0]) for p in (one.partners if one else ()) if p in numbers),
-        *((rows[p], column) for column, one in enumerate(prints[1]) for p in (one.partners if one else ()) if p in rows),
+        *(
+            (row, numbers[p])
+            for row, one in enumerate(prints[0])
+            for p in (one.partners if one else ())
+            if p in numbers
+        ),
+        *(
+            (rows[p], column)
+            for column, one in enumerate(prints[1])
+            for p in (one.partners if one else ())
+            if p in rows
+        ),
     ]
     for row, column in named:  # linked: meant to be done together
         table[row, column] = True
@@ -131,9 +147,13 @@ def compatible(
 
 
 def _meeting(
-    left: Sequence[Footprint | None], right: Sequence[Footprint | None], kinds: Sequence[tuple[str, str]]
+    left: Sequence[Footprint | None],
+    right: Sequence[Footprint | None],
+    kinds: Sequence[tuple[str, str]],
 ) -> NDArray[np.bool_]:
-    """Table: does an atom stand in one field of the one and in the other field of the other, either way round?"""
+    """Table: does an atom stand in one field of the one and in the other field of the other, either
+    way round?
+    """
     table = np.zeros((len(left), len(right)), np.bool_)
     for first, second in (*kinds, *((b, a) for a, b in kinds)):
         columns = _where(right, second)

@@ -19,8 +19,9 @@ from planners.pddl.lifted import TRUE, Formula
 class WholeActions:
     """The `Stepper` of joint-action PDDL.
 
-    Actions with the same parts are one joint action if they do the same; different results for the same parts are
-    an error (`BadInput`), because no robot could tell them apart.  ``places`` are the schemas' places, for that message.
+    Actions with the same parts are one joint action if they do the same; different results for the
+    same parts are an error (`BadInput`), because no robot could tell them apart.  ``places`` are
+    the schemas' places, for that message.
     """
 
     def __init__(
@@ -101,7 +102,9 @@ class WholeActions:
         return f"the joint action {self._actions[found[0]].label} is not applicable here"
 
     def name(self, row: Rows, labels: Sequence[int]) -> str:
-        """The ground joint action that these labels are in a state: the cheapest, as `steps` takes it."""
+        """The ground joint action that these labels are in a state: the cheapest, as `steps` takes
+        it.
+        """
         found = np.flatnonzero((self._labels == np.array(labels)).all(axis=1))
         _, operators = self._applicable(row[None, :])
         here = set(found.tolist()) & set(operators.tolist())

@@ -1,5 +1,6 @@
-"""Which operators are applicable in which states: a discrimination tree over required facts, for whole layers of
-states at a time."""
+"""Which operators are applicable in which states: a discrimination tree over required facts, for
+whole layers of states at a time.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +25,9 @@ def ranges(starts: Ints, counts: Ints) -> Ints:
 
 
 def spans(sizes: NDArray[np.float64], most: int) -> Iterator[slice]:
-    """Cut a table so that the sizes of each piece sum to at most ``most``; a larger row is a piece of its own."""
+    """Cut a table so that the sizes of each piece sum to at most ``most``; a larger row is a piece
+    of its own.
+    """
     ends = np.cumsum(sizes)
     start = 0
     while start < len(sizes):
@@ -79,8 +82,14 @@ class Matcher:
                     following.append(children[fact])
                 first_child.append(len(child_fact))
                 first_operator.append(len(operators))
-            self._levels.append(_Level(*(np.array(a, np.int64) for a in
-                                         (first_child, child_fact, first_operator, operators))))  # fmt: skip
+            self._levels.append(
+                _Level(
+                    *(
+                        np.array(a, np.int64)
+                        for a in (first_child, child_fact, first_operator, operators)
+                    )
+                )
+            )
             nodes, depth = following, depth + 1
 
     def match(self, rows: Rows) -> tuple[Ints, Ints]:

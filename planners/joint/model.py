@@ -1,7 +1,8 @@
 """Robots' subactions -> the joint model: states, joint actions, their results.
 
-A joint step gives every robot one label: 0 is idling, ``k`` the robot's k-th subaction.  The product of the robots'
-subactions is never stored: `JointModel.successors` composes what is applicable, a whole table of states at a time.
+A joint step gives every robot one label: 0 is idling, ``k`` the robot's k-th subaction.  The
+product of the robots' subactions is never stored: `JointModel.successors` composes what is
+applicable, a whole table of states at a time.
 """
 
 from __future__ import annotations
@@ -29,7 +30,9 @@ NO_FACT = "(no fact holds)"
 
 @dataclass(frozen=True, slots=True)
 class FullState:
-    """A goal that is one state: every fluent as in the row (given as a tuple of words, so that it can be hashed)."""
+    """A goal that is one state: every fluent as in the row (given as a tuple of words, so that it
+    can be hashed).
+    """
 
     words: tuple[int, ...]
 
@@ -42,8 +45,8 @@ Goal = Formula | FullState
 class Steps:
     """Joint steps out of a table of states, sorted by source and labels.
 
-    ``source`` (k) row numbers of the table; ``labels`` (k, robots); ``result`` (k, words) the states reached;
-    ``cost`` (k) the second component of the cost (0 under ``makespan``).
+    ``source`` (k) row numbers of the table; ``labels`` (k, robots); ``result`` (k, words) the
+    states reached; ``cost`` (k) the second component of the cost (0 under ``makespan``).
     """
 
     source: Ints
@@ -69,8 +72,9 @@ class Stepper(Protocol):
 class JointModel:
     """A joint model ``M = (P, A)`` (the paper, section 2) over the robots of one problem.
 
-    ``labels[i]`` are robot i's labels, ``labels[i][0]`` being idle.  ``actions`` are the ground actions it is made
-    of; ``keeps_idle[i]`` says whether robot i may idle without an action of its own.
+    ``labels[i]`` are robot i's labels, ``labels[i][0]`` being idle.  ``actions`` are the ground
+    actions it is made of; ``keeps_idle[i]`` says whether robot i may idle without an action of its
+    own.
     """
 
     name: str
@@ -120,7 +124,9 @@ class JointModel:
 
     def texts(self, labels: Sequence[int]) -> tuple[str | None, ...]:
         """Label numbers as text; None is idling."""
-        return tuple(own[number] if number else None for own, number in zip(self.labels, labels, strict=True))
+        return tuple(
+            own[number] if number else None for own, number in zip(self.labels, labels, strict=True)
+        )
 
     def numbers(self, texts: Sequence[str | None]) -> tuple[int, ...] | None:
         """Text as label numbers, or None if some robot has no such subaction."""
@@ -138,9 +144,11 @@ def show(atom: Atom | StepAtom) -> str:
 
 
 def own_text(text: str, robot: str) -> str:
-    """A subaction's text as the robot says it of itself: ``(pass r1 r2 ball)`` of r1 is ``pass r2 ball``.
+    """A subaction's text as the robot says it of itself: ``(pass r1 r2 ball)`` of r1 is ``pass r2
+    ball``.
 
-    Without the parentheses and the first of its arguments that is the robot's name; a further one is what it acts on.
+    Without the parentheses and the first of its arguments that is the robot's name; a further one
+    is what it acts on.
     """
     name, *args = text.strip("()").split()
     if robot in args:

@@ -19,11 +19,12 @@ _WORD_BITS = 64
 class StateCodec:
     """Joint states <-> rows of ``width`` 64-bit words.
 
-    Bit ``i % 64`` of word ``i // 64`` says whether ``facts[i]`` is true.  If ``memory`` is not None the row ends
-    with one word per robot: 0 before its first subaction, else 1 + the number of its last label in ``memory``
-    (``--remember-actions``).
+    Bit ``i % 64`` of word ``i // 64`` says whether ``facts[i]`` is true.  If ``memory`` is not None
+    the row ends with one word per robot: 0 before its first subaction, else 1 + the number of its
+    last label in ``memory`` (``--remember-actions``).
 
-    ``facts`` are PDDL atoms in lower case, sorted as strings; they are the *key* of a state in this order.
+    ``facts`` are PDDL atoms in lower case, sorted as strings; they are the *key* of a state in this
+    order.
     """
 
     facts: tuple[str, ...]
@@ -71,10 +72,14 @@ class StateCodec:
     def decode(self, row: Rows) -> list[str]:
         """The true atoms of a state, sorted."""
         atoms = [
-            self.facts[word * _WORD_BITS + bit] for word in range(self.fact_words) for bit in bits(int(row[word]))
+            self.facts[word * _WORD_BITS + bit]
+            for word in range(self.fact_words)
+            for bit in bits(int(row[word]))
         ]
         if self.memory is not None:
-            for robot, labels, last in zip(self.robots, self.memory, row[self.fact_words :], strict=True):
+            for robot, labels, last in zip(
+                self.robots, self.memory, row[self.fact_words :], strict=True
+            ):
                 name = "none" if last == 0 else labels[int(last) - 1]
                 atoms.append(f"(last {robot} {name})")
             atoms.sort()
@@ -130,7 +135,9 @@ def split_atoms(text: str) -> list[str]:
         if depth < 0:
             break
     if depth != 0 or text[end:].strip():
-        raise BadInput(f"cannot read the atoms {text[:60]!r}", remedy="Expected '(p a b) (q c) ..'.")
+        raise BadInput(
+            f"cannot read the atoms {text[:60]!r}", remedy="Expected '(p a b) (q c) ..'."
+        )
     return parts
 
 

@@ -70,15 +70,23 @@ def parse_domain(source: Source) -> Domain:
             "A joint action already says what every robot does.",
         )
     return Domain(
-        name, source, types, constants, names.predicates, names.functions, schemas, constraints, dependences
+        name,
+        source,
+        types,
+        constants,
+        names.predicates,
+        names.functions,
+        schemas,
+        constraints,
+        dependences,
     )
 
 
 def read_header(document: Document, kind: str) -> tuple[str, dict[str, list[Group]]]:
     """The name in ``(define (kind name) ..)`` and the sections behind it, by keyword.
 
-    Raises `Unsupported` for a section that coordlang cannot read and `BadInput` for one that PDDL does not
-    have.
+    Raises `Unsupported` for a section that coordlang cannot read and `BadInput` for one that PDDL
+    does not have.
     """
     root = document.root
     if root.head != "define":
@@ -89,7 +97,9 @@ def read_header(document: Document, kind: str) -> tuple[str, dict[str, list[Grou
         raise document.fail(
             f"expected '({kind} NAME)' after 'define'",
             title,
-            f"This is a {other} file: the order is DOMAIN PROBLEM." if {kind, other} == {"domain", "problem"} else None,
+            f"This is a {other} file: the order is DOMAIN PROBLEM."
+            if {kind, other} == {"domain", "problem"}
+            else None,
         )
     sections: dict[str, list[Group]] = {}
     for item in root.items[2:]:
@@ -113,29 +123,47 @@ def read_header(document: Document, kind: str) -> tuple[str, dict[str, list[Grou
 
 _SECTIONS = {
     "domain": {
-        ":requirements", ":types", ":constants", ":predicates", ":functions", ":action",
-        ":concurrency-constraint", ":positive-dependence",
+        ":requirements",
+        ":types",
+        ":constants",
+        ":predicates",
+        ":functions",
+        ":action",
+        ":concurrency-constraint",
+        ":positive-dependence",
     },
     "problem": {
-        ":domain", ":requirements", ":objects", ":init", ":goal", ":metric", ":length",
+        ":domain",
+        ":requirements",
+        ":objects",
+        ":init",
+        ":goal",
+        ":metric",
+        ":length",
     },
-}  # fmt: skip
+}
 
 
-def read_objects(names: Names, items: Sequence[Expression], into: dict[str, tuple[str, ...]]) -> None:
+def read_objects(
+    names: Names, items: Sequence[Expression], into: dict[str, tuple[str, ...]]
+) -> None:
     """Add a typed list of objects, with ``(:private ..)`` groups, to ``into`` (name -> types)."""
     document = names.document
     plain = [item for item in items if isinstance(item, Word)]
     private = [item for item in items if isinstance(item, Group) and item.head == ":private"]
     either = [item for item in items if isinstance(item, Group) and item.head != ":private"]
-    entries = typed_list(document, [i for i in items if i not in private] if either else plain, "an object")
+    entries = typed_list(
+        document, [i for i in items if i not in private] if either else plain, "an object"
+    )
     declared = {entry.word.text for entry in entries}
     for section in private:
         inner = list(section.items[1:])
         # Unfactored MA-PDDL writes the owner first: "(:private depot0 hoist0 - hoist)".
         first = inner[0].text if inner and isinstance(inner[0], Word) else ""
         repeated = sum(isinstance(i, Word) and i.text == first for i in inner) > 1
-        entries += typed_list(document, inner[1:] if repeated or first in declared else inner, "an object")
+        entries += typed_list(
+            document, inner[1:] if repeated or first in declared else inner, "an object"
+        )
     for entry in entries:
         names.check_types(entry)
         if entry.word.text.startswith("?"):
@@ -156,7 +184,9 @@ def _read_types(document: Document, sections: dict[str, list[Group]]) -> dict[st
         for entry in typed_list(document, section.items[1:], "a type"):
             name = entry.word.text
             offsets.setdefault(name, entry.word)
-            parents = tuple(p for p in entry.types if p not in ("object", name) and name != "object")
+            parents = tuple(
+                p for p in entry.types if p not in ("object", name) and name != "object"
+            )
             types[name] = tuple(dict.fromkeys((*types.get(name, ()), *parents)))
             for parent in parents:
                 types.setdefault(parent, ())
@@ -164,7 +194,9 @@ def _read_types(document: Document, sections: dict[str, list[Group]]) -> dict[st
     for name in types:
         cycle = _cycle(types, name)
         if cycle:
-            raise document.fail("the types form a cycle: " + " - ".join(cycle), offsets.get(name, document.root))
+            raise document.fail(
+                "the types form a cycle: " + " - ".join(cycle), offsets.get(name, document.root)
+            )
     return types
 
 
@@ -186,7 +218,9 @@ def _cycle(types: dict[str, tuple[str, ...]], start: str) -> list[str] | None:
     return None
 
 
-def _read_predicates(document: Document, sections: dict[str, list[Group]]) -> dict[str, frozenset[int]]:
+def _read_predicates(
+    document: Document, sections: dict[str, list[Group]]
+) -> dict[str, frozenset[int]]:
     predicates: dict[str, frozenset[int]] = {}
 
     def declare(items: Sequence[Expression]) -> None:
@@ -209,7 +243,9 @@ def _read_predicates(document: Document, sections: dict[str, list[Group]]) -> di
     return predicates
 
 
-def _read_functions(document: Document, sections: dict[str, list[Group]]) -> dict[str, frozenset[int]]:
+def _read_functions(
+    document: Document, sections: dict[str, list[Group]]
+) -> dict[str, frozenset[int]]:
     functions: dict[str, frozenset[int]] = {}
     for section in _all(sections, ":functions"):
         for item in section.items[1:]:
@@ -247,8 +283,11 @@ def _fields(document: Document, item: Group) -> dict[str, tuple[Expression, ...]
         if isinstance(part, Word) and part.text.startswith(":"):
             key = part.text
             if key not in _FIELDS:
-                raise document.fail(f"unknown keyword {key!r} in an action", part,
-                                    "Known here: " + ", ".join(_FIELDS) + ".")  # fmt: skip
+                raise document.fail(
+                    f"unknown keyword {key!r} in an action",
+                    part,
+                    "Known here: " + ", ".join(_FIELDS) + ".",
+                )
             if key in fields:
                 raise document.fail(f"{key} occurs twice in one action", part)
             fields[key] = ()
@@ -258,15 +297,18 @@ def _fields(document: Document, item: Group) -> dict[str, tuple[Expression, ...]
             fields[key] = (*fields[key], part)
     for key in (":parameters", ":precondition", ":effect"):
         if len(fields.get(key, ())) > 1:
-            raise document.fail(f"expected one expression after {key}, found {len(fields[key])}",
-                                fields[key][1])  # fmt: skip
+            raise document.fail(
+                f"expected one expression after {key}, found {len(fields[key])}", fields[key][1]
+            )
     return fields
 
 
 def _parameter_items(
     document: Document, fields: dict[str, tuple[Expression, ...]]
 ) -> tuple[tuple[Expression, ...], str | None]:
-    """The full typed list of parameters, the agent's first unless it stands among them; the agent's name."""
+    """The full typed list of parameters, the agent's first unless it stands among them; the agent's
+    name.
+    """
     listed: tuple[Expression, ...] = ()
     if fields.get(":parameters"):
         listed = group(document, fields[":parameters"][0], "a list of parameters").items
@@ -286,8 +328,12 @@ def _parameter_items(
     name = agent_items[0].text
     if any(isinstance(item, Word) and item.text == name for item in listed):
         return listed, name
-    if len(agent_items) > 1 and not (isinstance(agent_items[1], Word) and agent_items[1].text == "-"):
-        raise document.fail("expected '- TYPE' or nothing after the agent's variable", agent_items[1])
+    if len(agent_items) > 1 and not (
+        isinstance(agent_items[1], Word) and agent_items[1].text == "-"
+    ):
+        raise document.fail(
+            "expected '- TYPE' or nothing after the agent's variable", agent_items[1]
+        )
     if len(agent_items) == 1:  # an untyped agent must not take the type of the parameters behind it
         at = agent_items[0].offset
         agent_items = (agent_items[0], Word("-", at), Word("object", at))
@@ -312,8 +358,19 @@ def _read_schema(names: Names, item: Group) -> Schema:
     precondition: Formula = TRUE
     if fields.get(":precondition"):
         precondition = read_formula(inner, fields[":precondition"][0])
-    effects, cost = read_effects(inner, fields[":effect"][0]) if fields.get(":effect") else ((), None)
-    return Schema(name.text, parameters, agent, precondition, effects, _read_parts(inner, item), cost, item.offset)
+    effects, cost = (
+        read_effects(inner, fields[":effect"][0]) if fields.get(":effect") else ((), None)
+    )
+    return Schema(
+        name.text,
+        parameters,
+        agent,
+        precondition,
+        effects,
+        _read_parts(inner, item),
+        cost,
+        item.offset,
+    )
 
 
 def _read_parts(names: Names, item: Group) -> tuple[Part, ...]:
@@ -321,7 +378,9 @@ def _read_parts(names: Names, item: Group) -> tuple[Part, ...]:
     document = names.document
     parts: dict[str, Part] = {}
     for comment in document.comments:
-        if not item.offset < comment.offset < item.end or comment.text.split(maxsplit=1)[:1] != ["subaction"]:
+        if not item.offset < comment.offset < item.end or comment.text.split(maxsplit=1)[:1] != [
+            "subaction"
+        ]:
             continue
         found = _PART.match(comment.text)
         expected = "Expected '; subaction ROBOT (name args)' or '; subaction ROBOT idle'."
@@ -342,7 +401,9 @@ def _read_parts(names: Names, item: Group) -> tuple[Part, ...]:
     return tuple(parts.values())
 
 
-def _check_parts(document: Document, schemas: tuple[Schema, ...], actions: dict[str, Group]) -> None:
+def _check_parts(
+    document: Document, schemas: tuple[Schema, ...], actions: dict[str, Group]
+) -> None:
     if not any(schema.parts for schema in schemas):
         return
     for schema in schemas:
@@ -354,4 +415,6 @@ def _check_parts(document: Document, schemas: tuple[Schema, ...], actions: dict[
                 "In joint-action PDDL every action says what each robot does in it.",
             )
         if schema.agent is not None:
-            raise document.fail(f"action {schema.name!r} has both ':agent' and subaction comments", item)
+            raise document.fail(
+                f"action {schema.name!r} has both ':agent' and subaction comments", item
+            )

@@ -1,7 +1,8 @@
 """Factored MA-PDDL: one domain and one problem file per robot -> one domain and one problem.
 
-A robot's files hold what it knows: public objects, its own private ones, and the actions that it can do.  The union is the
-unfactored form; the parameter that can only be the robot itself becomes the action's ``:agent``.
+A robot's files hold what it knows: public objects, its own private ones, and the actions that it
+can do.  The union is the unfactored form; the parameter that can only be the robot itself becomes
+the action's ``:agent``.
 """
 
 from __future__ import annotations
@@ -19,14 +20,21 @@ from planners.pddl.sexpr import JoinedSource
 def read_factored(directory: str | Path) -> tuple[Domain, Problem]:
     """Read ``domain-ROBOT.pddl`` and ``problem-ROBOT.pddl`` for every robot of a directory.
 
-    Raises `BadInput` where a file has no partner, an action differs between files or has no parameter for its robot.
+    Raises `BadInput` where a file has no partner, an action differs between files or has no
+    parameter for its robot.
     """
     folder = Path(directory)
     if not folder.is_dir():
         what = "this is a file, not a folder" if folder.exists() else "there is no such folder"
-        raise BadInput(what, place=Place(str(directory)), remedy="Name the folder of the robots' files.")
-    domains = {path.stem.partition("-")[2].lower(): path for path in sorted(folder.glob("domain-*.pddl"))}
-    problems = {path.stem.partition("-")[2].lower(): path for path in sorted(folder.glob("problem-*.pddl"))}
+        raise BadInput(
+            what, place=Place(str(directory)), remedy="Name the folder of the robots' files."
+        )
+    domains = {
+        path.stem.partition("-")[2].lower(): path for path in sorted(folder.glob("domain-*.pddl"))
+    }
+    problems = {
+        path.stem.partition("-")[2].lower(): path for path in sorted(folder.glob("problem-*.pddl"))
+    }
     if not domains or set(domains) != set(problems):
         odd = ", ".join(sorted(set(domains) ^ set(problems))) or "no such files"
         raise BadInput(
@@ -46,7 +54,8 @@ def _of_robot(robot: str, domain: Domain, problem: Problem) -> tuple[Domain, Pro
     """The robot's view with its own parameter in every action marked as the agent."""
     if robot not in problem.objects:
         raise BadInput(
-            f"robot {robot!r} of the file name is no object of its problem", place=problem.source.section(":objects")
+            f"robot {robot!r} of the file name is no object of its problem",
+            place=problem.source.section(":objects"),
         )
     schemas = tuple(replace(s, agent=_agent(robot, s, domain, problem)) for s in domain.schemas)
     return replace(domain, schemas=schemas), problem
@@ -75,9 +84,14 @@ def _join_domains(domains: list[Domain], name: str) -> Domain:
     schemas: dict[str, Schema] = {}
     for domain in domains:
         if domain.name != first.name:
-            raise BadInput(f"domain {domain.name!r}, expected {first.name!r}", place=domain.source.section("domain"))
+            raise BadInput(
+                f"domain {domain.name!r}, expected {first.name!r}",
+                place=domain.source.section("domain"),
+            )
         for schema in domain.schemas:
-            known = schemas.setdefault(schema.name, replace(schema, offset=source.offset(domain.source, schema.offset)))
+            known = schemas.setdefault(
+                schema.name, replace(schema, offset=source.offset(domain.source, schema.offset))
+            )
             if replace(known, offset=0) != replace(schema, offset=0):
                 raise BadInput(
                     f"action {schema.name!r} differs between the robots' files",
@@ -135,7 +149,10 @@ def _join_problems(problems: list[Problem], domain: Domain, name: str) -> Proble
                 )
         for obj, types in problem.objects.items():
             if objects.setdefault(obj, types) != types:
-                raise BadInput(f"object {obj!r} has other types elsewhere", place=problem.source.section(":objects"))
+                raise BadInput(
+                    f"object {obj!r} has other types elsewhere",
+                    place=problem.source.section(":objects"),
+                )
         init |= problem.init
         goals[problem.goal] = None
     goal = next(iter(goals)) if len(goals) == 1 else And(tuple(goals))

@@ -28,14 +28,16 @@ NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)$")
 MAX_COST = 2**31
 _NUMERIC_TESTS = frozenset({"<", "<=", ">", ">="})
 _NUMERIC_EFFECTS = frozenset({"assign", "increase", "decrease", "scale-up", "scale-down"})
-_TEMPORAL = frozenset({"always", "sometime", "within", "at-most-once", "sometime-after", "hold-after"})
+_TEMPORAL = frozenset(
+    {"always", "sometime", "within", "at-most-once", "sometime-after", "hold-after"}
+)
 
 
 def read_formula(names: Names, item: Expression) -> Formula:
     """A precondition, condition or goal.
 
-    ``(name ..)`` is an atom when ``name`` is a declared predicate, else a literal about the same joint
-    step when it is an action.  Raises `BadInput` or `Unsupported` with the place.
+    ``(name ..)`` is an atom when ``name`` is a declared predicate, else a literal about the same
+    joint step when it is an action.  Raises `BadInput` or `Unsupported` with the place.
     """
     document = names.document
     item = group(document, item, "a formula in parentheses")
@@ -74,7 +76,9 @@ def read_formula(names: Names, item: Expression) -> Formula:
         raise _unsupported(names, "a preference", item)
     if head in _TEMPORAL or (head == "at" and rest and _is_word(rest[0], "end", "start")):
         raise _unsupported(names, f"trajectory constraint '({head} ..)'", item)
-    raise document.fail(f"unknown predicate {head!r}", item, known(names.predicates, head, "predicate"))
+    raise document.fail(
+        f"unknown predicate {head!r}", item, known(names.predicates, head, "predicate")
+    )
 
 
 def read_effects(names: Names, item: Expression) -> tuple[tuple[Effect, ...], int | Atom | None]:
@@ -156,15 +160,21 @@ def _cost(names: Names, item: Group, *, conditional: bool) -> int | Atom:
     if isinstance(amount, Word):
         if not NUMBER.match(amount.text):
             raise document.fail(f"expected a number, found {amount.text!r}", amount)
-        value = min(float(amount.text), 2.0 * MAX_COST)  # too large ones are refused where costs are used
+        value = min(
+            float(amount.text), 2.0 * MAX_COST
+        )  # too large ones are refused where costs are used
         if value < 0 or value % 1 != 0:
-            raise _unsupported(names, f"action cost {amount.text} (whole numbers from 0 only)", item)
+            raise _unsupported(
+                names, f"action cost {amount.text} (whole numbers from 0 only)", item
+            )
         return int(value)
     if amount.head not in names.functions:
         if amount.head in ("+", "-", "*", "/"):
             raise _unsupported(names, "arithmetic in an action cost", amount)
         raise document.fail(
-            f"unknown function {amount.head!r}", amount, known(names.functions, amount.head, "function")
+            f"unknown function {amount.head!r}",
+            amount,
+            known(names.functions, amount.head, "function"),
         )
     error = names.arity(amount, amount.head, names.functions[amount.head], "function")
     if error:

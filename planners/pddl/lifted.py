@@ -84,8 +84,8 @@ FALSE = Truth(False)
 class Effect:
     """One literal effect with the variables it ranges over and its condition.
 
-    Nested ``forall`` and ``when`` are flattened: ``variables`` lists every enclosing universal variable,
-    outermost first, and ``condition`` is the conjunction of every enclosing condition.
+    Nested ``forall`` and ``when`` are flattened: ``variables`` lists every enclosing universal
+    variable, outermost first, and ``condition`` is the conjunction of every enclosing condition.
     """
 
     atom: Atom
@@ -106,9 +106,9 @@ class Part:
 class Schema:
     """An action schema.
 
-    ``agent`` is the index of the acting robot's parameter (MA-PDDL), None in plain PDDL; ``parts`` is
-    not empty exactly for joint-action PDDL; ``cost`` is the ``(increase (total-cost) ..)`` term: a number,
-    a function term, or None.  ``offset`` points into the domain's source.
+    ``agent`` is the index of the acting robot's parameter (MA-PDDL), None in plain PDDL; ``parts``
+    is not empty exactly for joint-action PDDL; ``cost`` is the ``(increase (total-cost) ..)`` term:
+    a number, a function term, or None.  ``offset`` points into the domain's source.
     """
 
     name: str
@@ -125,9 +125,10 @@ class Schema:
 class Constraint:
     """A node of a concurrency network (Crosby, Jonsson, Rovatsos 2014).
 
-    For each binding of ``parameters``, the subactions of a joint step that match it are none, or at least ``low`` and at
-    most ``high`` (None: no bound).  ``actions`` lists each action with the positions of its arguments (the agent is
-    argument 0) that the parameters bind; ``offsets`` are the places of its entries in the text.
+    For each binding of ``parameters``, the subactions of a joint step that match it are none, or at
+    least ``low`` and at most ``high`` (None: no bound).  ``actions`` lists each action with the
+    positions of its arguments (the agent is argument 0) that the parameters bind; ``offsets`` are
+    the places of its entries in the text.
     """
 
     name: str
@@ -140,10 +141,11 @@ class Constraint:
 
 @dataclass(frozen=True, slots=True)
 class Domain:
-    """A domain; ``types`` maps each type to its direct supertypes, ``predicates`` a name to its arities.
+    """A domain; ``types`` maps each type to its direct supertypes, ``predicates`` a name to its
+    arities.
 
-    ``constraints`` and ``dependences`` are the concurrency network: a pair (v, w) says that whoever matches w needs
-    somebody who matches v with the same binding, in the same step.
+    ``constraints`` and ``dependences`` are the concurrency network: a pair (v, w) says that whoever
+    matches w needs somebody who matches v with the same binding, in the same step.
     """
 
     name: str

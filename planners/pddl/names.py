@@ -117,7 +117,9 @@ class Names:
                 )
             self.check_types(entry)
             if any(v.name == entry.word.text for v in variables):
-                raise self.document.fail(f"variable {entry.word.text} is declared twice", entry.word)
+                raise self.document.fail(
+                    f"variable {entry.word.text} is declared twice", entry.word
+                )
             variables.append(Variable(entry.word.text, entry.types))
         return tuple(variables)
 

@@ -1,4 +1,6 @@
-"""Concurrency networks (Crosby, Jonsson, Rovatsos 2014): constraints on how many do an action together."""
+"""Concurrency networks (Crosby, Jonsson, Rovatsos 2014): constraints on how many do an action
+together.
+"""
 
 from __future__ import annotations
 
@@ -18,24 +20,33 @@ def read_network(
 ) -> tuple[tuple[Constraint, ...], tuple[tuple[str, str], ...]]:
     """The ``:concurrency-constraint`` and ``:positive-dependence`` sections of a domain.
 
-    Raises `BadInput` for unknown actions, positions outside the arguments, impossible bounds, unknown constraints.
+    Raises `BadInput` for unknown actions, positions outside the arguments, impossible bounds,
+    unknown constraints.
     """
     arities = {schema.name: len(schema.parameters) for schema in schemas}
-    constraints = [_constraint(names, arities, s) for s in sections.get(":concurrency-constraint", ())]
+    constraints = [
+        _constraint(names, arities, s) for s in sections.get(":concurrency-constraint", ())
+    ]
     by_name = {c.name: c for c in constraints}
     dependences = []
     for section in sections.get(":positive-dependence", ()):
-        pair = [word(names.document, item, "the name of a constraint") for item in section.items[1:]]
+        pair = [
+            word(names.document, item, "the name of a constraint") for item in section.items[1:]
+        ]
         if len(pair) != 2:
             raise names.document.fail("expected '(:positive-dependence V W)'", section)
         for item in pair:
             if item.text not in by_name:
                 raise names.document.fail(
-                    f"unknown constraint {item.text!r}", item, known(by_name, item.text, "constraint")
+                    f"unknown constraint {item.text!r}",
+                    item,
+                    known(by_name, item.text, "constraint"),
                 )
         first, second = (by_name[item.text] for item in pair)
         if len(first.parameters) != len(second.parameters):
-            raise names.document.fail("the two constraints have different numbers of parameters", section)
+            raise names.document.fail(
+                "the two constraints have different numbers of parameters", section
+            )
         dependences.append((first.name, second.name))
     return tuple(constraints), tuple(dependences)
 
@@ -56,13 +67,17 @@ def _constraint(names: Names, arities: dict[str, int], section: Group) -> Constr
             + (f"; missing: {', '.join(sorted(missing))}" if missing else ""),
             section,
         )
-    parameters = names.read_variables(group(document, fields[":parameters"], "a list of variables").items)
+    parameters = names.read_variables(
+        group(document, fields[":parameters"], "a list of variables").items
+    )
     low, high = _bounds(names, group(document, fields[":bounds"], "'(LOW HIGH)'"))
     actions, offsets = [], []
     for item in group(document, fields[":actions"], "a list of actions").items:
         entry = group(document, item, "'(action POSITION ..)'")
         if entry.head not in arities:
-            raise document.fail(f"unknown action {entry.head!r}", entry, known(arities, entry.head, "action"))
+            raise document.fail(
+                f"unknown action {entry.head!r}", entry, known(arities, entry.head, "action")
+            )
         positions = tuple(_number(names, part) for part in entry.items[1:])
         if len(positions) != len(parameters) or any(p >= arities[entry.head] for p in positions):
             raise document.fail(
@@ -84,7 +99,9 @@ def _bounds(names: Names, item: Group) -> tuple[int, int | None]:
     most = _number(names, high)
     if most < low or most == 0:
         raise names.document.fail(
-            f"nobody can meet the bounds ({low} {most})", item, "HIGH is at least 1 and at least LOW; inf is no upper bound."
+            f"nobody can meet the bounds ({low} {most})",
+            item,
+            "HIGH is at least 1 and at least LOW; inf is no upper bound.",
         )
     return low, most
 

@@ -22,13 +22,17 @@ def read_problem(path: str | Path, domain: Domain) -> Problem:
 def parse_problem(source: Source, domain: Domain) -> Problem:
     """Read a problem.
 
-    Raises `BadInput` (with place and remedy) for anything that ``domain`` does not declare, a problem of another
-    domain, or a missing goal; `Unsupported` for timed literals and the like.
+    Raises `BadInput` (with place and remedy) for anything that ``domain`` does not declare, a
+    problem of another domain, or a missing goal; `Unsupported` for timed literals and the like.
     """
     document = parse(source)
     name, sections = read_header(document, "problem")
     for section in sections.get(":domain", ()):
-        other = word(document, section.items[1], "the name of the domain").text if len(section) > 1 else ""
+        other = (
+            word(document, section.items[1], "the name of the domain").text
+            if len(section) > 1
+            else ""
+        )
         if other != domain.name:
             raise document.fail(
                 f"this is a problem for domain {other!r}, not for {domain.name!r}",
@@ -45,7 +49,9 @@ def parse_problem(source: Source, domain: Domain) -> Problem:
     for section in sections.get(":init", ()):
         for item in section.items[1:]:
             _read_init(names, group(document, item, "an atom in parentheses"), init, values)
-    return Problem(name, source, objects, frozenset(init), _read_goal(names, document, sections), values)
+    return Problem(
+        name, source, objects, frozenset(init), _read_goal(names, document, sections), values
+    )
 
 
 def _read_goal(names: Names, document: Document, sections: dict[str, list[Group]]) -> Formula:

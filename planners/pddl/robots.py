@@ -23,7 +23,10 @@ def natural(name: str) -> tuple[tuple[int, int, str], ...]:
     """A sort key in which ``r2`` comes before ``r10``."""
     parts = re.split(r"([0-9]+)", name)
     # Numbers compare by their length without leading zeros, then as text: no int() that has limits.
-    return tuple((1, len(p.lstrip("0")), f"{p.lstrip('0')} {p}") if p[:1] in _DIGITS else (0, 0, p) for p in parts)
+    return tuple(
+        (1, len(p.lstrip("0")), f"{p.lstrip('0')} {p}") if p[:1] in _DIGITS else (0, 0, p)
+        for p in parts
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,8 +42,8 @@ class RobotChoice:
 class Team:
     """The choosers of a joint step, in natural order of their names.
 
-    ``by`` says how they were found, for `coordlang inspect`.  With ``--unowned environment`` the last one is
-    the environment.
+    ``by`` says how they were found, for `coordlang inspect`.  With ``--unowned environment`` the
+    last one is the environment.
     """
 
     robots: tuple[str, ...]
@@ -101,14 +104,18 @@ def find_team(domain: Domain, problem: Problem, choice: RobotChoice) -> Team:
     elif choice.names:
         for name in choice.names:
             if name not in problem.objects:
-                raise UsageError(f"--robots: there is no object {name!r}",
-                                 remedy=f"Objects: {', '.join(sorted(problem.objects, key=natural))}.")  # fmt: skip
+                raise UsageError(
+                    f"--robots: there is no object {name!r}",
+                    remedy=f"Objects: {', '.join(sorted(problem.objects, key=natural))}.",
+                )
         robots, by = tuple(sorted(set(choice.names), key=natural)), "--robots"
     elif choice.type:
         robots, by = _of_kind(domain, problem, choice.type), f"--robot-type {choice.type}"
         if not robots:
-            raise UsageError(f"--robot-type: nothing has type or predicate {choice.type!r}",
-                             remedy=f"Candidates: {', '.join(_kinds(domain, problem)) or 'none'}.")  # fmt: skip
+            raise UsageError(
+                f"--robot-type: nothing has type or predicate {choice.type!r}",
+                remedy=f"Candidates: {', '.join(_kinds(domain, problem)) or 'none'}.",
+            )
     else:
         robots, by = _detect(domain, problem)
     if not robots:
@@ -117,7 +124,9 @@ def find_team(domain: Domain, problem: Problem, choice: RobotChoice) -> Team:
             place=problem.source.section(":objects"),
             remedy=f"Robots are found by {by}; declare at least one such object.",
         )
-    if choice.unowned == "environment" and any(s.agent is None and not s.parts for s in domain.schemas):
+    if choice.unowned == "environment" and any(
+        s.agent is None and not s.parts for s in domain.schemas
+    ):
         if ENVIRONMENT in problem.objects:
             raise UsageError(
                 f"--unowned environment: an object of this problem is called {ENVIRONMENT!r} already",
@@ -147,13 +156,19 @@ def _declared(domain: Domain, problem: Problem) -> tuple[tuple[str, ...], str] |
 
 
 def _possible_agents(domain: Domain, problem: Problem, schema: Schema) -> tuple[str, ...]:
-    """The objects of the agent's type; in untyped domains those that its static type predicates hold for."""
+    """The objects of the agent's type; in untyped domains those that its static type predicates
+    hold for.
+    """
     agent = schema.parameters[schema.agent or 0]
     objects = objects_of(domain, problem, agent.types)
     if agent.types != ("object",):
         return objects
     changed = fluent_predicates(domain)
-    parts = schema.precondition.parts if isinstance(schema.precondition, And) else (schema.precondition,)
+    parts = (
+        schema.precondition.parts
+        if isinstance(schema.precondition, And)
+        else (schema.precondition,)
+    )
     kinds = {
         part.predicate
         for part in parts
@@ -171,7 +186,9 @@ def _of_kind(domain: Domain, problem: Problem, kind: str) -> tuple[str, ...]:
 
 
 def _detect(domain: Domain, problem: Problem) -> tuple[tuple[str, ...], str]:
-    named = {kind: robots for kind in ("robot", "agent") if (robots := _of_kind(domain, problem, kind))}
+    named = {
+        kind: robots for kind in ("robot", "agent") if (robots := _of_kind(domain, problem, kind))
+    }
     if len(set(named.values())) == 1:
         kind, robots = next(iter(named.items()))
         return robots, f"type {kind}"
@@ -179,7 +196,8 @@ def _detect(domain: Domain, problem: Problem) -> tuple[tuple[str, ...], str]:
     if len(candidates) == 1:
         return _of_kind(domain, problem, candidates[0]), f"type {candidates[0]}"
     raise BadInput(
-        "which objects are the robots? " + ("Several types could be" if candidates else "No type could be"),
+        "which objects are the robots? "
+        + ("Several types could be" if candidates else "No type could be"),
         place=domain.source.section(":types"),
         remedy="Say --robot-type TYPE or --robots NAME,NAME."
         + (f" Candidates: {', '.join(candidates)}." if candidates else ""),
@@ -187,14 +205,19 @@ def _detect(domain: Domain, problem: Problem) -> tuple[tuple[str, ...], str]:
 
 
 def _kinds(domain: Domain, problem: Problem) -> list[str]:
-    """What can be given as ``--robot-type``: the likely types, else all that some action takes, else unary predicates."""
+    """What can be given as ``--robot-type``: the likely types, else all that some action takes,
+    else unary predicates.
+    """
     taken = [p.types for schema in domain.schemas for p in schema.parameters]
     every = [
         kind
         for kind in sorted(domain.types)
-        if objects_of(domain, problem, (kind,)) and any(kind in domain.supertypes(t) for own in taken for t in own)
+        if objects_of(domain, problem, (kind,))
+        and any(kind in domain.supertypes(t) for own in taken for t in own)
     ]
-    unary = sorted({atom.predicate for atom in static_atoms(domain, problem) if len(atom.args) == 1})
+    unary = sorted(
+        {atom.predicate for atom in static_atoms(domain, problem) if len(atom.args) == 1}
+    )
     likely = [kind for kind in ("agent", "robot") if _of_kind(domain, problem, kind)]
     return likely or _candidates(domain, problem) or every or unary
 
@@ -210,7 +233,11 @@ def _candidates(domain: Domain, problem: Problem) -> list[str]:
             for schema in domain.schemas
         )
     ]
-    return [kind for kind in found if not any(other != kind and kind in domain.supertypes(other) for other in found)]
+    return [
+        kind
+        for kind in found
+        if not any(other != kind and kind in domain.supertypes(other) for other in found)
+    ]
 
 
 def static_atoms(domain: Domain, problem: Problem) -> frozenset[Atom]:

@@ -137,7 +137,8 @@ def read_source(path: str | Path) -> Source:
     try:
         return Source(name, data.decode("utf-8-sig"))
     except UnicodeDecodeError:
-        # Old benchmark files hold Latin-1 in their comments; a zero byte is no text in any encoding.
+        # Old benchmark files hold Latin-1 in their comments; a zero byte is no text in any
+        # encoding.
         if b"\0" in data:
             raise BadInput("this is a binary file, not PDDL text", place=Place(name)) from None
         return Source(name, data.decode("latin-1"))
@@ -146,7 +147,8 @@ def read_source(path: str | Path) -> Source:
 def parse(source: Source) -> Document:
     """Read the one top-level expression of ``source``.
 
-    Raises `BadInput` for unbalanced parentheses, text outside of them, or nesting beyond `MAX_DEPTH`.
+    Raises `BadInput` for unbalanced parentheses, text outside of them, or nesting beyond
+    `MAX_DEPTH`.
     """
     comments: list[Comment] = []
     open_groups: list[tuple[int, list[Expression]]] = []
@@ -175,7 +177,9 @@ def parse(source: Source) -> Document:
             else:
                 root = group
         elif not open_groups:
-            raise BadInput(f"expected '(define ...', found {token[:40]!r}", place=source.place(offset))
+            raise BadInput(
+                f"expected '(define ...', found {token[:40]!r}", place=source.place(offset)
+            )
         else:
             open_groups[-1][1].append(Word(token.lower(), offset))
     if open_groups:

@@ -1,7 +1,7 @@
 """Admissible heuristics: lower bounds on the joint steps from a state to a goal, for A*.
 
-Every one is consistent, is 0 exactly in goal states and counts joint steps only (the second cost component is bounded
-by 0).
+Every one is consistent, is 0 exactly in goal states and counts joint steps only (the second cost
+component is bounded by 0).
 """
 
 from __future__ import annotations
@@ -41,13 +41,18 @@ def blind(model: JointModel, goal: Goal) -> Heuristic:
 
 
 def relaxed(model: JointModel, goal: Goal) -> Heuristic:
-    """h^max with all robots acting at once: the steps until all atoms of the goal have been true, if nothing were ever
-    deleted and nobody were in anybody's way (Bonet and Geffner 2001, here with joint steps as the unit of time).
+    """h^max with all robots acting at once: the steps until all atoms of the goal have been true,
+    if nothing were ever deleted and nobody were in anybody's way (Bonet and Geffner 2001, here with
+    joint steps as the unit of time).
 
-    On a map it is the longest of the robots' own shortest paths.  O(literals of the ground actions) a state and layer.
+    On a map it is the longest of the robots' own shortest paths.  O(literals of the ground actions)
+    a state and layer.
     """
     wanted = np.array(sorted(_goal_facts(model, goal)), np.int64)
-    ways = sorted({(tuple(sorted(needs)), fact) for needs, fact in _ways(model)}, key=lambda way: (way[1], way[0]))
+    ways = sorted(
+        {(tuple(sorted(needs)), fact) for needs, fact in _ways(model)},
+        key=lambda way: (way[1], way[0]),
+    )
     first_need = np.cumsum([0, *(len(needs) for needs, _ in ways)])
     need = np.array([n for needs, _ in ways for n in needs], np.int64)
     fact = np.array([fact for _, fact in ways], np.int64)
@@ -63,7 +68,9 @@ def relaxed(model: JointModel, goal: Goal) -> Heuristic:
             layer += 1
             open_ways = np.ones((len(todo), len(ways)), np.bool_)
             if len(need):
-                met = np.logical_and.reduceat(true[np.ix_(todo, need)], first_need[:-1][~free], axis=1)
+                met = np.logical_and.reduceat(
+                    true[np.ix_(todo, need)], first_need[:-1][~free], axis=1
+                )
                 open_ways[:, ~free] = met
             before = true[np.ix_(todo, made)]
             after = before | np.logical_or.reduceat(open_ways, first_way, axis=1)
@@ -79,9 +86,10 @@ def relaxed(model: JointModel, goal: Goal) -> Heuristic:
 def manhattan(model: JointModel, goal: Goal) -> Heuristic:
     """The paper's: the largest Manhattan distance of something from where the goal wants it.
 
-    Places are objects whose names end in two numbers, such as ``c2-3``.  ``(at r1 c2-3)`` and all atoms that differ from
-    it in the place only are where one thing is.  The distance is divided by the farthest that any action moves the thing;
-    if an action puts it somewhere wherever it was before, it has no say.  So the bound is admissible in every domain.
+    Places are objects whose names end in two numbers, such as ``c2-3``.  ``(at r1 c2-3)`` and all
+    atoms that differ from it in the place only are where one thing is.  The distance is divided by
+    the farthest that any action moves the thing; if an action puts it somewhere wherever it was
+    before, it has no say.  So the bound is admissible in every domain.
 
     Raises `UsageError` if no atom of the goal has a place.
     """
@@ -98,7 +106,9 @@ def manhattan(model: JointModel, goal: Goal) -> Heuristic:
             thing, place = found
             speed = max(1, speeds[thing])
             members = np.array(sorted(things[thing]), np.int64)
-            steps = np.array([-(-_distance(things[thing][f], place) // speed) for f in members.tolist()])
+            steps = np.array(
+                [-(-_distance(things[thing][f], place) // speed) for f in members.tolist()]
+            )
             bounds.append((members, steps))
     if not bounds:
         raise UsageError(
@@ -130,7 +140,11 @@ _Place = tuple[int, int]
 def _thing(text: str) -> tuple[_Thing, _Place] | None:
     """The thing and the place that an atom speaks of, if it has exactly one place."""
     name, *args = text[1:-1].split(" ")
-    places = [(n, m) for n, arg in enumerate(args) if (m := re.search(r"(?<!\d)(\d{1,9})\D+(\d{1,9})$", arg))]
+    places = [
+        (n, m)
+        for n, arg in enumerate(args)
+        if (m := re.search(r"(?<!\d)(\d{1,9})\D+(\d{1,9})$", arg))
+    ]
     if len(places) != 1:
         return None
     [(number, match)] = places
@@ -145,11 +159,15 @@ def _speeds(model: JointModel, facts: dict[int, tuple[_Thing, _Place] | None]) -
         found = facts[fact]
         if found is None or fact in needs:
             continue
-        before = [other[1] for n in needs if (other := facts[n]) is not None and other[0] == found[0]]
+        before = [
+            other[1] for n in needs if (other := facts[n]) is not None and other[0] == found[0]
+        ]
         if not before:
             speeds.pop(found[0], None)
         elif found[0] in speeds:
-            speeds[found[0]] = max(speeds[found[0]], min(_distance(place, found[1]) for place in before))
+            speeds[found[0]] = max(
+                speeds[found[0]], min(_distance(place, found[1]) for place in before)
+            )
     return speeds
 
 
@@ -158,7 +176,9 @@ def _distance(one: _Place, other: _Place) -> int:
 
 
 def _ways(model: JointModel) -> Iterator[tuple[frozenset[int], int]]:
-    """Every (facts that must be true, fact that becomes true) of the ground actions, negative literals left out."""
+    """Every (facts that must be true, fact that becomes true) of the ground actions, negative
+    literals left out.
+    """
     known = model.evaluator.facts
     for action in model.actions:
         needs = _positive(model, action.precondition)

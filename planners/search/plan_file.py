@@ -19,7 +19,8 @@ Texts = tuple[str | None, ...]
 
 #: Larger counts are written as strings: not every JSON reader has big integers.
 _EXACT = 2**53
-#: A step number above this one is a mistake, not a plan with so many steps in which all robots idle.
+#: A step number above this one is a mistake, not a plan with so many steps in which all robots
+#: idle.
 _MOST_STEPS = 1_000_000
 
 
@@ -72,7 +73,10 @@ def to_json(plans: Plans, listed: Sequence[Plan], task: int = 0) -> dict[str, An
     model = plans.space.model
     makespan, second = plans.space.cost_of(task)
     data: dict[str, Any] = {
-        "plans": [{"cost": len(plan), "actions": [list(step) for step in texts(model, plan)]} for plan in listed],
+        "plans": [
+            {"cost": len(plan), "actions": [list(step) for step in texts(model, plan)]}
+            for plan in listed
+        ],
         "count": json_count(plans.count),
         "complete": len(listed) == plans.count,
         "optimal_cost": makespan,
@@ -100,7 +104,8 @@ def read_plans(path: str | Path, model: JointModel) -> list[tuple[Texts, ...]]:
 def only_one_plan(text: str, place: Place) -> None:
     """Raise `BadInput`, with the line, where a second plan begins in IPC text.
 
-    It begins with its comment, after the closing comment of the plan before it, or with step numbers that start again.
+    It begins with its comment, after the closing comment of the plan before it, or with step
+    numbers that start again.
     """
     first = last = -1  # step numbers
     begun = ended = actions = False
@@ -130,9 +135,12 @@ def _from_json(text: str, model: JointModel, place: Place) -> list[tuple[Texts, 
         raise BadInput(f"this is no JSON plan file: {error}", place=place) from None
     for plan in found:
         for number, step in enumerate(plan):
-            if len(step) != len(model.robots) or not all(t is None or isinstance(t, str) for t in step):
+            if len(step) != len(model.robots) or not all(
+                t is None or isinstance(t, str) for t in step
+            ):
                 raise BadInput(
-                    f"step {number} must have one text or null for each of {', '.join(model.robots)}", place=place
+                    f"step {number} must have one text or null for each of {', '.join(model.robots)}",
+                    place=place,
                 )
     return found
 
@@ -146,11 +154,15 @@ def _from_ipc(text: str, model: JointModel, name: str) -> tuple[Texts, ...]:
             continue
         match = _LINE.match(line)
         if match is None:
-            raise BadInput(f"expected '0: (action args)', found {raw.strip()!r}", place=Place(name, number, 1))
+            raise BadInput(
+                f"expected '0: (action args)', found {raw.strip()!r}", place=Place(name, number, 1)
+            )
         action = "(" + " ".join(match["action"][1:-1].split()) + ")"
         step = int(match["step"][-8:]) if match["step"] else len(steps)
         if match["step"] and (len(match["step"]) > 8 or step > _MOST_STEPS):
-            raise BadInput(f"step {match['step'][:20]} is too many steps", place=Place(name, number, 1))
+            raise BadInput(
+                f"step {match['step'][:20]} is too many steps", place=Place(name, number, 1)
+            )
         own = steps.setdefault(step, [None] * len(model.robots))
         _put(own, step, action, model, Place(name, number, 1))
     last = max(steps, default=-1)
@@ -172,5 +184,8 @@ def _put(own: list[str | None], step: int, action: str, model: JointModel, place
         raise NoSuchAction(action, step, place)
     for robot in owners:
         if own[robot] is not None:
-            raise BadInput(f"{model.robots[robot]} does two things in one step: {own[robot]} and {action}", place=place)
+            raise BadInput(
+                f"{model.robots[robot]} does two things in one step: {own[robot]} and {action}",
+                place=place,
+            )
         own[robot] = action

@@ -1,7 +1,8 @@
 """All optimal plans of tasks, as a layered graph whose paths they are.
 
-Costs are lexicographic, makespan first: with ``d(s)`` the cost from ``s`` to the goal, the optimal plans from ``I`` are
-exactly the paths of edges ``s -> t`` with ``d(s) = c(edge) + d(t)``.  All of them have the same length.
+Costs are lexicographic, makespan first: with ``d(s)`` the cost from ``s`` to the goal, the optimal
+plans from ``I`` are exactly the paths of edges ``s -> t`` with ``d(s) = c(edge) + d(t)``.  All of
+them have the same length.
 """
 
 from __future__ import annotations
@@ -36,12 +37,14 @@ Stored = list[tuple[int, Steps]]
 class PlanSpace:
     """The optimal plans of one or several tasks as paths of one layered graph.
 
-    A *node* is a pair of a goal and a state that lies on some optimal plan to it.  Nodes are sorted by layer.
+    A *node* is a pair of a goal and a state that lies on some optimal plan to it.  Nodes are sorted
+    by layer.
 
-    ``rows`` (states, words) is the table of states; per node: ``state`` its number in ``rows``, ``goal`` the number
-    of its goal, ``layer`` the joint steps left to the goal, ``first`` (nodes + 1) delimits its edges in ``target``
-    (nodes), ``labels`` (edges, robots) and ``cost``, sorted by labels.  ``goals`` are the goals by number; ``starts``
-    holds the node of each task's initial state and ``second`` the second component of its optimal cost.
+    ``rows`` (states, words) is the table of states; per node: ``state`` its number in ``rows``,
+    ``goal`` the number of its goal, ``layer`` the joint steps left to the goal, ``first`` (nodes +
+    1) delimits its edges in ``target`` (nodes), ``labels`` (edges, robots) and ``cost``, sorted by
+    labels.  ``goals`` are the goals by number; ``starts`` holds the node of each task's initial
+    state and ``second`` the second component of its optimal cost.
     """
 
     model: JointModel
@@ -63,7 +66,9 @@ class PlanSpace:
     @property
     def layers(self) -> list[slice]:
         """The nodes of each layer, the goals' layer (0) first."""
-        bounds = np.searchsorted(self.layer, np.arange(int(self.layer[-1]) + 2)) if len(self) else [0]
+        bounds = (
+            np.searchsorted(self.layer, np.arange(int(self.layer[-1]) + 2)) if len(self) else [0]
+        )
         return [slice(int(a), int(b)) for a, b in pairwise(bounds)]
 
     def cost_of(self, task: int) -> tuple[int, int]:
@@ -96,8 +101,12 @@ def search(model: JointModel, task: PlanningTask) -> PlanSpace:
         return _backward(model, task, layers, kept)
 
 
-def _forward(model: JointModel, task: PlanningTask, layers: list[Rows], kept: list[Stored | None]) -> None:
-    """Fill ``layers`` with the states by their distance from the start, ``kept`` with the joint steps out of them."""
+def _forward(
+    model: JointModel, task: PlanningTask, layers: list[Rows], kept: list[Stored | None]
+) -> None:
+    """Fill ``layers`` with the states by their distance from the start, ``kept`` with the joint
+    steps out of them.
+    """
     layer = task.init[None, :]
     seen = layer
     total = 0
@@ -126,7 +135,11 @@ def _forward(model: JointModel, task: PlanningTask, layers: list[Rows], kept: li
 
 
 def _searched(states: int) -> str:
-    return f"All {states:,} reachable states were searched." if states > 1 else "No other state can be reached."
+    return (
+        f"All {states:,} reachable states were searched."
+        if states > 1
+        else "No other state can be reached."
+    )
 
 
 def _backward(
@@ -135,7 +148,9 @@ def _backward(
     layers: list[Rows],
     kept: list[Stored | None],
 ) -> PlanSpace:
-    """Keep the edges that lead to the goal in time and at least cost, from the last layer to the first."""
+    """Keep the edges that lead to the goal in time and at least cost, from the last layer to the
+    first.
+    """
     goal_rows = layers[-1][model.holds(task.goal, layers[-1])]
     tables = [goal_rows]
     best = [np.zeros(len(goal_rows), np.int64)]
@@ -160,7 +175,9 @@ def _backward(
         layer=np.repeat(np.arange(len(tables)), np.diff(offsets)),
         first=np.searchsorted(source, np.arange(offsets[-1] + 1)),
         target=np.concatenate([e[1] + offsets[k] for k, e in enumerate(edges)] or [_none()]),
-        labels=np.concatenate([e[2] for e in edges] or [np.zeros((0, len(model.robots)), np.int32)]),
+        labels=np.concatenate(
+            [e[2] for e in edges] or [np.zeros((0, len(model.robots)), np.int32)]
+        ),
         cost=np.concatenate([e[3] for e in edges] or [_none()]),
         goals=(task.goal,),
         starts=np.array([offsets[-2]]),
@@ -207,7 +224,13 @@ def joined(spaces: Sequence[PlanSpace]) -> PlanSpace:
         goal=np.repeat(np.arange(len(spaces)), np.diff(node_offset)),
         layer=np.concatenate([s.layer for s in spaces]),
         first=np.concatenate(
-            [[0], *(s.first[1:] + sum(len(q.target) for q in spaces[:k]) for k, s in enumerate(spaces))]
+            [
+                [0],
+                *(
+                    s.first[1:] + sum(len(q.target) for q in spaces[:k])
+                    for k, s in enumerate(spaces)
+                ),
+            ]
         ),
         target=np.concatenate([s.target + node_offset[k] for k, s in enumerate(spaces)]),
         labels=np.concatenate([s.labels for s in spaces]),
@@ -221,7 +244,9 @@ def joined(spaces: Sequence[PlanSpace]) -> PlanSpace:
 
 @dataclass(frozen=True, slots=True)
 class TaskGroup:
-    """Tasks with one goal.  ``inits`` is a table of initial states, or None for every other state that can reach it."""
+    """Tasks with one goal.  ``inits`` is a table of initial states, or None for every other state
+    that can reach it.
+    """
 
     goal: Goal
     inits: Rows | None = None
@@ -233,9 +258,15 @@ def solvable(space: Space, groups: Sequence[TaskGroup]) -> list[TaskGroup]:
     kept = []
     for start in range(0, len(groups), size):
         batch = groups[start : start + size]
-        far = distances(space, np.stack([space.model.holds(group.goal, space.rows) for group in batch]))
+        far = distances(
+            space, np.stack([space.model.holds(group.goal, space.rows) for group in batch])
+        )
         for own, group in zip(far, batch, strict=True):
-            inits = group.inits if group.inits is None else group.inits[own[space.numbers(group.inits)] >= 0]
+            inits = (
+                group.inits
+                if group.inits is None
+                else group.inits[own[space.numbers(group.inits)] >= 0]
+            )
             if inits is None or len(inits):
                 kept.append(replace(group, inits=inits))
     return kept
@@ -244,8 +275,8 @@ def solvable(space: Space, groups: Sequence[TaskGroup]) -> list[TaskGroup]:
 def plan_spaces(space: Space, groups: Sequence[TaskGroup]) -> Iterator[PlanSpace]:
     """The optimal plans of many tasks over one explored space, in batches of goals.
 
-    One backward pass per goal serves every initial state.  Raises `ProvedImpossible` for a task whose goal cannot be
-    reached.
+    One backward pass per goal serves every initial state.  Raises `ProvedImpossible` for a task
+    whose goal cannot be reached.
     """
     size = max(1, _BATCH // max(1, len(space)))
     for start in range(0, len(groups), size):

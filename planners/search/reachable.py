@@ -13,7 +13,8 @@ from planners.joint.model import JointModel, Steps
 from planners.joint.states import Rows, find_rows, unique_rows
 from planners.limits import reaching
 
-#: States expanded at a time, and the joint steps that this should give: they bound the memory of one expansion.
+#: States expanded at a time, and the joint steps that this should give: they bound the memory of
+#: one expansion.
 _BLOCK = 20_000
 _STEPS = 4_000_000
 
@@ -22,8 +23,9 @@ _STEPS = 4_000_000
 class Space:
     """All states reachable from some initial states, with every joint step between them.
 
-    ``rows`` (states, words) are sorted; a state's *number* is its position there.  ``first`` (states + 1) delimits
-    the steps out of a state in ``target``, ``labels`` (steps, robots) and ``cost``, sorted by labels (CSR).
+    ``rows`` (states, words) are sorted; a state's *number* is its position there.  ``first``
+    (states + 1) delimits the steps out of a state in ``target``, ``labels`` (steps, robots) and
+    ``cost``, sorted by labels (CSR).
     """
 
     model: JointModel
@@ -42,7 +44,8 @@ class Space:
 
 
 def blocks(model: JointModel, rows: Rows) -> Iterator[tuple[int, Steps]]:
-    """`JointModel.successors` of a long table in pieces: (number of the piece's first row, its steps).
+    """`JointModel.successors` of a long table in pieces: (number of the piece's first row, its
+    steps).
 
     The first piece is short; how many steps its states have says how long the next ones may be.
     """
@@ -86,7 +89,9 @@ def explore(model: JointModel, inits: Rows) -> Space:
 
 
 def count(model: JointModel, inits: Rows) -> tuple[int, int]:
-    """How many states `explore` finds, and how many joint steps between them, in the memory that the states take."""
+    """How many states `explore` finds, and how many joint steps between them, in the memory that
+    the states take.
+    """
     layer, _ = unique_rows(inits)
     seen = layer
     steps_counted = depth = 0
@@ -108,7 +113,9 @@ def count(model: JointModel, inits: Rows) -> tuple[int, int]:
 
 
 def _joined(model: JointModel, seen: Rows, sources: list[Rows], found: list[Steps]) -> Space:
-    source = np.concatenate([find_rows(seen, rows)[steps.source] for rows, steps in zip(sources, found, strict=True)])
+    source = np.concatenate(
+        [find_rows(seen, rows)[steps.source] for rows, steps in zip(sources, found, strict=True)]
+    )
     order = np.argsort(source, kind="stable")
     return Space(
         model=model,

@@ -18,8 +18,8 @@ _MOST = 2**63 - 1
 def unique_tuples(table: Ints, bounds: list[int]) -> tuple[Ints, Ints]:
     """The different rows of ``table``, sorted, and each row's number among them.
 
-    ``bounds[k]`` is one more than the largest value of column k; values start at 0.  Columns are packed into as few
-    64-bit codes as they fit, so that most tables sort as plain numbers.
+    ``bounds[k]`` is one more than the largest value of column k; values start at 0.  Columns are
+    packed into as few 64-bit codes as they fit, so that most tables sort as plain numbers.
     """
     codes: list[Ints] = []
     code = np.zeros(len(table), np.int64)
@@ -42,10 +42,11 @@ def unique_tuples(table: Ints, bounds: list[int]) -> tuple[Ints, Ints]:
 
 @dataclass(frozen=True, slots=True)
 class EdgeIndex:
-    """Finds the edge of a node with given labels, robot by robot (a tree over label tuples, without overflow).
+    """Finds the edge of a node with given labels, robot by robot (a tree over label tuples, without
+    overflow).
 
-    ``keys[i]`` are sorted codes (prefix, label of robot i); a prefix is first the node, then the number of the
-    code one robot earlier; the last number is the edge itself.
+    ``keys[i]`` are sorted codes (prefix, label of robot i); a prefix is first the node, then the
+    number of the code one robot earlier; the last number is the edge itself.
     """
 
     radix: tuple[int, ...]

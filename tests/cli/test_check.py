@@ -15,9 +15,13 @@ T_MAP = DOMAINS / "t-map"
 
 
 @pytest.mark.parametrize("folder", ["t-map", "three-cells"])
-def test_agreement(folder: str, coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_agreement(
+    folder: str, coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
-    outcome = coordlang("check", DOMAINS / folder / "domain.pddl", DOMAINS / folder / "problem.pddl", "--json")
+    outcome = coordlang(
+        "check", DOMAINS / folder / "domain.pddl", DOMAINS / folder / "problem.pddl", "--json"
+    )
     assert outcome.code == 0
     data = json.loads(outcome.out)
     assert data["agree"] is True
@@ -47,5 +51,7 @@ def test_a_disagreement_is_refuted(coordlang: Command, monkeypatch: pytest.Monke
 
 def test_the_time_limit_ends_fast_downward_too(coordlang: Command) -> None:
     grid = DOMAINS / "grid"
-    outcome = coordlang("check", grid / "domain.pddl", grid / "corners-10x10.pddl", "--time-limit", "3")
+    outcome = coordlang(
+        "check", grid / "domain.pddl", grid / "corners-10x10.pddl", "--time-limit", "3"
+    )
     assert outcome.code == 23

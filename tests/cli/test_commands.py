@@ -31,7 +31,9 @@ def test_plans_count(style: Path, size: str, count: int, coordlang: Command) -> 
 
 @pytest.mark.parametrize("style", [GRID, JOINT])
 @pytest.mark.parametrize("form", ["ipc", "json"])
-def test_every_printed_plan_is_valid(style: Path, form: str, coordlang: Command, tmp_path: Path) -> None:
+def test_every_printed_plan_is_valid(
+    style: Path, form: str, coordlang: Command, tmp_path: Path
+) -> None:
     files = style / "domain.pddl", style / "corners-3x3.pddl"
     outcome = coordlang("plans", *files, "--max", "100", "--format", form)
     loaded = load(files[0], [files[1]])
@@ -50,7 +52,9 @@ def test_every_printed_plan_is_valid(style: Path, form: str, coordlang: Command,
 
 
 def test_plans_json(coordlang: Command) -> None:
-    outcome = coordlang("plans", GRID / "domain.pddl", GRID / "corners-3x3.pddl", "--json", "--max", "2")
+    outcome = coordlang(
+        "plans", GRID / "domain.pddl", GRID / "corners-3x3.pddl", "--json", "--max", "2"
+    )
     data = json.loads(outcome.out)
     assert data["count"] == 18
     assert data["complete"] is False
@@ -73,7 +77,9 @@ def test_coordination_shows_a_miscoordination(coordlang: Command) -> None:
     assert "18 optimal plans of 4 steps; coordination is required" in outcome.out
     assert "<-- breaks here" in outcome.out
     assert "r1 follows this optimal plan:" in outcome.out
-    data = json.loads(coordlang("coordination", GRID / "domain.pddl", GRID / "corners-3x3.pddl", "--json").out)
+    data = json.loads(
+        coordlang("coordination", GRID / "domain.pddl", GRID / "corners-3x3.pddl", "--json").out
+    )
     assert data["tasks"][0]["requires_coordination"] is True
 
 
@@ -140,9 +146,14 @@ def test_build_for_given_problems(coordlang: Command, tmp_path: Path) -> None:
     assert data["tasks"]["kind"] == "problems"
     assert data["tasks"]["tasks"][0]["init"] == ["(at r1 c0-0)", "(at r2 c2-2)"]
     assert json.loads(coordlang("verify", path, *files, "--json").out) == {
-        "holds": True, "tasks": 1, "words": len(data["words"]), "nodes": 15, "miscoordination": None,
-        "lower_bound": None, "reasons": None,
-    }  # fmt: skip
+        "holds": True,
+        "tasks": 1,
+        "words": len(data["words"]),
+        "nodes": 15,
+        "miscoordination": None,
+        "lower_bound": None,
+        "reasons": None,
+    }
 
 
 def test_build_to_stdout(coordlang: Command, t_map: tuple[Path, Path]) -> None:
@@ -163,7 +174,9 @@ def test_inseparable_plans(coordlang: Command, tmp_path: Path) -> None:
     """Either robot may press, but not both: two plans through the same two states."""
     domain, problem, path = tmp_path / "d.pddl", tmp_path / "p.pddl", tmp_path / "l.json"
     domain.write_text(INSEPARABLE)
-    problem.write_text("(define (problem p) (:domain lamps) (:objects r1 r2 - robot) (:init) (:goal (lit)))")
+    problem.write_text(
+        "(define (problem p) (:domain lamps) (:objects r1 r2 - robot) (:init) (:goal (lit)))"
+    )
     outcome = coordlang("build", domain, problem, "-o", path)
     assert outcome.code == 11
     assert "pass through the same states" in outcome.err
@@ -186,7 +199,15 @@ def in_a_process(arguments: list[str], seed: str) -> bytes:
 
 
 def test_same_input_same_bytes() -> None:
-    arguments = ["build", str(GRID / "domain.pddl"), str(GRID / "gw2-2x3.pddl"), "--tasks", "all", "-o", "-"]
+    arguments = [
+        "build",
+        str(GRID / "domain.pddl"),
+        str(GRID / "gw2-2x3.pddl"),
+        "--tasks",
+        "all",
+        "-o",
+        "-",
+    ]
     first, second = (json.loads(in_a_process(arguments, seed)) for seed in ("1", "2"))
     for data in (first, second):
         data.pop("producer")
@@ -217,7 +238,9 @@ def test_commands_are_all_listed(coordlang: Command) -> None:
 
 
 @pytest.mark.parametrize("error", [ValueError("odd"), OSError(1, "odd")])
-def test_a_bug_is_said_plainly(error: Exception, coordlang: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bug_is_said_plainly(
+    error: Exception, coordlang: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Whatever goes wrong inside: one message, exit code 32, no traceback."""
 
     def broken() -> None:

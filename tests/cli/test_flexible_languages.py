@@ -13,15 +13,42 @@ SQUARE = GRID / "domain.pddl", GRID / "gw1-2x2.pddl"
 
 def test_prefer_flexible(tmp_path: Path, coordlang: Command) -> None:
     path = tmp_path / "l.json"
-    outcome = coordlang("build", *SQUARE, "--tasks", "all", "--method", "minimal", "--prefer", "flexible", "-o", path, "--json")
+    outcome = coordlang(
+        "build",
+        *SQUARE,
+        "--tasks",
+        "all",
+        "--method",
+        "minimal",
+        "--prefer",
+        "flexible",
+        "-o",
+        path,
+        "--json",
+    )
     figures = json.loads(outcome.out)
     assert outcome.code == 0
     assert figures["words"] == figures["lower_bound"] == 3
-    assert figures["flexibility_before"] < figures["flexibility"] <= figures["flexibility_bound"] + 1e-9
+    assert (
+        figures["flexibility_before"]
+        < figures["flexibility"]
+        <= figures["flexibility_bound"] + 1e-9
+    )
     assert 0 < figures["communication_saving"] < 1
     assert coordlang("verify", path, *SQUARE).code == 0
     again = tmp_path / "again.json"
-    coordlang("build", *SQUARE, "--tasks", "all", "--method", "minimal", "--prefer", "flexible", "-o", again)
+    coordlang(
+        "build",
+        *SQUARE,
+        "--tasks",
+        "all",
+        "--method",
+        "minimal",
+        "--prefer",
+        "flexible",
+        "-o",
+        again,
+    )
     first, second = (json.loads(p.read_text()) for p in (path, again))
     assert first["states"] == second["states"]
 
@@ -55,7 +82,9 @@ def test_overlapping_words_are_written_and_verified(tmp_path: Path, coordlang: C
     assert outcome.code == 0
     assert "words overlap, every optimal plan has a sentence whose plans mix freely" in outcome.out
     # All words for all states: no sentence is usable any more.
-    data["also"] = {state: [w for w in data["words"][:3] if w != word] for state, word in data["states"].items()}
+    data["also"] = {
+        state: [w for w in data["words"][:3] if w != word] for state, word in data["states"].items()
+    }
     path.write_text(json.dumps(data))
     outcome = coordlang("verify", path, *SQUARE)
     assert outcome.code == 1

@@ -1,4 +1,6 @@
-"""Output files: refused before the work where they cannot be written, overwrite an input file or each other."""
+"""Output files: refused before the work where they cannot be written, overwrite an input file or
+each other.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +18,15 @@ SENTENCE = "w0"
 
 @pytest.fixture
 def folder(
-    language: Path, t_map: tuple[Path, Path], coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    language: Path,
+    t_map: tuple[Path, Path],
+    coordlang: Command,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> Path:
-    """A working folder with a file of each kind; `in/` holds the PDDL files by the names that `export` writes."""
+    """A working folder with a file of each kind; `in/` holds the PDDL files by the names that
+    `export` writes.
+    """
     monkeypatch.chdir(tmp_path)
     language.rename("l.json")
     Path("in").mkdir()
@@ -55,7 +63,9 @@ OVERWRITING = [
 
 
 @pytest.mark.parametrize("arguments", OVERWRITING, ids=" ".join)
-def test_no_input_file_is_overwritten(arguments: tuple[str, ...], coordlang: Command, folder: Path) -> None:
+def test_no_input_file_is_overwritten(
+    arguments: tuple[str, ...], coordlang: Command, folder: Path
+) -> None:
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     outcome = coordlang(*arguments)
     assert (outcome.code, outcome.out) == (2, "")
@@ -78,23 +88,41 @@ def test_two_outputs_are_two_files(name: str, coordlang: Command, folder: Path) 
 
 
 TO_FILE = [
-    (*BUILD, "-o"), (*BUILD, "-o", "x.json", "--certificate"), (*UNDERSTAND, "-o"), (*CHOICES, "-o"), VERIFY, REPORT,
-    (*EXPORT, "--to", "ltlf", "-o"), ("tasks", "d.pddl", "p.pddl", "-o"), ("evaluate", "game", "--page"),
-]  # fmt: skip
+    (*BUILD, "-o"),
+    (*BUILD, "-o", "x.json", "--certificate"),
+    (*UNDERSTAND, "-o"),
+    (*CHOICES, "-o"),
+    VERIFY,
+    REPORT,
+    (*EXPORT, "--to", "ltlf", "-o"),
+    ("tasks", "d.pddl", "p.pddl", "-o"),
+    ("evaluate", "game", "--page"),
+]
 
 
 @pytest.mark.parametrize("arguments", TO_FILE, ids=" ".join)
 @pytest.mark.parametrize(
     ("place", "reason"),
-    [("no/x", "there is no folder no"), ("plan/x", "there is no folder plan"), ("in", "Is a directory"),
-     ("shut/x", "Permission denied")],
-)  # fmt: skip
+    [
+        ("no/x", "there is no folder no"),
+        ("plan/x", "there is no folder plan"),
+        ("in", "Is a directory"),
+        ("shut/x", "Permission denied"),
+    ],
+)
 def test_the_place_is_looked_at_before_the_work(
-    arguments: tuple[str, ...], place: str, reason: str, coordlang: Command, folder: Path, monkeypatch: pytest.MonkeyPatch
+    arguments: tuple[str, ...],
+    place: str,
+    reason: str,
+    coordlang: Command,
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     Path("shut").mkdir()
     access = os.access  # the superuser may write everywhere
-    monkeypatch.setattr(os, "access", lambda path, mode: Path(path).name != "shut" and access(path, mode))
+    monkeypatch.setattr(
+        os, "access", lambda path, mode: Path(path).name != "shut" and access(path, mode)
+    )
     for module in ("planners.pddl.read_domain", "coordlang.evaluation.lab.runner.run"):
         monkeypatch.setattr(module, lambda *_: pytest.fail("no work before"))
     outcome = coordlang(*arguments, place)
@@ -102,18 +130,29 @@ def test_the_place_is_looked_at_before_the_work(
     assert f"{arguments[-1]} {place} cannot be written: {reason}\n  Name a file" in outcome.err
 
 
-def test_a_shut_folder_for_exported_files(coordlang: Command, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_shut_folder_for_exported_files(
+    coordlang: Command, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(os, "access", lambda path, mode: not os.path.isdir(path))
     assert "Permission denied" in coordlang(*EXPORT, "-o", "made/here").err
     assert not Path("made").exists()
 
 
-@pytest.mark.parametrize("arguments", [(*BUILD, "-o", "x.json", "--certificate", "-"), (*VERIFY, "-")], ids=" ".join)
-def test_second_outputs_do_not_go_to_stdout(arguments: tuple[str, ...], coordlang: Command, folder: Path) -> None:
+@pytest.mark.parametrize(
+    "arguments", [(*BUILD, "-o", "x.json", "--certificate", "-"), (*VERIFY, "-")], ids=" ".join
+)
+def test_second_outputs_do_not_go_to_stdout(
+    arguments: tuple[str, ...], coordlang: Command, folder: Path
+) -> None:
     outcome = coordlang(*arguments)
     assert (outcome.code, outcome.out) == (2, "")
     assert f"{arguments[-2]} -: this cannot go to stdout\n  Name a file." in outcome.err
 
 
 def test_a_device_may_be_both(coordlang: Command, folder: Path) -> None:
-    assert coordlang(*BUILD, "--method", "minimal", "-o", "/dev/null", "--certificate", "/dev/null").code == 0
+    assert (
+        coordlang(
+            *BUILD, "--method", "minimal", "-o", "/dev/null", "--certificate", "/dev/null"
+        ).code
+        == 0
+    )

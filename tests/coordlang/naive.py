@@ -1,4 +1,6 @@
-"""The paper's definitions, read literally: plans are listed and every mixture is made.  Tiny inputs only."""
+"""The paper's definitions, read literally: plans are listed and every mixture is made.  Tiny inputs
+only.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ def listed(space: PlanSpace, task: int, most: int) -> list[Plan]:
 
 def mixture(plans: tuple[Plan, ...]) -> Plan:
     """Robot i does its part of plan i, step by step."""
-    return tuple(tuple(step[i] for i, step in enumerate(steps)) for steps in zip(*plans, strict=True))
+    return tuple(
+        tuple(step[i] for i, step in enumerate(steps)) for steps in zip(*plans, strict=True)
+    )
 
 
 def failing(plans: list[Plan], robots: int) -> Iterator[tuple[Plan, ...]]:
@@ -38,7 +42,9 @@ def states(space: PlanSpace, task: int, plan: Plan) -> tuple[int, ...]:
 
 
 def divergence(sequences: list[tuple[int, ...]]) -> tuple[int, frozenset[int]] | None:
-    """alpha*: the last state before the sequences first differ, and the different next ones; None if they never do."""
+    """alpha*: the last state before the sequences first differ, and the different next ones; None
+    if they never do.
+    """
     for step, here in enumerate(zip(*sequences, strict=True)):
         if len(set(here)) > 1:
             return sequences[0][step - 1], frozenset(here)
@@ -47,7 +53,11 @@ def divergence(sequences: list[tuple[int, ...]]) -> tuple[int, frozenset[int]] |
 
 def minimal(found: set[tuple[int, frozenset[int]]]) -> set[tuple[int, frozenset[int]]]:
     """Without those that another one with the same last state implies."""
-    return {(last, after) for last, after in found if not any(p == last and other < after for p, other in found)}
+    return {
+        (last, after)
+        for last, after in found
+        if not any(p == last and other < after for p, other in found)
+    }
 
 
 def sentence(words: list[int]) -> tuple[int, ...]:

@@ -1,7 +1,8 @@
 """Small random models as PDDL text: unstructured enough to meet what grids never show.
 
-Joint-action PDDL over a few facts, every joint action with random literals: joint actions with the same effect, mixtures that
-drift away and come back, dead ends, several goal states.  MA-PDDL with random subactions: interference and idling.
+Joint-action PDDL over a few facts, every joint action with random literals: joint actions with the
+same effect, mixtures that drift away and come back, dead ends, several goal states.  MA-PDDL with
+random subactions: interference and idling.
 """
 
 from __future__ import annotations
@@ -62,12 +63,18 @@ def ma_text(random: Random, robots: int) -> tuple[str, list[str]]:
             f"  :precondition (and {' '.join(literals(random, pool, 2))})\n  :effect (and {effects(random, pool)}))"
         )
     predicates = " ".join(f"({f})" for f in shared) + " (own ?r - robot)"
-    domain = f"(define (domain random) (:types robot) (:predicates {predicates})\n" + "\n".join(actions) + ")"
+    domain = (
+        f"(define (domain random) (:types robot) (:predicates {predicates})\n"
+        + "\n".join(actions)
+        + ")"
+    )
     return domain, shared + [f"own r{n + 1}" for n in range(robots)]
 
 
 def graph_text(random: Random, robots: int) -> tuple[str, str]:
-    """Robots on a small random directed graph, each with edges of its own; random rules of the road.  Much RC."""
+    """Robots on a small random directed graph, each with edges of its own; random rules of the
+    road.  Much RC.
+    """
     places = [f"c{n}" for n in range(random.choice([3, 3, 4]))]
     names = [f"r{n + 1}" for n in range(robots)]
     rules = ["(forall (?o - robot ?z - place) (not (go ?o ?z ?y)))"]
@@ -87,7 +94,11 @@ def graph_text(random: Random, robots: int) -> tuple[str, str]:
         " :effect (and (at ?r ?y) (not (at ?r ?x)))))"
     )
     ways = [
-        f"(way {r} {x} {y})" for r in names for x in places for y in places if x != y and random.random() < 0.75
+        f"(way {r} {x} {y})"
+        for r in names
+        for x in places
+        for y in places
+        if x != y and random.random() < 0.75
     ]
     start, end = (random.sample(places, robots) for _ in range(2))
     at = [f"(at {r} {p})" for r, p in zip(names, start, strict=True)]
@@ -107,7 +118,11 @@ def random_model(seed: int, robots: int) -> tuple[Domain, Problem, ModelOptions]
     if random.random() < 0.4:
         text, problem = graph_text(random, robots)
         domain = parse_domain(Source("random-domain.pddl", text))
-        return domain, parse_problem(Source("random-problem.pddl", problem), domain), ModelOptions(cost=cost)
+        return (
+            domain,
+            parse_problem(Source("random-problem.pddl", problem), domain),
+            ModelOptions(cost=cost),
+        )
     style = random.choice([joint_text, ma_text])
     text, facts = style(random, robots)
     domain = parse_domain(Source("random-domain.pddl", text))
@@ -116,4 +131,8 @@ def random_model(seed: int, robots: int) -> tuple[Domain, Problem, ModelOptions]
     init = " ".join(f"({f})" for f in facts if random.random() < 0.5)
     goal = " ".join(literals(random, facts, 2))
     problem = f"(define (problem p) (:domain random) {objects} (:init {init}) (:goal (and {goal})))"
-    return domain, parse_problem(Source("random-problem.pddl", problem), domain), ModelOptions(cost=cost)
+    return (
+        domain,
+        parse_problem(Source("random-problem.pddl", problem), domain),
+        ModelOptions(cost=cost),
+    )

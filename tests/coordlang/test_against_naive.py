@@ -51,7 +51,9 @@ def listable(candidates: Candidates, most: int) -> None:
 def naive_divergences(
     spaces: tuple[PlanSpace, ...], most: int
 ) -> tuple[set[tuple[int, frozenset[int]]], list[bool], bool]:
-    """alpha* of all failing mixtures, which tasks require coordination, and whether some plans are inseparable."""
+    """alpha* of all failing mixtures, which tasks require coordination, and whether some plans are
+    inseparable.
+    """
     found, requires, same_states = set(), [], False
     for space in spaces:
         for task in range(len(space.starts)):
@@ -77,7 +79,11 @@ def test_walk_equals_listing(robots: int, most: int) -> None:
         candidates = candidates_of(seed, robots)
         listable(candidates, most)
         expected, requires, same_states = naive_divergences(candidates.spaces, most)
-        witnesses = [miscoordination(space, task) for space in candidates.spaces for task in range(len(space.starts))]
+        witnesses = [
+            miscoordination(space, task)
+            for space in candidates.spaces
+            for task in range(len(space.starts))
+        ]
         assert [w is not None for w in witnesses] == requires
         assert any(inseparable(space) is not None for space in candidates.spaces) == same_states
         seen["compared"] += 1
@@ -89,7 +95,9 @@ def test_walk_equals_listing(robots: int, most: int) -> None:
             table = {
                 (last, frozenset(s for s in after if s >= 0))
                 for last, after in zip(
-                    found.divergences.last.tolist(), found.divergences.following.tolist(), strict=True
+                    found.divergences.last.tolist(),
+                    found.divergences.following.tolist(),
+                    strict=True,
                 )
             }
             assert table == expected
@@ -114,7 +122,10 @@ def test_verify_equals_definition(robots: int, most: int) -> None:
         size = random.randint(1, 4)
         word = np.array([random.randrange(size) for _ in candidates.rows])
         table = WordTable(tuple(f"w{n}" for n in range(size)), candidates.rows, word, 0)
-        expected = all(naive.is_language(space, dict(enumerate(word.tolist())), most) for space in candidates.spaces)
+        expected = all(
+            naive.is_language(space, dict(enumerate(word.tolist())), most)
+            for space in candidates.spaces
+        )
         verdict = verify(table, candidates.spaces)
         assert verdict.holds == expected
         seen[expected] += 1
@@ -135,7 +146,9 @@ def check_witness(candidates: Candidates, table: WordTable, witness: object) -> 
             if not set(plans) <= set(all_plans) or naive.mixture(plans) in all_plans:
                 continue
             words = table.of_rows(space.rows)
-            sentences = {naive.sentence([int(words[s]) for s in naive.states(space, task, p)]) for p in plans}
+            sentences = {
+                naive.sentence([int(words[s]) for s in naive.states(space, task, p)]) for p in plans
+            }
             if len(sentences) == 1:
                 return
     raise AssertionError("no task has these plans with one sentence and a failing mixture")
@@ -143,7 +156,9 @@ def check_witness(candidates: Candidates, table: WordTable, witness: object) -> 
 
 @pytest.mark.parametrize(("robots", "most"), SIZES)
 def test_greedy_is_a_language_and_merging_is_judged_right(robots: int, most: int) -> None:
-    """Merging two words that alpha separates is refuted by `verify` exactly when the naive twin says so."""
+    """Merging two words that alpha separates is refuted by `verify` exactly when the naive twin
+    says so.
+    """
     seen = {True: 0, False: 0}
 
     @settings(max_examples=120, deadline=None, derandomize=True)
@@ -161,9 +176,13 @@ def test_greedy_is_a_language_and_merging_is_judged_right(robots: int, most: int
             for b in range(a):
                 merged = np.where(word == a, b, word)
                 expected = all(
-                    naive.is_language(space, dict(enumerate(merged.tolist())), most) for space in candidates.spaces
+                    naive.is_language(space, dict(enumerate(merged.tolist())), most)
+                    for space in candidates.spaces
                 )
-                assert verify(WordTable(names, candidates.rows, merged, 0), candidates.spaces).holds == expected
+                assert (
+                    verify(WordTable(names, candidates.rows, merged, 0), candidates.spaces).holds
+                    == expected
+                )
                 seen[expected] += 1
 
     compare()

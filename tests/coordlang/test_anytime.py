@@ -23,12 +23,26 @@ from tests.coordlang.test_minimal import shipped
 
 HANDOVER = DOMAINS / "handover"
 #: Three words are found soon; whether two suffice is open after minutes.
-HARD = [str(HANDOVER / "domain.pddl"), str(HANDOVER / "exchange.pddl"), "--tasks", "all", "--method", "minimal"]
+HARD = [
+    str(HANDOVER / "domain.pddl"),
+    str(HANDOVER / "exchange.pddl"),
+    "--tasks",
+    "all",
+    "--method",
+    "minimal",
+]
 
 
 def start(*arguments: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-c", "from coordlang.cli import main; main()", "build", *HARD, *arguments],
+        [
+            sys.executable,
+            "-c",
+            "from coordlang.cli import main; main()",
+            "build",
+            *HARD,
+            *arguments,
+        ],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -48,7 +62,9 @@ def test_a_time_limit_writes_the_best_language(tmp_path: Path) -> None:
     process = start("-o", str(path), "--time-limit", "4", "--json")
     out, err = process.communicate(timeout=60)
     assert process.returncode == 3, err
-    assert "the time limit of 4 s is over; the best language so far is written, without proof" in err
+    assert (
+        "the time limit of 4 s is over; the best language so far is written, without proof" in err
+    )
     assert json.loads(out)["proved_minimal"] is False
     check_file(path)
 
@@ -64,8 +80,12 @@ def test_an_interrupt_writes_the_best_language(tmp_path: Path) -> None:
     check_file(path)
 
 
-@pytest.mark.parametrize("error", [OutOfTime("late"), OutOfMemory("full"), MemoryError(), KeyboardInterrupt()])
-def test_words_are_kept_when_enlarging_them_is_stopped(error: BaseException, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    "error", [OutOfTime("late"), OutOfMemory("full"), MemoryError(), KeyboardInterrupt()]
+)
+def test_words_are_kept_when_enlarging_them_is_stopped(
+    error: BaseException, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def stop(*_: object) -> None:
         raise error
 
@@ -78,7 +98,9 @@ def test_words_are_kept_when_enlarging_them_is_stopped(error: BaseException, mon
 
 
 def test_a_better_partition_found_on_the_way_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Time is over while separating words are looked for, after some were found: `minimal` returns them."""
+    """Time is over while separating words are looked for, after some were found: `minimal` returns
+    them.
+    """
 
     def late(*_: object) -> bool:
         raise OutOfTime("late")
@@ -86,12 +108,21 @@ def test_a_better_partition_found_on_the_way_is_kept(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(sys.modules["coordlang.vocabulary.separating"]._AlphaOrBeta, "decide", late)
     built = build_language(shipped("grid", "gw2-2x3"), "minimal")
     assert isinstance(built.stopped, OutOfTime)
-    assert len(built.language.words) < build_language(shipped("grid", "gw2-2x3"), "greedy").language.guarantee.size
+    assert (
+        len(built.language.words)
+        < build_language(shipped("grid", "gw2-2x3"), "greedy").language.guarantee.size
+    )
 
 
-@pytest.mark.parametrize(("error", "code"), [(OutOfTime("the time limit is over"), 3), (KeyboardInterrupt(), 130)])
+@pytest.mark.parametrize(
+    ("error", "code"), [(OutOfTime("the time limit is over"), 3), (KeyboardInterrupt(), 130)]
+)
 def test_the_language_is_written_without_its_certificate(
-    error: BaseException, code: int, coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    error: BaseException,
+    code: int,
+    coordlang: Command,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def stop(_: object) -> None:
         raise error

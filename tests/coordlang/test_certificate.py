@@ -10,7 +10,14 @@ import msgspec
 import pytest
 
 from coordlang.building import Built, build_language, certificate_of
-from coordlang.certificate import Certificate, Reason, check, encode, read_certificate, write_certificate
+from coordlang.certificate import (
+    Certificate,
+    Reason,
+    check,
+    encode,
+    read_certificate,
+    write_certificate,
+)
 from coordlang.certificate.encoding import core
 from coordlang.certificate.file import WarpingPath
 from coordlang.required.miscoordination import inseparable
@@ -57,8 +64,12 @@ def test_any_solver_refutes_the_dimacs(built: Built, certificate: Certificate) -
             assert solver.solve() is False
 
 
-def test_a_language_satisfies_the_clauses_of_more_words(built: Built, certificate: Certificate) -> None:
-    """The same reasons with one word more must be satisfiable: otherwise the encoding refutes anything."""
+def test_a_language_satisfies_the_clauses_of_more_words(
+    built: Built, certificate: Certificate
+) -> None:
+    """The same reasons with one word more must be satisfiable: otherwise the encoding refutes
+    anything.
+    """
     more = msgspec.structs.replace(certificate, refuted=3)
     with pytest.raises(Refuted, match="leave languages with 3 words"):
         check(more, built.job.candidates)
@@ -71,19 +82,28 @@ def changed(certificate: Certificate, number: int, **fields: object) -> Certific
 
 
 def _same_plan(reason: Reason) -> dict[str, object]:
-    return {"plans": [reason.plans[0], reason.plans[0]], "paths": [WarpingPath((0, 1), [(k, k) for k in range(len(reason.plans[0]) + 1)])]}
+    return {
+        "plans": [reason.plans[0], reason.plans[0]],
+        "paths": [WarpingPath((0, 1), [(k, k) for k in range(len(reason.plans[0]) + 1)])],
+    }
 
 
 TAMPERED: list[tuple[str, Callable[[Reason], dict[str, object]]]] = [
     ("is no optimal plan", lambda r: {"plans": [r.plans[0][:-1], r.plans[1]]}),
-    ("is no optimal plan", lambda r: {"plans": [r.plans[0], [["(move r1 c9 c9)", None], *r.plans[1][1:]]]}),
+    (
+        "is no optimal plan",
+        lambda r: {"plans": [r.plans[0], [["(move r1 c9 c9)", None], *r.plans[1][1:]]]},
+    ),
     ("is no optimal plan", lambda r: {"plans": [r.plans[0], [step[:1] for step in r.plans[1]]]}),
     ("the mixture of its plans is an optimal plan", _same_plan),
     ("expected a plan for each of 2 robots", lambda r: {"plans": [*r.plans, r.plans[0]]}),
     ("do not join all of its plans", lambda r: {"paths": []}),
     ("is no warping path", lambda r: {"paths": [WarpingPath((0, 1), r.paths[0].cells[1:])]}),
     ("is no warping path", lambda r: {"paths": [WarpingPath((0, 1), r.paths[0].cells[:-1])]}),
-    ("is no warping path", lambda r: {"paths": [WarpingPath((0, 1), [r.paths[0].cells[0], r.paths[0].cells[-1]])]}),
+    (
+        "is no warping path",
+        lambda r: {"paths": [WarpingPath((0, 1), [r.paths[0].cells[0], r.paths[0].cells[-1]])]},
+    ),
     ("there are no plans", lambda r: {"paths": [WarpingPath((0, 2), r.paths[0].cells)]}),
     ("is no candidate task", lambda r: {"goal": r.init}),
     ("is no candidate task", lambda r: {"goal": r.goal[:1]}),
@@ -92,7 +112,9 @@ TAMPERED: list[tuple[str, Callable[[Reason], dict[str, object]]]] = [
 
 
 @pytest.mark.parametrize(("what", "change"), TAMPERED)
-def test_tampered(built: Built, certificate: Certificate, what: str, change: Callable[[Reason], dict[str, object]]) -> None:
+def test_tampered(
+    built: Built, certificate: Certificate, what: str, change: Callable[[Reason], dict[str, object]]
+) -> None:
     number = next(n for n, r in enumerate(certificate.reasons) if len(r.paths[0].cells) > 2)
     bad = changed(certificate, number, **change(certificate.reasons[number]))
     with pytest.raises(Refuted, match=f"reason {number + 1} of the certificate is wrong.*{what}"):
@@ -101,7 +123,10 @@ def test_tampered(built: Built, certificate: Certificate, what: str, change: Cal
 
 def test_missing_reasons_prove_nothing(built: Built, certificate: Certificate) -> None:
     with pytest.raises(Refuted, match="leave languages with 2 words"):
-        check(msgspec.structs.replace(certificate, reasons=certificate.reasons[:1]), built.job.candidates)
+        check(
+            msgspec.structs.replace(certificate, reasons=certificate.reasons[:1]),
+            built.job.candidates,
+        )
     with pytest.raises(Refuted, match="other robots"):
         check(msgspec.structs.replace(certificate, robots=["a", "b"]), built.job.candidates)
 
@@ -111,7 +136,11 @@ def test_other_methods(method: str) -> None:
     """A certificate for what the method proves, also where it met no counterexamples itself."""
     built = build_language(shipped("three-cells"), method)
     checked = check(certificate_of(built), built.job.candidates)
-    assert checked.lower_bound == built.language.guarantee.lower_bound == (3 if method == "exhaustive" else 2)
+    assert (
+        checked.lower_bound
+        == built.language.guarantee.lower_bound
+        == (3 if method == "exhaustive" else 2)
+    )
 
 
 def test_nothing_to_refute() -> None:
@@ -124,12 +153,20 @@ def test_nothing_to_refute() -> None:
     assert not encode([frozenset({(0, 1)})], 2).refuted()
 
 
-@pytest.mark.parametrize(("folder", "remember"), [("tray", False), ("lock", True), ("charger", False), ("push-box", True)])
+@pytest.mark.parametrize(
+    ("folder", "remember"),
+    [("tray", False), ("lock", True), ("charger", False), ("push-box", True)],
+)
 def test_three_robots(folder: str, remember: bool) -> None:
     domain = read_domain(DOMAINS / folder / "domain.pddl")
     problem = read_problem(DOMAINS / folder / "three-robots.pddl", domain)
-    built = build_language(from_problems(domain, [problem], ModelOptions(remember_actions=remember)), "minimal")
-    assert check(certificate_of(built), built.job.candidates).lower_bound == built.language.guarantee.size
+    built = build_language(
+        from_problems(domain, [problem], ModelOptions(remember_actions=remember)), "minimal"
+    )
+    assert (
+        check(certificate_of(built), built.job.candidates).lower_bound
+        == built.language.guarantee.size
+    )
 
 
 def test_task_file_with_symmetries() -> None:
@@ -176,7 +213,18 @@ def test_random_models(robots: int, number: int) -> None:
 def test_command_line(coordlang: Command, tmp_path: Path) -> None:
     files = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
     language, proof, dimacs = tmp_path / "l.json", tmp_path / "c.json", tmp_path / "c.cnf"
-    made = coordlang("build", *files, "--tasks", "all", "--method", "minimal", "-o", language, "--certificate", proof)
+    made = coordlang(
+        "build",
+        *files,
+        "--tasks",
+        "all",
+        "--method",
+        "minimal",
+        "-o",
+        language,
+        "--certificate",
+        proof,
+    )
     assert made.code == 0
     good = coordlang("verify", language, *files, "--lower-bound", proof, "--dimacs", dimacs)
     assert (good.code, good.out.splitlines()[-1].split(":")[0]) == (0, "lower bound 3")
@@ -194,7 +242,16 @@ def test_command_line(coordlang: Command, tmp_path: Path) -> None:
     assert "says that 3 words are needed; the certificate proves 2 only" in weak.err
 
 
-@pytest.mark.parametrize("text", ["", "{}", '{"format": "coordlang/certificate", "version": 2}', "[1]", '{"format": "coordlang/certificate", "version": 1, "reasons": 3}'])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{}",
+        '{"format": "coordlang/certificate", "version": 2}',
+        "[1]",
+        '{"format": "coordlang/certificate", "version": 1, "reasons": 3}',
+    ],
+)
 def test_what_is_no_certificate(text: str, tmp_path: Path) -> None:
     path = tmp_path / "c.json"
     path.write_text(text)

@@ -1,4 +1,6 @@
-"""What every way to a language must do, whatever it is: a new one in `METHODS` is tested here without being named."""
+"""What every way to a language must do, whatever it is: a new one in `METHODS` is tested here
+without being named.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ from tests.coordlang.test_minimal import shipped, states_of
 
 @cache
 def small(robots: int, most: int, number: int) -> list[Candidates]:
-    """Random models that require coordination, with separable plans, few states and few plans; also partial goals."""
+    """Random models that require coordination, with separable plans, few states and few plans; also
+    partial goals.
+    """
     found: list[Candidates] = []
     for seed in range(10_000):
         domain, problem, options = random_model(seed, robots)
@@ -59,18 +63,25 @@ def test_a_language_by_definition_with_a_true_bound(method: str, robots: int, mo
             for task in range(len(space.starts)):
                 plans = naive.listed(space, task, most)
                 for chosen in naive.failing(plans, robots):
-                    said = {naive.sentence([word[s] for s in naive.states(space, task, plan)]) for plan in chosen}
+                    said = {
+                        naive.sentence([word[s] for s in naive.states(space, task, plan)])
+                        for plan in chosen
+                    }
                     assert len(said) > 1
         least = len(set(by_brute_force(built.job).partition.values()))
         assert 1 <= guarantee.lower_bound <= least <= guarantee.size == len(language.words)
         assert guarantee.proved_minimal == (guarantee.size == guarantee.lower_bound)
-        assert build_language(candidates, method, seed=3).language == language, "the same input, the same language"
+        assert build_language(candidates, method, seed=3).language == language, (
+            "the same input, the same language"
+        )
         assert guarantee.size > 1, "the models require coordination"
 
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("error", [OutOfTime("late"), OutOfMemory("full"), KeyboardInterrupt()])
-def test_stopped_while_it_checks(method: str, error: BaseException, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stopped_while_it_checks(
+    method: str, error: BaseException, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A limit while a better partition is verified: the one before it is left."""
     import coordlang.building
 
@@ -88,7 +99,9 @@ def test_stopped_while_it_checks(method: str, error: BaseException, monkeypatch:
     built = build_language(candidates, method)
     assert built.verdict.holds
     assert len(built.language.words) == len(set(checked[0].values()))
-    assert built.stopped is (None if method == "greedy" else error), "greedy finds one partition only"
+    assert built.stopped is (None if method == "greedy" else error), (
+        "greedy finds one partition only"
+    )
     assert not built.language.guarantee.proved_minimal
 
 

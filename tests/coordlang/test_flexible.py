@@ -44,7 +44,9 @@ def shipped(folder: str, stem: str = "problem") -> Candidates:
 
 @cache
 def on_graph(seed: int, robots: int) -> Candidates | None:
-    """Robots on a random graph: all pairs of states, or one task with a partial goal.  None for a useless draw."""
+    """Robots on a random graph: all pairs of states, or one task with a partial goal.  None for a
+    useless draw.
+    """
     text, problem = graph_text(Random(seed), robots)
     domain = parse_domain(Source("domain.pddl", text))
     goal = parse_problem(Source("problem.pddl", problem), domain)
@@ -55,7 +57,9 @@ def on_graph(seed: int, robots: int) -> Candidates | None:
     return candidates if 0 < candidates.count <= 140 else None
 
 
-def listed(candidates: Candidates) -> Iterator[tuple[PlanSpace, int, list[Plan], list[tuple[int, ...]]]]:
+def listed(
+    candidates: Candidates,
+) -> Iterator[tuple[PlanSpace, int, list[Plan], list[tuple[int, ...]]]]:
     """Each task with its plans in their order and the states that they pass through."""
     for space in candidates.spaces:
         for task in range(len(space.starts)):
@@ -106,7 +110,9 @@ def test_flexibility_against_its_definition() -> None:
     between = 0
     for folder, stem in (("three-cells", "problem"), ("t-map", "problem"), ("grid", "gw1-2x2")):
         candidates = shipped(folder, stem)
-        between += sum(check_measures(candidates, random_words(candidates, random)) for _ in range(3))
+        between += sum(
+            check_measures(candidates, random_words(candidates, random)) for _ in range(3)
+        )
     assert between > 10
 
 
@@ -123,7 +129,9 @@ def test_flexibility_of_random_models(robots: int) -> None:
         graph = on_graph(2 * seed, robots)
         if graph is not None:
             with suppress(naive.TooLarge):
-                between += sum(check_measures(graph, random_words(graph, Random(n))) for n in range(4))
+                between += sum(
+                    check_measures(graph, random_words(graph, Random(n))) for n in range(4)
+                )
     assert measured >= 2
     assert between >= 1
 
@@ -151,10 +159,14 @@ def test_objective_measures_the_same() -> None:
         for _ in range(40):
             states = random.sample(range(len(candidates.rows)), random.choice([1, 1, 2, 6]))
             word[states] = [random.randrange(5) for _ in states]
-            bound = np.array(flexibility(candidates.spaces, of_nodes(candidates, [0] * len(word))).plans, float)
+            bound = np.array(
+                flexibility(candidates.spaces, of_nodes(candidates, [0] * len(word))).plans, float
+            )
             room = objective.room(value, bound, states)
             after = objective.update(value, word, states)
-            assert after == pytest.approx(flexibility(candidates.spaces, of_nodes(candidates, word.tolist())).expected)
+            assert after == pytest.approx(
+                flexibility(candidates.spaces, of_nodes(candidates, word.tolist())).expected
+            )
             assert after.mean() - value.mean() <= room + 1e-9
             changes += bool((after != value).any())
             value = after
@@ -174,7 +186,9 @@ def failing(candidates: Candidates) -> list[list[tuple[int, ...]]]:
 
 def partitions(states: list[int], size: int) -> Iterator[dict[int, int]]:
     for words in product(range(size), repeat=len(states)):
-        if [words.index(w) for w in range(size) if w in words] == sorted(words.index(w) for w in set(words)):
+        if [words.index(w) for w in range(size) if w in words] == sorted(
+            words.index(w) for w in set(words)
+        ):
             yield dict(zip(states, words, strict=True))
 
 
@@ -185,10 +199,18 @@ def all_languages(candidates: Candidates, size: int) -> list[tuple[Fraction, dic
     every = [sequences for _, _, _, sequences in listed(candidates)]
     found = []
     for word in partitions(states, size):
-        if any(len({naive.sentence([word[s] for s in states]) for states in plans}) == 1 for plans in bad):
+        if any(
+            len({naive.sentence([word[s] for s in states]) for states in plans}) == 1
+            for plans in bad
+        ):
             continue
         table = [word.get(s, 0) for s in range(len(candidates.rows))]
-        found.append((sum((expected(sequences, table) for sequences in every), Fraction(0)) / len(every), word))
+        found.append(
+            (
+                sum((expected(sequences, table) for sequences in every), Fraction(0)) / len(every),
+                word,
+            )
+        )
     return found
 
 
@@ -205,26 +227,37 @@ def some_tasks(candidates: Candidates, random: Random, number: int) -> Candidate
     key = candidates.model.codec.key
     tasks = []
     for _ in range(number):
-        init, goal = (tuple(split_atoms(key(row))) for row in candidates.rows[random.sample(range(len(candidates.rows)), 2)])
+        init, goal = (
+            tuple(split_atoms(key(row)))
+            for row in candidates.rows[random.sample(range(len(candidates.rows)), 2)]
+        )
         tasks.append(ListedTask(init, goal[: random.randint(1, len(goal))]))
     return from_listed(candidates.loaded.domain, candidates.loaded.problems, tasks)
 
 
 def test_flexible_is_best_by_trying_all() -> None:
-    """On models small enough for it the search goes from the worst language to the best; no bound is exceeded."""
+    """On models small enough for it the search goes from the worst language to the best; no bound
+    is exceeded.
+    """
     better = 0
     random = Random(2)
     for _ in range(30):
-        candidates = shipped(*random.choice([("grid", "gw1-2x2"), ("grid", "gwb2-3x3"), ("t-map", "problem")]))
+        candidates = shipped(
+            *random.choice([("grid", "gw1-2x2"), ("grid", "gwb2-3x3"), ("t-map", "problem")])
+        )
         candidates = some_tasks(candidates, random, random.randint(1, 4))
-        if len({int(s) for space in candidates.spaces for s in space.state}) > 9 or not requiring(candidates):
+        if len({int(s) for space in candidates.spaces for s in space.state}) > 9 or not requiring(
+            candidates
+        ):
             continue
         built = build_language(candidates, "minimal")
         languages = all_languages(candidates, built.language.guarantee.size)
         worst, word = min(languages, key=lambda pair: pair[0])
         best = max(value for value, _ in languages)
         checked: list[Partition] = []
-        outcome = flexible(replace(built.job, check=checked.append), Outcome(word, len(set(word.values()))))
+        outcome = flexible(
+            replace(built.job, check=checked.append), Outcome(word, len(set(word.values())))
+        )
         assert outcome.figures["flexibility"] == pytest.approx(float(best), rel=1e-9)
         assert outcome.figures["flexibility_before"] == pytest.approx(float(worst), rel=1e-9)
         assert float(best) <= outcome.figures["flexibility_bound"] * (1 + 1e-9)
@@ -235,18 +268,25 @@ def test_flexible_is_best_by_trying_all() -> None:
 
 
 def largest(plans: list[Plan], divisions: list[set[int]], robots: int) -> list[int]:
-    """For each plan the most plans, it among them, of which every two mix when the robots in a division follow one of them
-    and all others the other one; all sets are tried."""
+    """For each plan the most plans, it among them, of which every two mix when the robots in a
+    division follow one of them and all others the other one; all sets are tried.
+    """
     good = set(plans)
 
     def mixes(one: Plan, other: Plan, side: set[int]) -> bool:
-        return naive.mixture(tuple(one if robot in side else other for robot in range(robots))) in good
+        return (
+            naive.mixture(tuple(one if robot in side else other for robot in range(robots))) in good
+        )
 
     free = [
         set(chosen)
         for size in range(len(plans), 0, -1)
         for chosen in combinations(plans, size)
-        if all(mixes(one, other, side) for one, other in product(chosen, repeat=2) for side in divisions)
+        if all(
+            mixes(one, other, side)
+            for one, other in product(chosen, repeat=2)
+            for side in divisions
+        )
     ]
     return [max(len(chosen) for chosen in free if plan in chosen) for plan in plans]
 
@@ -271,12 +311,19 @@ def test_bounds_are_the_largest_sets_that_mix(robots: int) -> None:
 
 
 def test_every_division_counts_in_the_bound() -> None:
-    """Three robots push a box: for some plans one robot's freedom is the limit, for others another one's."""
+    """Three robots push a box: for some plans one robot's freedom is the limit, for others another
+    one's.
+    """
     domain = read_domain(DOMAINS / "push-box" / "domain.pddl")
-    candidates = from_problems(domain, [read_problem(DOMAINS / "push-box" / "three-robots.pddl", domain)])
+    candidates = from_problems(
+        domain, [read_problem(DOMAINS / "push-box" / "three-robots.pddl", domain)]
+    )
     (space,) = candidates.spaces
     (bound,) = flexibility_bounds(candidates.spaces, [walk(space).requires])
-    alone = [flexibility_bounds([divided(space, [robot])], [walk(divided(space, [robot])).requires])[0] for robot in range(3)]
+    alone = [
+        flexibility_bounds([divided(space, [robot])], [walk(divided(space, [robot])).requires])[0]
+        for robot in range(3)
+    ]
     assert bound < min(alone)
 
 
@@ -296,7 +343,9 @@ def test_flexible_reaches_its_bound_on_the_ring() -> None:
     """GWB5: the language leaves as many plans open as any language could."""
     domain = read_domain(DOMAINS / "grid" / "domain.pddl")
     problem = read_problem(DOMAINS / "grid" / "gwb5-3x3.pddl", domain)
-    candidates = from_listed(domain, [problem], read_task_file(DOMAINS / "grid" / "gwb5-3x3.tasks.json"))
+    candidates = from_listed(
+        domain, [problem], read_task_file(DOMAINS / "grid" / "gwb5-3x3.tasks.json")
+    )
     built = build_language(candidates, "minimal", prefer="flexible")
     assert built.verdict.holds
     assert built.language.guarantee.proved_minimal

@@ -15,16 +15,24 @@ from planners.joint.states import Rows, StateCodec
 
 
 def random_codec(random: Random) -> StateCodec:
-    facts = tuple(sorted(f"(p{random.randint(0, 9)} {n})" for n in range(random.choice([0, 3, 63, 64, 65, 200]))))
+    facts = tuple(
+        sorted(
+            f"(p{random.randint(0, 9)} {n})" for n in range(random.choice([0, 3, 63, 64, 65, 200]))
+        )
+    )
     robots = tuple(f"r{n}" for n in range(random.randint(1, 3)))
-    labels = tuple(("idle", *(f"(go {r} {n})" for n in range(random.randint(1, 4)))) for r in robots)
+    labels = tuple(
+        ("idle", *(f"(go {r} {n})" for n in range(random.randint(1, 4)))) for r in robots
+    )
     return StateCodec(facts, robots, labels if random.random() < 0.5 else None)
 
 
 def random_rows(random: Random, codec: StateCodec) -> Rows:
     rows = np.zeros((random.randint(1, 30), codec.width), np.uint64)
     for row in rows:
-        row[: codec.fact_words] = codec.mask(n for n in range(len(codec.facts)) if random.random() < random.choice([0, 0.1, 0.9]))
+        row[: codec.fact_words] = codec.mask(
+            n for n in range(len(codec.facts)) if random.random() < random.choice([0, 0.1, 0.9])
+        )
         if codec.memory is not None:
             row[codec.fact_words :] = [random.randint(0, len(own)) for own in codec.memory]
     return rows
@@ -71,13 +79,22 @@ def test_both_ways(block: int, monkeypatch: pytest.MonkeyPatch) -> None:
         read, wrong = read_keys(codec, texts)
         expected = [naive_row(codec, text) for text in texts]
         assert wrong.tolist() == [n for n, row in enumerate(expected) if row is None]
-        assert all((row == right).all() for row, right in zip(read, expected, strict=True) if right is not None)
+        assert all(
+            (row == right).all()
+            for row, right in zip(read, expected, strict=True)
+            if right is not None
+        )
         seen["wrong"] += len(wrong)
         seen["right"] += len(texts) - len(wrong)
-        seen["changed, but right"] += sum(a != b and r is not None for a, b, r in zip(texts, written, expected, strict=True))
+        seen["changed, but right"] += sum(
+            a != b and r is not None for a, b, r in zip(texts, written, expected, strict=True)
+        )
         seen["remembering"] += codec.memory is not None
         seen["nothing true"] += "" in texts
-    assert all(seen[case] > 5 for case in ("wrong", "right", "changed, but right", "remembering", "nothing true")), seen
+    assert all(
+        seen[case] > 5
+        for case in ("wrong", "right", "changed, but right", "remembering", "nothing true")
+    ), seen
 
 
 def test_no_keys() -> None:

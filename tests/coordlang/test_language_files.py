@@ -47,7 +47,9 @@ PARKED = parking("parked", "(at r1 a) (parked r2)", "(at r1 c) (at r2 a)")
 def test_the_verdict_does_not_depend_on_which_problems_are_given(
     given: list[int], coordlang: Command, tmp_path: Path
 ) -> None:
-    """In one problem staying replaces idling, in the other it cannot: the model is the one that was built for."""
+    """In one problem staying replaces idling, in the other it cannot: the model is the one that was
+    built for.
+    """
     (tmp_path / "d.pddl").write_text(PARKING)
     files = []
     for name, text in (("roads", ROADS), ("parked", PARKED)):
@@ -57,17 +59,26 @@ def test_the_verdict_does_not_depend_on_which_problems_are_given(
     assert coordlang("build", tmp_path / "d.pddl", *files, "-o", path).code == 0
     built = json.loads(coordlang("verify", path, tmp_path / "d.pddl", *files, "--json").out)
     chosen = [files[k] for k in given]
-    assert json.loads(coordlang("verify", path, tmp_path / "d.pddl", *chosen, "--json").out) == built
+    assert (
+        json.loads(coordlang("verify", path, tmp_path / "d.pddl", *chosen, "--json").out) == built
+    )
 
 
 def edit(path: Path, **changes: object) -> None:
     path.write_text(json.dumps(json.loads(path.read_text()) | changes))
 
 
-def test_a_key_in_another_order_is_refused(coordlang: Command, language: Path, t_map: tuple[Path, Path]) -> None:
+def test_a_key_in_another_order_is_refused(
+    coordlang: Command, language: Path, t_map: tuple[Path, Path]
+) -> None:
     """A robot looks states up by their key: what it would not find must not be verified."""
     states = json.loads(language.read_text())["states"]
-    edit(language, states={" ".join(reversed(k.replace(") (", ")|(").split("|"))): w for k, w in states.items()})
+    edit(
+        language,
+        states={
+            " ".join(reversed(k.replace(") (", ")|(").split("|"))): w for k, w in states.items()
+        },
+    )
     outcome = coordlang("verify", language, *t_map)
     assert outcome.code == 31
     assert "is no key of a state; it would be" in outcome.err
@@ -76,16 +87,29 @@ def test_a_key_in_another_order_is_refused(coordlang: Command, language: Path, t
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"guarantee": {"method": "x", "size": 9, "lower_bound": 1, "proved_minimal": False}}, "contradicts the 4 words"),
-        ({"guarantee": {"method": "x", "size": 4, "lower_bound": 99, "proved_minimal": True}}, "contradicts the 4 words"),
-        ({"guarantee": {"method": "x", "size": 4, "lower_bound": 2, "proved_minimal": True}}, "contradicts the lower bound"),
+        (
+            {"guarantee": {"method": "x", "size": 9, "lower_bound": 1, "proved_minimal": False}},
+            "contradicts the 4 words",
+        ),
+        (
+            {"guarantee": {"method": "x", "size": 4, "lower_bound": 99, "proved_minimal": True}},
+            "contradicts the 4 words",
+        ),
+        (
+            {"guarantee": {"method": "x", "size": 4, "lower_bound": 2, "proved_minimal": True}},
+            "contradicts the lower bound",
+        ),
         ({"robots": []}, "the robots must be different, and at least one"),
         ({"tasks": {"kind": "problems", "count": 2, "tasks": []}}, "records 2 tasks but lists 0"),
         ({"tasks": {"kind": "all", "count": 5}}, "the language records 5 tasks"),
     ],
 )
 def test_contradictions(
-    changes: dict[str, object], message: str, coordlang: Command, language: Path, t_map: tuple[Path, Path]
+    changes: dict[str, object],
+    message: str,
+    coordlang: Command,
+    language: Path,
+    t_map: tuple[Path, Path],
 ) -> None:
     edit(language, **changes)
     outcome = coordlang("verify", language, *t_map)
@@ -122,7 +146,9 @@ def test_a_file_that_is_no_gzip(tmp_path: Path) -> None:
 
 def problem_of(folder_init: str, goal: str) -> Candidates:
     domain = parse_domain(Source("parking", PARKING))
-    return from_problems(domain, [parse_problem(Source("p", parking("p", folder_init, goal)), domain)])
+    return from_problems(
+        domain, [parse_problem(Source("p", parking("p", folder_init, goal)), domain)]
+    )
 
 
 @pytest.mark.parametrize(
@@ -130,7 +156,11 @@ def problem_of(folder_init: str, goal: str) -> Candidates:
     [
         shipped("t-map"),
         shipped("grid", "gw1-2x2"),
-        all_pairs(*(lambda d: (d, [parse_problem(Source("p", ROADS), d)]))(parse_domain(Source("parking", PARKING)))),
+        all_pairs(
+            *(lambda d: (d, [parse_problem(Source("p", ROADS), d)]))(
+                parse_domain(Source("parking", PARKING))
+            )
+        ),
         problem_of("(at r1 a) (at r2 c)", "(or (at r1 b) (at r2 b))"),
     ],
     ids=["t-map", "gw1", "roads", "one task"],
@@ -146,17 +176,24 @@ def test_symmetries_map_plans_to_plans(candidates: Candidates) -> None:
             lists.add(frozenset(tuple(plans.states(plan)) for plan in plans))
     for permutation in found:
         assert sorted(permutation.tolist()) == list(range(len(candidates.rows)))
-        image = {frozenset(tuple(int(permutation[s]) for s in states) for states in plans) for plans in lists}
+        image = {
+            frozenset(tuple(int(permutation[s]) for s in states) for states in plans)
+            for plans in lists
+        }
         assert image == lists
 
 
 def test_objects_that_nothing_reaches_cost_no_symmetries() -> None:
-    """A hundred cells without a door: the same symmetries, and not a hundred factorial of them to try."""
+    """A hundred cells without a door: the same symmetries, and not a hundred factorial of them to
+    try.
+    """
     text = (DOMAINS / "grid" / "gw1-2x2.pddl").read_text()
     extra = " ".join(f"far{n}" for n in range(100))
     domain = read_domain(DOMAINS / "grid" / "domain.pddl")
     plain = all_pairs(domain, [parse_problem(Source("p", text), domain)])
-    more = all_pairs(domain, [parse_problem(Source("p", text.replace(" - cell", f" {extra} - cell")), domain)])
+    more = all_pairs(
+        domain, [parse_problem(Source("p", text.replace(" - cell", f" {extra} - cell")), domain)]
+    )
     assert more.count == plain.count
     found = [s.tolist() for s in state_symmetries(plain)]
     assert len(found) == 15
@@ -173,9 +210,13 @@ def test_what_is_closed() -> None:
     assert not closed([turn, back, swap])
 
 
-@pytest.mark.parametrize(("folder", "stem"), [("three-cells", "problem"), ("t-map", "problem"), ("grid", "gw1-2x2")])
+@pytest.mark.parametrize(
+    ("folder", "stem"), [("three-cells", "problem"), ("t-map", "problem"), ("grid", "gw1-2x2")]
+)
 @pytest.mark.parametrize("method", ["greedy", "minimal"])
-def test_every_single_corruption_that_matters_is_caught(folder: str, stem: str, method: str) -> None:
+def test_every_single_corruption_that_matters_is_caught(
+    folder: str, stem: str, method: str
+) -> None:
     """Each state moved to each other word, or to a new one: `verify` says what the definition says."""
     candidates = shipped(folder, stem)
     language = build_language(candidates, method).language
@@ -188,7 +229,8 @@ def test_every_single_corruption_that_matters_is_caught(folder: str, stem: str, 
             changed[state] = other
             corrupt = WordTable((*language.words, "new"), candidates.rows, changed, 0)
             expected = all(
-                naive.is_language(space, dict(enumerate(changed.tolist())), 1000) for space in candidates.spaces
+                naive.is_language(space, dict(enumerate(changed.tolist())), 1000)
+                for space in candidates.spaces
             )
             assert verify(corrupt, candidates.spaces).holds == expected, (state, other)
             verdicts[expected] += 1

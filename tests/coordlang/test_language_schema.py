@@ -1,4 +1,6 @@
-"""The JSON Schema of language files: the packaged copy, what is written, what is not allowed, and what is written by hand."""
+"""The JSON Schema of language files: the packaged copy, what is written, what is not allowed, and
+what is written by hand.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ RUNNING = [DOMAINS / "three-cells" / name for name in ("domain.pddl", "problem.p
 
 @pytest.fixture(scope="module")
 def written() -> dict[str, Any]:
-    data: dict[str, Any] = json.loads(to_bytes(build_language(shipped("three-cells"), "minimal").language))
+    data: dict[str, Any] = json.loads(
+        to_bytes(build_language(shipped("three-cells"), "minimal").language)
+    )
     return data
 
 
@@ -44,7 +48,9 @@ def readable(data: object) -> bool:
 
 def test_packaged_schema_is_the_printed_one(coordlang: Command) -> None:
     packaged = Path(coordlang_folder() / "language.schema.json").read_text()
-    assert packaged == coordlang("schema").out, "coordlang schema > coordlang/language/language.schema.json"
+    assert packaged == coordlang("schema").out, (
+        "coordlang schema > coordlang/language/language.schema.json"
+    )
     jsonschema.Draft202012Validator.check_schema(json.loads(packaged))
 
 
@@ -52,14 +58,19 @@ def coordlang_folder() -> Path:
     return Path(str(coordlang.__file__)).parent
 
 
-@pytest.mark.parametrize(("method", "folder", "stem"), [("minimal", "three-cells", "problem"), ("greedy", "grid", "gw2-2x3")])
+@pytest.mark.parametrize(
+    ("method", "folder", "stem"),
+    [("minimal", "three-cells", "problem"), ("greedy", "grid", "gw2-2x3")],
+)
 def test_what_is_written_is_valid(method: str, folder: str, stem: str, tmp_path: Path) -> None:
     language = build_language(shipped(folder, stem), method).language
     for name in ("l.json", "l.json.gz"):
         write_language(language, tmp_path / name)
         assert read_language(tmp_path / name) == language
     assert valid(json.loads((tmp_path / "l.json").read_text()))
-    assert gzip.decompress((tmp_path / "l.json.gz").read_bytes()) == (tmp_path / "l.json").read_bytes()
+    assert (
+        gzip.decompress((tmp_path / "l.json.gz").read_bytes()) == (tmp_path / "l.json").read_bytes()
+    )
 
 
 Change = Callable[[dict[str, Any]], object]
@@ -141,7 +152,9 @@ def test_further_keys_are_ignored(written: dict[str, Any]) -> None:
     data = copy.deepcopy(written) | {"note": "by me"}
     data["guarantee"]["note"] = 1
     assert valid(data)
-    assert language_from_bytes(json.dumps(data).encode(), HERE) == language_from_bytes(json.dumps(written).encode(), HERE)
+    assert language_from_bytes(json.dumps(data).encode(), HERE) == language_from_bytes(
+        json.dumps(written).encode(), HERE
+    )
 
 
 BY_HAND = {
@@ -149,11 +162,15 @@ BY_HAND = {
     "version": 1,
     "words": ["a", "b", "c"],
     "states": {
-        "(at r1 b) (at r2 a)": "a", "(at r1 c) (at r2 a)": "a", "(at r1 a) (at r2 b)": "b",
-        "(at r1 c) (at r2 b)": "b", "(at r1 a) (at r2 c)": "c", "(at r1 b) (at r2 c)": "c",
+        "(at r1 b) (at r2 a)": "a",
+        "(at r1 c) (at r2 a)": "a",
+        "(at r1 a) (at r2 b)": "b",
+        "(at r1 c) (at r2 b)": "b",
+        "(at r1 a) (at r2 c)": "c",
+        "(at r1 b) (at r2 c)": "c",
     },
     "default": "a",
-}  # fmt: skip
+}
 
 
 def test_by_hand(coordlang: Command, tmp_path: Path) -> None:
@@ -169,7 +186,9 @@ def test_by_hand(coordlang: Command, tmp_path: Path) -> None:
     assert explained.code == 0
     assert "at(r2) = a" in explained.out
     assert "r1, r2" in explained.out
-    assert coordlang("explain", path, *RUNNING, "--task").code == 1  # it records no task, so it guarantees nothing
+    assert (
+        coordlang("explain", path, *RUNNING, "--task").code == 1
+    )  # it records no task, so it guarantees nothing
 
 
 def test_by_hand_only_a_default(coordlang: Command, tmp_path: Path) -> None:
@@ -191,8 +210,16 @@ def test_by_hand_and_wrong(coordlang: Command, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "key"),
     [
-        ('"(at r1 b) (at r2 a)":', '"(at r1 a) (at r2 b)": "a", "(at r1 b) (at r2 a)":', "(at r1 a) (at r2 b)"),
-        ('"(at r1 b) (at r2 a)":', '"(at r1 \\u0061) (at r2 b)": "a", "(at r1 b) (at r2 a)":', "(at r1 a) (at r2 b)"),
+        (
+            '"(at r1 b) (at r2 a)":',
+            '"(at r1 a) (at r2 b)": "a", "(at r1 b) (at r2 a)":',
+            "(at r1 a) (at r2 b)",
+        ),
+        (
+            '"(at r1 b) (at r2 a)":',
+            '"(at r1 \\u0061) (at r2 b)": "a", "(at r1 b) (at r2 a)":',
+            "(at r1 a) (at r2 b)",
+        ),
         ('"default":', '"default": "b", "default":', "default"),
         ('"states":', '"states": {"(at r1 a) (at r2 b)": "b"}, "states":', "states"),
         ('"version":', '"producer": {"seed": 1, "\\u0073eed": 2}, "version":', "seed"),
@@ -215,4 +242,7 @@ def test_escapes_in_keys_are_no_duplicates() -> None:
     data = BY_HAND | {"states": {'(say "a")': "a", "(say \\)": "b", '(say \\")': "c", "(é)": "a"}}
     language = language_from_bytes(json.dumps(data).encode(), HERE)
     assert dict(language.states) == data["states"]
-    assert dict(language_from_bytes(json.dumps(data, ensure_ascii=False).encode(), HERE).states) == data["states"]
+    assert (
+        dict(language_from_bytes(json.dumps(data, ensure_ascii=False).encode(), HERE).states)
+        == data["states"]
+    )

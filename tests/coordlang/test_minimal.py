@@ -30,9 +30,15 @@ def shipped(folder: str, stem: str = "problem") -> Candidates:
 
 @pytest.mark.parametrize(
     ("folder", "stem", "words"),
-    [("three-cells", "problem", 3), ("t-map", "problem", 3), ("grid", "gw1-2x2", 3), ("grid-joint", "gw1-2x2", 3),
-     ("grid", "gw2-2x3", 5), ("grid", "gwb2-3x3", 3)],
-)  # fmt: skip
+    [
+        ("three-cells", "problem", 3),
+        ("t-map", "problem", 3),
+        ("grid", "gw1-2x2", 3),
+        ("grid-joint", "gw1-2x2", 3),
+        ("grid", "gw2-2x3", 5),
+        ("grid", "gwb2-3x3", 3),
+    ],
+)
 def test_known_minima(folder: str, stem: str, words: int) -> None:
     built = build_language(shipped(folder, stem), "minimal")
     guarantee = built.language.guarantee
@@ -51,7 +57,9 @@ SEQUENCES = st.lists(st.integers(0, 4), min_size=1, max_size=6)
 
 @settings(max_examples=500, deadline=None)
 @given(SEQUENCES, SEQUENCES, st.lists(st.integers(0, 2), min_size=5, max_size=5))
-def test_same_sentence_iff_a_warping_path_exists(u: list[int], v: list[int], word: list[int]) -> None:
+def test_same_sentence_iff_a_warping_path_exists(
+    u: list[int], v: list[int], word: list[int]
+) -> None:
     clause = warping_clause(u, v, word)
     assert (clause is not None) == (sentence(word[s] for s in u) == sentence(word[s] for s in v))
     if clause is not None:
@@ -78,7 +86,10 @@ def test_separation_clause_of_three_plans() -> None:
 
 
 @settings(max_examples=200, deadline=None)
-@given(st.integers(1, 3), st.lists(st.sets(st.tuples(st.integers(0, 4), st.integers(0, 4)), min_size=1), max_size=6))
+@given(
+    st.integers(1, 3),
+    st.lists(st.sets(st.tuples(st.integers(0, 4), st.integers(0, 4)), min_size=1), max_size=6),
+)
 def test_colouring_against_trying_all(size: int, drawn: list[set[tuple[int, int]]]) -> None:
     clauses = [frozenset(pair(a, b) for a, b in clause if a != b) for clause in drawn]
     colouring = Colouring([2, 0, 1, 4, 3], size)
@@ -110,10 +121,19 @@ GROUPS = (
     st.permutations(list(combinations(range(5), 2))),
 )
 def test_one_of_symmetric_partitions(
-    size: int, group: list[list[int]], drawn: list[set[tuple[int, int]]], pairs: list[tuple[int, int]]
+    size: int,
+    group: list[list[int]],
+    drawn: list[set[tuple[int, int]]],
+    pairs: list[tuple[int, int]],
 ) -> None:
-    """Where all images of a clause are clauses, a partition is left if there was one, and it is the first of its images."""
-    clauses = {frozenset(pair(s[a], s[b]) for a, b in clause if a != b) for clause in drawn for s in [range(5), *group]}
+    """Where all images of a clause are clauses, a partition is left if there was one, and it is the
+    first of its images.
+    """
+    clauses = {
+        frozenset(pair(s[a], s[b]) for a, b in clause if a != b)
+        for clause in drawn
+        for s in [range(5), *group]
+    }
     plain, led = Colouring(range(5), size), Colouring(range(5), size)
     for colouring in (plain, led):
         for clause in sorted(clauses, key=sorted):
@@ -160,7 +180,11 @@ def test_problems_are_kept_and_learn_what_is_new() -> None:
 
 
 def test_reduce_drops_what_is_implied() -> None:
-    short, long, other = frozenset({(0, 1)}), frozenset({(0, 1), (1, 2)}), frozenset({(1, 2), (2, 3)})
+    short, long, other = (
+        frozenset({(0, 1)}),
+        frozenset({(0, 1), (1, 2)}),
+        frozenset({(1, 2), (2, 3)}),
+    )
     assert reduce([long, short, other, short]) == [short, other]
     assert reduce([long, short, other], 1) == [short, other], "short ones first"
     assert reduce([long, short, other], 0) == [short, long, other]

@@ -32,7 +32,9 @@ def all_readings(states: tuple[int, ...], words: Overlap) -> set[Sentence]:
     return {naive.sentence(list(chosen)) for chosen in product(*(sorted(words[s]) for s in states))}
 
 
-def usable_sizes(plans: list[Plan], sequences: list[tuple[int, ...]], words: Overlap, robots: int) -> list[int]:
+def usable_sizes(
+    plans: list[Plan], sequences: list[tuple[int, ...]], words: Overlap, robots: int
+) -> list[int]:
     """For each plan the most plans that one of its usable sentences leaves open; 0 if it has none."""
     read = [all_readings(states, words) for states in sequences]
     good = set(plans)
@@ -40,7 +42,9 @@ def usable_sizes(plans: list[Plan], sequences: list[tuple[int, ...]], words: Ove
     for own in read:
         sizes = [0]
         for sentence in own:
-            open_plans = [plan for plan, other in zip(plans, read, strict=True) if sentence in other]
+            open_plans = [
+                plan for plan, other in zip(plans, read, strict=True) if sentence in other
+            ]
             if all(naive.mixture(mixed) in good for mixed in product(open_plans, repeat=robots)):
                 sizes.append(len(open_plans))
         best.append(max(sizes))
@@ -63,15 +67,27 @@ def models() -> tuple[Candidates, ...]:
     """Small models with two and three robots, all of which require coordination somewhere."""
     random = Random(4)
     found = [shipped("three-cells")]
-    found += [some_tasks(shipped(*name), random, 5) for name in 3 * [("grid", "gw1-2x2"), ("grid", "gwb2-3x3")]]
+    found += [
+        some_tasks(shipped(*name), random, 5)
+        for name in 3 * [("grid", "gw1-2x2"), ("grid", "gwb2-3x3")]
+    ]
     graphs = [on_graph(seed, robots) for robots in (2, 3) for seed in range(16)]
-    found += [c for c in graphs if c is not None and all(inseparable(space) is None for space in c.spaces)]
-    return tuple(c for c in found if any(walk(space).requires[space.starts].any() for space in c.spaces) and small(c))
+    found += [
+        c for c in graphs if c is not None and all(inseparable(space) is None for space in c.spaces)
+    ]
+    return tuple(
+        c
+        for c in found
+        if any(walk(space).requires[space.starts].any() for space in c.spaces) and small(c)
+    )
 
 
 def small(candidates: Candidates) -> bool:
     try:
-        return all(len(plans) <= (14 if len(candidates.model.robots) == 2 else 6) for _, _, plans, _ in listed(candidates))
+        return all(
+            len(plans) <= (14 if len(candidates.model.robots) == 2 else 6)
+            for _, _, plans, _ in listed(candidates)
+        )
     except naive.TooLarge:
         return False
 
@@ -82,7 +98,10 @@ def random_overlap(candidates: Candidates, random: Random) -> dict[int, frozense
     own = [random.randrange(size) for _ in range(len(candidates.rows))]
     if random.random() < 0.6:  # all states apart is a language
         own, size = list(range(len(candidates.rows))), len(candidates.rows)
-    return {s: frozenset({w, *(x for x in range(size) if random.random() < extra / 2)}) for s, w in enumerate(own)}
+    return {
+        s: frozenset({w, *(x for x in range(size) if random.random() < extra / 2)})
+        for s, w in enumerate(own)
+    }
 
 
 def test_there_are_models_of_both_kinds() -> None:
@@ -144,7 +163,9 @@ def test_enlarged_words_are_a_language_and_leave_more_open() -> None:
     for candidates in models():
         requires = [walk(space).requires for space in candidates.spaces]
         built = build_language(candidates, "greedy")
-        partition = {s: n for n, s in enumerate(built.job.states)} if len(built.job.states) < 9 else None
+        partition = (
+            {s: n for n, s in enumerate(built.job.states)} if len(built.job.states) < 9 else None
+        )
         word = words_of_states(built.language, candidates.model, candidates.rows)
         partition = partition or {s: next(iter(word[s])) for s in built.job.states}
         enlarged = enlarge(candidates.spaces, requires, partition)
@@ -157,7 +178,10 @@ def test_enlarged_words_are_a_language_and_leave_more_open() -> None:
         assert enlarged.expected == pytest.approx([float(value) for value in want])
         assert enlarged.before == pytest.approx([float(value) for value in before])
         assert all(own >= {partition[s]} for s, own in enlarged.words.items())
-        assert enlarged.expected.mean() <= flexibility_bounds(candidates.spaces, requires).mean() + 1e-9
+        assert (
+            enlarged.expected.mean()
+            <= flexibility_bounds(candidates.spaces, requires).mean() + 1e-9
+        )
         better += sum(want) > sum(before)
     assert better >= 3
 
@@ -192,8 +216,16 @@ def test_a_bad_also_is_refused() -> None:
     language = build_language(shipped("three-cells"), "minimal").language
     key, word = next(iter(language.states.items()))
     other = next(w for w in language.words if w != word)
-    assert language_from_bytes(to_bytes(replace(language, also={key: (other,)})), Place("l")).also == {key: (other,)}
-    for also in ({key: ()}, {key: (word,)}, {key: ("w9",)}, {key: (other, other)}, {"(at r1 nowhere)": (other,)}):
+    assert language_from_bytes(
+        to_bytes(replace(language, also={key: (other,)})), Place("l")
+    ).also == {key: (other,)}
+    for also in (
+        {key: ()},
+        {key: (word,)},
+        {key: ("w9",)},
+        {key: (other, other)},
+        {"(at r1 nowhere)": (other,)},
+    ):
         with pytest.raises(BadInput, match="'also' of"):
             language_from_bytes(to_bytes(replace(language, also=also)), Place("l"))
 
@@ -201,5 +233,12 @@ def test_a_bad_also_is_refused() -> None:
 def test_old_files_have_no_also() -> None:
     language = build_language(shipped("three-cells"), "minimal").language
     assert b'"also"' not in to_bytes(language)
-    assert np.array_equal([len(w) for w in words_of_states(language, shipped("three-cells").model, shipped("three-cells").rows)],
-                          np.ones(6))  # fmt: skip
+    assert np.array_equal(
+        [
+            len(w)
+            for w in words_of_states(
+                language, shipped("three-cells").model, shipped("three-cells").rows
+            )
+        ],
+        np.ones(6),
+    )

@@ -23,18 +23,26 @@ from tests.coordlang.test_flexible import listed, on_graph, partitions
 
 
 def pair_failing(plans: list[Plan], robots: int, i: int, j: int) -> list[tuple[int, int]]:
-    """Two plans with a bad mixture: i follows the first, j the second, everybody else one of the two."""
+    """Two plans with a bad mixture: i follows the first, j the second, everybody else one of the
+    two.
+    """
     good = set(plans)
     found = []
     for a, b in product(range(len(plans)), repeat=2):
         for chosen in product((a, b), repeat=robots):
-            if chosen[i] == a and chosen[j] == b and naive.mixture(tuple(plans[k] for k in chosen)) not in good:
+            if (
+                chosen[i] == a
+                and chosen[j] == b
+                and naive.mixture(tuple(plans[k] for k in chosen)) not in good
+            ):
                 found.append((a, b))
                 break
     return found
 
 
-def bad_pairs(candidates: Candidates, i: int, j: int) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
+def bad_pairs(
+    candidates: Candidates, i: int, j: int
+) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
     robots = len(candidates.model.robots)
     return [
         (sequences[a], sequences[b])
@@ -43,8 +51,12 @@ def bad_pairs(candidates: Candidates, i: int, j: int) -> list[tuple[tuple[int, .
     ]
 
 
-def apart(bad: list[tuple[tuple[int, ...], tuple[int, ...]]], word: dict[int, int] | list[int]) -> bool:
-    return all(naive.sentence([word[s] for s in u]) != naive.sentence([word[s] for s in v]) for u, v in bad)
+def apart(
+    bad: list[tuple[tuple[int, ...], tuple[int, ...]]], word: dict[int, int] | list[int]
+) -> bool:
+    return all(
+        naive.sentence([word[s] for s in u]) != naive.sentence([word[s] for s in v]) for u, v in bad
+    )
 
 
 def models(robots: int) -> list[Candidates]:
@@ -99,12 +111,17 @@ def test_pair_languages_are_smallest() -> None:
             assert language.pairs == (pair,)
             bad = bad_pairs(candidates, *pair)
             assert apart(bad, dict(language.words))
-            least = next(k for k in range(1, 7) if any(apart(bad, word) for word in partitions(states, k)))
+            least = next(
+                k for k in range(1, 7) if any(apart(bad, word) for word in partitions(states, k))
+            )
             assert language.size == least
             compared += least > 1
         # With one sentence for each pair, two plans that fit all of them mix freely.
         joined = together(languages)
-        assert unsafe_pair(candidates.spaces, [joined.get(s, 0) for s in range(len(candidates.rows))]) is None
+        assert (
+            unsafe_pair(candidates.spaces, [joined.get(s, 0) for s in range(len(candidates.rows))])
+            is None
+        )
         one = language_for(candidates.spaces, list(combinations(range(3), 2)))
         assert max(language.size for language in languages) <= one.size
     assert compared >= 3
@@ -125,7 +142,9 @@ def test_inseparable_plans_have_no_language(robots: str, tmp_path: Path) -> None
     (tmp_path / "d.pddl").write_text("""(define (domain lamps) (:types robot) (:predicates (lit))
       (:action press :agent ?r - robot :parameters ()
         :precondition (and (not (lit)) (forall (?o - robot) (not (press ?o)))) :effect (lit)))""")
-    (tmp_path / "p.pddl").write_text(f"(define (problem p) (:domain lamps) (:objects {robots} - robot) (:goal (lit)))")
+    (tmp_path / "p.pddl").write_text(
+        f"(define (problem p) (:domain lamps) (:objects {robots} - robot) (:goal (lit)))"
+    )
     domain = read_domain(tmp_path / "d.pddl")
     candidates = from_problems(domain, [read_problem(tmp_path / "p.pddl", domain)])
     with pytest.raises(Inseparable) as caught:
@@ -145,7 +164,10 @@ def test_three_plans_that_every_two_of_which_mix() -> None:
     """The flags: good for every pair of robots, and three plans of one sentence fail."""
     candidates = flags()
     number: dict[str, int] = {}
-    words = [number.setdefault(colours(candidates.model.codec.key(row)), len(number)) for row in candidates.rows]
+    words = [
+        number.setdefault(colours(candidates.model.codec.key(row)), len(number))
+        for row in candidates.rows
+    ]
     assert sorted(number) == ["alike", "blue and green", "blue and red", "green and red", "start"]
     assert unsafe_pair(candidates.spaces, words) is None
     verdict = verify(table_of(candidates, words), candidates.spaces)

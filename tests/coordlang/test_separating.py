@@ -1,4 +1,6 @@
-"""Theorem 3 against its definition: plans listed, all failing tuples separated, all partitions tried."""
+"""Theorem 3 against its definition: plans listed, all failing tuples separated, all partitions
+tried.
+"""
 
 from __future__ import annotations
 
@@ -96,13 +98,18 @@ def small_models(robots: int, most: int, number: int) -> Iterator[tuple[int, Can
 @pytest.mark.parametrize("written", [True, False])
 @pytest.mark.parametrize(
     ("robots", "most", "number"),
-    [(2, 40, 12), (3, 14, 6), pytest.param(2, 40, 200, marks=pytest.mark.slow),
-     pytest.param(3, 14, 100, marks=pytest.mark.slow)],
-)  # fmt: skip
+    [
+        (2, 40, 12),
+        (3, 14, 6),
+        pytest.param(2, 40, 200, marks=pytest.mark.slow),
+        pytest.param(3, 14, 100, marks=pytest.mark.slow),
+    ],
+)
 def test_against_the_theorem(
     robots: int, most: int, number: int, written: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Least sizes with and without beta, and the order of the four methods; `minimal` equals `exhaustive`.
+    """Least sizes with and without beta, and the order of the four methods; `minimal` equals
+    `exhaustive`.
 
     With all constraints written down, and with constraints asked of the walk.
     """
@@ -118,14 +125,25 @@ def test_against_the_theorem(
         for built, wanted in ((full, both), (first, alpha)):
             assert built.stopped is None
             size = built.language.guarantee.size
-            assert size == least(candidates, states, wanted) == built.figures["separating_lower_bound"]
-            word = {s: built.language.words.index(built.language.states[codec.key(candidates.rows[s])]) for s in states}
+            assert (
+                size == least(candidates, states, wanted) == built.figures["separating_lower_bound"]
+            )
+            word = {
+                s: built.language.words.index(built.language.states[codec.key(candidates.rows[s])])
+                for s in states
+            }
             assert all(satisfies(word, demand) for demand in wanted)
         exhaustive, minimal, greedy = (
-            build_language(candidates, method).language.guarantee for method in ("exhaustive", "minimal", "greedy")
+            build_language(candidates, method).language.guarantee
+            for method in ("exhaustive", "minimal", "greedy")
         )
         assert exhaustive.size == minimal.size == minimal.lower_bound
-        sizes = (exhaustive.size, full.language.guarantee.size, first.language.guarantee.size, greedy.size)
+        sizes = (
+            exhaustive.size,
+            full.language.guarantee.size,
+            first.language.guarantee.size,
+            greedy.size,
+        )
         assert list(sizes) == sorted(sizes)
         seen[sizes] += 1
     assert any(a < b for a, b, _, _ in seen), "no model where the minimum is below Theorem 3's"
@@ -134,7 +152,12 @@ def test_against_the_theorem(
 
 @pytest.mark.parametrize(
     ("folder", "stem", "both", "alpha"),
-    [("three-cells", "problem", 3, 6), ("grid", "gw1-2x2", 6, 8), ("grid", "gw2-2x3", 7, 13), ("grid", "gwb2-3x3", 6, 8)],
+    [
+        ("three-cells", "problem", 3, 6),
+        ("grid", "gw1-2x2", 6, 8),
+        ("grid", "gw2-2x3", 7, 13),
+        ("grid", "gwb2-3x3", 6, 8),
+    ],
 )
 def test_known_minima(folder: str, stem: str, both: int, alpha: int) -> None:
     """The running example needs 6 words under alpha alone and 3 under alpha or beta (the paper)."""
@@ -149,8 +172,14 @@ def test_gw1_has_eight_states_that_alpha_alone_keeps_apart() -> None:
     candidates = shipped("grid", "gw1-2x2")
     apart = {p for (group,) in demands(candidates, 1000, beta=False) for p in group}
     states = sorted({s for p in apart for s in p})
-    assert any(all(frozenset(p) in apart for p in combinations(group, 2)) for group in combinations(states, 8))
-    assert not any(all(frozenset(p) in apart for p in combinations(group, 2)) for group in combinations(states, 9))
+    assert any(
+        all(frozenset(p) in apart for p in combinations(group, 2))
+        for group in combinations(states, 8)
+    )
+    assert not any(
+        all(frozenset(p) in apart for p in combinations(group, 2))
+        for group in combinations(states, 9)
+    )
 
 
 def test_different_ends_need_one_pair_only() -> None:
@@ -159,14 +188,25 @@ def test_different_ends_need_one_pair_only() -> None:
     assert [sorted(s.pairs) for s in alternatives(2, [5, 3])] == [[(2, 3), (2, 5), (3, 5)]]
 
 
-@pytest.mark.parametrize(("robots", "most", "number"), [(2, 40, 14), (3, 14, 8), pytest.param(2, 40, 100, marks=pytest.mark.slow),
-     pytest.param(3, 14, 50, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("robots", "most", "number"),
+    [
+        (2, 40, 14),
+        (3, 14, 8),
+        pytest.param(2, 40, 100, marks=pytest.mark.slow),
+        pytest.param(3, 14, 50, marks=pytest.mark.slow),
+    ],
+)
 def test_every_constraint_and_no_other(robots: int, most: int, number: int) -> None:
     """What is written down are the demands of the failing tuples, all listed."""
     for _, candidates in small_models(robots, most, number):
         found = [SeparationWalk(space).every(10**6) for space in candidates.spaces]
         every = {
-            tuple(sorted((frozenset(frozenset(p) for p in s.pairs) for s in constraint), key=sorted_pairs))
+            tuple(
+                sorted(
+                    (frozenset(frozenset(p) for p in s.pairs) for s in constraint), key=sorted_pairs
+                )
+            )
             for constraints in found
             if constraints is not None
             for constraint in constraints

@@ -27,10 +27,14 @@ DOMAINS = Path(__file__).parents[2] / "domains"
 def matches(atom: str, pattern: str) -> bool:
     """Word by word, a ``?`` for any one."""
     mine, theirs = (text.strip("()").split() for text in (atom, pattern))
-    return len(mine) == len(theirs) and all(b in ("?", a) for a, b in zip(mine, theirs, strict=True))
+    return len(mine) == len(theirs) and all(
+        b in ("?", a) for a, b in zip(mine, theirs, strict=True)
+    )
 
 
-def naive(loaded: Loaded, starts: list[str], goals: list[str]) -> set[tuple[frozenset[str], frozenset[str]]]:
+def naive(
+    loaded: Loaded, starts: list[str], goals: list[str]
+) -> set[tuple[frozenset[str], frozenset[str]]]:
     """The definition, with sets of atoms."""
     twin = Twin(loaded.domain, loaded.problems[0], loaded.team)
     states, todo = {twin.init}, [twin.init]
@@ -38,7 +42,9 @@ def naive(loaded: Loaded, starts: list[str], goals: list[str]) -> set[tuple[froz
         new = {after for _, after in twin.successors(todo.pop())} - states
         states |= new
         todo += new
-    text = {state: frozenset(f"({' '.join((a.predicate, *a.args))})" for a in state) for state in states}
+    text = {
+        state: frozenset(f"({' '.join((a.predicate, *a.args))})" for a in state) for state in states
+    }
     own = text[twin.init]
     chosen = {s for s in states if all(any(matches(a, p) for p in starts) for a in text[s] ^ own)}
     wanted = {
@@ -88,32 +94,63 @@ def test_without_goals_it_is_the_problems_own() -> None:
     assert varied_tasks(loaded, [], []) == (
         ListedTask(("(at r1 yard)", "(at r2 yard)"), ("(at r1 lab)", "(at r2 lab)")),
     )
-    assert {task.goal for task in varied_tasks(loaded, ["(at ? ?)"], [])} == {("(at r1 lab)", "(at r2 lab)")}
+    assert {task.goal for task in varied_tasks(loaded, ["(at ? ?)"], [])} == {
+        ("(at r1 lab)", "(at r2 lab)")
+    }
 
 
 def test_a_pattern_that_matches_nothing() -> None:
     loaded = load(DOMAINS / "lock" / "domain.pddl", [DOMAINS / "lock" / "both-in.pddl"])
     for wrong in ("(on r1 ?)", "(at r1)", "at r1 ?", "(at r1 ? ?)", "(switch outer yard)", ""):
-        with pytest.raises(UsageError, match=re.escape(f"no fluent of this problem matches {wrong}")):
+        with pytest.raises(
+            UsageError, match=re.escape(f"no fluent of this problem matches {wrong}")
+        ):
             varied_tasks(loaded, [], [wrong])
 
 
 def test_goals_that_cannot_be_together() -> None:
-    loaded = load(DOMAINS / "three-cells" / "domain.pddl", [DOMAINS / "three-cells" / "problem.pddl"])
+    loaded = load(
+        DOMAINS / "three-cells" / "domain.pddl", [DOMAINS / "three-cells" / "problem.pddl"]
+    )
     with pytest.raises(ProvedImpossible, match="there is no such task"):
         varied_tasks(loaded, [], ["(at r1 a)", "(at r2 a)"])
 
 
-def test_the_command_writes_what_build_reads(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    files = str(DOMAINS / "three-cells" / "domain.pddl"), str(DOMAINS / "three-cells" / "problem.pddl")
+def test_the_command_writes_what_build_reads(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    files = (
+        str(DOMAINS / "three-cells" / "domain.pddl"),
+        str(DOMAINS / "three-cells" / "problem.pddl"),
+    )
     output = tmp_path / "tasks.json"
-    assert run(["tasks", *files, "--start", "(AT  r1 ?)", "--goal", "( at r2 ? )", "-o", str(output), "--json"]) == 0
+    assert (
+        run(
+            [
+                "tasks",
+                *files,
+                "--start",
+                "(AT  r1 ?)",
+                "--goal",
+                "( at r2 ? )",
+                "-o",
+                str(output),
+                "--json",
+            ]
+        )
+        == 0
+    )
     assert json.loads(capfd.readouterr().out) == {"tasks": 4, "starts": 2, "goals": 2}
     assert len(read_task_file(output)) == 4
     assert run(["tasks", *files, "--start", "(at r1 ?)", "--goal", "(at r2 ?)", "-o", "-"]) == 0
     shown = capfd.readouterr()
     assert shown.out == output.read_text()
     assert shown.err == "4 tasks: 2 starts, 2 goals\n"
-    assert run(["build", *files, "--tasks", str(output), "-o", str(tmp_path / "language.json")]) == 0
+    assert (
+        run(["build", *files, "--tasks", str(output), "-o", str(tmp_path / "language.json")]) == 0
+    )
     assert run(["tasks", *files, "--goal", "(on r2 ?)", "-o", str(output)]) == 2
-    assert run(["tasks", *files, "--goal", "(at r1 a)", "--goal", "(at r2 a)", "-o", str(output)]) == 11
+    assert (
+        run(["tasks", *files, "--goal", "(at r1 a)", "--goal", "(at r2 a)", "-o", str(output)])
+        == 11
+    )

@@ -12,24 +12,37 @@ from planners.search.plan_space import PlanSpace, search
 from planners.search.plans import Plan, Plans
 
 
-def joint_space(actions: list[tuple[str, str, str]], robots: int, goal: str, init: str = "") -> PlanSpace:
-    """Joint-action PDDL from (subactions, precondition, effect); ``-`` is idling, facts are p0 .. p9."""
+def joint_space(
+    actions: list[tuple[str, str, str]], robots: int, goal: str, init: str = ""
+) -> PlanSpace:
+    """Joint-action PDDL from (subactions, precondition, effect); ``-`` is idling, facts are p0 ..
+    p9.
+    """
     text = []
     for number, (parts, before, after) in enumerate(actions):
         comments = "\n".join(
-            f"; subaction r{n} {'idle' if p == '-' else f'({p})'}" for n, p in enumerate(parts.split(), 1)
+            f"; subaction r{n} {'idle' if p == '-' else f'({p})'}"
+            for n, p in enumerate(parts.split(), 1)
         )
-        text.append(f"(:action j{number} :parameters ()\n{comments}\n :precondition (and {before}) :effect (and {after}))")
+        text.append(
+            f"(:action j{number} :parameters ()\n{comments}\n :precondition (and {before}) :effect (and {after}))"
+        )
     predicates = " ".join(f"(p{n})" for n in range(10))
-    domain = parse_domain(Source("d", f"(define (domain d) (:predicates {predicates})\n" + "\n".join(text) + ")"))
-    problem = parse_problem(Source("p", f"(define (problem p) (:domain d) (:init {init}) (:goal (and {goal})))"), domain)
+    domain = parse_domain(
+        Source("d", f"(define (domain d) (:predicates {predicates})\n" + "\n".join(text) + ")")
+    )
+    problem = parse_problem(
+        Source("p", f"(define (problem p) (:domain d) (:init {init}) (:goal (and {goal})))"), domain
+    )
     loaded = build(domain, [problem])
     assert len(loaded.model.robots) == robots
     return search(loaded.model, loaded.tasks[0])
 
 
 def mixture(plans: tuple[Plan, ...]) -> Plan:
-    return tuple(tuple(step[i] for i, step in enumerate(steps)) for steps in zip(*plans, strict=True))
+    return tuple(
+        tuple(step[i] for i, step in enumerate(steps)) for steps in zip(*plans, strict=True)
+    )
 
 
 def test_two_actions_of_one_effect() -> None:
@@ -55,11 +68,17 @@ def test_failing_after_the_plans_have_met() -> None:
     plans = Plans.of(space)
     model = space.model
     idle = "idle"
-    by_text = {tuple(tuple(t or idle for t in model.texts(step)) for step in plan): plan for plan in plans}
+    by_text = {
+        tuple(tuple(t or idle for t in model.texts(step)) for step in plan): plan for plan in plans
+    }
     first = by_text[(("(flip)", idle), (idle, idle), ("(finish)", idle))]
     second = by_text[((idle, idle), (idle, "(flip)"), ("(finish)", idle))]
     mixed = mixture((second, first))
-    assert tuple(tuple(t or idle for t in model.texts(s)) for s in mixed) == ((idle, idle), (idle, idle), ("(finish)", idle))
+    assert tuple(tuple(t or idle for t in model.texts(s)) for s in mixed) == (
+        (idle, idle),
+        (idle, idle),
+        ("(finish)", idle),
+    )
     assert plans.states(first)[1] != plans.states(second)[1]
     assert plans.states(first)[2] == plans.states(second)[2]
     assert plans.rank(mixed) is None

@@ -1,4 +1,6 @@
-"""docs/pddl.md: its table of what is not supported, and that each rule is shown by an example that is run."""
+"""docs/pddl.md: its table of what is not supported, and that each rule is shown by an example that
+is run.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +19,16 @@ PAGE = DOCS / "pddl.md"
 REFUSED = rows(sections(PAGE)["What is not supported"])
 #: The sections that give rules of joint steps.
 RULES = [
-    "Before and after", "Interference", "Action formulas", "Linked actions", "Conditional effects", "Idling", "Following",
-    "Concurrency networks", "Joint-action PDDL",
-]  # fmt: skip
+    "Before and after",
+    "Interference",
+    "Action formulas",
+    "Linked actions",
+    "Conditional effects",
+    "Idling",
+    "Following",
+    "Concurrency networks",
+    "Joint-action PDDL",
+]
 
 
 def texts(where: str = "", example: str = "") -> tuple[str, str]:
@@ -56,7 +65,9 @@ def test_what_is_not_supported(cells: list[str]) -> None:
     assert place.line > 0
 
 
-def test_an_unknown_section_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unknown_section_is_bad_input(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     domain, problem = texts("section", "(:observe (p))")
     (tmp_path / "d.pddl").write_text(domain)
     (tmp_path / "p.pddl").write_text(problem)
@@ -69,7 +80,9 @@ def test_each_rule_is_shown(rule: str) -> None:
     """Both that something is a joint step and that something is not, where the section shows steps."""
     shown = [b.text for b in blocks(PAGE) if b.kind == "output" and b.text in sections(PAGE)[rule]]
     assert any(line.startswith("yes: ") for text in shown for line in text.splitlines())
-    assert rule == "Conditional effects" or any(line.startswith("no: ") for text in shown for line in text.splitlines())
+    assert rule == "Conditional effects" or any(
+        line.startswith("no: ") for text in shown for line in text.splitlines()
+    )
 
 
 def test_every_answer_is_compared() -> None:

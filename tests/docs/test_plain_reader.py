@@ -41,7 +41,9 @@ def test_reader_needs_the_standard_library_only() -> None:
 
 @pytest.mark.parametrize("flags", [[], ["--remember-actions"]], ids=["states", "actions"])
 @pytest.mark.parametrize("ending", [".json", ".json.gz"])
-def test_reader_says_the_same(flags: list[str], ending: str, reader: dict[str, Any], tmp_path: Path) -> None:
+def test_reader_says_the_same(
+    flags: list[str], ending: str, reader: dict[str, Any], tmp_path: Path
+) -> None:
     path = tmp_path / f"language{ending}"
     assert run(["build", str(DOMAIN), str(PROBLEM), "--tasks", "all", "-o", str(path), *flags]) == 0
     plain = reader["read_language"](path)
@@ -58,7 +60,10 @@ def test_reader_says_the_same(flags: list[str], ending: str, reader: dict[str, A
                 states = Plans(space, start, counted).states(plan)
                 expected = [language.words[w] for w in sentence(int(word[s]) for s in states)]
                 # The reader gets atoms in no particular order.
-                assert reader["sentence"](plain, [set(codec.decode(space.rows[s])) for s in states]) == expected
+                assert (
+                    reader["sentence"](plain, [set(codec.decode(space.rows[s])) for s in states])
+                    == expected
+                )
                 compared += 1
                 words.update(expected)
     assert compared >= 132
@@ -67,7 +72,11 @@ def test_reader_says_the_same(flags: list[str], ending: str, reader: dict[str, A
 
 def test_reader_uses_the_default_and_refuses(reader: dict[str, Any], tmp_path: Path) -> None:
     language = {"states": {"(p)": "w1"}, "default": "w0"}
-    assert reader["sentence"](language, [["(p)"], [], ["(q)", "(p)"], ["(p)"]]) == ["w1", "w0", "w1"]
+    assert reader["sentence"](language, [["(p)"], [], ["(q)", "(p)"], ["(p)"]]) == [
+        "w1",
+        "w0",
+        "w1",
+    ]
     path = tmp_path / "x.json.gz"
     path.write_bytes(gzip.compress(b'{"format": "coordlang/language", "version": 2}'))
     with pytest.raises(ValueError, match="version 1"):
@@ -79,7 +88,9 @@ def test_task_file_of_the_page(tmp_path: Path) -> None:
     path = tmp_path / "tasks.json"
     path.write_text(next(b.text for b in blocks(DOCS / "formats.md") if b.kind == "json"))
     assert len(read_task_file(path)) == 2
-    files = [str(ROOT / "domains" / "three-cells" / name) for name in ("domain.pddl", "problem.pddl")]
+    files = [
+        str(ROOT / "domains" / "three-cells" / name) for name in ("domain.pddl", "problem.pddl")
+    ]
     assert run(["build", *files, "--tasks", str(path), "-o", str(tmp_path / "l.json")]) == 0
 
 
@@ -87,6 +98,8 @@ def test_language_by_hand_of_the_page(reader: dict[str, Any], tmp_path: Path) ->
     """The language that docs/formats.md writes by hand is one, also for the plain reader."""
     path = tmp_path / "by-hand.json"
     path.write_text([b.text for b in blocks(DOCS / "formats.md") if b.kind == "json"][1])
-    files = [str(ROOT / "domains" / "three-cells" / name) for name in ("domain.pddl", "problem.pddl")]
+    files = [
+        str(ROOT / "domains" / "three-cells" / name) for name in ("domain.pddl", "problem.pddl")
+    ]
     assert run(["verify", str(path), *files, "--tasks", "all"]) == 0
     assert reader["word"](reader["read_language"](path), ["(at r2 b)", "(at r1 c)"]) == "r2-in-b"

@@ -1,4 +1,6 @@
-"""docs/cli.md against click's own lists, links against files, the list of files against the packages."""
+"""docs/cli.md against click's own lists, links against files, the list of files against the
+packages.
+"""
 
 from __future__ import annotations
 
@@ -58,7 +60,12 @@ def test_choices_and_defaults(name: str) -> None:
     for spelling, option in options(name).items():
         cells = described(name)[spelling]
         if isinstance(option.type, click.Choice):
-            listed = {word for inline in code(cells[0]) for word in inline.split() if not word.startswith("-")}
+            listed = {
+                word
+                for inline in code(cells[0])
+                for word in inline.split()
+                if not word.startswith("-")
+            }
             real = set(option.type.choices)
             assert listed <= real, f"{name} {spelling}"
             assert listed == real, f"{name} {spelling}"
@@ -74,7 +81,10 @@ def test_usage(name: str) -> None:
 
 
 def test_every_command_has_its_row() -> None:
-    listed = [code(cells[0]) or re.findall(r"\[(\w+)\]", cells[0]) for cells in rows(sections(CLI)["Command line"])]
+    listed = [
+        code(cells[0]) or re.findall(r"\[(\w+)\]", cells[0])
+        for cells in rows(sections(CLI)["Command line"])
+    ]
     assert [names[0] for names in listed] == list(COMMANDS)
 
 
@@ -94,11 +104,18 @@ def test_exit_codes() -> None:
     importlib.import_module("coordlang.building")
     listed = [int(cells[0]) for cells in rows(sections(CLI)["Exit codes"])]
     assert listed == sorted(listed)
-    assert set(listed) == {0, EXIT_INTERRUPTED, EXIT_BROKEN_PIPE, *(kind.exit_code for kind in error_tree(CoordlangError))}
+    assert set(listed) == {
+        0,
+        EXIT_INTERRUPTED,
+        EXIT_BROKEN_PIPE,
+        *(kind.exit_code for kind in error_tree(CoordlangError)),
+    }
 
 
 def error_tree(kind: type[CoordlangError]) -> list[type[CoordlangError]]:
-    ours = [k for k in kind.__subclasses__() if k.__module__.split(".")[0] in ("planners", "coordlang")]
+    ours = [
+        k for k in kind.__subclasses__() if k.__module__.split(".")[0] in ("planners", "coordlang")
+    ]
     return [kind, *(below for k in ours for below in error_tree(k))]
 
 
@@ -127,8 +144,14 @@ def test_index_links_every_page() -> None:
 def test_file_list(package: str) -> None:
     """docs/extending.md has one line for each file."""
     listed = re.findall(rf"`({package}/[\w/]+\.py)`", prose(DOCS / "extending.md"))
-    real = [p.relative_to(ROOT).as_posix() for p in (ROOT / package).rglob("*.py") if p.name != "__init__.py"]
-    rows_of = [cells for cells in rows(prose(DOCS / "extending.md")) if cells[0].startswith(f"`{package}/")]
+    real = [
+        p.relative_to(ROOT).as_posix()
+        for p in (ROOT / package).rglob("*.py")
+        if p.name != "__init__.py"
+    ]
+    rows_of = [
+        cells for cells in rows(prose(DOCS / "extending.md")) if cells[0].startswith(f"`{package}/")
+    ]
     assert sorted(code(cells[0])[0] for cells in rows_of) == sorted(real)
     assert all((ROOT / path).exists() for path in listed if "NAME" not in path)
 
@@ -142,4 +165,6 @@ def test_blocks_are_of_known_kinds() -> None:
     """A misspelt kind would not be run."""
     for page in PAGES:
         for block in blocks(page):
-            assert block.kind in {"python", "output", "console", "json", "sh", "lisp", ""}, f"{page.name}:{block.line}"
+            assert block.kind in {"python", "output", "console", "json", "sh", "lisp", ""}, (
+                f"{page.name}:{block.line}"
+            )

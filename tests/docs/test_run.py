@@ -15,7 +15,8 @@ import pytest
 from coordlang.cli import run
 from tests.docs.pages import PAGES, ROOT, Block, Command, blocks, commands
 
-#: A line of a console block that stands for any number of lines; at the end of a line, for the rest of that line.
+#: A line of a console block that stands for any number of lines; at the end of a line, for the rest
+#: of that line.
 ANYTHING = "..."
 
 
@@ -61,7 +62,9 @@ def test_page_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
             printed = run_python(block, where, namespace)
         elif block.kind == "output":
             assert printed is not None, f"{where}: no Python block before this output"
-            assert matches(block.text.splitlines(), printed.splitlines()), f"{where}: printed\n{printed}"
+            assert matches(block.text.splitlines(), printed.splitlines()), (
+                f"{where}: printed\n{printed}"
+            )
             printed = None
         elif block.kind == "console":
             for command in commands(block):
@@ -92,7 +95,9 @@ def run_command(command: Command, page: str, monkeypatch: pytest.MonkeyPatch) ->
         assert exit_code == 0, f"{where} ended with {exit_code}:\n{real}"
         return
     shown = "\n".join(command.shown).rstrip("\n")
-    assert matches(shown.split("\n"), real.rstrip("\n").split("\n")), f"{where}: the real output is\n{real}"
+    assert matches(shown.split("\n"), real.rstrip("\n").split("\n")), (
+        f"{where}: the real output is\n{real}"
+    )
 
 
 def test_there_is_something_to_run() -> None:

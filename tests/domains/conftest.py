@@ -36,5 +36,7 @@ def _world(folder: str, problem: str) -> World:
 
 @pytest.fixture(scope="session")
 def world() -> Callable[[str, str], World]:
-    """``world(folder, problem)``: the model, its reachable states, and all optimal plans of the problem."""
+    """``world(folder, problem)``: the model, its reachable states, and all optimal plans of the
+    problem.
+    """
     return _world

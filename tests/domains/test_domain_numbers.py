@@ -1,4 +1,6 @@
-"""What the shipped domains contain: the paper's numbers, the numbers in the README files, and both styles equal."""
+"""What the shipped domains contain: the paper's numbers, the numbers in the README files, and both
+styles equal.
+"""
 
 from __future__ import annotations
 
@@ -76,8 +78,12 @@ def test_table_1_filtered_tasks(world, style, problem, tasks, states, at_least):
 
 def farthest(init: tuple[str, ...], goal: tuple[str, ...]) -> int:
     """The greatest Manhattan distance of a robot, from the atoms' text."""
-    numbers = [[[int(n) for n in re.findall(r"\d+", atom)] for atom in state] for state in (init, goal)]
-    return max(abs(a[1] - b[1]) + abs(a[2] - b[2]) for a, b in zip(*numbers, strict=True) if a[0] == b[0])
+    numbers = [
+        [[int(n) for n in re.findall(r"\d+", atom)] for atom in state] for state in (init, goal)
+    ]
+    return max(
+        abs(a[1] - b[1]) + abs(a[2] - b[2]) for a, b in zip(*numbers, strict=True) if a[0] == b[0]
+    )
 
 
 @pytest.mark.parametrize("style", STYLES)
@@ -86,7 +92,9 @@ def test_trading_opposite_corners(world, style, size, plans):
     assert Plans.of(world(style, f"corners-{size}x{size}").plans).count == plans
 
 
-@pytest.mark.parametrize("problem", [row[0] for row in ALL_TASKS] + ["gwb5-3x3", "gwb7-3x5", "gwb8-4x4", "corners-4x4"])
+@pytest.mark.parametrize(
+    "problem", [row[0] for row in ALL_TASKS] + ["gwb5-3x3", "gwb7-3x5", "gwb8-4x4", "corners-4x4"]
+)
 def test_both_styles_are_the_same_model(world, problem):
     one, other = (world(style, problem).space for style in STYLES)
     assert one.model.codec.facts == other.model.codec.facts
@@ -109,7 +117,11 @@ def test_joint_schemas_are_disjoint(world, problem):
 def steps(space: Space) -> set[tuple[int, tuple[str | None, ...], int]]:
     """(state, where each robot moves, next state); a step that is there twice is an error."""
     found = [
-        (source, tuple(text and text.split()[-1] for text in space.model.texts(labels)), int(target))
+        (
+            source,
+            tuple(text and text.split()[-1] for text in space.model.texts(labels)),
+            int(target),
+        )
         for source in range(len(space))
         for labels, target in zip(
             space.labels[space.first[source] : space.first[source + 1]],
@@ -124,7 +136,9 @@ def steps(space: Space) -> set[tuple[int, tuple[str | None, ...], int]]:
 def counts_at_starts(plans: PlanSpace) -> list[tuple[int, int, int]]:
     """(goal, initial state, number of optimal plans) of every task."""
     all_counts = counts(plans)
-    return [(int(plans.goal[node]), int(plans.state[node]), all_counts[node]) for node in plans.starts]
+    return [
+        (int(plans.goal[node]), int(plans.state[node]), all_counts[node]) for node in plans.starts
+    ]
 
 
 def naive_steps(grid: GridMap, state: tuple[str, ...]) -> set[tuple[str, ...]]:
@@ -134,7 +148,10 @@ def naive_steps(grid: GridMap, state: tuple[str, ...]) -> set[tuple[str, ...]]:
         after
         for after in product(*options)
         if len(set(after)) == len(after)
-        and not any(a != b and (b, a) in zip(state, after, strict=True) for a, b in zip(state, after, strict=True))
+        and not any(
+            a != b and (b, a) in zip(state, after, strict=True)
+            for a, b in zip(state, after, strict=True)
+        )
     }
 
 
@@ -156,7 +173,9 @@ def test_the_grid_domain_against_its_rules(grid, starts):
     text = problem_text(Scenario("naive", grid, starts, starts), "grid")
     loaded = build(domain, [parse_problem(Source("naive", text), domain)])
     space = explore(loaded.model, loaded.tasks[0].init[None, :])
-    cells = [tuple(re.findall(r"\(at r\d+ (\S+)\)", loaded.model.codec.key(row))) for row in space.rows]
+    cells = [
+        tuple(re.findall(r"\(at r\d+ (\S+)\)", loaded.model.codec.key(row))) for row in space.rows
+    ]
 
     seen, todo = {starts}, [starts]
     while todo:
@@ -165,14 +184,20 @@ def test_the_grid_domain_against_its_rules(grid, starts):
         todo += new
     assert set(cells) == seen
     for number, state in enumerate(cells):
-        after = [cells[target] for target in space.target[space.first[number] : space.first[number + 1]]]
+        after = [
+            cells[target] for target in space.target[space.first[number] : space.first[number + 1]]
+        ]
         assert len(state) == robots
         assert Counter(after) == Counter(naive_steps(grid, state))
 
 
 def test_a_full_ring_can_only_turn():
     """Following in a cycle: with no free cell all robots move at once, or none does."""
-    assert naive_steps(three_cells(), ("a", "b", "c")) == {("a", "b", "c"), ("b", "c", "a"), ("c", "a", "b")}
+    assert naive_steps(three_cells(), ("a", "b", "c")) == {
+        ("a", "b", "c"),
+        ("b", "c", "a"),
+        ("c", "a", "b"),
+    }
 
 
 def test_three_cells(world):
@@ -188,7 +213,10 @@ def test_t_map(world):
 def test_who_uses_the_passing_place_of_the_corridor(world):
     here = world("corridor", "problem")
     aside = Counter(
-        tuple(any(text and text.endswith(" c0-4)") for text in column) for column in zip(*texts, strict=True))
+        tuple(
+            any(text and text.endswith(" c0-4)") for text in column)
+            for column in zip(*texts, strict=True)
+        )
         for plan in Plans.of(here.plans)
         for texts in [[here.loaded.model.texts(labels) for labels in plan]]
     )
@@ -200,7 +228,9 @@ def readme_rows() -> list[tuple[str, str, dict[str, int]]]:
     found = []
     for readme in sorted(DOMAINS.glob("*/README.md")):
         for table in re.findall(r"^\| problem \|.*\n(?:\|.*\n)+", readme.read_text(), re.MULTILINE):
-            columns, _, *rows = ([entry.strip() for entry in line.split("|")[1:-1]] for line in table.splitlines())
+            columns, _, *rows = (
+                [entry.strip() for entry in line.split("|")[1:-1]] for line in table.splitlines()
+            )
             for row in rows:
                 values = dict(zip(columns, row, strict=True))
                 numbers = {key: int(values[key]) for key in ("states", "makespan", "optimal plans")}
@@ -217,7 +247,11 @@ def test_every_problem_is_in_a_readme():
 @pytest.mark.parametrize(
     ("folder", "problem", "told"),
     [
-        pytest.param(*row, id=f"{row[0]}-{row[1]}", marks=[pytest.mark.slow] if row[2]["states"] > 4000 else [])
+        pytest.param(
+            *row,
+            id=f"{row[0]}-{row[1]}",
+            marks=[pytest.mark.slow] if row[2]["states"] > 4000 else [],
+        )
         for row in readme_rows()
     ],
 )
@@ -231,7 +265,9 @@ def test_the_numbers_in_the_readme_files(world, folder, problem, told):
     assert seen == told
 
 
-@pytest.mark.parametrize(("problem", "tasks"), [*((r[0], r[1]) for r in ALL_TASKS), *((r[0], r[1]) for r in FILTERED)])
+@pytest.mark.parametrize(
+    ("problem", "tasks"), [*((r[0], r[1]) for r in ALL_TASKS), *((r[0], r[1]) for r in FILTERED)]
+)
 def test_the_numbers_of_tasks_in_the_readme(problem, tasks):
     text = (DOMAINS / "grid" / "README.md").read_text()
     assert re.search(rf"^\| {problem} \| \d+ \| {tasks} \|", text, re.MULTILINE)

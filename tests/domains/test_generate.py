@@ -31,7 +31,10 @@ BY_HAND = {
     "t-map/t-map.map",
     "corridor/corridor.map",
     "corridor/rooms.tasks.json",
-    *(f"{folder}/README.md" for folder in ("grid", "grid-joint", "three-cells", "t-map", "corridor")),
+    *(
+        f"{folder}/README.md"
+        for folder in ("grid", "grid-joint", "three-cells", "t-map", "corridor")
+    ),
 }
 
 
@@ -39,7 +42,8 @@ def files(folder: Path) -> dict[str, bytes]:
     return {
         path.relative_to(folder).as_posix(): path.read_bytes()
         for path in sorted(folder.rglob("*"))
-        if path.is_file() and not any(part.startswith((".", "__")) for part in path.relative_to(folder).parts)
+        if path.is_file()
+        and not any(part.startswith((".", "__")) for part in path.relative_to(folder).parts)
     }
 
 
@@ -67,7 +71,11 @@ def test_pictures_are_self_contained_and_say_what_they_show():
 
 def test_a_ring_of_two_rows_is_drawn_with_its_wall():
     lines = {
-        name: len(ElementTree.parse(DOMAINS / "grid" / f"{name}.svg").findall("{http://www.w3.org/2000/svg}line"))
+        name: len(
+            ElementTree.parse(DOMAINS / "grid" / f"{name}.svg").findall(
+                "{http://www.w3.org/2000/svg}line"
+            )
+        )
         for name in ("gw3-2x4", "gwb1-2x4", "gwb4-2x5")
     }
     assert lines == {"gw3-2x4": 0, "gwb1-2x4": 2, "gwb4-2x5": 3}
@@ -81,13 +89,30 @@ def test_one_problem_with_everything(tmp_path, style, domain):
     loaded = load(DOMAINS / domain / "domain.pddl", [problem])
     assert loaded.model.codec.decode(loaded.tasks[0].init) == ["(at r1 c0-0)", "(at r2 c1-2)"]
     assert ElementTree.parse(picture).getroot().tag.endswith("svg")
-    # Only corners are 3 apart: 4 pairs for one robot, 5 * 5 places for the other; both far: 4 * 3.  2 * 100 - 12.
+    # Only corners are 3 apart: 4 pairs for one robot, 5 * 5 places for the other; both far: 4 * 3.
+    # 2 * 100 - 12.
     assert len(json.loads(tasks.read_text())["tasks"]) == 188
 
 
 def test_a_problem_from_a_map_on_stdout(capsys, tmp_path):
     path = DOMAINS / "t-map" / "t-map.map"
-    assert main(["map", str(path), "--starts", "c0-1", "c1-0", "--goals", "c1-0", "c0-1", "--domain", "t-map"]) == 0
+    assert (
+        main(
+            [
+                "map",
+                str(path),
+                "--starts",
+                "c0-1",
+                "c1-0",
+                "--goals",
+                "c1-0",
+                "c0-1",
+                "--domain",
+                "t-map",
+            ]
+        )
+        == 0
+    )
     assert capsys.readouterr().out == (DOMAINS / "t-map" / "problem.pddl").read_text()
 
 
@@ -111,7 +136,9 @@ def test_errors_of_the_command(capsys, arguments, code, message):
     assert captured.out == ""
 
 
-@pytest.mark.parametrize("arguments", [["ring", "1x4"], ["open", "0x3"], ["open", "3"], ["circle", "3x3"], []])
+@pytest.mark.parametrize(
+    "arguments", [["ring", "1x4"], ["open", "0x3"], ["open", "3"], ["circle", "3x3"], []]
+)
 def test_usage(arguments):
     with pytest.raises(SystemExit) as caught:
         main(arguments)

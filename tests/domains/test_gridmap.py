@@ -26,7 +26,9 @@ def test_open_grid():
     assert grid.distance("c0-0", "c1-2") == 3
 
 
-@pytest.mark.parametrize(("size", "cells"), [((2, 2), 4), ((2, 4), 8), ((4, 2), 8), ((3, 3), 8), ((3, 5), 12)])
+@pytest.mark.parametrize(
+    ("size", "cells"), [((2, 2), 4), ((2, 4), 8), ((4, 2), 8), ((3, 3), 8), ((3, 5), 12)]
+)
 def test_a_ring_is_one_cycle(size, cells):
     grid = ring(*size)
     assert len(grid.cells) == len(grid.edges) == cells
@@ -99,8 +101,13 @@ def test_a_map_that_is_no_text(tmp_path):
 def test_maps_that_others_wrote():
     if not SHARED.is_dir():
         pytest.skip(f"{SHARED} is not here")
-    sizes = {path.stem: len(read_map(path).cells) for path in sorted((SHARED / "maps").glob("*.map"))}
-    assert {name: sizes[name] for name in ("6x6", "empty-8-8", "tree", "loop-chain", "lacam-2x1", "corners")} == {
+    sizes = {
+        path.stem: len(read_map(path).cells) for path in sorted((SHARED / "maps").glob("*.map"))
+    }
+    assert {
+        name: sizes[name]
+        for name in ("6x6", "empty-8-8", "tree", "loop-chain", "lacam-2x1", "corners")
+    } == {
         "6x6": 36,
         "empty-8-8": 64,
         "tree": 7,

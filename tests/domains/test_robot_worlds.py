@@ -1,4 +1,6 @@
-"""The worlds that are no maps: their rules hold in every step, and what their README files say is true."""
+"""The worlds that are no maps: their rules hold in every step, and what their README files say is
+true.
+"""
 
 from __future__ import annotations
 
@@ -53,7 +55,9 @@ def tables(folder: str, first: str) -> Iterator[Row]:
     """The rows of the README tables whose first column is ``first``."""
     text = (DOMAINS / folder / "README.md").read_text()
     for table in re.findall(rf"^\| {first} \|.*\n(?:\|.*\n)+", text, re.MULTILINE):
-        columns, _, *rows = ([cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines())
+        columns, _, *rows = (
+            [cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines()
+        )
         yield from (dict(zip(columns, row, strict=True)) for row in rows)
 
 
@@ -63,7 +67,8 @@ by_problem = pytest.mark.parametrize(
     ("folder", "row"), [pytest.param(f, r, id=f"{f}-{r['problem']}") for f, r in PROBLEMS]
 )
 by_language = pytest.mark.parametrize(
-    ("folder", "row"), [pytest.param(f, r, id=f"{f}-{r['language for']}-{r['--tasks']}") for f, r in LANGUAGES]
+    ("folder", "row"),
+    [pytest.param(f, r, id=f"{f}-{r['language for']}-{r['--tasks']}") for f, r in LANGUAGES],
 )
 by_world = pytest.mark.parametrize("folder", WORLDS)
 
@@ -78,7 +83,9 @@ def test_the_table_of_problems(world, folder: str, row: Row) -> None:
     assert len(here.space) == int(row["states"])
     assert here.plans.cost_of(0)[0] == int(row["makespan"])
     assert Plans.of(here.plans).count == int(row["optimal plans"])
-    assert plans_under(folder, row["problem"], "makespan+actions") == int(row["with fewest actions"])
+    assert plans_under(folder, row["problem"], "makespan+actions") == int(
+        row["with fewest actions"]
+    )
     if "with least fuel" in row:
         assert plans_under(folder, row["problem"], "makespan+cost") == int(row["with least fuel"])
     required = miscoordination(here.plans, 0) is not None
@@ -126,11 +133,15 @@ def test_the_table_of_languages(folder: str, row: Row) -> None:
 
 
 @by_world
-def test_the_commands_in_the_readme(folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_commands_in_the_readme(
+    folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "domains").symlink_to(DOMAINS)
     monkeypatch.chdir(tmp_path)
     page = DOMAINS / folder / "README.md"
-    run = [command for block in blocks(page) if block.kind == "console" for command in commands(block)]
+    run = [
+        command for block in blocks(page) if block.kind == "console" for command in commands(block)
+    ]
     assert {command.text.split()[1] for command in run} == {"coordination", "build", "verify"}
     for command in run:
         run_command(command, folder, monkeypatch)
@@ -163,9 +174,16 @@ def test_there_is_a_problem_of_each_kind(folder: str) -> None:
 @pytest.mark.parametrize(
     ("folder", "problem"),
     [
-        pytest.param(folder, row["problem"], id=f"{folder}-{row['problem']}", marks=[] if first else pytest.mark.slow)
+        pytest.param(
+            folder,
+            row["problem"],
+            id=f"{folder}-{row['problem']}",
+            marks=[] if first else pytest.mark.slow,
+        )
         for (folder, row), first in zip(
-            PROBLEMS, [n == 0 or PROBLEMS[n - 1][0] != f for n, (f, _) in enumerate(PROBLEMS)], strict=True
+            PROBLEMS,
+            [n == 0 or PROBLEMS[n - 1][0] != f for n, (f, _) in enumerate(PROBLEMS)],
+            strict=True,
         )
     ],
 )
@@ -194,7 +212,8 @@ def test_who_the_robots_are(folder: str) -> None:
 
 
 State = frozenset[tuple[str, ...]]
-#: (state with the static facts, subactions by robot, next state); the words of an atom or a subaction are apart.
+#: (state with the static facts, subactions by robot, next state); the words of an atom or a
+#: subaction are apart.
 Step = tuple[State, dict[str, tuple[str, ...]], State]
 
 
@@ -205,7 +224,9 @@ def atoms(key: str) -> State:
 
 def steps(loaded: Loaded, space: Space) -> Iterator[Step]:
     model = space.model
-    fixed = frozenset((atom.predicate, *atom.args) for atom in static_atoms(loaded.domain, loaded.problems[0]))
+    fixed = frozenset(
+        (atom.predicate, *atom.args) for atom in static_atoms(loaded.domain, loaded.problems[0])
+    )
     keys = [atoms(model.codec.key(row)) for row in space.rows]
     for source, before in enumerate(keys):
         for edge in range(space.first[source], space.first[source + 1]):
@@ -230,11 +251,15 @@ def two_arms_rule(before: State, chosen: dict[str, tuple[str, ...]], after: Stat
     """One arm over a place; nobody swings to where somebody was."""
     over = [atom[2] for atom in after if atom[0] == "over"]
     was = {atom[2] for atom in before if atom[0] == "over"}
-    return len(set(over)) == len(over) and not any(a[0] == "swing" and a[3] in was for a in chosen.values())
+    return len(set(over)) == len(over) and not any(
+        a[0] == "swing" and a[3] in was for a in chosen.values()
+    )
 
 
 def push_box_rule(before: State, chosen: dict[str, tuple[str, ...]], after: State) -> bool:
-    """The box moves exactly if at least two push, all the same way, and nobody walks through that door."""
+    """The box moves exactly if at least two push, all the same way, and nobody walks through that
+    door.
+    """
     pushes = [action[2:] for action in chosen.values() if action[0] == "push"]
     doors = {frozenset(way[1:]) for way in pushes}
     walks = {frozenset(action[2:]) for action in chosen.values() if action[0] == "go"}
@@ -260,14 +285,22 @@ def vans_rule(before: State, chosen: dict[str, tuple[str, ...]], after: State) -
         for state in (before, after)
     ]
     seats = [atom[2] for atom in after if atom[0] == "aboard"]
-    return all(len(d) == 1 for d in drivers) and drivers[::2] == drivers[1::2] and len(set(seats)) == len(seats)
+    return (
+        all(len(d) == 1 for d in drivers)
+        and drivers[::2] == drivers[1::2]
+        and len(set(seats)) == len(seats)
+    )
 
 
 def lock_rule(before: State, chosen: dict[str, tuple[str, ...]], after: State) -> bool:
     """A door that is passed is held by somebody else, and the switches of one door only are held."""
     held = {robot: action[2] for robot, action in chosen.items() if action[0] == "hold"}
     passed = {robot: action[2] for robot, action in chosen.items() if action[0] == "pass"}
-    return len(set(held.values())) <= 1 and set(passed.values()) <= set(held.values()) and not held.keys() & passed
+    return (
+        len(set(held.values())) <= 1
+        and set(passed.values()) <= set(held.values())
+        and not held.keys() & passed
+    )
 
 
 def charger_rule(before: State, chosen: dict[str, tuple[str, ...]], after: State) -> bool:
@@ -282,7 +315,9 @@ def elevator_rule(before: State, chosen: dict[str, tuple[str, ...]], after: Stat
     (cabin,) = [atom[1] for atom in after if atom[0] == "stops"]
     inside = {atom[1] for atom in after if atom[0] == "inside"}
     moving = any(action[0] == "move" for action in chosen.values())
-    return all(("on", walker, cabin) in after for walker in inside) and not (moving and len(chosen) > 1)
+    return all(("on", walker, cabin) in after for walker in inside) and not (
+        moving and len(chosen) > 1
+    )
 
 
 def flags_rule(before: State, chosen: dict[str, tuple[str, ...]], after: State) -> bool:

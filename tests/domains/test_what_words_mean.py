@@ -1,7 +1,8 @@
 """What the READMEs say in words of a smallest language is true.
 
-Some describe the words: then that partition is a language, and none has fewer words.  Some say what the sentences tell:
-then all plans of a sentence agree on it, in every task that requires coordination.
+Some describe the words: then that partition is a language, and none has fewer words.  Some say what
+the sentences tell: then all plans of a sentence agree on it, in every task that requires
+coordination.
 """
 
 from __future__ import annotations
@@ -51,7 +52,9 @@ def either(*words: Word) -> Word:
 
 @dataclass(frozen=True)
 class Meaning:
-    """A language of ``len(words) + 1`` words, as a README describes it: the other word holds the rest."""
+    """A language of ``len(words) + 1`` words, as a README describes it: the other word holds the
+    rest.
+    """
 
     folder: str
     problem: str
@@ -67,29 +70,96 @@ class Meaning:
 CARRYING = ("(holds arm1 red)", "(holds arm2 blue)")
 MEANINGS = [
     Meaning("three-cells", "problem", "all", "", (has("(at r2 a)"), has("(at r2 b)"))),
-    Meaning("t-map", "problem", "all", "", (has("(at r1 c1-1)", "(at r2 c0-1)"), has("(at r1 c1-1)", "(at r2 c1-0)"))),
+    Meaning(
+        "t-map",
+        "problem",
+        "all",
+        "",
+        (has("(at r1 c1-1)", "(at r2 c0-1)"), has("(at r1 c1-1)", "(at r2 c1-0)")),
+    ),
     Meaning("corridor", "problem", "its own", "", (has("(at r1 c0-4)"),)),
-    Meaning("charger", "three-robots", "its own", "--cost makespan+actions", (
-        only("r1"), only("r2"), has("(charged r3)", without=("(charged r1)", "(charged r2)")))),
-    Meaning("elevator", "two-calls", "its own", "", (has("(stops second)", "(outside r1)", "(outside r2)"),)),
-    Meaning("handover", "two-doors", "its own", "", (has("(at r1 west-south)", "(at r2 east-south)", "(holds r2 box)"),)),
-    Meaning("handover", "exchange", "its own", "", (lambda s: sum("west" in a and "lies" in a for a in s) == 2,)),
-    Meaning("lock", "both-in", "all", "", (
-        either(has("(at r1 yard)", "(at r2 yard)"), has("(at r1 hall)", "(at r2 hall)")),
-        either(has("(at r1 lock)", "(at r2 yard)"), has("(at r1 hall)", "(at r2 lock)")))),
-    Meaning("lock", "three-robots", "its own", "--remember-actions --cost makespan+actions", (
-        lambda s: any(a.startswith("(last r2 (hold") for a in s),)),
-    Meaning("push-box", "around", "all", "", tuple(
-        has(f"(at r1 {p})", f"(at r2 {p})", f"(stands box {p})") for p in ("store", "yard"))),
-    Meaning("push-box", "around", "its own", "", (has("(at r1 yard)", "(at r2 yard)", "(stands box yard)"),)),
+    Meaning(
+        "charger",
+        "three-robots",
+        "its own",
+        "--cost makespan+actions",
+        (only("r1"), only("r2"), has("(charged r3)", without=("(charged r1)", "(charged r2)"))),
+    ),
+    Meaning(
+        "elevator",
+        "two-calls",
+        "its own",
+        "",
+        (has("(stops second)", "(outside r1)", "(outside r2)"),),
+    ),
+    Meaning(
+        "handover",
+        "two-doors",
+        "its own",
+        "",
+        (has("(at r1 west-south)", "(at r2 east-south)", "(holds r2 box)"),),
+    ),
+    Meaning(
+        "handover",
+        "exchange",
+        "its own",
+        "",
+        (lambda s: sum("west" in a and "lies" in a for a in s) == 2,),
+    ),
+    Meaning(
+        "lock",
+        "both-in",
+        "all",
+        "",
+        (
+            either(has("(at r1 yard)", "(at r2 yard)"), has("(at r1 hall)", "(at r2 hall)")),
+            either(has("(at r1 lock)", "(at r2 yard)"), has("(at r1 hall)", "(at r2 lock)")),
+        ),
+    ),
+    Meaning(
+        "lock",
+        "three-robots",
+        "its own",
+        "--remember-actions --cost makespan+actions",
+        (lambda s: any(a.startswith("(last r2 (hold") for a in s),),
+    ),
+    Meaning(
+        "push-box",
+        "around",
+        "all",
+        "",
+        tuple(has(f"(at r1 {p})", f"(at r2 {p})", f"(stands box {p})") for p in ("store", "yard")),
+    ),
+    Meaning(
+        "push-box",
+        "around",
+        "its own",
+        "",
+        (has("(at r1 yard)", "(at r2 yard)", "(stands box yard)"),),
+    ),
     Meaning("tray", "serve", "its own", "", (has("(holds r1 back)", "(tray-at parlour)"),)),
     Meaning("tray", "three-robots", "its own", "", (has("(holds r1 back)", "(tray-at parlour)"),)),
-    Meaning("two-arms", "exchange", "exchange.tasks.json", "", (
-        has("(over arm1 back)", "(over arm2 front)", *CARRYING),
-        either(has("(over arm1 back)", "(over arm2 right)", *CARRYING),
-               has("(over arm1 back)", "(over arm2 front)", "(on red front)", "(on blue back)")))),
-    Meaning("vans", "one-van", "one-van.tasks.json", "", (has("(aboard d1 v1)", without=("(at v1 depot)",)),)),
-]  # fmt: skip
+    Meaning(
+        "two-arms",
+        "exchange",
+        "exchange.tasks.json",
+        "",
+        (
+            has("(over arm1 back)", "(over arm2 front)", *CARRYING),
+            either(
+                has("(over arm1 back)", "(over arm2 right)", *CARRYING),
+                has("(over arm1 back)", "(over arm2 front)", "(on red front)", "(on blue back)"),
+            ),
+        ),
+    ),
+    Meaning(
+        "vans",
+        "one-van",
+        "one-van.tasks.json",
+        "",
+        (has("(aboard d1 v1)", without=("(at v1 depot)",)),),
+    ),
+]
 
 
 def verdict(meaning: Meaning, tasks: Candidates) -> Verdict:
@@ -124,7 +194,10 @@ def first(schema: str) -> Feature:
     """Who does the first subaction of this schema."""
 
     def feature(plan: Plan) -> frozenset[int]:
-        steps = [frozenset(r for r, text in enumerate(step) if text and text.startswith(f"({schema} ")) for step in plan]
+        steps = [
+            frozenset(r for r, text in enumerate(step) if text and text.startswith(f"({schema} "))
+            for step in plan
+        ]
         return next(filter(None, steps), frozenset())
 
     return feature
@@ -148,7 +221,9 @@ def aside(plan: Plan) -> frozenset[int]:
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_what_the_sentences_tell(folder: str, problem: str, tasks: str, told: Feature, leaves: bool) -> None:
+def test_what_the_sentences_tell(
+    folder: str, problem: str, tasks: str, told: Feature, leaves: bool
+) -> None:
     given = candidates(folder, {"language for": problem, "--tasks": tasks, "options": ""})
     figures = said(build_language(given, "minimal").language, given, told)
     assert figures["different"] > 0
@@ -157,10 +232,16 @@ def test_what_the_sentences_tell(folder: str, problem: str, tasks: str, told: Fe
 
 
 #: The maps; the READMEs of the other worlds are read in test_robot_worlds.
-MAPS = [(folder, row) for folder in ("three-cells", "t-map", "corridor", "grid") for row in tables(folder, "language for")]
+MAPS = [
+    (folder, row)
+    for folder in ("three-cells", "t-map", "corridor", "grid")
+    for row in tables(folder, "language for")
+]
 
 
-@pytest.mark.parametrize(("folder", "row"), [pytest.param(f, r, id=f"{f}-{r['language for']}") for f, r in MAPS])
+@pytest.mark.parametrize(
+    ("folder", "row"), [pytest.param(f, r, id=f"{f}-{r['language for']}") for f, r in MAPS]
+)
 def test_the_languages_of_the_maps(folder: str, row: Row) -> None:
     tasks = candidates(folder, row)
     assert tasks.count == int(row["tasks"])
@@ -173,10 +254,17 @@ def test_the_languages_of_the_maps(folder: str, row: Row) -> None:
 
 
 @pytest.mark.parametrize("folder", ["corridor"])
-def test_the_commands_of_the_maps(folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_commands_of_the_maps(
+    folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "domains").symlink_to(DOMAINS)
     monkeypatch.chdir(tmp_path)
-    run = [c for block in blocks(DOMAINS / folder / "README.md") if block.kind == "console" for c in commands(block)]
+    run = [
+        c
+        for block in blocks(DOMAINS / folder / "README.md")
+        if block.kind == "console"
+        for c in commands(block)
+    ]
     assert {command.text.split()[1] for command in run} == {"build", "verify"}
     for command in run:
         run_command(command, folder, monkeypatch)

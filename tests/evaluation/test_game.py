@@ -24,9 +24,14 @@ def all_games(sizes: tuple[int, ...], liked: int) -> tuple[Fraction, Fraction, F
     by_plan, by_sentence, by_width = [], [], []
     for likes in combinations(range(len(owner)), liked):
         accepted = {owner[p] for p in likes}
-        by_plan += [1 + next(n for n, p in enumerate(order) if p in likes) for order in permutations(range(len(owner)))]
+        by_plan += [
+            1 + next(n for n, p in enumerate(order) if p in likes)
+            for order in permutations(range(len(owner)))
+        ]
         orders = permutations(range(len(sizes)))
-        by_sentence += [1 + next(n for n, s in enumerate(order) if s in accepted) for order in orders]
+        by_sentence += [
+            1 + next(n for n, s in enumerate(order) if s in accepted) for order in orders
+        ]
         by_width.append(1 + next(n for n, s in enumerate(widest) if s in accepted))
     return (
         Fraction(sum(by_plan), len(by_plan)),
@@ -57,6 +62,8 @@ def test_three_cells_by_hand() -> None:
 def test_games_played() -> None:
     random = Random(1)
     games = [play((3, 2, 1), 2, random) for _ in range(4000)]
-    for what, expected in enumerate((expected_for_plans(6, 2), expected_for_sentences((3, 2, 1), 2))):
+    for what, expected in enumerate(
+        (expected_for_plans(6, 2), expected_for_sentences((3, 2, 1), 2))
+    ):
         assert fmean(game[what] for game in games) == pytest.approx(float(expected), rel=0.05)
     assert play((1,), 5, random) == (1, 1)  # it likes all there are

@@ -12,7 +12,13 @@ from coordlang.evaluation.lab.recipe import Settings
 from coordlang.evaluation.material.hazards import Hazard, Sayings, exact_odds, own_choices
 from coordlang.evaluation.material.languages import language_for
 from coordlang.evaluation.material.trials import Trial, Trials, subaction_trials, warehouse_trials
-from coordlang.evaluation.material.warehouse import LAYOUTS, WAREHOUSES, deliveries, human_in, listed_tasks
+from coordlang.evaluation.material.warehouse import (
+    LAYOUTS,
+    WAREHOUSES,
+    deliveries,
+    human_in,
+    listed_tasks,
+)
 from coordlang.use.sentence.spoken import Spoken
 from planners.search.plans import Plan
 from tests.conftest import DOMAINS
@@ -25,7 +31,9 @@ def groups(one: Spoken) -> dict[tuple[int, ...], list[Plan]]:
     of_state = dict(zip(one.space.state.tolist(), one.word.tolist(), strict=True))
     found: dict[tuple[int, ...], list[Plan]] = {}
     for plan in naive.listed(one.space, one.task, 10_000):
-        found.setdefault(naive.sentence([of_state[s] for s in naive.states(one.space, one.task, plan)]), []).append(plan)
+        found.setdefault(
+            naive.sentence([of_state[s] for s in naive.states(one.space, one.task, plan)]), []
+        ).append(plan)
     return found
 
 
@@ -39,10 +47,15 @@ def survive(plans: list[Plan], hazard: Hazard) -> bool:
 
 def random_hazard(one: Spoken, random: Random) -> Hazard:
     labels = [range(1, len(own)) for own in one.model.labels]
-    return Hazard(str(random.random()), tuple(frozenset(random.sample(own, random.randint(0, 2))) for own in labels))
+    return Hazard(
+        str(random.random()),
+        tuple(frozenset(random.sample(own, random.randint(0, 2))) for own in labels),
+    )
 
 
-@pytest.mark.parametrize(("folder", "stem"), [("grid", "gw2-2x3"), ("tray", "serve"), ("t-map", "problem")])
+@pytest.mark.parametrize(
+    ("folder", "stem"), [("grid", "gw2-2x3"), ("tray", "serve"), ("t-map", "problem")]
+)
 def test_against_listed_plans(folder: str, stem: str) -> None:
     random = Random(5)
     tasks = spoken(folder, stem)
@@ -56,7 +69,9 @@ def test_against_listed_plans(folder: str, stem: str) -> None:
         for hazard, exact in zip(hazards, odds[one.task], strict=True):
             lives = {words: survive(plans, hazard) for words, plans in said.items()}
             assert lives == {words: sayings.survives(one.task, words, hazard) for words in said}
-            assert exact.sentence == pytest.approx(sum(len(said[w]) for w, yes in lives.items() if yes) / total)
+            assert exact.sentence == pytest.approx(
+                sum(len(said[w]) for w, yes in lives.items() if yes) / total
+            )
             alone = sum(not hazard.breaks(plan) for plans in said.values() for plan in plans)
             assert exact.plan == pytest.approx(alone / total)
             assert exact.possible == (alone > 0)
@@ -66,14 +81,17 @@ def test_against_listed_plans(folder: str, stem: str) -> None:
 
 
 def test_three_cells_by_hand() -> None:
-    """Whoever does not wait passes c: a human in c stops every plan.  r1 goes from a to b in two of the four plans."""
+    """Whoever does not wait passes c: a human in c stops every plan.  r1 goes from a to b in two of
+    the four plans.
+    """
     one = three_cells()
     labels = one.model.labels[0]
     forbidden = frozenset([labels.index("(move r1 a b)")])
     hazards = [human_in(one.model, "c"), Hazard("a b", (forbidden, frozenset()))]
     [[in_c, in_ab]] = exact_odds(one.space, one.word, hazards)
     assert (in_c.plan, in_c.sentence, in_c.possible) == (0, 0, False)
-    # Under b c a r1 goes straight in both plans, under b a it goes through c in both: nothing to choose from.
+    # Under b c a r1 goes straight in both plans, under b a it goes through c in both: nothing to
+    # choose from.
     assert (in_ab.plan, in_ab.sentence, in_ab.possible) == (0.5, 0.5, True)
     assert Sayings(one).survives(0, (1, 0), hazards[1])
     assert not Sayings(one).survives(0, (1, 2, 0), hazards[1])
@@ -111,7 +129,8 @@ def test_deliveries() -> None:
                 }
                 assert distances == {columns - 1 + (rows - 1 if layout == "across" else 0)}
                 assert one.legs[-1] == (one.fetch, one.bring)
-            # 12 starts times 4 places to fetch, less 4 that are there already; bringing is among these.
+            # 12 starts times 4 places to fetch, less 4 that are there already; bringing is among
+            # these.
             assert len(listed_tasks(every)) == 44
 
 
@@ -119,7 +138,9 @@ def test_a_warehouse_by_enumeration(tmp_path) -> None:
     """Success rates of the smallest warehouse: every delivery, cell and pair of plans looked at."""
     world, rows, columns = WAREHOUSES["open 3x3"]
     every = deliveries(rows, columns, "along")
-    candidates, language = language_for(world, "greedy", Settings(DOMAINS, tmp_path), listed_tasks(every))
+    candidates, language = language_for(
+        world, "greedy", Settings(DOMAINS, tmp_path), listed_tasks(every)
+    )
     trials = warehouse_trials(candidates, language, every)
     assert len(trials.trials) == 48 * 5
     base = trials.sayings.spoken
@@ -133,7 +154,9 @@ def test_a_warehouse_by_enumeration(tmp_path) -> None:
             found = said[task]
             total = sum(map(len, found.values()))
             by_plan *= sum(not hazard.breaks(p) for plans in found.values() for p in plans) / total
-            by_sentence *= sum(len(plans) for plans in found.values() if survive(plans, hazard)) / total
+            by_sentence *= (
+                sum(len(plans) for plans in found.values() if survive(plans, hazard)) / total
+            )
         plan, sentence = plan + by_plan, sentence + by_sentence
     exact = trials.exact()
     assert exact is not None
@@ -155,16 +178,27 @@ def test_subactions_that_fail_are_needed_by_some_plan() -> None:
     model, space = candidates.model, trials.sayings.spoken.space
     nothing = {action.label for action in model.actions if action.does_nothing}
     for task in Random(0).sample(range(len(space.starts)), 30):
-        used = {(robot, label) for plan in naive.listed(space, task, 1000) for step in plan
-                for robot, label in enumerate(step) if label}  # fmt: skip
-        names = {f"{model.robots[r]} {model.labels[r][n]}" for r, n in used if model.labels[r][n] not in nothing}
+        used = {
+            (robot, label)
+            for plan in naive.listed(space, task, 1000)
+            for step in plan
+            for robot, label in enumerate(step)
+            if label
+        }
+        names = {
+            f"{model.robots[r]} {model.labels[r][n]}"
+            for r, n in used
+            if model.labels[r][n] not in nothing
+        }
         assert by_task.get(task, set()) == names
 
 
 def test_a_plan_survives_only_what_it_does_not_need() -> None:
     one = three_cells()
     nobody = Hazard("nothing", (frozenset(), frozenset()))
-    trials = Trials(Sayings(one), (nobody, human_in(one.model, "c")), (Trial((0,), 0), Trial((0,), 1)))
+    trials = Trials(
+        Sayings(one), (nobody, human_in(one.model, "c")), (Trial((0,), 0), Trial((0,), 1))
+    )
     assert trials.exact() == {"plan": 0.5, "sentence": 0.5, "possible": 0.5}
     runs = trials.sample(200, Random(0))
     assert runs["plan"] == runs["sentence"]

@@ -22,8 +22,8 @@ from planners.errors import OutOfMemory
 from tests.coordlang import naive
 from tests.evaluation.worlds import shipped, spoken, three_cells
 
-#: r1 a..b, r2 b..a in two steps.  In between they may be in (a, c), (b, c), (c, a) or (c, b); (a, b) and (b, a) would swap.
-#: r2 is in b, c, a twice and in b, a twice.
+#: r1 a..b, r2 b..a in two steps.  In between they may be in (a, c), (b, c), (c, a) or (c, b); (a,
+#: b) and (b, a) would swap. r2 is in b, c, a twice and in b, a twice.
 IN_A, IN_B, IN_C = 0, 1, 2
 
 
@@ -39,15 +39,26 @@ def test_three_cells_by_hand() -> None:
     # The first plan in the order of labels: r1 waits (label 0) and r2 steps to c.
     assert task.first == (IN_B, IN_C, IN_A)
     measures = flexibility.measures([task])
-    assert (measures["open"], measures["several"], measures["open_several"], measures["expected"]) == (2, 1, 2, 2)
+    assert (
+        measures["open"],
+        measures["several"],
+        measures["open_several"],
+        measures["expected"],
+    ) == (2, 1, 2, 2)
     savings = communication.measures([task])
-    assert (savings["differing"], savings["saving"], savings["saving_most"]) == (0, 0, round(1 / 3, 6))
+    assert (savings["differing"], savings["saving"], savings["saving_most"]) == (
+        0,
+        0,
+        round(1 / 3, 6),
+    )
     assert savings["saving_expected"] == round(1 / 6, 6)
     assert savings["saving_of_actions"] == -0.5  # three words for two joint actions
 
 
 def test_means_are_over_the_right_tasks() -> None:
-    """Two tasks of two steps: one sentence of three words with one plan, one of a single word with five."""
+    """Two tasks of two steps: one sentence of three words with one plan, one of a single word with
+    five.
+    """
     tasks = [Said(2, {(0, 1, 2): 1}, (0, 1, 2), (0, 1, 2)), Said(2, {(0,): 5}, (0,), (0,))]
     savings = communication.measures(tasks)
     assert (savings["differing"], savings["tasks"]) == (1, 2)
@@ -57,7 +68,9 @@ def test_means_are_over_the_right_tasks() -> None:
     assert (plans["open"], plans["several"], plans["open_several"], plans["plans"]) == (3, 1, 5, 3)
 
 
-@pytest.mark.parametrize(("folder", "stem"), [("t-map", "problem"), ("tray", "serve"), ("grid", "gw2-2x3")])
+@pytest.mark.parametrize(
+    ("folder", "stem"), [("t-map", "problem"), ("tray", "serve"), ("grid", "gw2-2x3")]
+)
 def test_sentences_against_listed_plans(folder: str, stem: str) -> None:
     tasks = spoken(folder, stem)
     lengths = set()
@@ -65,11 +78,14 @@ def test_sentences_against_listed_plans(folder: str, stem: str) -> None:
         of_state = dict(zip(one.space.state.tolist(), one.word.tolist(), strict=True))
         plans = naive.listed(one.space, one.task, 10_000)
         sentences = [
-            naive.sentence([of_state[s] for s in naive.states(one.space, one.task, plan)]) for plan in plans
-        ]  # fmt: skip
+            naive.sentence([of_state[s] for s in naive.states(one.space, one.task, plan)])
+            for plan in plans
+        ]
         assert Counter(sentences) == counted.plans
         assert (sentences[0], sentences[-1]) == (counted.first, counted.last)
-        assert counted.expected_open == Fraction(sum(sentences.count(s) for s in sentences), len(plans))
+        assert counted.expected_open == Fraction(
+            sum(sentences.count(s) for s in sentences), len(plans)
+        )
         assert counted.steps == len(plans[0])
         lengths |= set(map(len, sentences))
     assert len(lengths) > 1
@@ -96,7 +112,9 @@ def test_all_orders_make_languages_of_different_sizes() -> None:
     states = states_on_plans(candidates.spaces).tolist()
     for order in natural_orders(candidates, states).values():
         assert sorted(order) == states
-    assert len({tuple(order) for order in natural_orders(candidates, states).values()}) == len(NATURAL)
+    assert len({tuple(order) for order in natural_orders(candidates, states).values()}) == len(
+        NATURAL
+    )
     sizes = {}
     for name, words in greedy_in_orders(candidates, 15, Random(0)):
         sizes[name] = int(words.max()) + 1
@@ -110,15 +128,23 @@ def test_all_orders_make_languages_of_different_sizes() -> None:
 def test_brute_force_says_why_it_has_nothing() -> None:
     candidates = shipped("three-cells")
     assert brute_force(candidates, 60.0, 0)["words"] == 3
-    pairs = sum(len(naive.listed(space, task, 1000)) ** 2
-                for space in candidates.spaces for task in range(len(space.starts)))  # fmt: skip
+    pairs = sum(
+        len(naive.listed(space, task, 1000)) ** 2
+        for space in candidates.spaces
+        for task in range(len(space.starts))
+    )
     assert pairs_of_plans(candidates) == pairs
     assert brute_force(shipped("grid", "gw2-2x3"), 0.5, 0)["why"] == "out of time"
 
 
 @pytest.mark.parametrize(
     ("successes", "runs", "low", "high"),
-    [(0, 10, 0.0, 0.2775), (10, 10, 0.7225, 1.0), (5, 10, 0.2366, 0.7634), (50, 100, 0.4038, 0.5962)],
+    [
+        (0, 10, 0.0, 0.2775),
+        (10, 10, 0.7225, 1.0),
+        (5, 10, 0.2366, 0.7634),
+        (50, 100, 0.4038, 0.5962),
+    ],
 )
 def test_wilson(successes: int, runs: int, low: float, high: float) -> None:
     """Newcombe (1998) and tables of the score interval."""

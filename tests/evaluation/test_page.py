@@ -29,20 +29,28 @@ def test_the_page_is_what_the_results_say() -> None:
     told = sections({name: [record_of(line) for line in found] for name, found in lines.items()})
     assert set(told) == set(RECIPES)
     text = page_text([line for found in lines.values() for line in found], told, "evaluation")
-    assert PAGE.read_text() == text, "run: coordlang evaluate all --results docs/evaluation --page docs/evaluation.md"
+    assert PAGE.read_text() == text, (
+        "run: coordlang evaluate all --results docs/evaluation --page docs/evaluation.md"
+    )
 
 
 def test_the_results_are_of_a_whole_run(tmp_path: Path) -> None:
-    """Every piece of work with its default parameters, of the files as they are, and of one state of the code."""
+    """Every piece of work with its default parameters, of the files as they are, and of one state
+    of the code.
+    """
     lines = all_lines()
     for name, recipe in RECIPES.items():
-        wanted = [(unit.key, dict(unit.parameters)) for unit in recipe.units(Settings(DOMAINS, tmp_path))]
+        wanted = [
+            (unit.key, dict(unit.parameters)) for unit in recipe.units(Settings(DOMAINS, tmp_path))
+        ]
         assert [(line["key"], line["parameters"]) for line in lines[name]] == wanted
     every = [line for found in lines.values() for line in found]
     assert len({line["code"] for line in every}) == 1
     for line in every:
         for file, digest in line["inputs"].items():
-            assert file_hash(DOMAINS / file) == digest, f"{file} has changed: run the evaluation again"
+            assert file_hash(DOMAINS / file) == digest, (
+                f"{file} has changed: run the evaluation again"
+            )
 
 
 def test_figures_are_small_and_self_contained() -> None:
@@ -53,8 +61,12 @@ def test_figures_are_small_and_self_contained() -> None:
         data = (FOLDER / name).read_bytes()
         assert len(data) < 300_000
         root = ElementTree.fromstring(data)
-        outside = [value for element in root.iter() for key, value in element.attrib.items()
-                   if key.endswith("href") and not value.startswith("#")]  # fmt: skip
+        outside = [
+            value
+            for element in root.iter()
+            for key, value in element.attrib.items()
+            if key.endswith("href") and not value.startswith("#")
+        ]
         assert not outside
 
 
@@ -75,10 +87,19 @@ def test_the_papers_values_are_drawn_in(figure: str, texts: list[str]) -> None:
 def test_table_1_has_the_papers_tasks_and_states() -> None:
     of = {line["key"]: line["result"] for line in all_lines()["table1"]}
     for name, paper in TABLE_1.items():
-        assert (of[f"{name}/greedy"]["tasks"], of[f"{name}/greedy"]["states"]) == (paper.tasks, paper.states)
-        words = [of[f"{name}/{column}"]["words"] for column in ("minimal", "separating", "least alpha", "greedy")]
+        assert (of[f"{name}/greedy"]["tasks"], of[f"{name}/greedy"]["states"]) == (
+            paper.tasks,
+            paper.states,
+        )
+        words = [
+            of[f"{name}/{column}"]["words"]
+            for column in ("minimal", "separating", "least alpha", "greedy")
+        ]
         assert words == sorted(words)
-        assert all(of[f"{name}/{column}"]["verified"] for column in ("minimal", "separating", "least alpha", "greedy"))
+        assert all(
+            of[f"{name}/{column}"]["verified"]
+            for column in ("minimal", "separating", "least alpha", "greedy")
+        )
 
 
 def test_a_page_of_nothing_much(tmp_path: Path) -> None:

@@ -61,13 +61,20 @@ def test_units_have_names_of_their_own(tmp_path: Path) -> None:
         assert {unit.experiment for unit in units} == set(RECIPES)
         assert all(unit.files for unit in units)
     # Each on grids and on worlds that are none.
-    grids = {name: {u.parameters.get("world", "grid") in {w.name for w in OTHERS} for u in recipe.units(whole)}
-             for name, recipe in RECIPES.items()}  # fmt: skip
+    grids = {
+        name: {
+            u.parameters.get("world", "grid") in {w.name for w in OTHERS}
+            for u in recipe.units(whole)
+        }
+        for name, recipe in RECIPES.items()
+    }
     assert all(kinds == {True, False} for kinds in grids.values())
 
 
 def test_expansions_on_three_cells() -> None:
-    """By hand: the start, then a state after one step; from all but one of them the goal is a step away, and comes up next."""
+    """By hand: the start, then a state after one step; from all but one of them the goal is a step
+    away, and comes up next.
+    """
     one = three_cells()
     terrain = Terrain(one.model, one.table)
     assert planning_cost.expansions(one, "blind", terrain) == (2, 2, 2)
@@ -77,26 +84,37 @@ def test_expansions_on_three_cells() -> None:
 def test_a_sentence_saves_work() -> None:
     tasks = spoken("tray", "serve", "greedy")
     terrain = Terrain(tasks[0].model, tasks[0].table)
-    counted = [planning_cost.expansions(one, "relaxed", terrain) for one in Random(1).sample(tasks, 40)]
+    counted = [
+        planning_cost.expansions(one, "relaxed", terrain) for one in Random(1).sample(tasks, 40)
+    ]
     alone, pruned, bounded = (sum(column) for column in zip(*counted, strict=True))
     assert bounded <= pruned < alone
 
 
 def test_the_detour_is_optimal_and_nobody_else_moves_otherwise(tmp_path: Path) -> None:
     settings = Settings(DOMAINS, tmp_path)
-    candidates, language = language_for(scenario.CORRIDOR, "greedy", settings, scenario.trading_rooms())
+    candidates, language = language_for(
+        scenario.CORRIDOR, "greedy", settings, scenario.trading_rooms()
+    )
     assert candidates.count == 36 * 36
-    one = next(s for s in speak_candidates(language, candidates) if scenario._ends(s) == (scenario.START, scenario.GOAL))
+    one = next(
+        s
+        for s in speak_candidates(language, candidates)
+        if scenario._ends(s) == (scenario.START, scenario.GOAL)
+    )
     found = scenario.detour(one)
     way, (agreed, other) = found["detour"], found["agreed"]
     assert scenario.PLACE in way
     assert scenario.PLACE not in agreed
     assert found["optimal"] is True
-    # Looked at without the library: one step at a time, never in one cell, never through each other.
+    # Looked at without the library: one step at a time, never in one cell, never through each
+    # other.
     for r1, r2 in ((agreed, other), (way, other)):
         assert (r1[0], r2[0], r1[-1], r2[-1]) == (*scenario.START, *scenario.GOAL)
         assert len(r1) == len(r2) == len(agreed)
-        for (a, b), (c, d) in zip(zip(r1, r2, strict=True), zip(r1[1:], r2[1:], strict=True), strict=False):
+        for (a, b), (c, d) in zip(
+            zip(r1, r2, strict=True), zip(r1[1:], r2[1:], strict=True), strict=False
+        ):
             assert c != d
             assert (a, b) != (d, c)
             for before, after in ((a, c), (b, d)):
@@ -110,10 +128,16 @@ def test_the_detour_is_optimal_and_nobody_else_moves_otherwise(tmp_path: Path) -
 
 
 def test_freedom_on_three_cells() -> None:
-    """Agreed: r1 a..a..b with one move, r2 b..c..a with two.  Under b c a r1 may as well move first: the same subaction."""
+    """Agreed: r1 a..a..b with one move, r2 b..c..a with two.  Under b c a r1 may as well move
+    first: the same subaction.
+    """
     one = three_cells()
     found = scenario.freedom([one])
-    assert found == {"plan": 3, "sentence": 0, "optimal": 3}  # r1 could go through c, and r2 straight
+    assert found == {
+        "plan": 3,
+        "sentence": 0,
+        "optimal": 3,
+    }  # r1 could go through c, and r2 straight
 
 
 def test_places() -> None:
@@ -123,7 +147,9 @@ def test_places() -> None:
         position("kitchen")
 
 
-def test_languages_are_kept_and_unfinished_ones_are_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_languages_are_kept_and_unfinished_ones_are_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     settings = Settings(DOMAINS, tmp_path / "cache")
     world = WORLDS["GW1"]
     _, first = language_for(world, "minimal", settings)
@@ -151,7 +177,14 @@ def record(world: str, column: str, **result: object) -> Record:
 
 def test_what_table_1_says_of_the_paper() -> None:
     """Told from the results: other numbers, other sentences."""
-    base = {"tasks": 132, "states": 12, "divergences": 68, "proved_minimal": False, "stopped": False, "work": {}}
+    base = {
+        "tasks": 132,
+        "states": 12,
+        "divergences": 68,
+        "proved_minimal": False,
+        "stopped": False,
+        "work": {},
+    }
     least = {**base, "work": {"separating_lower_bound": 8}, "words": 8}
     records = [
         record("GW1", "greedy", **base, words=8),
@@ -160,13 +193,18 @@ def test_what_table_1_says_of_the_paper() -> None:
         record("GW1", "orders", words={"by number": 8, "random 1": 9}),
     ]
     section = table1.section(records)
-    assert "| GW1 | 132 | 12 | 68 | 7 (exact 3) | 8 | 8 to 9 | 8* |" in "\n".join(map(str, section.blocks))
+    assert "| GW1 | 132 | 12 | 68 | 7 (exact 3) | 8 | 8 to 9 | 8* |" in "\n".join(
+        map(str, section.blocks)
+    )
     told = "\n".join(section.differences)
     assert "On GW1 the paper's number is outside of what 2 orders gave" in told
     assert "GW1 (7 against 8)" in told
     assert "2.3 to 2.3 times smaller" in told
     assert section.headlines == (("GW1: words", "7", "8", "3*"),)
-    same = [record("GW1", "greedy", **base, words=7), record("GW1", "orders", words={"by number": 6, "random 1": 8})]
+    same = [
+        record("GW1", "greedy", **base, words=7),
+        record("GW1", "orders", words={"by number": 6, "random 1": 8}),
+    ]
     assert table1.section(same).differences == ()
     wrong = [record("GW1", "greedy", **{**base, "tasks": 131}, words=7)]
     assert "Tasks or states" in table1.section(wrong).differences[0]

@@ -1,4 +1,6 @@
-"""Runs: killed ones go on, processes do not matter, limits are kept, results say what they were made with."""
+"""Runs: killed ones go on, processes do not matter, limits are kept, results say what they were
+made with.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,10 @@ def settings(folder: Path, **others: Any) -> Settings:
 def lines(folder: Path, name: str) -> list[dict[str, Any]]:
     """The lines of a results file, without what depends on the clock."""
     found = [json.loads(line) for line in (folder / f"{name}.jsonl").read_text().splitlines()]
-    return [{key: value for key, value in line.items() if key not in ("seconds", "cpu")} for line in found]
+    return [
+        {key: value for key, value in line.items() if key not in ("seconds", "cpu")}
+        for line in found
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +51,9 @@ def test_a_line_says_what_it_was_made_with(finished: Path) -> None:
         assert line["status"] == "done"
         assert line["seed"] == 0
         assert set(line["versions"]) >= {"coordlang", "python", "numpy", "python-sat"}
-        assert all(len(found) == 64 for found in (line["id"], line["code"], *line["inputs"].values()))
+        assert all(
+            len(found) == 64 for found in (line["id"], line["code"], *line["inputs"].values())
+        )
         assert any(name.endswith("domain.pddl") for name in line["inputs"])
     keys = [line["key"] for line in lines(finished, "game")]
     assert keys == [unit.key for unit in GAME.units(settings(finished))]
@@ -91,9 +98,22 @@ def test_other_parameters_are_other_results(finished: Path, tmp_path: Path) -> N
 
 
 def start(folder: Path, *arguments: str) -> subprocess.Popen[bytes]:
-    call = ["evaluate", "game", "--quick", "--samples", "2", "--results", str(folder), "--domains", str(DOMAINS), *arguments]
+    call = [
+        "evaluate",
+        "game",
+        "--quick",
+        "--samples",
+        "2",
+        "--results",
+        str(folder),
+        "--domains",
+        str(DOMAINS),
+        *arguments,
+    ]
     code = f"import sys; sys.argv[1:] = {call!r}; from coordlang.cli import main; main()"
-    return subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    return subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
 
 
 def wait_for_lines(path: Path, number: int, process: subprocess.Popen[bytes]) -> None:
@@ -121,7 +141,10 @@ def test_a_killed_run_goes_on(finished: Path, tmp_path: Path, how: signal.Signal
     _, said = again.communicate(timeout=120)
     assert again.returncode == 0, said
     assert lines(tmp_path, "game") == lines(finished, "game")
-    after = {line["id"]: line for line in map(json.loads, (tmp_path / "game.jsonl").read_text().splitlines())}
+    after = {
+        line["id"]: line
+        for line in map(json.loads, (tmp_path / "game.jsonl").read_text().splitlines())
+    }
     assert all(after[line["id"]] == line for line in before)
     assert (tmp_path / "evaluation.md").read_text().startswith("# Evaluation\n")
 
@@ -173,7 +196,9 @@ def test_command(coordlang: Command, tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.glob("*.svg")) == ["game.svg"]
     assert (tmp_path / "png" / "game.png").read_bytes().startswith(b"\x89PNG")
     assert str(tmp_path / "game.svg") in told["files"]
-    text = coordlang("evaluate", "game", "--quick", "--samples", 1, "--page", tmp_path / "page.md", *common)
+    text = coordlang(
+        "evaluate", "game", "--quick", "--samples", 1, "--page", tmp_path / "page.md", *common
+    )
     assert "| plan |" in text.out
     assert f"page {tmp_path / 'page.md'}" in text.err
     assert "![Proposals until accepted" in (tmp_path / "page.md").read_text()
@@ -191,7 +216,12 @@ def test_command(coordlang: Command, tmp_path: Path) -> None:
     ],
 )
 def test_errors(
-    coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], code: int, message: str
+    coordlang: Command,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    code: int,
+    message: str,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     found = coordlang("evaluate", *arguments)

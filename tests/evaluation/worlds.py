@@ -1,4 +1,6 @@
-"""Small worlds for the measures: the running example with the language of the paper, and others with built ones."""
+"""Small worlds for the measures: the running example with the language of the paper, and others
+with built ones.
+"""
 
 from __future__ import annotations
 
@@ -30,13 +32,17 @@ def where_r2_is(candidates: Candidates) -> Language:
 
 @cache
 def three_cells() -> Spoken:
-    """r1 and r2 trade a and b on three adjacent cells, a joint step being three states: four optimal plans."""
+    """r1 and r2 trade a and b on three adjacent cells, a joint step being three states: four
+    optimal plans.
+    """
     candidates = shipped("three-cells", everything=False)
     return next(iter(speak_candidates(where_r2_is(candidates), candidates)))
 
 
 @cache
-def spoken(folder: str, stem: str, method: str = "minimal", everything: bool = True) -> tuple[Spoken, ...]:
+def spoken(
+    folder: str, stem: str, method: str = "minimal", everything: bool = True
+) -> tuple[Spoken, ...]:
     """Every candidate task with a language that a method makes."""
     candidates = shipped(folder, stem, everything)
     return tuple(speak_candidates(build_language(candidates, method).language, candidates))

@@ -35,7 +35,9 @@ def by_sentence(spoken: Spoken, most: int) -> dict[tuple[int, ...], list[Plan]]:
     return groups
 
 
-def check(spoken: Spoken, words: tuple[int, ...], plans: list[Plan], found: Asked, few: int) -> None:
+def check(
+    spoken: Spoken, words: tuple[int, ...], plans: list[Plan], found: Asked, few: int
+) -> None:
     model = spoken.model
     assert found.sentence == tuple(spoken.table.words[w] for w in words)
     assert (found.plans, found.steps) == (len(plans), len(plans[0]))
@@ -47,8 +49,12 @@ def check(spoken: Spoken, words: tuple[int, ...], plans: list[Plan], found: Aske
         assert len(part.listed) == (len(texts) if len(texts) <= few else 0)
         short = {tuple(t and own_text(t, model.robots[robot]) for t in text) for text in texts}
         assert len(texts) > few or set(part.listed) == short
-        assert [set(own) for own in part.choices] == [set(step) for step in zip(*short, strict=True)]
-    assert [(c.before, c.after) for c in found.changes] == list(zip(found.sentence, found.sentence[1:], strict=False))
+        assert [set(own) for own in part.choices] == [
+            set(step) for step in zip(*short, strict=True)
+        ]
+    assert [(c.before, c.after) for c in found.changes] == list(
+        zip(found.sentence, found.sentence[1:], strict=False)
+    )
     space = spoken.space
     word = spoken.table.of_rows(space.rows)
     steps: list[set[int]] = [set() for _ in found.changes]
@@ -75,7 +81,9 @@ def test_against_listed_plans(robots: int) -> None:
             continue
         if not 0 < candidates.count <= 300:
             continue
-        language = random_language(Random(seed), candidates)  # RC or not: what is asked is about listed plans
+        language = random_language(
+            Random(seed), candidates
+        )  # RC or not: what is asked is about listed plans
         formulas = word_formulas(language, candidates.model)
         for spoken in list(speak_candidates(language, candidates))[:8]:
             try:
@@ -91,13 +99,17 @@ def test_against_listed_plans(robots: int) -> None:
                 seen["many subplans"] += any((p.subplans or 0) > few for p in found.parts)
                 for change in found.changes:
                     seen[f"{len(change.robots)} decide"] += 1
-    assert all(seen[case] for case in ("changes", "many subplans", "0 decide", "1 decide", "2 decide")), seen
+    assert all(
+        seen[case] for case in ("changes", "many subplans", "0 decide", "1 decide", "2 decide")
+    ), seen
 
 
 def test_changes_that_may_come_sooner_or_later() -> None:
     """Three words that say in which third of the grid a robot is."""
     domain = read_domain(DOMAINS / "grid" / "domain.pddl")
-    candidates = from_problems(domain, [read_problem(DOMAINS / "grid" / "corners-4x4.pddl", domain)])
+    candidates = from_problems(
+        domain, [read_problem(DOMAINS / "grid" / "corners-4x4.pddl", domain)]
+    )
     keys = [candidates.model.codec.key(row) for row in candidates.rows]
     words = {key: f"w{min(2, int(key.split('(at r1 c')[1][0]))}" for key in keys}
     language = language_of(words, ("w0", "w1", "w2"))
@@ -112,9 +124,13 @@ def test_changes_that_may_come_sooner_or_later() -> None:
     assert several
 
 
-@pytest.mark.parametrize(("folder", "stem", "every"), [("t-map", "problem", 3), ("grid", "gw2-2x3", 100)])
+@pytest.mark.parametrize(
+    ("folder", "stem", "every"), [("t-map", "problem", 3), ("grid", "gw2-2x3", 100)]
+)
 def test_who_decides_a_change(folder: str, stem: str, every: int) -> None:
-    """In every state before the change: these robots' subactions settle it, and no smaller set of robots does."""
+    """In every state before the change: these robots' subactions settle it, and no smaller set of
+    robots does.
+    """
     candidates = shipped(folder, stem)
     language = build_language(candidates, "greedy").language
     formulas = word_formulas(language, candidates.model)
@@ -128,14 +144,18 @@ def test_who_decides_a_change(folder: str, stem: str, every: int) -> None:
                 robots = [spoken.model.robots.index(r) for r in change.robots]
                 assert settled(spoken, before, words[number + 1], robots)
                 for left_out in robots:
-                    assert not settled(spoken, before, words[number + 1], [r for r in robots if r != left_out])
+                    assert not settled(
+                        spoken, before, words[number + 1], [r for r in robots if r != left_out]
+                    )
                 sizes[len(robots)] += 1
     assert sizes[1], sizes
     assert sizes[2], sizes
 
 
 def states_before(fits: object, spoken: Spoken, number: int) -> set[int]:
-    """The states in which a plan is just before its change of word ``number``, by following all plans."""
+    """The states in which a plan is just before its change of word ``number``, by following all
+    plans.
+    """
     found = set()
     word = spoken.table.of_rows(spoken.space.rows)
     plans = Plans.of(fits)  # type: ignore[arg-type]
@@ -163,7 +183,9 @@ def settled(spoken: Spoken, states: set[int], after: int, robots: list[int]) -> 
 
 def test_the_running_example_in_plain_sentences() -> None:
     domain = read_domain(DOMAINS / "three-cells" / "domain.pddl")
-    candidates = from_problems(domain, [read_problem(DOMAINS / "three-cells" / "problem.pddl", domain)])
+    candidates = from_problems(
+        domain, [read_problem(DOMAINS / "three-cells" / "problem.pddl", domain)]
+    )
     language = build_language(candidates, "greedy").language
     formulas = word_formulas(language, candidates.model)
     (spoken,) = speak_candidates(language, candidates)
@@ -178,7 +200,9 @@ def test_the_running_example_in_plain_sentences() -> None:
     ]
 
 
-def test_command_refusals(coordlang: Command, language: object, t_map: tuple[object, object]) -> None:
+def test_command_refusals(
+    coordlang: Command, language: object, t_map: tuple[object, object]
+) -> None:
     assert coordlang("explain", language, *t_map, "--sentence", "w0").code == 2
     wrong = coordlang("explain", language, *t_map, "--task", "--sentence", "w3 w0")
     assert wrong.code == 1
@@ -194,7 +218,10 @@ def test_json(coordlang: Command, language: object, t_map: tuple[object, object]
     assert data["formulas"]["w0"]["pddl"] == "(and (not (at r1 c1-1)) (not (at r2 c1-1)))"
     assert sum(s["plans"] for s in data["sentences"]) == 2
     for said in data["sentences"]:
-        assert said["sentence"].split() == [said["changes"][0]["from"], *(c["to"] for c in said["changes"])]
+        assert said["sentence"].split() == [
+            said["changes"][0]["from"],
+            *(c["to"] for c in said["changes"]),
+        ]
         assert [len(robot["listed"][0]) for robot in said["robots"]] == [said["steps"]] * 2
     each = coordlang("explain", language, *t_map, "--each").out
     assert "every other state" not in each

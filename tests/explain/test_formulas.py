@@ -30,11 +30,15 @@ from tests.coordlang.test_minimal import shipped
 
 def language_of(words: dict[str, str], names: tuple[str, ...]) -> Language:
     guarantee = Guarantee("by hand", len(names), 1, len(names) == 1)
-    return Language(names, words, names[0], ("r1", "r2"), guarantee, {}, {}, {"kind": "all", "count": 0}, {})
+    return Language(
+        names, words, names[0], ("r1", "r2"), guarantee, {}, {}, {"kind": "all", "count": 0}, {}
+    )
 
 
 def random_language(random: Random, candidates: Candidates) -> Language:
-    """Some of the states, each with a random word of a few: no coordination language, but a partition."""
+    """Some of the states, each with a random word of a few: no coordination language, but a
+    partition.
+    """
     names = tuple(f"w{n}" for n in range(random.randint(1, 4)))
     keys = [candidates.model.codec.key(row) for row in candidates.rows]
     mapped = random.sample(keys, random.randint(1, len(keys)))
@@ -43,7 +47,10 @@ def random_language(random: Random, candidates: Candidates) -> Language:
 
 def listed(conjunction: tuple[str, ...], atoms: set[str]) -> bool:
     """A conjunction of ground literals as PDDL reads it."""
-    return all(text[5:-1] not in atoms if text.startswith("(not ") else text in atoms for text in conjunction)
+    return all(
+        text[5:-1] not in atoms if text.startswith("(not ") else text in atoms
+        for text in conjunction
+    )
 
 
 def check_exact(language: Language, candidates: Candidates, formulas: dict[str, Cover]) -> None:
@@ -51,13 +58,19 @@ def check_exact(language: Language, candidates: Candidates, formulas: dict[str, 
     for key, word in language.states.items():
         atoms = set(model.codec.decode(model.codec.parse_key(key)))
         assert [w for w, formula in formulas.items() if formula.holds(atoms)] == [word]
-        assert [w for w, f in formulas.items() if any(listed(c, atoms) for c in f.conditions())] == [word]
+        assert [
+            w for w, f in formulas.items() if any(listed(c, atoms) for c in f.conditions())
+        ] == [word]
     for word, formula in formulas.items():
         assert formula.states == sum(w == word for w in language.states.values())
         for term, count in zip(formula.terms, formula.counts, strict=True):
             alone = Cover((term,), (count,), 0, False)
             mine = [k for k, w in language.states.items() if w == word]
-            assert count == sum(alone.holds(model.codec.decode(model.codec.parse_key(k))) for k in mine) > 0
+            assert (
+                count
+                == sum(alone.holds(model.codec.decode(model.codec.parse_key(k))) for k in mine)
+                > 0
+            )
 
 
 @pytest.mark.parametrize("robots", [2, 3])
@@ -81,20 +94,32 @@ def test_exactly_one_formula_is_true_in_every_mapped_state(robots: int) -> None:
             atoms = candidates.model.codec.decode(candidates.model.codec.parse_key(key))
             true = [w for w, formula in told.rules if formula is None or formula.holds(atoms)]
             assert word in true
-            assert true[0] == word if told.in_order else [w for w in true if dict(told.rules)[w]] in ([word], [])
+            assert (
+                true[0] == word
+                if told.in_order
+                else [w for w in true if dict(told.rules)[w]] in ([word], [])
+            )
         seen["in order"] += told.in_order
         seen["every other state"] += any(formula is None for _, formula in told.rules)
         seen["each"] += all(formula is not None for _, formula in told.rules)
         seen["several terms"] += any(len(f.terms) > 1 for f in formulas.values())
         seen["a word without states"] += any(not f.states for f in formulas.values())
         seen["several values"] += any(len(v.values) > 2 for v in mapped.valuation.variables)
-    assert all(seen[case] for case in ("every other state", "each", "several terms", "a word without states")), seen
+    assert all(
+        seen[case]
+        for case in ("every other state", "each", "several terms", "a word without states")
+    ), seen
     assert seen["several values"]
 
 
 @pytest.mark.parametrize(
     ("folder", "stem", "method"),
-    [("t-map", "problem", "minimal"), ("grid", "gwb2-3x3", "greedy"), ("charger", "queue", "greedy"), ("grid-joint", "gw2-2x3", "greedy")],
+    [
+        ("t-map", "problem", "minimal"),
+        ("grid", "gwb2-3x3", "greedy"),
+        ("charger", "queue", "greedy"),
+        ("grid-joint", "gw2-2x3", "greedy"),
+    ],
 )
 def test_exact_on_shipped_domains(folder: str, stem: str, method: str) -> None:
     domain = read_domain(DOMAINS / folder / "domain.pddl")
@@ -118,10 +143,14 @@ def test_where_a_robot_is() -> None:
 
 
 def test_text_and_pddl() -> None:
-    """One robot's place out of three, and everything else: as text, and as PDDL where a set of values needs negations."""
+    """One robot's place out of three, and everything else: as text, and as PDDL where a set of
+    values needs negations.
+    """
     candidates = shipped("three-cells")
     keys = [candidates.model.codec.key(row) for row in candidates.rows]
-    language = language_of({key: "w1" if "(at r1 a)" in key else "w0" for key in keys}, ("w0", "w1"))
+    language = language_of(
+        {key: "w1" if "(at r1 a)" in key else "w0" for key in keys}, ("w0", "w1")
+    )
     formulas = word_formulas(language, candidates.model)
     assert shown(formulas["w1"]) == "at(r1) = a"
     assert pddl_condition(formulas["w1"]) == "(at r1 a)"
@@ -133,19 +162,26 @@ def test_text_and_pddl() -> None:
 
 
 def test_conditions_of_sets_of_values() -> None:
-    """Not excluding the others, where "none of them" is one of the others; and text that says which are excluded."""
+    """Not excluding the others, where "none of them" is one of the others; and text that says which
+    are excluded.
+    """
     atoms = ("(at b x)", "(at b y)", "(at b z)")
     places = tuple(("at(b)", place) for place in "xyz")
     carried = Variable("at(b)", (*atoms, None), (*places, ("at(b)", "none")))
     somewhere = Literal(carried, frozenset(atoms[:2]))
     assert somewhere.conditions() == [("(at b x)",), ("(at b y)",)]
     assert literal_text(somewhere) == "at(b) in {x, y}"
-    assert Literal(carried, frozenset((atoms[0], None))).conditions() == [("(not (at b y))", "(not (at b z))")]
+    assert Literal(carried, frozenset((atoms[0], None))).conditions() == [
+        ("(not (at b y))", "(not (at b z))")
+    ]
     assert literal_text(Literal(carried, frozenset(atoms))) == "at(b) != none"
     lying = Variable("at(b)", atoms, places)
     assert Literal(lying, frozenset(atoms[:2])).conditions() == [("(not (at b z))",)]
-    both = Variable("free/holds(r)", ("(free r)", "(holds r b)", "(holds r c)"),
-                    (("free(r)", ""), ("holds(r)", "b"), ("holds(r)", "c")))  # fmt: skip
+    both = Variable(
+        "free/holds(r)",
+        ("(free r)", "(holds r b)", "(holds r c)"),
+        (("free(r)", ""), ("holds(r)", "b"), ("holds(r)", "c")),
+    )
     assert literal_text(Literal(both, frozenset(("(free r)",)))) == "free(r)"
     assert literal_text(Literal(both, frozenset(both.values[1:]))) == "not free(r)"
     for variable in (carried, lying, both):
@@ -166,8 +202,14 @@ def test_further_states_have_the_default() -> None:
     free = word_formulas(language, candidates.model)
     exact = word_formulas(language, candidates.model, candidates.rows)
     states = [set(candidates.model.codec.decode(row)) for row in candidates.rows]
-    assert all([w for w, f in exact.items() if f.holds(s)] == [language.states.get(k, "w0")] for k, s in zip(keys, states, strict=True))
-    assert not all([w for w, f in free.items() if f.holds(s)] == [language.states.get(k, "w0")] for k, s in zip(keys, states, strict=True))
+    assert all(
+        [w for w, f in exact.items() if f.holds(s)] == [language.states.get(k, "w0")]
+        for k, s in zip(keys, states, strict=True)
+    )
+    assert not all(
+        [w for w, f in free.items() if f.holds(s)] == [language.states.get(k, "w0")]
+        for k, s in zip(keys, states, strict=True)
+    )
     assert exact["w1"].length > free["w1"].length
 
 
@@ -190,12 +232,18 @@ def random_points(random: Random) -> Points:
     random.shuffle(every)
     on = random.randint(1, min(8, len(every)))
     off = random.randint(0, len(every) - on)
-    tables = [np.array(part, np.int64).reshape(-1, len(sizes)) for part in (every[:on], every[on : on + off])]
+    tables = [
+        np.array(part, np.int64).reshape(-1, len(sizes))
+        for part in (every[:on], every[on : on + off])
+    ]
     return Points(sizes, *tables)
 
 
 def limited(points: Points, box: np.ndarray) -> int:
-    return sum(not box[start : start + size].all() for start, size in zip(points.offset, points.sizes, strict=True))
+    return sum(
+        not box[start : start + size].all()
+        for start, size in zip(points.offset, points.sizes, strict=True)
+    )
 
 
 def test_fewest_boxes_by_trying_all() -> None:
@@ -206,8 +254,14 @@ def test_fewest_boxes_by_trying_all() -> None:
         maximal = every_box(points)
         held = {tuple(np.flatnonzero(points.inside(b[None, :], points.on)[0])) for b in maximal}
         most = [frozenset(h) for h in held if not any(set(h) < set(o) for o in held)]
-        best = next(k for k in range(1, len(points.on) + 1)
-                    if any(len(frozenset().union(*c)) == len(points.on) for c in combinations(most, min(k, len(most)))))  # fmt: skip
+        best = next(
+            k
+            for k in range(1, len(points.on) + 1)
+            if any(
+                len(frozenset().union(*c)) == len(points.on)
+                for c in combinations(most, min(k, len(most)))
+            )
+        )
         assert boxes.fewest
         assert len(boxes.prime) == best
         for least, prime in zip(boxes.least, boxes.prime, strict=True):
@@ -231,7 +285,11 @@ def test_a_single_term_limits_as_few_variables_as_possible() -> None:
         off = off[(off != 1).any(axis=1)]
         points = Points((2,) * 8, on, off)
         (box,) = minimise(points).prime
-        needed = next(k for k in range(9) if any((off[:, list(c)] != 1).any(axis=1).all() for c in combinations(range(8), k)))
+        needed = next(
+            k
+            for k in range(9)
+            if any((off[:, list(c)] != 1).any(axis=1).all() for c in combinations(range(8), k))
+        )
         assert limited(points, box) == needed
         shorter += limited(points, expand(points, points.supercube([0]), on)) > needed
     assert shorter > 10  # expanding alone does not do it
@@ -251,14 +309,23 @@ def test_expanded_boxes_are_prime(ordered: bool) -> None:
             assert points.inside(larger[None, :], points.off).any()
 
 
-@pytest.mark.parametrize(("folder", "stem", "names"), [
-    ("grid", "gw2-2x3", {"at(r1)", "at(r2)"}),
-    ("two-arms", "exchange", {"over(arm1)", "over(arm2)", "empty/holds(arm1)", "empty/holds(arm2)"}),
-    ("vans", "two-vans", {"aboard/at(d1)", "at(v1)", "at(v2)"}),
-    ("elevator", "two-calls", {"inside/outside(r1)", "stops"}),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("folder", "stem", "names"),
+    [
+        ("grid", "gw2-2x3", {"at(r1)", "at(r2)"}),
+        (
+            "two-arms",
+            "exchange",
+            {"over(arm1)", "over(arm2)", "empty/holds(arm1)", "empty/holds(arm2)"},
+        ),
+        ("vans", "two-vans", {"aboard/at(d1)", "at(v1)", "at(v2)"}),
+        ("elevator", "two-calls", {"inside/outside(r1)", "stops"}),
+    ],
+)
 def test_variables_are_invariants(folder: str, stem: str, names: set[str]) -> None:
-    """At most one atom of a variable is true in every reachable state; "none" is a value only where it can happen."""
+    """At most one atom of a variable is true in every reachable state; "none" is a value only where
+    it can happen.
+    """
     domain = read_domain(DOMAINS / folder / "domain.pddl")
     candidates = from_problems(domain, [read_problem(DOMAINS / folder / f"{stem}.pddl", domain)])
     space = explore(candidates.model, np.stack([task.init for task in candidates.loaded.tasks]))

@@ -1,4 +1,6 @@
-"""PDDL that others wrote, read where it lies, against independent reference numbers (its README has the table)."""
+"""PDDL that others wrote, read where it lies, against independent reference numbers (its README has
+the table).
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ from foreign_rows import BY_NAME, LANGUAGE_BY_NAME, LANGUAGES, ROWS, SHARED, Row
 
 pytestmark = [
     pytest.mark.foreign,
-    pytest.mark.skipif(not SHARED.is_dir(), reason=f"the inputs that others wrote are not here: {SHARED}"),
+    pytest.mark.skipif(
+        not SHARED.is_dir(), reason=f"the inputs that others wrote are not here: {SHARED}"
+    ),
 ]
 
 
@@ -40,7 +44,9 @@ def test_numbers(row: Row, capfd: pytest.CaptureFixture[str]) -> None:
     assert inspected["states"] == row.states
     makespan = output(capfd, "plans", *row.arguments, "--count", "--json")
     assert (makespan["optimal_cost"], makespan["count"]) == (row.makespan, row.plans)
-    actions = output(capfd, "plans", *row.arguments, "--count", "--json", "--cost", "makespan+actions")
+    actions = output(
+        capfd, "plans", *row.arguments, "--count", "--json", "--cost", "makespan+actions"
+    )
     assert (actions["optimal_cost"], actions["count"]) == (row.makespan, row.fewest)
 
 
@@ -52,10 +58,16 @@ def test_fast_downward_agrees(row: Row, capfd: pytest.CaptureFixture[str]) -> No
     assert checked["fast_downward"][0] == row.makespan  # type: ignore[index]
 
 
-def test_both_forms_of_workshop_have_the_same_plans_of_fewest_actions(capfd: pytest.CaptureFixture[str]) -> None:
-    """The network form only forbids more in steps that no plan needs: pressing both switches, unlocking twice."""
+def test_both_forms_of_workshop_have_the_same_plans_of_fewest_actions(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    """The network form only forbids more in steps that no plan needs: pressing both switches,
+    unlocking twice.
+    """
     plans = [
-        output(capfd, "plans", *BY_NAME[name].arguments, "--max", "100", "--format", "json", *more)["plans"]
+        output(capfd, "plans", *BY_NAME[name].arguments, "--max", "100", "--format", "json", *more)[
+            "plans"
+        ]
         for name in ("workshop-cal", "workshop-cn")
         for more in ((), ("--cost", "makespan+actions"))
     ]
@@ -84,8 +96,14 @@ def test_logistics_by_counting(capfd: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("path", "message"),
     [
-        ("durative/domain.pddl", "domain.pddl:25:1: durative actions (:durative-action) are not supported"),
-        ("derived/domain.pddl", "domain.pddl:21:3: derived predicates (axioms) (:derived) are not supported"),
+        (
+            "durative/domain.pddl",
+            "domain.pddl:25:1: durative actions (:durative-action) are not supported",
+        ),
+        (
+            "derived/domain.pddl",
+            "domain.pddl:21:3: derived predicates (axioms) (:derived) are not supported",
+        ),
         (
             "multirobot-ros/domain_turtlebot_demo_multirobot.pddl",
             "domain_turtlebot_demo_multirobot.pddl:20:1: durative actions (:durative-action) are not supported",
@@ -102,18 +120,38 @@ def test_refused(path: str, message: str, capfd: pytest.CaptureFixture[str]) -> 
 def test_the_numeric_sample_is_plain_strips(capfd: pytest.CaptureFixture[str]) -> None:
     """`refuse/numeric` has no numeric feature, so there is nothing in it to refuse, and it is read.
 
-    Its only requirement is :typing.  It declares no function, has no number, no assignment, no comparison and no metric:
-    each word of the two files is a keyword of STRIPS with types or one of the domain's own names.
+    Its only requirement is :typing.  It declares no function, has no number, no assignment, no
+    comparison and no metric: each word of the two files is a keyword of STRIPS with types or one of
+    the domain's own names.
     """
     place = SHARED / "refuse" / "numeric"
-    domain, problem = (re.sub(";.*", "", (place / f"{name}.pddl").read_text()) for name in ("domain", "problem"))
+    domain, problem = (
+        re.sub(";.*", "", (place / f"{name}.pddl").read_text()) for name in ("domain", "problem")
+    )
     assert re.findall(r"\(:requirements([^)]*)\)", domain) == [" :typing"]
     assert "requirements" not in problem
-    keywords = set(re.findall(r":[a-z-]+|(?<=\()(?:and|not|define|domain|problem)(?=[ \n])", domain + problem))
+    keywords = set(
+        re.findall(r":[a-z-]+|(?<=\()(?:and|not|define|domain|problem)(?=[ \n])", domain + problem)
+    )
     assert keywords == {
-        "define", "domain", "problem", ":requirements", ":typing", ":types", ":predicates", ":action", ":parameters",
-        ":precondition", ":effect", ":domain", ":objects", ":init", ":goal", "and", "not",
-    }  # fmt: skip
+        "define",
+        "domain",
+        "problem",
+        ":requirements",
+        ":typing",
+        ":types",
+        ":predicates",
+        ":action",
+        ":parameters",
+        ":precondition",
+        ":effect",
+        ":domain",
+        ":objects",
+        ":init",
+        ":goal",
+        "and",
+        "not",
+    }
     heads = set(re.findall(r"\(([^\s():?]+)", domain[domain.index("(:action") :]))
     assert heads == {"and", "not", "at", "in", "link", "path"}
     words = set(re.split(r"[\s()]+", domain + problem)) - {"", "-"}
@@ -144,12 +182,15 @@ def test_a_language_for_varied_tasks(name: str) -> None:
     assert figures["proved"]
     assert (figures["tasks"], figures["requiring"], figures["words"]) == (tasks, requiring, words)
     assert figures["greedy"] >= words  # type: ignore[operator]
-    # What the words are said to mean: all plans of every sentence agree on it (of mapf in nine of ten tasks).
+    # What the words are said to mean: all plans of every sentence agree on it (of mapf in nine of
+    # ten tasks).
     assert figures["told"] >= LANGUAGE_BY_NAME[name].agree * figures["different"] > 0  # type: ignore[operator]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("language", [x for x in LANGUAGES if x.name not in QUICK], ids=lambda language: language.name)
+@pytest.mark.parametrize(
+    "language", [x for x in LANGUAGES if x.name not in QUICK], ids=lambda language: language.name
+)
 def test_the_other_languages(language: foreign.Language) -> None:
     figures = foreign.build(language, 200)
     assert figures["verified"]
@@ -158,14 +199,20 @@ def test_the_other_languages(language: foreign.Language) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("row", ["depot", "depot-con", "taxi"])
-def test_a_language_of_four_or_five_robots(row: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    figures = output(capfd, "build", *BY_NAME[row].arguments, "-o", str(tmp_path / "language.json"), "--json")
+def test_a_language_of_four_or_five_robots(
+    row: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    figures = output(
+        capfd, "build", *BY_NAME[row].arguments, "-o", str(tmp_path / "language.json"), "--json"
+    )
     assert figures["verified"]
     assert figures["tasks_requiring_coordination"] == 1
 
 
 def test_plans_that_no_state_tells_apart(capfd: pytest.CaptureFixture[str]) -> None:
-    """Of two robots beside the small box either may push it while the other one walks: remembering tells them apart."""
+    """Of two robots beside the small box either may push it while the other one walks: remembering
+    tells them apart.
+    """
     row = BY_NAME["boxpushing"]
     language = LANGUAGE_BY_NAME["boxpushing"]
     with pytest.raises(Inseparable) as caught:

@@ -1,4 +1,6 @@
-"""Broken PDDL never ends in a traceback, a hang or a message without a place (`benchmarks/fuzz.py`)."""
+"""Broken PDDL never ends in a traceback, a hang or a message without a place
+(`benchmarks/fuzz.py`).
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,9 @@ def test_two_thousand_mutants(start: int, fuzz: ModuleType, tmp_path: Path) -> N
 
 def test_a_mutant_is_the_same_every_time(fuzz: ModuleType) -> None:
     sources = fuzz.pairs(foreign=False)
-    assert [fuzz.mutant(n, 3, sources) for n in range(30)] == [fuzz.mutant(n, 3, sources) for n in range(30)]
+    assert [fuzz.mutant(n, 3, sources) for n in range(30)] == [
+        fuzz.mutant(n, 3, sources) for n in range(30)
+    ]
 
 
 @pytest.mark.parametrize(

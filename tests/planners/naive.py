@@ -1,7 +1,8 @@
 """Naive twin of the joint model: joint steps, reachable states and optimal plans by brute force.
 
-Every robot tries every type-correct argument tuple of every schema; what is a joint step is asked of
-`planners.check.validate`, one step at a time.  Nothing is shared with grounding, composition or search.
+Every robot tries every type-correct argument tuple of every schema; what is a joint step is asked
+of `planners.check.validate`, one step at a time.  Nothing is shared with grounding, composition or
+search.
 """
 
 from __future__ import annotations
@@ -97,13 +98,17 @@ class Twin:
         return list(found)
 
     def actions(self, labels: Labels) -> int:
-        """The second component of ``makespan+actions``: chosen subactions, shared ones once, do-nothing ones free."""
+        """The second component of ``makespan+actions``: chosen subactions, shared ones once,
+        do-nothing ones free.
+        """
         if self.rules.is_joint_action:
             return sum(label is not None for label in labels)
         return sum(not self.does_nothing(label) for label in {*labels} - {None})
 
     def does_nothing(self, label: str) -> bool:
-        """No effect, whatever the state and the step, and no formula of the domain names the action."""
+        """No effect, whatever the state and the step, and no formula of the domain names the
+        action.
+        """
         found = self.rules.instance(label)
         assert not isinstance(found, str), found
         touched = self.rules.touched(found)
@@ -112,10 +117,14 @@ class Twin:
         schemas = self.rules.domain.schemas
         bound = {name for c in self.rules.domain.constraints for name, _ in c.actions}
         formulas = [f for s in schemas for f in (s.precondition, *(e.condition for e in s.effects))]
-        return found.schema.name not in {name for f in formulas for name in _actions_named(f)} | bound
+        return (
+            found.schema.name not in {name for f in formulas for name in _actions_named(f)} | bound
+        )
 
     def optimal(self, goal: Formula | None = None, *, actions: bool = False) -> Optimal | None:
-        """The optimal plans under ``makespan`` or ``makespan+actions``; None if the goal cannot be reached."""
+        """The optimal plans under ``makespan`` or ``makespan+actions``; None if the goal cannot be
+        reached.
+        """
         wanted = self.rules.problem.goal if goal is None else goal
 
         def is_goal(state: State) -> bool:
@@ -129,7 +138,8 @@ class Twin:
                 return None
             seen |= after
             layers.append(after)
-        # From behind: the least second component at the least makespan, and the steps that keep to it.
+        # From behind: the least second component at the least makespan, and the steps that keep to
+        # it.
         best = {s: 0 for s in layers[-1] if is_goal(s)}
         edges: list[dict[State, list[Step]]] = []
         for layer in reversed(layers[:-1]):
@@ -160,9 +170,13 @@ class Optimal:
 
     def count(self) -> int:
         """The number of different sequences of joint actions."""
-        counts = {state: 1 for layer in self.edges[-1:] for steps in layer.values() for _, state in steps}
+        counts = {
+            state: 1 for layer in self.edges[-1:] for steps in layer.values() for _, state in steps
+        }
         for layer in reversed(self.edges):
-            counts = {state: sum(counts[after] for _, after in steps) for state, steps in layer.items()}
+            counts = {
+                state: sum(counts[after] for _, after in steps) for state, steps in layer.items()
+            }
         return counts[self.init] if self.edges else 1
 
     def plans(self) -> Iterator[Plan]:
@@ -180,14 +194,22 @@ class Optimal:
 
 
 def successors(
-    domain: Domain, problem: Problem, team: Team, state: State, idle_allowed: Sequence[bool] | None = None
+    domain: Domain,
+    problem: Problem,
+    team: Team,
+    state: State,
+    idle_allowed: Sequence[bool] | None = None,
 ) -> frozenset[Step]:
     """All joint steps from a state: (labels, state after)."""
     return Twin(domain, problem, team, idle_allowed).successors(state)
 
 
 def reachable(
-    domain: Domain, problem: Problem, team: Team, idle_allowed: Sequence[bool] | None = None, limit: int = 10_000
+    domain: Domain,
+    problem: Problem,
+    team: Team,
+    idle_allowed: Sequence[bool] | None = None,
+    limit: int = 10_000,
 ) -> list[State]:
     """All reachable states; raises `TooLarge` beyond ``limit``."""
     return Twin(domain, problem, team, idle_allowed).reachable(limit)

@@ -17,7 +17,8 @@ PlainState = frozenset[int]
 class OptimalPlans:
     """The optimal cost of a plain task and its optimal action sequences.
 
-    ``edges`` are (action number, cost, next state); a cycle without cost would make infinitely many plans: `RecursionError`.
+    ``edges`` are (action number, cost, next state); a cycle without cost would make infinitely many
+    plans: `RecursionError`.
     """
 
     plain: PlainTask
@@ -50,7 +51,11 @@ class OptimalPlans:
 
     def _tight(self, state: PlainState) -> list[tuple[int, PlainState]]:
         far = self.distance[state]
-        return [(n, after) for n, cost, after in self.edges[state] if cost + self.distance.get(after, far + 1) == far]
+        return [
+            (n, after)
+            for n, cost, after in self.edges[state]
+            if cost + self.distance.get(after, far + 1) == far
+        ]
 
 
 def holds(conditions: Sequence[tuple[int, bool]], state: PlainState) -> bool:

@@ -1,8 +1,8 @@
 """Small random domains and problems as PDDL text, for comparing the fast model with its naive twin.
 
-Every seed gives one model with two or three robots and at most `_FLUENTS` ground fluents, hence at most
-``2 ** _FLUENTS`` states.  Three kinds: MA-PDDL with ``:agent``, plain typed PDDL with actions shared by two robots
-(and now and then actions of nobody), and joint-action PDDL.
+Every seed gives one model with two or three robots and at most `_FLUENTS` ground fluents, hence at
+most ``2 ** _FLUENTS`` states.  Three kinds: MA-PDDL with ``:agent``, plain typed PDDL with actions
+shared by two robots (and now and then actions of nobody), and joint-action PDDL.
 """
 
 from __future__ import annotations
@@ -17,7 +17,14 @@ from planners.pddl.robots import Unowned
 Kind = Literal["agent", "plain", "joint"]
 KINDS: tuple[Kind, ...] = ("agent", "plain", "joint")
 _FLUENTS = 7
-_SIGNATURES = ((), ("robot",), ("place",), ("robot", "place"), ("place", "place"), ("robot", "robot"))
+_SIGNATURES = (
+    (),
+    ("robot",),
+    ("place",),
+    ("robot", "place"),
+    ("place", "place"),
+    ("robot", "robot"),
+)
 #: Types that a variable may have, and how often.
 _TYPES = ("robot", "robot", "place", "place", "place", "hub", "object", "(either robot hub)")
 
@@ -56,10 +63,14 @@ class _Writer:
         bodies = [self._schema(name, scope) for name, scope in self.actions.items()]
         missing = [p for p in self.fluents if not any(f"({p}" in effect for _, effect in bodies)]
         first = self.actions["a0"]
-        bodies[0][1] += "".join(f" ({name}{self._terms(self.fluents[name], first)})" for name in missing)
+        bodies[0][1] += "".join(
+            f" ({name}{self._terms(self.fluents[name], first)})" for name in missing
+        )
         texts = [
             self._action(name, scope, precondition, f"(and{effect})" if effect else "()")
-            for (name, scope), (precondition, effect) in zip(self.actions.items(), bodies, strict=True)
+            for (name, scope), (precondition, effect) in zip(
+                self.actions.items(), bodies, strict=True
+            )
         ]
         predicates = " ".join(
             f"({name}{''.join(f' ?{i} - {t}' for i, t in enumerate(types))})"
@@ -73,7 +84,8 @@ class _Writer:
         )
         return RandomModel(domain, self._problem(), self.unowned)
 
-    # -- what there is ---------------------------------------------------------------------------------------
+    # -- what there is
+    # ---------------------------------------------------------------------------------------
 
     def _choose_names(self) -> None:
         pick = self.random
@@ -105,7 +117,9 @@ class _Writer:
         pick = self.random
         if self.kind == "joint":
             number = pick.choice((0, 1, 2, 2, 3, 4))
-            return {f"?x{i}": pick.choice(("place", "place", "hub", "robot")) for i in range(number)}
+            return {
+                f"?x{i}": pick.choice(("place", "place", "hub", "robot")) for i in range(number)
+            }
         scope = {"?r": "robot"}
         if self.kind == "plain":
             if self.unowned != "error" and pick.random() < 0.4:
@@ -119,10 +133,13 @@ class _Writer:
             scope[f"?x{number}"] = pick.choice(types)
         return scope
 
-    # -- schemas ---------------------------------------------------------------------------------------------
+    # -- schemas
+    # ---------------------------------------------------------------------------------------------
 
     def _schema(self, name: str, scope: Scope) -> list[str]:
-        """Precondition and the effects (not yet joined) of an action; one in six has no effect at all."""
+        """Precondition and the effects (not yet joined) of an action; one in six has no effect at
+        all.
+        """
         pick = self.random
         if pick.random() < 0.12 and self.kind != "joint":
             return self._wait(scope)
@@ -138,7 +155,10 @@ class _Writer:
             precondition = "()"
         if pick.random() < 1 / 6:
             return [precondition, ""]
-        return [precondition, "".join(f" {self._effect(scope, 2)}" for _ in range(pick.randint(1, 3)))]
+        return [
+            precondition,
+            "".join(f" {self._effect(scope, 2)}" for _ in range(pick.randint(1, 3))),
+        ]
 
     def _wait(self, scope: Scope) -> list[str]:
         """An action that does nothing: always possible, or wherever one fact holds."""
@@ -162,7 +182,9 @@ class _Writer:
         more = [self._about_the_step(scope)] if self.kind != "joint" and pick.random() < 0.4 else []
         more += [f"(not {there})"] if pick.random() < 0.4 else []
         more += [self._literal(scope)] if pick.random() < 0.2 else []
-        effect = f" (not {here}) {there}" + (f" {self._effect(scope, 2)}" if pick.random() < 0.3 else "")
+        effect = f" (not {here}) {there}" + (
+            f" {self._effect(scope, 2)}" if pick.random() < 0.3 else ""
+        )
         return [f"(and {' '.join((here, *more))})", effect]
 
     def _action(self, name: str, scope: Scope, precondition: str, effect: str) -> str:
@@ -179,19 +201,30 @@ class _Writer:
         return "\n".join(lines)
 
     def _comments(self, scope: Scope) -> list[str]:
-        """The robots' parts.  Mostly all parameters are named, so that the parts determine the action."""
+        """The robots' parts.  Mostly all parameters are named, so that the parts determine the
+        action.
+        """
         pick = self.random
         lines = []
         for robot in self.robots:
             terms = [v for v in scope if pick.random() < 0.8]
             if pick.random() < 0.1:
                 terms.append(self.places[0])
-            part = "idle" if pick.random() < 0.25 else f"({' '.join((pick.choice(('go', 'do')), *terms))})"
+            part = (
+                "idle"
+                if pick.random() < 0.25
+                else f"({' '.join((pick.choice(('go', 'do')), *terms))})"
+            )
             lines.append(f"    ; subaction {robot} {part}")
         # A missing line means idle; the first robot is always named.
-        return [line for n, line in enumerate(lines) if n == 0 or not line.endswith("idle") or pick.random() < 0.5]
+        return [
+            line
+            for n, line in enumerate(lines)
+            if n == 0 or not line.endswith("idle") or pick.random() < 0.5
+        ]
 
-    # -- formulas --------------------------------------------------------------------------------------------
+    # -- formulas
+    # --------------------------------------------------------------------------------------------
 
     def _term(self, kind: str, scope: Scope) -> str:
         """Mostly a variable of the type, sometimes a constant or a variable of any type."""
@@ -220,7 +253,9 @@ class _Writer:
 
     def _formula(self, scope: Scope, depth: int, *, step: bool = True) -> str:
         pick = self.random
-        kind = pick.choice(("literal", "equal", "step", "and", "or", "not", "imply", "forall", "exists"))
+        kind = pick.choice(
+            ("literal", "equal", "step", "and", "or", "not", "imply", "forall", "exists")
+        )
         if depth == 0:
             kind = pick.choice(("literal", "literal", "literal", "equal", "step"))
         if kind == "step" and (self.kind == "joint" or not step):
@@ -233,7 +268,9 @@ class _Writer:
             case "step":
                 return self._step_atom(scope)
             case "and" | "or":
-                parts = [self._formula(scope, inner, step=step) for _ in range(pick.choice((1, 2, 2, 3)))]
+                parts = [
+                    self._formula(scope, inner, step=step) for _ in range(pick.choice((1, 2, 2, 3)))
+                ]
                 return f"({kind} {' '.join(parts)})"
             case "not":
                 return f"(not {self._formula(scope, inner, step=step)})"
@@ -243,7 +280,9 @@ class _Writer:
                 return self._quantified(kind, self._variables(), scope, inner, step=step)
         return self._literal(scope)
 
-    def _quantified(self, kind: str, variables: Scope, scope: Scope, depth: int, *, step: bool) -> str:
+    def _quantified(
+        self, kind: str, variables: Scope, scope: Scope, depth: int, *, step: bool
+    ) -> str:
         listed = " ".join(f"{v} - {t}" for v, t in variables.items())
         return f"({kind} ({listed}) {self._formula({**scope, **variables}, depth, step=step)})"
 
@@ -252,12 +291,15 @@ class _Writer:
         return f"({name}{self._terms(tuple(self.actions[name].values()), scope)})"
 
     def _about_the_step(self, scope: Scope) -> str:
-        """The forms that domains use: nobody does .., somebody else does .., nobody does .. unless .."""
+        """The forms that domains use: nobody does .., somebody else does .., nobody does .. unless
+        ..
+        """
         pick = self.random
         inner = {**scope, "?o": "robot"}
         name = pick.choice(list(self.actions))
         args = [
-            "?o" if t == "robot" and pick.random() < 0.8 else self._term(t, inner) for t in self.actions[name].values()
+            "?o" if t == "robot" and pick.random() < 0.8 else self._term(t, inner)
+            for t in self.actions[name].values()
         ]
         atom = f"({' '.join((name, *args))})"
         form = pick.random()
@@ -270,10 +312,16 @@ class _Writer:
 
     def _effect(self, scope: Scope, depth: int) -> str:
         pick = self.random
-        kind = pick.choice(("literal", "literal", "literal", "when", "forall")) if depth else "literal"
+        kind = (
+            pick.choice(("literal", "literal", "literal", "when", "forall")) if depth else "literal"
+        )
         if kind == "when":
             about_step = self.kind != "joint" and pick.random() < 0.3
-            condition = self._about_the_step(scope) if about_step else self._formula(scope, pick.choice((0, 0, 1, 2)))
+            condition = (
+                self._about_the_step(scope)
+                if about_step
+                else self._formula(scope, pick.choice((0, 0, 1, 2)))
+            )
             return f"(when {condition} {self._effect(scope, depth - 1)})"
         if kind == "forall":
             variables = self._variables()
@@ -284,7 +332,8 @@ class _Writer:
         literal = atom if pick.random() < 0.55 else f"(not {atom})"
         return literal if pick.random() < 0.85 else f"(and {literal} {self._effect(scope, 0)})"
 
-    # -- the problem -----------------------------------------------------------------------------------------
+    # -- the problem
+    # -----------------------------------------------------------------------------------------
 
     def _problem(self) -> str:
         pick = self.random

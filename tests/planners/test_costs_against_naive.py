@@ -1,4 +1,6 @@
-"""``--cost makespan+cost`` against brute force: least makespan, then least PDDL action cost, on random models."""
+"""``--cost makespan+cost`` against brute force: least makespan, then least PDDL action cost, on
+random models.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,9 @@ Price = Callable[[str], int]
 
 
 def priced(seed: int, kind: Kind) -> tuple[Loaded, Price]:
-    """A random model in which every action costs a constant, or what its first argument costs, or nothing."""
+    """A random model in which every action costs a constant, or what its first argument costs, or
+    nothing.
+    """
     text = random_model(seed, kind)
     random = Random(seed)
     names = re.findall(r"\(:action (\S+)", text.domain)
@@ -38,14 +42,26 @@ def priced(seed: int, kind: Kind) -> tuple[Loaded, Price]:
         variables = re.findall(r"\?\w+", pieces[number].split(":precondition")[0])
         fixed[name] = random.choice((0, 1, 2, 5, None if variables else 3))
         term = f"(price {variables[0]})" if fixed[name] is None else str(fixed[name])
-        cost = "" if fixed[name] == 0 and random.random() < 0.5 else f"(increase (total-cost) {term}) "
-        pieces[number] = re.sub(r":effect \((?:and ?)?", f":effect (and {cost}", pieces[number], count=1)
-    domain = parse_domain(Source("d", "".join(pieces).replace("(:predicates", "(:functions (price ?x)) (:predicates", 1)))
+        cost = (
+            "" if fixed[name] == 0 and random.random() < 0.5 else f"(increase (total-cost) {term}) "
+        )
+        pieces[number] = re.sub(
+            r":effect \((?:and ?)?", f":effect (and {cost}", pieces[number], count=1
+        )
+    domain = parse_domain(
+        Source(
+            "d", "".join(pieces).replace("(:predicates", "(:functions (price ?x)) (:predicates", 1)
+        )
+    )
     plain = parse_problem(Source("p", text.problem), domain)
     prices = {name: random.randrange(4) for name in sorted(plain.objects)}
     known = " ".join(f"(= (price {name}) {value})" for name, value in prices.items())
-    problem = parse_problem(Source("p", text.problem.replace("(:init", f"(:init {known}", 1)), domain)
-    loaded = build(domain, [problem], ModelOptions(RobotChoice(unowned=text.unowned), "makespan+cost"))
+    problem = parse_problem(
+        Source("p", text.problem.replace("(:init", f"(:init {known}", 1)), domain
+    )
+    loaded = build(
+        domain, [problem], ModelOptions(RobotChoice(unowned=text.unowned), "makespan+cost")
+    )
 
     def price(label: str) -> int:
         name, *args = label.strip("()").split()
@@ -56,10 +72,16 @@ def priced(seed: int, kind: Kind) -> tuple[Loaded, Price]:
 
 
 def brute_force(twin: Twin, goal: Formula, price: Price) -> tuple[int, int, int]:
-    """(makespan, cost, number of plans): all sequences of joint steps, of least length, then of least price."""
+    """(makespan, cost, number of plans): all sequences of joint steps, of least length, then of
+    least price.
+    """
     paths: dict[State, Counter[int]] = {twin.init: Counter({0: 1})}
     for makespan in range(len(twin.reachable(128))):
-        done = [costs for state, costs in paths.items() if twin.rules.holds(goal, {}, True, Moment(state))]
+        done = [
+            costs
+            for state, costs in paths.items()
+            if twin.rules.holds(goal, {}, True, Moment(state))
+        ]
         if done:
             total = sum(done, Counter())
             return makespan, min(total), total[min(total)]
@@ -83,7 +105,10 @@ def test_the_same_cost_and_the_same_number_of_plans(kind: Kind) -> None:
         twin = Twin(loaded.domain, loaded.problems[0], loaded.team, model.keeps_idle, 3000)
         try:
             last = twin.reachable(128)[-1]
-            parts = (*sorted(last - twin.init, key=str), *(Not(a) for a in sorted(twin.init - last, key=str)))
+            parts = (
+                *sorted(last - twin.init, key=str),
+                *(Not(a) for a in sorted(twin.init - last, key=str)),
+            )
             goal = And(parts)
             wanted = brute_force(twin, goal, price)
         except TooLarge:

@@ -26,7 +26,8 @@ from planners.search.plan_space import search
 
 FOREIGN = Path(__file__).parents[3] / "shared" / "data" / "foreign"
 
-#: A formula that demands a partner without effects, a conditional effect, a disjunction, interference over a tool.
+#: A formula that demands a partner without effects, a conditional effect, a disjunction,
+#: interference over a tool.
 WORKSHOP = """
 (define (domain workshop)
   (:types robot)
@@ -81,7 +82,8 @@ JOINT_TASK = """
   (:goal (and (at1 c) (at2 d))))
 """
 
-#: Lamps along a corridor that put out their neighbours: more states than anybody searches in the time of a test.
+#: Lamps along a corridor that put out their neighbours: more states than anybody searches in the
+#: time of a test.
 BIG_CELLS = 24
 BIG = """
 (define (domain big)
@@ -156,13 +158,17 @@ def test_a_wrong_model_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     loaded = read(WORKSHOP, text.replace("(:init (free))", "(:init (free) (in r1) (in r2))"))
     expected = search(loaded.model, loaded.tasks[0]).cost_of(0)
     assert expected == (3, 0)
-    monkeypatch.setattr(plain_module.choosers, "clashes", lambda actions: (frozenset(),) * len(actions))
+    monkeypatch.setattr(
+        plain_module.choosers, "clashes", lambda actions: (frozenset(),) * len(actions)
+    )
     assert optimal_cost(loaded.model, loaded.tasks[0], limit=0).cost == (1, 0)
 
 
 @pytest.mark.parametrize("limit", [2000, 0])
 def test_an_unsolvable_task_has_no_cost(limit: int) -> None:
-    loaded = workshop("(and (free) (or (and (clean) (not (wet))) (and (open) (not (in r1)) (not (in r2)))))")
+    loaded = workshop(
+        "(and (free) (or (and (clean) (not (wet))) (and (open) (not (in r1)) (not (in r2)))))"
+    )
     with pytest.raises(ProvedImpossible):
         search(loaded.model, loaded.tasks[0])
     assert optimal_cost(loaded.model, loaded.tasks[0], limit=limit).cost is None
@@ -176,7 +182,9 @@ def test_a_goal_that_holds_at_the_start() -> None:
 def test_a_step_cost_that_was_too_small_is_raised(monkeypatch: pytest.MonkeyPatch) -> None:
     loaded = workshop(GOAL, "makespan+actions")
     monkeypatch.setattr(fast_downward, "LONGEST", 1)
-    assert optimal_cost(loaded.model, loaded.tasks[0]).cost == search(loaded.model, loaded.tasks[0]).cost_of(0)
+    assert optimal_cost(loaded.model, loaded.tasks[0]).cost == search(
+        loaded.model, loaded.tasks[0]
+    ).cost_of(0)
 
 
 def test_nothing_is_written_or_printed(
@@ -195,7 +203,9 @@ def test_nothing_is_written_or_printed(
 
 
 @pytest.mark.parametrize("seconds", [0.5, 5.0])
-def test_the_time_limit_ends_everything(seconds: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_time_limit_ends_everything(
+    seconds: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Once while unified-planning is being imported, once while Fast Downward searches."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     loaded = big()
@@ -229,11 +239,14 @@ def test_a_parent_that_is_killed_takes_everything_with_it(tmp_path: Path) -> Non
     )
     parent = subprocess.Popen(
         [sys.executable, "-c", code, str(Path(__file__).parent)],
-        stdout=subprocess.PIPE, env={**os.environ, "TMPDIR": str(tmp_path)},
-    )  # fmt: skip
+        stdout=subprocess.PIPE,
+        env={**os.environ, "TMPDIR": str(tmp_path)},
+    )
     assert parent.stdout is not None
     assert parent.stdout.readline() == b"ready\n"
-    wait_until(lambda: any("downward" in line and "--search" in line for line in processes(tmp_path)))
+    wait_until(
+        lambda: any("downward" in line and "--search" in line for line in processes(tmp_path))
+    )
     parent.kill()
     parent.communicate()
     wait_until(lambda: not processes(tmp_path))
@@ -265,7 +278,10 @@ def test_a_crash_of_the_worker_shows_what_it_said(monkeypatch: pytest.MonkeyPatc
 
 def test_importing_is_cheap() -> None:
     code = "import sys, planners.classical.fast_downward; print([m for m in ('unified_planning', 'tarski') if m in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "[]\n"
+    assert (
+        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout
+        == "[]\n"
+    )
 
 
 ROWS: list[tuple[str, str, str, RobotChoice, int]] = [
@@ -290,7 +306,13 @@ ROWS: list[tuple[str, str, str, RobotChoice, int]] = [
 @pytest.mark.parametrize(("limit", "cost"), [(2000, "makespan"), (0, "makespan+actions")])
 @pytest.mark.parametrize(("folder", "domain", "problem", "robots", "makespan"), ROWS)
 def test_foreign_models(
-    folder: str, domain: str, problem: str, robots: RobotChoice, makespan: int, limit: int, cost: Cost
+    folder: str,
+    domain: str,
+    problem: str,
+    robots: RobotChoice,
+    makespan: int,
+    limit: int,
+    cost: Cost,
 ) -> None:
     files = FOREIGN / folder
     loaded = load(files / f"{domain}.pddl", [files / f"{problem}.pddl"], ModelOptions(robots, cost))

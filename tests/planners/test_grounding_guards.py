@@ -1,4 +1,6 @@
-"""Quantifiers that look up static facts give the formulas that trying every object gives, in the same order."""
+"""Quantifiers that look up static facts give the formulas that trying every object gives, in the
+same order.
+"""
 
 from __future__ import annotations
 
@@ -58,7 +60,9 @@ def grounded(domain: str, problem: str, unowned: Unowned = "error") -> tuple[Gro
     return ground_actions(lifted, read, find_team(lifted, read, RobotChoice(unowned=unowned)))
 
 
-def both(domain: str, problem: str, unowned: Unowned = "error") -> tuple[tuple[GroundAction, ...], ...]:
+def both(
+    domain: str, problem: str, unowned: Unowned = "error"
+) -> tuple[tuple[GroundAction, ...], ...]:
     fast = grounded(domain, problem, unowned)
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(_Grounder, "_facts_of", lambda *_: None)

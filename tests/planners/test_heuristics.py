@@ -24,11 +24,15 @@ def check(name: str, model: JointModel, goal: Goal, space: Space) -> Counter[int
     assert ((bound == 0) == (true == 0)).all()
     source = np.repeat(np.arange(len(space)), np.diff(space.first))
     assert (bound[source] <= bound[space.target] + 1).all()
-    return Counter((true - bound)[(true >= 0) & (bound < FAR)].tolist()) + Counter({-1: int((bound >= FAR).sum())})
+    return Counter((true - bound)[(true >= 0) & (bound < FAR)].tolist()) + Counter(
+        {-1: int((bound >= FAR).sum())}
+    )
 
 
 def distances(space: Space, goals: list[bool]) -> np.ndarray:
-    """The least joint steps from every state to a goal, -1 where there is no way: layer by layer, backward."""
+    """The least joint steps from every state to a goal, -1 where there is no way: layer by layer,
+    backward.
+    """
     before: dict[int, set[int]] = {}
     for state in range(len(space)):
         for target in space.target[space.first[state] : space.first[state + 1]].tolist():
@@ -59,9 +63,21 @@ def test_random_models(name: str) -> None:
 
 @pytest.mark.parametrize(
     "problem",
-    ["grid/corners-3x3", "grid/gwb5-3x3", "grid-joint/corners-3x3", "corridor/problem", "push-box/around", "charger/queue",
-     "elevator/two-calls", "handover/exchange", "vans/one-van", "two-arms/exchange", "lock/let-in", "tray/serve"],
-)  # fmt: skip
+    [
+        "grid/corners-3x3",
+        "grid/gwb5-3x3",
+        "grid-joint/corners-3x3",
+        "corridor/problem",
+        "push-box/around",
+        "charger/queue",
+        "elevator/two-calls",
+        "handover/exchange",
+        "vans/one-van",
+        "two-arms/exchange",
+        "lock/let-in",
+        "tray/serve",
+    ],
+)
 def test_shipped_domains(problem: str) -> None:
     folder = DOMAINS / problem.split("/")[0]
     loaded = load(folder / "domain.pddl", [DOMAINS / f"{problem}.pddl"])
@@ -73,7 +89,9 @@ def test_shipped_domains(problem: str) -> None:
             assert folder.name not in ("grid", "grid-joint", "corridor")
             continue
         if name == "relaxed" and problem.startswith("grid"):
-            assert gaps[0] > sum(gaps.values()) / 2, "on an open map robots are seldom in each other's way"
+            assert gaps[0] > sum(gaps.values()) / 2, (
+                "on an open map robots are seldom in each other's way"
+            )
 
 
 def test_manhattan_is_the_distance_on_the_map() -> None:
@@ -93,11 +111,16 @@ AROUND = """(define (problem p) (:domain jumps) (:objects r1 r2 - robot c0-0 c0-
 
 
 def test_manhattan_is_admissible_where_robots_jump() -> None:
-    """Three cells a step: seven cells are three steps; and nothing is known of a robot that turns up anywhere."""
+    """Three cells a step: seven cells are three steps; and nothing is known of a robot that turns
+    up anywhere.
+    """
     from planners.pddl import parse_domain, parse_problem
     from planners.pddl.sexpr import Source
 
-    for more, expected in [("", 3), ("(:action beam :agent ?r - robot :parameters (?x - place) :effect (at ?r ?x))", None)]:
+    for more, expected in [
+        ("", 3),
+        ("(:action beam :agent ?r - robot :parameters (?x - place) :effect (at ?r ?x))", None),
+    ]:
         domain = parse_domain(Source("d", JUMPS.format(more=more)))
         loaded = build(domain, [parse_problem(Source("p", AROUND), domain)])
         model, goal, space = of(loaded)
@@ -106,4 +129,6 @@ def test_manhattan_is_admissible_where_robots_jump() -> None:
                 heuristic("manhattan", model, goal)
             continue
         check("manhattan", model, goal, space)
-        assert heuristic("manhattan", model, goal)(loaded.tasks[0].init[None, :]).tolist() == [expected]
+        assert heuristic("manhattan", model, goal)(loaded.tasks[0].init[None, :]).tolist() == [
+            expected
+        ]

@@ -57,14 +57,20 @@ def test_formulas_are_shown_with_what_is_there() -> None:
         "(push r1 anvil a b) speaks of (push r2 anvil a b) in the same step",
         "(look r1 a) forbids (look r2 a) in the same step",
     )
-    # The partner's places in the wrong order: it would have to push the other way from where the anvil is not.
+    # The partner's places in the wrong order: it would have to push the other way from where the
+    # anvil is not.
     misread = PUSHING.replace("(push ?o ?x ?from ?to)", "(push ?o ?x ?from ?from)")
     shown = inspect(made(misread, TASK)).formulas
-    assert "(push r1 anvil a b) speaks of (push r2 anvil a a), which nobody can ever do, in the same step" in shown
+    assert (
+        "(push r1 anvil a b) speaks of (push r2 anvil a a), which nobody can ever do, in the same step"
+        in shown
+    )
 
 
 def test_the_goal_is_the_one_that_was_understood() -> None:
-    assert inspect(made(PUSHING, TASK)).goal == "(forall (?x - heavy) (or (in ?x b) (not (seen a))))"
+    assert (
+        inspect(made(PUSHING, TASK)).goal == "(forall (?x - heavy) (or (in ?x b) (not (seen a))))"
+    )
 
 
 def both_possible(loaded: Loaded, first: str, second: str) -> bool:
@@ -78,7 +84,12 @@ def both_possible(loaded: Loaded, first: str, second: str) -> bool:
             {own[label] for label in labels[begin[state] : begin[state + 1]]}
             for own, (begin, labels) in zip(model.labels, choices, strict=True)
         ]
-        if any(first in a and second in b for i, a in enumerate(texts) for j, b in enumerate(texts) if i != j):
+        if any(
+            first in a and second in b
+            for i, a in enumerate(texts)
+            for j, b in enumerate(texts)
+            if i != j
+        ):
             return True
     return False
 
@@ -92,10 +103,17 @@ def named(loaded: Loaded, example: str) -> tuple[str, str]:
 @pytest.mark.parametrize(
     ("folder", "problem"),
     [
-        ("two-arms", "exchange"), ("push-box", "next-door"), ("tray", "serve"), ("vans", "two-each"), ("lock", "both-in"),
-        ("charger", "three-robots"), ("elevator", "two-calls"), ("handover", "exchange"), ("grid", "three-robots-3x3"),
+        ("two-arms", "exchange"),
+        ("push-box", "next-door"),
+        ("tray", "serve"),
+        ("vans", "two-each"),
+        ("lock", "both-in"),
+        ("charger", "three-robots"),
+        ("elevator", "two-calls"),
+        ("handover", "exchange"),
+        ("grid", "three-robots-3x3"),
     ],
-)  # fmt: skip
+)
 def test_the_example_can_happen_in_the_shipped_domains(folder: str, problem: str) -> None:
     loaded = load(DOMAINS / folder / "domain.pddl", [DOMAINS / folder / f"{problem}.pddl"])
     example = inspect(loaded).example
@@ -140,7 +158,9 @@ def test_unparsed_formulas_read_as_they_were(kind: Kind) -> None:
             actions = {s.name: len(s.parameters) for s in domain.schemas}
             scope = {v.name for v in schema.parameters}
             constants, types = frozenset(domain.constants), frozenset(domain.types)
-            names = Names(document, types, domain.predicates, {}, actions, constants, frozenset(scope))
+            names = Names(
+                document, types, domain.predicates, {}, actions, constants, frozenset(scope)
+            )
             assert read_formula(names, document.root) == schema.precondition
             read += 1
     assert read >= 40

@@ -35,10 +35,14 @@ _MOST_PLANS = 300
 
 @pytest.fixture(autouse=True, scope="module")
 def one_reachability_per_model() -> Iterator[None]:
-    """Tarski's program runs in a process of its own, and every model is built for two costs: run it once."""
+    """Tarski's program runs in a process of its own, and every model is built for two costs: run it
+    once.
+    """
     asked: dict[str, dict[str, list[tuple[str, ...]]]] = {}
 
-    def remembered(domain: Domain, objects: dict[str, tuple[str, ...]], init: Iterable[Atom]) -> Any:
+    def remembered(
+        domain: Domain, objects: dict[str, tuple[str, ...]], init: Iterable[Atom]
+    ) -> Any:
         init = list(init)
         key = domain.source.text + str((objects, init))
         if key not in asked:
@@ -66,7 +70,9 @@ def _key(state: State) -> list[str]:
     return sorted("(" + " ".join((atom.predicate, *atom.args)) + ")" for atom in state)
 
 
-def _fast_steps(loaded: Loaded, state: State) -> set[tuple[tuple[str | None, ...], tuple[str, ...]]]:
+def _fast_steps(
+    loaded: Loaded, state: State
+) -> set[tuple[tuple[str | None, ...], tuple[str, ...]]]:
     model = loaded.model
     steps = model.successors(model.codec.encode(_key(state))[None, :])
     found = [
@@ -86,7 +92,9 @@ def _check_model(text: RandomModel, note: Callable[[str], None]) -> None:
         note("too large")
         return
     except BadInput:
-        note("ambiguous parts")  # exit 31: two joint actions with the same parts do different things
+        note(
+            "ambiguous parts"
+        )  # exit 31: two joint actions with the same parts do different things
         with pytest.raises(BadInput, match="different results"):
             explore(loaded.model, loaded.tasks[0].init[None, :])
         return
@@ -110,11 +118,15 @@ def _check_idling_adds_nothing(twin: Twin) -> None:
     rules = twin.rules
     free = Twin(rules.domain, rules.problem, rules.team, budget=_MOST_TRIES)
     for state in free.reachable(_MOST_STATES):
-        assert {t for _, t in free.successors(state)} == {t for _, t in twin.successors(state)}, _key(state)
+        assert {t for _, t in free.successors(state)} == {t for _, t in twin.successors(state)}, (
+            _key(state)
+        )
 
 
 def _far(twin: Twin, state: State) -> Problem:
-    """The same problem with the last state that the twin reached as its goal, as far as it differs from the first."""
+    """The same problem with the last state that the twin reached as its goal, as far as it differs
+    from the first.
+    """
     goals: list[Formula] = [*sorted(state - twin.init, key=str)]
     goals += [Not(atom) for atom in sorted(twin.init - state, key=str)]
     return replace(twin.rules.problem, goal=And(tuple(goals)))
@@ -134,7 +146,9 @@ def _check_plans(loaded: Loaded, twin: Twin, problem: Problem, note: Callable[[s
     plans = Plans.of(search(model, task))
     assert plans.space.cost_of(0) == (wanted.makespan, wanted.second)
     assert plans.count == wanted.count()
-    (space,) = plan_spaces(explore(model, task.init[None, :]), [TaskGroup(task.goal, task.init[None, :])])
+    (space,) = plan_spaces(
+        explore(model, task.init[None, :]), [TaskGroup(task.goal, task.init[None, :])]
+    )
     assert space.cost_of(0) == plans.space.cost_of(0)
     assert Plans.of(space).count == plans.count
     listed = [tuple(model.texts(step) for step in plan) for plan in islice(plans, _MOST_PLANS)]
@@ -144,7 +158,10 @@ def _check_plans(loaded: Loaded, twin: Twin, problem: Problem, note: Callable[[s
 
 
 def _check_verdicts(
-    twin: Twin, problem: Problem, keeps_idle: tuple[bool, ...], plans: list[tuple[tuple[str | None, ...], ...]]
+    twin: Twin,
+    problem: Problem,
+    keeps_idle: tuple[bool, ...],
+    plans: list[tuple[tuple[str | None, ...], ...]],
 ) -> None:
     domain, team = twin.rules.domain, twin.rules.team
     for plan in plans:
@@ -164,7 +181,8 @@ def test_same_joint_steps_and_optimal_plans(kind: Kind, seed: int) -> None:
     _check_model(random_model(seed, kind), event)
 
 
-# -- by hand: rules that random models meet rarely ---------------------------------------------------------------
+# -- by hand: rules that random models meet rarely
+# ---------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -193,7 +211,8 @@ def test_formulas_about_the_joint_step(effect: str) -> None:
     _check_model(RandomModel(domain, problem), note=lambda _: None)
 
 
-# -- by hand: when a robot may not idle ---------------------------------------------------------------------------
+# -- by hand: when a robot may not idle
+# ---------------------------------------------------------------------------
 
 _ROOMS = """(define (domain rooms) (:types robot place) (:predicates (at ?r - robot ?p - place) (ok ?r - robot))
   (:action move :agent ?r - robot :parameters (?from ?to - place) :precondition (at ?r ?from)
@@ -216,29 +235,44 @@ _WAIT = "(:action wait :agent ?r - robot :parameters () {precondition} :effect (
         ("", (True, True)),
         (_WAIT.format(precondition=""), (False, False)),
         # One of a group of facts always holds: every action that ends one makes another one true.
-        ("(:action stay :agent ?r - robot :parameters (?p - place) :precondition (at ?r ?p))", (False, False)),
+        (
+            "(:action stay :agent ?r - robot :parameters (?p - place) :precondition (at ?r ?p))",
+            (False, False),
+        ),
         # Only r1 is ok at the start, and nobody ever stops being ok.
-        (_WAIT.format(precondition=":precondition (ok ?r)")
-         + "(:action heal :agent ?r - robot :parameters () :effect (ok ?r))", (False, True)),
-        (_WAIT.format(precondition=":precondition (ok ?r)")
-         + "(:action fall :agent ?r - robot :parameters () :effect (not (ok ?r)))", (True, True)),
-        (_WAIT.format(precondition=":precondition (not (ok ?r))")
-         + "(:action heal :agent ?r - robot :parameters () :effect (ok ?r))", (True, True)),
+        (
+            _WAIT.format(precondition=":precondition (ok ?r)")
+            + "(:action heal :agent ?r - robot :parameters () :effect (ok ?r))",
+            (False, True),
+        ),
+        (
+            _WAIT.format(precondition=":precondition (ok ?r)")
+            + "(:action fall :agent ?r - robot :parameters () :effect (not (ok ?r)))",
+            (True, True),
+        ),
+        (
+            _WAIT.format(precondition=":precondition (not (ok ?r))")
+            + "(:action heal :agent ?r - robot :parameters () :effect (ok ?r))",
+            (True, True),
+        ),
         # A formula needs it.
-        (_WAIT.format(precondition="")
-         + "(:action watch :agent ?r - robot :parameters (?o - robot) :precondition (wait ?o) :effect (ok ?r))",
-         (True, True)),
+        (
+            _WAIT.format(precondition="")
+            + "(:action watch :agent ?r - robot :parameters (?o - robot) :precondition (wait ?o) :effect (ok ?r))",
+            (True, True),
+        ),
         # It does something.
         (_WAIT.format(precondition="").replace(":effect ()", ":effect (ok ?r)"), (True, True)),
     ],
-)  # fmt: skip
+)
 def test_when_idling_is_dropped(more: str, keeps_idle: tuple[bool, bool]) -> None:
     loaded = _rooms(more)
     assert loaded.model.keeps_idle == keeps_idle
     # r1 walks over, r2 stays where it is: one plan, and not one more for every way to do nothing.
     if not any(keeps_idle):
         plans = [
-            [loaded.model.texts(step) for step in plan] for plan in Plans.of(search(loaded.model, loaded.tasks[0]))
+            [loaded.model.texts(step) for step in plan]
+            for plan in Plans.of(search(loaded.model, loaded.tasks[0]))
         ]
         assert all(label is not None for plan in plans for step in plan for label in step)
 
@@ -252,7 +286,9 @@ def test_a_shared_do_nothing_action_is_nobodys_own() -> None:
     )
     # (meet r1 r1) belongs to r1 alone; without it there is only meeting the other one.
     assert _load(text).model.keeps_idle == (False, False)
-    apart = text.domain.replace("(?r ?q - robot))", "(?r ?q - robot) :precondition (not (= ?r ?q)))")
+    apart = text.domain.replace(
+        "(?r ?q - robot))", "(?r ?q - robot) :precondition (not (= ?r ?q)))"
+    )
     assert _load(RandomModel(apart, text.problem)).model.keeps_idle == (True, True)
 
 
@@ -271,7 +307,9 @@ def test_a_wait_that_others_disturb_does_not_replace_idling() -> None:
     twin = _twin(loaded, text)
     _check_idling_adds_nothing(twin)
     plans = Plans.of(search(loaded.model, loaded.tasks[0]))
-    assert [[loaded.model.texts(step) for step in plan] for plan in plans] == [[("(push r1 r2 a b)", None)]]
+    assert [[loaded.model.texts(step) for step in plan] for plan in plans] == [
+        [("(push r1 r2 a b)", None)]
+    ]
 
 
 def test_an_effect_on_every_object() -> None:

@@ -1,7 +1,7 @@
 """All optimal plans counted by K*, an independent planner, from the plain PDDL of the joint model.
 
-In the explicit form one plain action is one joint action, so the counts must be equal.  K* comes with
-``pip install '.[oracles]'``; without it these tests are skipped.
+In the explicit form one plain action is one joint action, so the counts must be equal.  K* comes
+with ``pip install '.[oracles]'``; without it these tests are skipped.
 """
 
 from __future__ import annotations
@@ -33,7 +33,9 @@ DOMAINS = Path(__file__).parents[2] / "domains"
 def test_k_star_counts_the_same_plans(
     folder: str, stem: str, count: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    planners = pytest.importorskip("kstar_planner.planners", reason="K* is not installed (extra oracles)")
+    planners = pytest.importorskip(
+        "kstar_planner.planners", reason="K* is not installed (extra oracles)"
+    )
     loaded = load(DOMAINS / folder / "domain.pddl", [DOMAINS / folder / f"{stem}.pddl"])
     plain = compile_plain(loaded.model, loaded.tasks[0], limit=100_000)
     assert plain.form == "explicit"
@@ -43,7 +45,9 @@ def test_k_star_counts_the_same_plans(
     for path, text in zip((domain, problem), to_pddl(plain), strict=True):
         path.write_text(text)
     monkeypatch.chdir(tmp_path)
-    found = planners.plan_topk(domain, problem, number_of_plans_bound=count + 100, timeout=120)["plans"]
+    found = planners.plan_topk(domain, problem, number_of_plans_bound=count + 100, timeout=120)[
+        "plans"
+    ]
     best = min(plan["cost"] for plan in found)
     assert best == ours.space.cost_of(0)[0]
     # More plans were asked for than there are optimal ones: none is missing.

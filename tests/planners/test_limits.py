@@ -165,7 +165,9 @@ def corners(problem: str = "corners-3x3") -> Loaded:
 
 
 def stopped(loaded: Loaded, after: int, error: BaseException) -> Loaded:
-    return replace(loaded, model=replace(loaded.model, stepper=Stopping(loaded.model.stepper, error, [after])))
+    return replace(
+        loaded, model=replace(loaded.model, stepper=Stopping(loaded.model.stepper, error, [after]))
+    )
 
 
 @pytest.mark.parametrize("error", [late(), MemoryError()], ids=["time", "memory"])
@@ -173,8 +175,12 @@ def test_search_says_how_far_it_got(error: BaseException) -> None:
     loaded = stopped(corners(), 2, error)
     with pytest.raises((OutOfTime, OutOfMemory)) as caught:
         search(loaded.model, loaded.tasks[0])
-    # Six cells are within two steps of each of two opposite corners, three of them of both: 6 * 6 - 3.  One step: 3 * 3.
-    assert f"33 states within 2 steps of the initial state of {loaded.tasks[0].name}, 24 of them new" in str(caught.value)
+    # Six cells are within two steps of each of two opposite corners, three of them of both: 6 * 6 -
+    # 3.  One step: 3 * 3.
+    assert (
+        f"33 states within 2 steps of the initial state of {loaded.tasks[0].name}, 24 of them new"
+        in str(caught.value)
+    )
 
 
 def test_exploring_says_how_far_it_got() -> None:
@@ -211,7 +217,9 @@ def test_grounding_says_how_far_it_got(monkeypatch: pytest.MonkeyPatch) -> None:
         patched.setattr(instantiate, "reachable_arguments", fail)
         with pytest.raises(OutOfTime) as caught:
             corners()
-    assert "looking for the applicable instances of 1 action schemas over 11 objects" in str(caught.value)
+    assert "looking for the applicable instances of 1 action schemas over 11 objects" in str(
+        caught.value
+    )
     assert grounding.FEWER in str(caught.value)
     monkeypatch.setattr(instantiate._Grounder, "action", fail)
     with pytest.raises(OutOfTime, match="time limit") as caught:
@@ -232,7 +240,11 @@ def plans(problem: str) -> PlanSpace:
     ],
 )
 def test_a_walk_that_will_not_fit_is_not_begun_in_earnest(
-    left: float, seconds: float, error: type[CoordlangError], said: str, monkeypatch: pytest.MonkeyPatch
+    left: float,
+    seconds: float,
+    error: type[CoordlangError],
+    said: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     space = plans("three-robots-3x3")
     whole = walk(space)
@@ -253,13 +265,20 @@ def test_a_walk_that_will_not_fit_is_not_begun_in_earnest(
 def test_a_size_that_nobody_can_wait_for(monkeypatch: pytest.MonkeyPatch) -> None:
     space = plans("three-robots-3x3")
     monkeypatch.setattr(coordination, "_MOST", 1000.0)
-    with pytest.raises(OutOfMemory, match=r"nodes of one layer of the walk have .* combinations of 3 plans' next steps"):
+    with pytest.raises(
+        OutOfMemory,
+        match=r"nodes of one layer of the walk have .* combinations of 3 plans' next steps",
+    ):
         walk(space)
 
 
-def test_verification_and_the_search_for_a_break_say_how_far_they_got(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_verification_and_the_search_for_a_break_say_how_far_they_got(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     space = plans("corners-3x3")
-    table = WordTable(("w0",), np.zeros((0, space.rows.shape[1]), np.uint64), np.zeros(0, np.int64), 0)
+    table = WordTable(
+        ("w0",), np.zeros((0, space.rows.shape[1]), np.uint64), np.zeros(0, np.int64), 0
+    )
 
     def fail(*_: object, **__: object) -> None:
         raise late()
@@ -297,6 +316,9 @@ def test_combinations_that_do_not_fit_are_not_made(monkeypatch: pytest.MonkeyPat
     loaded = corners("three-robots-3x3")
     monkeypatch.setattr("planners.joint.composition._CHUNK", 10)
     monkeypatch.setattr("planners.joint.composition.memory_left", lambda: 1000)
-    # Each robot in its corner may go two ways or stay; two of them may not go to the one cell between them.
-    with pytest.raises(OutOfMemory, match="3 of 3 robots have 24 combinations of subactions in 1 state: about"):
+    # Each robot in its corner may go two ways or stay; two of them may not go to the one cell
+    # between them.
+    with pytest.raises(
+        OutOfMemory, match="3 of 3 robots have 24 combinations of subactions in 1 state: about"
+    ):
         search(loaded.model, loaded.tasks[0])

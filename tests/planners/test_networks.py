@@ -1,4 +1,6 @@
-"""Concurrency networks: each kind of constraint by hand, and random networks against the naive twin."""
+"""Concurrency networks: each kind of constraint by hand, and random networks against the naive
+twin.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,10 @@ def crews(network: str) -> set[tuple[str, ...]]:
     loaded = rowing(network)
     model = loaded.model
     steps = model.successors(loaded.tasks[0].init[None, :])
-    return {tuple(text[1:].split(" ")[0] if text else "-" for text in model.texts(row)) for row in steps.labels}
+    return {
+        tuple(text[1:].split(" ")[0] if text else "-" for text in model.texts(row))
+        for row in steps.labels
+    }
 
 
 def rowers(network: str) -> set[int]:
@@ -51,17 +56,31 @@ def constraint(name: str, bounds: str, action: str) -> str:
 
 @pytest.mark.parametrize(
     ("bounds", "numbers"),
-    [("(1 1)", {0, 1}), ("(2 2)", {0, 2}), ("(2 inf)", {0, 2, 3}), ("(1 2)", {0, 1, 2}), ("(3 3)", {0, 3}), ("(4 4)", {0}),
-     (f"(2 {10**20})", {0, 2, 3}), (f"(2 {'9' * 5000})", {0, 2, 3}), (f"({10**20} {10**30})", {0}), ("(02 003)", {0, 2, 3})],
+    [
+        ("(1 1)", {0, 1}),
+        ("(2 2)", {0, 2}),
+        ("(2 inf)", {0, 2, 3}),
+        ("(1 2)", {0, 1, 2}),
+        ("(3 3)", {0, 3}),
+        ("(4 4)", {0}),
+        (f"(2 {10**20})", {0, 2, 3}),
+        (f"(2 {'9' * 5000})", {0, 2, 3}),
+        (f"({10**20} {10**30})", {0}),
+        ("(02 003)", {0, 2, 3}),
+    ],
 )
 def test_bounds(bounds: str, numbers: set[int]) -> None:
     assert rowers(constraint("v", bounds, "row")) == numbers
 
 
-@pytest.mark.parametrize("parameter", ["?b", "?b - object", "?b - (either boat place)", "?b - vessel", "?b - tub"])
+@pytest.mark.parametrize(
+    "parameter", ["?b", "?b - object", "?b - (either boat place)", "?b - vessel", "?b - tub"]
+)
 def test_types_that_some_object_may_share(parameter: str) -> None:
     network = constraint("v", "(2 2)", "row").replace("?b - boat", parameter)
-    text = ROWING.replace("robot boat place", "robot place tub - boat boat - vessel").replace("NETWORK", network)
+    text = ROWING.replace("robot boat place", "robot place tub - boat boat - vessel").replace(
+        "NETWORK", network
+    )
     domain = parse_domain(Source("rowing", text))
     build(domain, [parse_problem(Source("crew", CREW), domain)])
 
@@ -69,7 +88,14 @@ def test_types_that_some_object_may_share(parameter: str) -> None:
 def test_an_object_of_two_types_matches() -> None:
     network = constraint("v", "(2 2)", "row").replace("?b - boat", "?b - place")
     domain = parse_domain(Source("rowing", ROWING.replace("NETWORK", network)))
-    build(domain, [parse_problem(Source("crew", CREW.replace("b - boat", "b - (either boat place)")), domain)])
+    build(
+        domain,
+        [
+            parse_problem(
+                Source("crew", CREW.replace("b - boat", "b - (either boat place)")), domain
+            )
+        ],
+    )
 
 
 def test_without_a_network_anybody_rows() -> None:
@@ -77,11 +103,17 @@ def test_without_a_network_anybody_rows() -> None:
 
 
 def test_dependence_is_needed_by_the_second_only() -> None:
-    network = constraint("v", "(1 1)", "light") + constraint("w", "(2 2)", "row") + "(:positive-dependence v w)"
+    network = (
+        constraint("v", "(1 1)", "light")
+        + constraint("w", "(2 2)", "row")
+        + "(:positive-dependence v w)"
+    )
     found = crews(network)
     assert {crew for crew in found if "row" in crew} == {
-        ("row", "row", "light"), ("row", "light", "row"), ("light", "row", "row"),
-    }  # fmt: skip
+        ("row", "row", "light"),
+        ("row", "light", "row"),
+        ("light", "row", "row"),
+    }
     assert ("light", "-", "-") in found  # a light alone is allowed
     assert ("light", "light", "-") not in found
 
@@ -94,10 +126,18 @@ def test_dependence_is_needed_by_the_second_only() -> None:
         (constraint("v", "(1)", "row"), "expected '(LOW HIGH)'"),
         (constraint("v", "(x 1)", "row"), "expected a number from 0, found 'x'"),
         (constraint("v", "(1 ²)", "row"), "expected a number from 0, found '²'"),
-        (constraint("v", "(1 1)", "row").replace("(row 1)", "(row 0)"),
-         "argument 0 of row is ?r - robot, which is never ?b - boat: the constraint 'v' would never match"),
-        (constraint("v", "(1 1)", "row").replace("boat", "place"), "argument 1 of row is ?b - boat, which is never ?b - place"),
-        (constraint("v", "(1 1)", "row").replace("(row 1)", "(row 9)"), "expected 1 argument positions below 3"),
+        (
+            constraint("v", "(1 1)", "row").replace("(row 1)", "(row 0)"),
+            "argument 0 of row is ?r - robot, which is never ?b - boat: the constraint 'v' would never match",
+        ),
+        (
+            constraint("v", "(1 1)", "row").replace("boat", "place"),
+            "argument 1 of row is ?b - boat, which is never ?b - place",
+        ),
+        (
+            constraint("v", "(1 1)", "row").replace("(row 1)", "(row 9)"),
+            "expected 1 argument positions below 3",
+        ),
         ("(:concurrency-constraint v :bounds (1 1))", "missing: :actions, :parameters"),
         ("(:positive-dependence v w)", "unknown constraint 'v'"),
     ],
@@ -109,10 +149,14 @@ def test_a_wrong_network(network: str, message: str) -> None:
 
 
 def random_network(random: Random, domain: Domain) -> str:
-    """One to three constraints over the arguments of a random type, and maybe a dependence between two of them."""
+    """One to three constraints over the arguments of a random type, and maybe a dependence between
+    two of them.
+    """
     kinds = sorted({p.types for s in domain.schemas for p in s.parameters})
     kind = random.choice(kinds)
-    places = [(s.name, n) for s in domain.schemas for n, p in enumerate(s.parameters) if p.types == kind]
+    places = [
+        (s.name, n) for s in domain.schemas for n, p in enumerate(s.parameters) if p.types == kind
+    ]
     typed = kind[0] if len(kind) == 1 else f"(either {' '.join(kind)})"
     lines = []
     for number in range(random.randint(1, 3)):
@@ -148,13 +192,20 @@ def test_random_networks() -> None:
 
 
 def test_an_action_that_satisfies_both_itself_is_still_linked() -> None:
-    """(v, w) dependent and `a` in both: it needs nobody, but it is meant to be done together with the others in v."""
-    domain = parse_domain(Source("d", """(define (domain d) (:types robot) (:predicates (p) (q) (n))
+    """(v, w) dependent and `a` in both: it needs nobody, but it is meant to be done together with
+    the others in v.
+    """
+    domain = parse_domain(
+        Source(
+            "d",
+            """(define (domain d) (:types robot) (:predicates (p) (q) (n))
       (:action a :agent ?r - robot :parameters () :effect (and (not (p)) (q)))
       (:action b :agent ?r - robot :parameters () :precondition (p) :effect (n))
       (:concurrency-constraint v :parameters () :bounds (1 inf) :actions ((a) (b)))
       (:concurrency-constraint w :parameters () :bounds (1 inf) :actions ((a)))
-      (:positive-dependence v w))"""))  # fmt: skip
+      (:positive-dependence v w))""",
+        )
+    )
     text = "(define (problem p) (:domain d) (:objects r1 r2 - robot) (:init (p)) (:goal (q)))"
     problem = parse_problem(Source("p", text), domain)
     loaded = build(domain, [problem])

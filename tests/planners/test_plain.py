@@ -47,8 +47,8 @@ CORRIDOR_TASK = """
   (:goal (and (at r1 c) (at r2 a))))
 """
 
-#: Partners (positive formulas) that would interfere if the formula did not link them, an effect that only a partner
-#: brings about, an action without effects, a disjunction.
+#: Partners (positive formulas) that would interfere if the formula did not link them, an effect
+#: that only a partner brings about, an action without effects, a disjunction.
 PARTNERS = """
 (define (domain partners)
   (:types robot table)
@@ -75,7 +75,8 @@ PARTNERS_TASK = """
   (:goal (and (high t1) (high t2) (open) (not (dirty t1)) (not (dirty t2)) (not (tired r1)))))
 """
 
-#: Robots are objects: an action with two robots is shared; three robots, one of which is needed by both others.
+#: Robots are objects: an action with two robots is shared; three robots, one of which is needed by
+#: both others.
 RELAY = """
 (define (domain relay)
   (:requirements :strips :typing :negative-preconditions :disjunctive-preconditions)
@@ -98,7 +99,8 @@ RELAY_TASK = """
   (:goal (and (has r3 b1) (or (done b2) (and (has r1 b2) (or (done b1) (not (busy r2))))))))
 """
 
-#: What one robot may both delete and conditionally add must not wipe out what another adds: adds win over all deletes.
+#: What one robot may both delete and conditionally add must not wipe out what another adds: adds
+#: win over all deletes.
 BLINK = """
 (define (domain blink)
   (:types robot)
@@ -175,7 +177,9 @@ MODELS = {
 
 
 @cache
-def read(domain_text: str, problem_text: str, cost: Cost = "makespan", unowned: Unowned = "error") -> Loaded:
+def read(
+    domain_text: str, problem_text: str, cost: Cost = "makespan", unowned: Unowned = "error"
+) -> Loaded:
     domain = parse_domain(Source("domain.pddl", domain_text))
     problem = parse_problem(Source("problem.pddl", problem_text), domain)
     return build(domain, [problem], ModelOptions(RobotChoice(unowned=unowned), cost))
@@ -199,7 +203,9 @@ def solved(plain: PlainTask) -> tuple[int, int] | None:
 
 
 def dijkstra(plain: PlainTask) -> int | None:
-    return min((cost for state, cost in reached(plain).items() if holds(plain.goal, state)), default=None)
+    return min(
+        (cost for state, cost in reached(plain).items() if holds(plain.goal, state)), default=None
+    )
 
 
 def reached(plain: PlainTask) -> dict[frozenset[int], int]:
@@ -226,7 +232,9 @@ def holds(conditions: Sequence[tuple[int, bool]], state: frozenset[int]) -> bool
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("cost", COSTS)
 @pytest.mark.parametrize("name", MODELS)
-def test_both_forms_have_the_optimal_cost_of_the_joint_model(name: str, cost: Cost, form: str) -> None:
+def test_both_forms_have_the_optimal_cost_of_the_joint_model(
+    name: str, cost: Cost, form: str
+) -> None:
     loaded = read(*MODELS[name], cost)
     expected = ours(loaded.model, loaded.tasks[0])
     assert expected is not None
@@ -262,12 +270,17 @@ def test_a_goal_that_is_a_full_state(form: str) -> None:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_goal_that_holds_at_the_start_costs_nothing(form: str) -> None:
-    loaded = read(CORRIDOR, CORRIDOR_TASK.replace("(and (at r1 c) (at r2 a))", "(or (at r1 a) (at r1 b))"))
+    loaded = read(
+        CORRIDOR, CORRIDOR_TASK.replace("(and (at r1 c) (at r2 a))", "(or (at r1 a) (at r1 b))")
+    )
     assert solved(compile_plain(loaded.model, loaded.tasks[0], FORMS[form])) == (0, 0)
 
 
 @pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("goal", ["(and (at r1 c) (at r2 c))", "(and (at r1 a) (or (next a d) (at r1 b)) (not (at r1 a)))"])
+@pytest.mark.parametrize(
+    "goal",
+    ["(and (at r1 c) (at r2 c))", "(and (at r1 a) (or (next a d) (at r1 b)) (not (at r1 a)))"],
+)
 def test_an_unsolvable_task_stays_unsolvable(goal: str, form: str) -> None:
     loaded = read(CORRIDOR, CORRIDOR_TASK.replace("(and (at r1 c) (at r2 a))", goal))
     assert ours(loaded.model, loaded.tasks[0]) is None
@@ -283,9 +296,13 @@ def test_remembered_actions_change_no_cost(form: str) -> None:
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_without_its_conflicts_a_model_is_cheaper(form: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_its_conflicts_a_model_is_cheaper(
+    form: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     loaded = read(TOOL, TOOL_TASK)
-    monkeypatch.setattr(plain_module.choosers, "clashes", lambda actions: (frozenset(),) * len(actions))
+    monkeypatch.setattr(
+        plain_module.choosers, "clashes", lambda actions: (frozenset(),) * len(actions)
+    )
     assert solved(compile_plain(loaded.model, loaded.tasks[0], FORMS[form])) == (1, 0)
 
 
@@ -293,8 +310,12 @@ def test_few_joint_actions_are_written_explicitly_and_many_are_not() -> None:
     loaded = read(TOOL, TOOL_TASK)
     plain = compile_plain(loaded.model, loaded.tasks[0], 5)
     assert sorted(action.name for action in plain.actions) == [
-        "(release r1) idle", "(work r1) idle", "idle (release r2)", "idle (work r2)", "idle idle"
-    ]  # fmt: skip
+        "(release r1) idle",
+        "(work r1) idle",
+        "idle (release r2)",
+        "idle (work r2)",
+        "idle idle",
+    ]
     assert compile_plain(loaded.model, loaded.tasks[0], 4).form == "select-then-apply"
 
 
@@ -337,13 +358,18 @@ def test_the_pddl_says_the_same(name: str, form: str) -> None:
     assert len(domain.schemas) == len(plain.actions)
     assert len(problem.init) == len(plain.init)
     for action, schema in zip(plain.actions, domain.schemas, strict=True):
-        assert (len(action.adds) + len(action.deletes), action.cost) == (len(schema.effects), schema.cost)
+        assert (len(action.adds) + len(action.deletes), action.cost) == (
+            len(schema.effects),
+            schema.cost,
+        )
     for user_name in (*plain.facts, *(action.name for action in plain.actions)):
         assert f"; {user_name}\n" in domain_text
 
 
 def test_equal_names_after_cleaning_stay_apart() -> None:
-    names = plain_module.pddl._safe_names(["(at r_1 a)", "(at r 1_a)", "(at r 1 a)", "and", "9", "(#)"])
+    names = plain_module.pddl._safe_names(
+        ["(at r_1 a)", "(at r 1_a)", "(at r 1 a)", "and", "9", "(#)"]
+    )
     assert len(set(names)) == len(names)
     assert all(name[0].isalpha() for name in names)
 
@@ -370,7 +396,9 @@ def distances(model: JointModel, task: PlanningTask) -> dict[frozenset[str], tup
 
 def plain_distances(plain: PlainTask) -> dict[frozenset[str], tuple[int, int] | None]:
     """The same of a plain task; between two steps nothing but the state and the time is true."""
-    between = {plain.facts[fact] for fact in plain.init if plain.facts[fact].startswith("(time to choose ")}
+    between = {
+        plain.facts[fact] for fact in plain.init if plain.facts[fact].startswith("(time to choose ")
+    }
     found = {}
     for state, total in reached(plain).items():
         texts = {plain.facts[fact] for fact in state}
@@ -401,4 +429,6 @@ def random_state(loaded: Loaded, seed: int) -> Rows:
     rng = random.Random(seed)
     if seed % 4 == 0:
         return loaded.tasks[0].init
-    return loaded.model.codec.encode(fact for fact in loaded.model.codec.facts if rng.random() < 0.6)
+    return loaded.model.codec.encode(
+        fact for fact in loaded.model.codec.facts if rng.random() < 0.6
+    )

@@ -19,7 +19,8 @@ from planners.search.plan_space import search
 from planners.search.plans import Plans
 from planners.search.reachable import explore
 
-#: Two ground actions of joint-action PDDL with the same parts: where both are possible they are one joint action.
+#: Two ground actions of joint-action PDDL with the same parts: where both are possible they are one
+#: joint action.
 TWICE = """
 (define (domain twice)
   (:types lamp)

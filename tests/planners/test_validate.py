@@ -1,4 +1,6 @@
-"""The rules of joint steps (docs/pddl.md), each by hand-worked plans that keep it and that break it."""
+"""The rules of joint steps (docs/pddl.md), each by hand-worked plans that keep it and that break
+it.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +52,8 @@ def rejected(verdict: Verdict, step: int, *words: str) -> bool:
     return True
 
 
-# -- a world of rooms ---------------------------------------------------------------------------------------------
+# -- a world of rooms
+# ---------------------------------------------------------------------------------------------
 
 MOVE = """(:types robot place) (:predicates (at ?r - robot ?p - place) (static ?a ?b - place))
   (:action move :agent ?r - robot :parameters (?from ?to - place)
@@ -82,7 +85,11 @@ def test_idling_is_a_choice_and_costs_a_step() -> None:
 
 
 def test_idling_can_be_forbidden() -> None:
-    plan: list[Labels] = [["(move r1 a b)", "(move r2 b c)"], ["(move r1 b a)", None], ["(move r1 a b)", None]]
+    plan: list[Labels] = [
+        ["(move r1 a b)", "(move r2 b c)"],
+        ["(move r1 b a)", None],
+        ["(move r1 a b)", None],
+    ]
     assert validate(*rooms(), plan, allow_idle=(False, True)).valid
     assert rejected(validate(*rooms(), plan, allow_idle=(True, False)), 1, "r2 has to choose")
 
@@ -102,11 +109,17 @@ def test_another_task_brings_its_fluents_and_its_goal() -> None:
     init = [Atom("at", ("r1", "c")), Atom("at", ("r2", "c"))]
     goal = And((Atom("at", ("r1", "b")), Not(Atom("at", ("r2", "b")))))
     assert validate(*rooms(), [["(move r1 c b)", None]], init=init, goal=goal).valid
-    assert rejected(validate(*rooms(), [["(move r1 a b)", None]], init=init, goal=goal), 0, "(at r1 a) is false")
+    assert rejected(
+        validate(*rooms(), [["(move r1 a b)", None]], init=init, goal=goal), 0, "(at r1 a) is false"
+    )
 
 
 def test_the_first_broken_step_is_named() -> None:
-    plan: list[Labels] = [["(move r1 a b)", None], ["(move r1 b a)", "(move r2 a b)"], ["(move r1 b c)", None]]
+    plan: list[Labels] = [
+        ["(move r1 a b)", None],
+        ["(move r1 b a)", "(move r2 a b)"],
+        ["(move r1 b c)", None],
+    ]
     assert rejected(validate(*rooms(), plan), 1, "r2", "(move r2 a b)", "(at r2 a) is false")
 
 
@@ -132,7 +145,8 @@ def test_a_step_has_one_entry_per_robot() -> None:
     assert rejected(validate(*rooms(), [["(move r1 a b)"]]), 0, "1 entries for 2 robots")
 
 
-# -- when preconditions are read ----------------------------------------------------------------------------------
+# -- when preconditions are read
+# ----------------------------------------------------------------------------------
 
 FREE = """(:types robot place) (:predicates (at ?r - robot ?p - place) (free ?p - place))
   (:action move :agent ?r - robot :parameters (?from ?to - place)
@@ -145,13 +159,17 @@ def test_following_is_allowed_in_the_constraint_style() -> None:
 
 
 def test_following_is_forbidden_by_a_precondition_in_the_state_before() -> None:
-    setting = world(FREE, """(:objects r1 r2 - robot a b c - place)
-        (:init (at r1 a) (at r2 b) (free c)) (:goal (at r1 b))""")  # fmt: skip
+    setting = world(
+        FREE,
+        """(:objects r1 r2 - robot a b c - place)
+        (:init (at r1 a) (at r2 b) (free c)) (:goal (at r1 b))""",
+    )
     assert "(free b) is false" in str(one_step(setting, "(move r1 a b)", "(move r2 b c)"))
     assert validate(*setting, [[None, "(move r2 b c)"], ["(move r1 a b)", None]]).valid
 
 
-# -- action formulas ----------------------------------------------------------------------------------------------
+# -- action formulas
+# ----------------------------------------------------------------------------------------------
 
 
 def test_a_negative_action_formula_forbids_the_swap() -> None:
@@ -191,8 +209,9 @@ LIFT = """(:types robot table) (:predicates (up ?t - table) {predicates})
 
 
 def test_a_positive_formula_demands_a_partner() -> None:
-    setting = world(LIFT.format(predicates=""),
-                    "(:objects r1 r2 - robot t u - table) (:init) (:goal (up t))")  # fmt: skip
+    setting = world(
+        LIFT.format(predicates=""), "(:objects r1 r2 - robot t u - table) (:init) (:goal (up t))"
+    )
     assert one_step(setting, "(lift r1 t)", "(lift r2 t)") is None
     assert "nobody does (lift r2 t)" in str(one_step(setting, "(lift r1 t)", None))
     assert "nobody does (lift r2 t)" in str(one_step(setting, "(lift r1 t)", "(lift r2 u)"))
@@ -200,13 +219,17 @@ def test_a_positive_formula_demands_a_partner() -> None:
 
 def test_a_positive_formula_may_be_met_by_the_acting_robot_itself() -> None:
     """Only negative formulas leave the acting robot out."""
-    setting = world(LIFT.format(predicates="").replace("(not (= ?o ?r))", ""),
-                    "(:objects r1 r2 - robot t - table) (:init) (:goal (up t))")  # fmt: skip
+    setting = world(
+        LIFT.format(predicates="").replace("(not (= ?o ?r))", ""),
+        "(:objects r1 r2 - robot t - table) (:init) (:goal (up t))",
+    )
     assert one_step(setting, "(lift r1 t)", None) is None
 
 
 def test_polarity_is_read_through_double_negation_and_implication() -> None:
-    """``(imply (nod ?r) ..)`` in the precondition of nod is a negative formula about the acting robot: it is true."""
+    """``(imply (nod ?r) ..)`` in the precondition of nod is a negative formula about the acting
+    robot: it is true.
+    """
     setting = world(
         """(:types robot) (:predicates (never) (done ?r - robot))
         (:action nod :agent ?r - robot :parameters () :precondition (imply (nod ?r) (never)) :effect (done ?r))
@@ -241,7 +264,8 @@ def test_an_action_formula_with_an_argument_of_another_type_speaks_of_no_action(
     assert one_step(setting, "(c r1)", None) is not None
 
 
-# -- who owns what ------------------------------------------------------------------------------------------------
+# -- who owns what
+# ------------------------------------------------------------------------------------------------
 
 CARRY = """(:types robot place) (:predicates (at ?r - robot) (up) (rung))
   (:action carry :parameters (?r ?q - robot) :precondition (and (at ?r) (not (up))) :effect (up))
@@ -253,7 +277,9 @@ CARRIERS = "(:objects r1 r2 r3 - robot) (:init (at r1) (at r2)) (:goal (up))"
 def test_a_shared_action_is_chosen_by_all_its_owners() -> None:
     setting = world(CARRY.format(more=""), CARRIERS)
     assert one_step(setting, "(carry r1 r2)", "(carry r1 r2)", "(go r3)") is None
-    assert one_step(setting, "(carry r1 r2)", None, None) == "(carry r1 r2) needs r2 to choose it too"
+    assert (
+        one_step(setting, "(carry r1 r2)", None, None) == "(carry r1 r2) needs r2 to choose it too"
+    )
     assert "needs r2" in str(one_step(setting, "(carry r1 r2)", "(carry r2 r1)", None))
     assert "belongs to r1 and r2" in str(one_step(setting, None, None, "(carry r1 r2)"))
 
@@ -277,7 +303,8 @@ def test_actions_of_nobody() -> None:
     assert "needs r3" in str(one_step(shared, "(ring)", "(ring)", None))
 
 
-# -- interference -------------------------------------------------------------------------------------------------
+# -- interference
+# -------------------------------------------------------------------------------------------------
 
 
 def two(first: str, second: str, init: str = "(p) (s)") -> World:
@@ -308,7 +335,10 @@ ADDS_Q = ":effect (q)"
 
 
 def test_deleting_what_another_requires() -> None:
-    assert clash(DELETES_P, ":precondition (p) :effect (n)") == "(one r1) deletes (p), which (two r2) requires"
+    assert (
+        clash(DELETES_P, ":precondition (p) :effect (n)")
+        == "(one r1) deletes (p), which (two r2) requires"
+    )
 
 
 def test_deleting_what_another_adds() -> None:
@@ -344,7 +374,9 @@ def test_an_atom_both_deleted_and_added_counts_as_added() -> None:
     assert clash(both, ":precondition (p) :effect (n)") is None
     assert clash(both, ":effect (p)") is None
     assert "deletes (p)" in str(clash(DELETES_P, both))
-    assert "adds (q)" in str(clash(":effect (and (not (q)) (q))", ":precondition (not (q)) :effect (n)"))
+    assert "adds (q)" in str(
+        clash(":effect (and (not (q)) (q))", ":precondition (not (q)) :effect (n)")
+    )
 
 
 def test_conditional_effects_count_as_if_they_fired() -> None:
@@ -363,7 +395,9 @@ def test_the_condition_of_an_effect_counts_as_required() -> None:
 
 
 def test_a_negative_formula_of_the_acting_robot_is_left_in_the_condition_of_an_effect() -> None:
-    """There it may be false, so that the other literals of the disjunction count; in a precondition it is true."""
+    """There it may be false, so that the other literals of the disjunction count; in a precondition
+    it is true.
+    """
     assert "requires" in str(clash(DELETES_P, ":effect (when (or (not (two ?r)) (p)) (n))"))
     assert clash(DELETES_P, ":precondition (or (not (two ?r)) (p)) :effect (n)") is None
 
@@ -372,27 +406,34 @@ def test_an_effect_that_can_never_fire_touches_nothing() -> None:
     assert clash(DELETES_P, ":effect (and (n) (when (and (p) (z)) (n)) (when (z) (p)))") is None
 
 
-@pytest.mark.parametrize("formula", ["(or (p) (q))", "(or (q) (not (not (p))))", "(imply (not (p)) (q))"])
+@pytest.mark.parametrize(
+    "formula", ["(or (p) (q))", "(or (q) (not (not (p))))", "(imply (not (p)) (q))"]
+)
 def test_every_literal_of_a_disjunction_counts(formula: str) -> None:
     assert "deletes (p)" in str(clash(DELETES_P, f":precondition {formula} :effect (n)"))
     assert "adds (q)" in str(clash(ADDS_Q, ":precondition (or (p) (not (q))) :effect (n)"))
 
 
-@pytest.mark.parametrize("formula", [
-    "(or (s) (p))",
-    "(or (p) (not (z)))",
-    "(or (p) (= ?r ?r))",
-    "(imply (z) (p))",
-    "(forall (?t - (either robot thing)) (or (p) (not (z))))",
-    "(or (s) (and (p) (q)))",
-    # Nothing is both a robot and a thing: no such subaction, so the negative formula is true.
-    "(or (p) (not (other ?r ?r)))",
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "formula",
+    [
+        "(or (s) (p))",
+        "(or (p) (not (z)))",
+        "(or (p) (= ?r ?r))",
+        "(imply (z) (p))",
+        "(forall (?t - (either robot thing)) (or (p) (not (z))))",
+        "(or (s) (and (p) (q)))",
+        # Nothing is both a robot and a thing: no such subaction, so the negative formula is true.
+        "(or (p) (not (other ?r ?r)))",
+    ],
+)
 def test_what_statics_equalities_and_types_decide_requires_nothing(formula: str) -> None:
     assert clash(DELETES_P, f":precondition {formula} :effect (n)") is None
 
 
-@pytest.mark.parametrize("formula", ["(or (z) (p))", "(and (s) (p))", "(or (p) (not (= ?r ?r)))", "(or (p) (not (p)))"])
+@pytest.mark.parametrize(
+    "formula", ["(or (z) (p))", "(and (s) (p))", "(or (p) (not (= ?r ?r)))", "(or (p) (not (p)))"]
+)
 def test_only_statics_equalities_and_types_are_simplified(formula: str) -> None:
     assert "deletes (p)" in str(clash(DELETES_P, f":precondition {formula} :effect (n)"))
 
@@ -432,20 +473,25 @@ def test_a_positive_formula_in_an_effect_condition_links_too() -> None:
     linked = ":precondition (p) :effect (when (one r1) (n))"
     setting = two(DELETES_P, linked)
     assert one_step(setting, "(one r1)", "(two r2)") is None
-    assert "deletes (p)" in str(one_step(setting, "(two r1)", "(one r2)"))  # it names r1's action only
+    assert "deletes (p)" in str(
+        one_step(setting, "(two r1)", "(one r2)")
+    )  # it names r1's action only
 
 
 def test_a_negative_formula_does_not_link() -> None:
     """Double negation is positive, an implication's premise is negative."""
     positive = ":precondition (and (p) (or (s) (n) (not (not (one r1))))) :effect (n)"
-    assert "deletes (p)" in str(one_step(two(DELETES_P, positive), "(one r1)", "(two r2)"))  # (s) decides it
+    assert "deletes (p)" in str(
+        one_step(two(DELETES_P, positive), "(one r1)", "(two r2)")
+    )  # (s) decides it
     positive = positive.replace("(s)", "(z)")
     assert one_step(two(DELETES_P, positive), "(one r1)", "(two r2)") is None
     negative = ":precondition (and (p) (imply (one r1) (p))) :effect (n)"
     assert "deletes (p)" in str(one_step(two(DELETES_P, negative), "(one r1)", "(two r2)"))
 
 
-# -- effects ------------------------------------------------------------------------------------------------------
+# -- effects
+# ------------------------------------------------------------------------------------------------------
 
 EFFECTS = """(:types robot thing - object box - thing) (:predicates (on ?t - object) (big ?t - object) (p) (q))
   (:action swap :agent ?r - robot :parameters ()
@@ -460,7 +506,9 @@ EFFECTS = """(:types robot thing - object box - thing) (:predicates (on ?t - obj
 
 
 def things(init: str) -> World:
-    return world(EFFECTS, f"(:objects r1 r2 - robot t - thing b c - box) (:init {init}) (:goal (p))")
+    return world(
+        EFFECTS, f"(:objects r1 r2 - robot t - thing b c - box) (:init {init}) (:goal (p))"
+    )
 
 
 def test_conditions_are_read_in_the_state_before() -> None:
@@ -505,7 +553,8 @@ def test_a_robot_moves_from_where_it_is() -> None:
     assert "(at r1 b) is false" in reason
 
 
-# -- joint-action PDDL --------------------------------------------------------------------------------------------
+# -- joint-action PDDL
+# --------------------------------------------------------------------------------------------
 
 JOINT = """(:types place) (:predicates (at1 ?p - place) (at2 ?p - place) (link ?a ?b - place))
   (:action both :parameters (?a ?b ?c ?d - place)
@@ -536,7 +585,9 @@ def test_the_parts_name_the_joint_action() -> None:
 
 def test_parts_that_no_joint_action_has() -> None:
     setting = world(JOINT, PLACES)
-    assert "no joint action" in str(one_step(setting, None, None))  # idling is written, or it is not there
+    assert "no joint action" in str(
+        one_step(setting, None, None)
+    )  # idling is written, or it is not there
     assert "no joint action" in str(one_step(setting, None, "(move b c)"))
     assert "no joint action" in str(one_step(setting, "(look)", "(look)"))
     assert "no joint action" in str(one_step(setting, "(move a a b)", None))
@@ -544,10 +595,15 @@ def test_parts_that_no_joint_action_has() -> None:
 
 def test_a_joint_action_that_is_not_applicable() -> None:
     setting = world(JOINT, PLACES)
-    assert "(both a b b b) is not applicable: (link b b) is false" in str(one_step(setting, "(move a b)", "(move b b)"))
+    assert "(both a b b b) is not applicable: (link b b) is false" in str(
+        one_step(setting, "(move a b)", "(move b b)")
+    )
     # A missing line means idle; the third parameter is found by trying: r2 stands in b.
     assert "not applicable" in str(one_step(setting, "(move a b)", None))
-    assert after(world(JOINT, PLACES.replace("(at2 b)", "(at2 c)")), "(move a b)", None) >= {"at1 b", "at2 c"}
+    assert after(world(JOINT, PLACES.replace("(at2 b)", "(at2 c)")), "(move a b)", None) >= {
+        "at1 b",
+        "at2 c",
+    }
 
 
 AMBIGUOUS = """(:predicates (p) (q))
@@ -565,11 +621,16 @@ def test_the_parts_determine_the_result() -> None:
     with pytest.raises(BadInput, match="different results"):
         validate(*world(AMBIGUOUS.format(when="()", effect="(q)"), problem), [["(do)", None]])
     # The same result, or only one of them applicable: no harm.
-    assert validate(*world(AMBIGUOUS.format(when="()", effect="(and (p) (not (q)))"), problem), [["(do)", None]]).valid
-    assert validate(*world(AMBIGUOUS.format(when="(q)", effect="(q)"), problem), [["(do)", None]]).valid
+    assert validate(
+        *world(AMBIGUOUS.format(when="()", effect="(and (p) (not (q)))"), problem), [["(do)", None]]
+    ).valid
+    assert validate(
+        *world(AMBIGUOUS.format(when="(q)", effect="(q)"), problem), [["(do)", None]]
+    ).valid
 
 
-# -- independence -------------------------------------------------------------------------------------------------
+# -- independence
+# -------------------------------------------------------------------------------------------------
 
 
 def test_the_checker_shares_only_the_nouns() -> None:
@@ -577,7 +638,12 @@ def test_the_checker_shares_only_the_nouns() -> None:
     for module in (planners.check.validate, planners.check.rules):
         tree = ast.parse(Path(module.__file__).read_text())
         imported |= {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
-        imported |= {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
+        imported |= {
+            alias.name
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Import)
+            for alias in node.names
+        }
     imported.discard("planners.check.rules")
     ours = {name for name in imported if name and name.startswith("planners")}
     assert ours == {"planners.errors", "planners.pddl.lifted", "planners.pddl.robots"}

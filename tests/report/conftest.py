@@ -28,9 +28,15 @@ if TYPE_CHECKING:
 
 CHROMIUM = Path("/usr/bin/chromium")
 ARGUMENTS = [
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync",
-]  # fmt: skip
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
 
 
 @dataclass(frozen=True)
@@ -57,7 +63,11 @@ def data_of(html: bytes) -> dict[str, Any]:
 
 @cache
 def make_language(
-    domain: str, problem: str, tasks: str | None = "all", method: str = "greedy", options: ModelOptions | None = None
+    domain: str,
+    problem: str,
+    tasks: str | None = "all",
+    method: str = "greedy",
+    options: ModelOptions | None = None,
 ) -> tuple[Language, Domain, Problem]:
     lifted = read_domain(DOMAINS / domain / "domain.pddl")
     read = read_problem(DOMAINS / domain / f"{problem}.pddl", lifted)
@@ -72,7 +82,9 @@ def make_language(
 
 
 @cache
-def make_world(domain: str, problem: str, tasks: str | None = "all", method: str = "greedy", shown: int = 6) -> World:
+def make_world(
+    domain: str, problem: str, tasks: str | None = "all", method: str = "greedy", shown: int = 6
+) -> World:
     language, lifted, read = make_language(domain, problem, tasks, method)
     return World(language, lifted, read, make_report(language, lifted, [read], tasks_shown=shown))
 
@@ -84,7 +96,9 @@ def refuted(language: Language) -> Language:
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: the page is not opened")
+    api = pytest.importorskip(
+        "playwright.sync_api", reason="playwright is not installed: the page is not opened"
+    )
     if not CHROMIUM.exists():
         pytest.skip(f"there is no {CHROMIUM}: the page is not opened")
     with api.sync_playwright() as playwright:
@@ -111,7 +125,9 @@ class Opened:
         return found
 
     def forward(self, steps: int = 1) -> None:
-        self.page.evaluate("n => { while (n--) document.querySelector('#transport .forward').click(); }", steps)
+        self.page.evaluate(
+            "n => { while (n--) document.querySelector('#transport .forward').click(); }", steps
+        )
 
 
 class Opener:
@@ -123,7 +139,9 @@ class Opener:
     def __call__(self, html: bytes, width: int = 1200, height: int = 900, **context: Any) -> Opened:
         path = self.folder / f"{len(self.pages)}.html"
         path.write_bytes(html)
-        page = self.browser.new_context(viewport={"width": width, "height": height}, **context).new_page()
+        page = self.browser.new_context(
+            viewport={"width": width, "height": height}, **context
+        ).new_page()
         opened = Opened(page, [], [])
         page.on("console", lambda message: opened.messages.append(message.text))
         page.on("pageerror", lambda error: opened.messages.append(str(error)))
@@ -135,7 +153,9 @@ class Opener:
 
 @pytest.fixture
 def open_page(browser: Browser, tmp_path: Path) -> Iterator[Opener]:
-    """Opens pages from files; in the end none may have logged anything or asked for anything but its own file."""
+    """Opens pages from files; in the end none may have logged anything or asked for anything but
+    its own file.
+    """
     opener = Opener(browser, tmp_path)
     yield opener
     for opened in opener.pages:

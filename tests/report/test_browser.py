@@ -15,9 +15,14 @@ from planners.search.plans import Plans
 from tests.report.conftest import Opened, Opener, World, make_language, make_world, refuted
 
 WORLDS = [
-    ("t-map", "problem", "all"), ("three-cells", "problem", "all"), ("lock", "both-in", "all"), ("handover", "two-doors", "all"),
-    ("vans", "two-vans", "all"), ("elevator", "two-calls", "all"), ("grid", "three-robots-3x3", None),
-]  # fmt: skip
+    ("t-map", "problem", "all"),
+    ("three-cells", "problem", "all"),
+    ("lock", "both-in", "all"),
+    ("handover", "two-doors", "all"),
+    ("vans", "two-vans", "all"),
+    ("elevator", "two-calls", "all"),
+    ("grid", "three-robots-3x3", None),
+]
 
 
 def at(key: str, predicate: str = "at") -> dict[str, str]:
@@ -78,7 +83,9 @@ def test_plans_are_those_of_the_planner(open_page: Opener) -> None:
 
 
 def test_all_plans_through_the_interface_of_the_page(open_page: Opener) -> None:
-    """The page's own counting and ranking, over all sentences of all tasks: nothing is missing, nothing twice."""
+    """The page's own counting and ranking, over all sentences of all tasks: nothing is missing,
+    nothing twice.
+    """
     for domain, problem, tasks in WORLDS:
         opened = open_page(make_world(domain, problem, tasks).report.html)
         found = opened.page.evaluate(
@@ -103,7 +110,9 @@ def test_all_plans_through_the_interface_of_the_page(open_page: Opener) -> None:
 
 
 def test_a_robots_options_are_its_own_subplans(open_page: Opener) -> None:
-    """What the page lets a robot do, step by step, is what its part is in some plan with the sentence; no more, no less."""
+    """What the page lets a robot do, step by step, is what its part is in some plan with the
+    sentence; no more, no less.
+    """
     world = make_world("grid", "three-robots-3x3", None)
     spoken = speak(world.language, world.domain, world.problem)
     opened = open_page(world.report.html)
@@ -118,7 +127,8 @@ def test_a_robots_options_are_its_own_subplans(open_page: Opener) -> None:
     )
     for entry, robots in zip(world.data["tasks"][0]["sentences"], ways, strict=False):
         plans = [
-            [spoken.model.texts(step) for step in plan] for plan in Plans.of(fitting(spoken, entry["words"]))
+            [spoken.model.texts(step) for step in plan]
+            for plan in Plans.of(fitting(spoken, entry["words"]))
         ]
         for robot, found in enumerate(robots):
             expected = {tuple(step[robot] or "idle" for step in plan) for plan in plans}
@@ -138,7 +148,8 @@ def test_choosing_for_a_robot(open_page: Opener) -> None:
         page.keyboard.press(str(len(buttons)))  # keys choose, too
         assert page.evaluate(f"DATA.labels[0][taskView.steps[{step}][0]].text") == labels[-1]
     assert "on an optimal plan" in page.inner_text("#now")
-    # Every mixture of the robots' choices is optimal: over and over with other choices of the others.
+    # Every mixture of the robots' choices is optimal: over and over with other choices of the
+    # others.
     for _ in range(25):
         page.dispatch_event("#transport .plan-nav button", "click")
         opened.forward(4)
@@ -146,7 +157,9 @@ def test_choosing_for_a_robot(open_page: Opener) -> None:
 
 
 def test_without_a_sentence_it_goes_wrong(open_page: Opener) -> None:
-    """In the place of a robot, with all optimal plans open (a language of one word), some mixture breaks, and it is said."""
+    """In the place of a robot, with all optimal plans open (a language of one word), some mixture
+    breaks, and it is said.
+    """
     language, domain, problem = make_language("t-map", "problem")
     opened = open_page(make_report(refuted(language), domain, [problem], tasks_shown=1).html)
     page = opened.page
@@ -168,7 +181,15 @@ def test_keys(open_page: Opener) -> None:
     opened = open_page(world.report.html)
     page = opened.page
     output = "#transport output"
-    for key, step in [("ArrowRight", 1), ("ArrowRight", 2), ("ArrowLeft", 1), ("End", 4), ("ArrowRight", 4), ("Home", 0), ("ArrowLeft", 0)]:
+    for key, step in [
+        ("ArrowRight", 1),
+        ("ArrowRight", 2),
+        ("ArrowLeft", 1),
+        ("End", 4),
+        ("ArrowRight", 4),
+        ("Home", 0),
+        ("ArrowLeft", 0),
+    ]:
         page.keyboard.press(key)  # nothing is focused: the task's player listens
         assert page.inner_text(output) == f"step {step} of 4"
     page.keyboard.press("Space")
@@ -191,7 +212,15 @@ def test_keys(open_page: Opener) -> None:
     for _ in range(60):
         page.keyboard.press("Tab")
         seen.add(page.evaluate("document.activeElement.closest('[id]')?.id"))
-    assert seen >= {"task-select", "modes", "transport", "sentence-list", "timeline", "space", "without-transport"}
+    assert seen >= {
+        "task-select",
+        "modes",
+        "transport",
+        "sentence-list",
+        "timeline",
+        "space",
+        "without-transport",
+    }
 
 
 def test_a_sentence_highlights_what_remains(open_page: Opener) -> None:
@@ -215,15 +244,23 @@ def remaining(world: World, number: int) -> set[int]:
         nodes = todo.pop()
         if len(nodes) == task["steps"] + 1:
             said = [data["state_words"][task["nodes"]["state"][n]] for n in nodes]
-            if words is None or [w for k, w in enumerate(said) if not k or said[k - 1] != w] == words:
+            if (
+                words is None
+                or [w for k, w in enumerate(said) if not k or said[k - 1] != w] == words
+            ):
                 found.update(nodes)
             continue
-        todo += [[*nodes, n] for n in set(task["target"][task["first"][nodes[-1]] : task["first"][nodes[-1] + 1]])]
+        todo += [
+            [*nodes, n]
+            for n in set(task["target"][task["first"][nodes[-1]] : task["first"][nodes[-1] + 1]])
+        ]
     return found
 
 
 def test_the_picture_of_the_words(open_page: Opener) -> None:
-    """Every state of the language is there once, with its word; a word alone, on demand; and the map's tint agrees."""
+    """Every state of the language is there once, with its word; a word alone, on demand; and the
+    map's tint agrees.
+    """
     world = make_world("t-map", "problem")
     opened = open_page(world.report.html)
     page = opened.page
@@ -247,12 +284,16 @@ def test_the_picture_of_the_words(open_page: Opener) -> None:
         "Object.fromEntries(taskView.scene.places.map(({ tint }, k) => [DATA.places[k].name, tint.textContent]).filter(e => e[1]))"
     )
     assert tinted == {
-        at(key)["r1"]: word[1:] for key, word in world.language.states.items() if at(key)["r2"] == other
+        at(key)["r1"]: word[1:]
+        for key, word in world.language.states.items()
+        if at(key)["r2"] == other
     }
 
 
 @pytest.mark.parametrize(("domain", "problem", "tasks"), [WORLDS[0], WORLDS[2], WORLDS[3]])
-def test_the_miscoordination(open_page: Opener, domain: str, problem: str, tasks: str | None) -> None:
+def test_the_miscoordination(
+    open_page: Opener, domain: str, problem: str, tasks: str | None
+) -> None:
     """Played to its end: each robot's plan and what they do together, as the witness has them."""
     world = make_world(domain, problem, tasks)
     opened = open_page(world.report.html)
@@ -262,7 +303,9 @@ def test_the_miscoordination(open_page: Opener, domain: str, problem: str, tasks
     assert opened.page.inner_text("#verdict") in ("So far, so good.", "")
     for robot, states in enumerate([*witness["states"], witness["together"]]):
         shown = opened.things(f"#acts .act:nth-child({robot + 1})")
-        keys = [world.data["facts"][f]["text"] for f in world.data["states"][states[witness["breaks"]]]]
+        keys = [
+            world.data["facts"][f]["text"] for f in world.data["states"][states[witness["breaks"]]]
+        ]
         expected = at(" ".join(keys)) | at(" ".join(keys), "lies")
         assert {thing: shown[thing] for thing in expected} == expected
     opened.page.click("#without-transport .forward")
@@ -273,7 +316,9 @@ def test_the_miscoordination(open_page: Opener, domain: str, problem: str, tasks
 @pytest.mark.parametrize(("width", "scheme"), [(320, "light"), (390, "dark"), (1280, "light")])
 def test_narrow_and_wide(open_page: Opener, width: int, scheme: str) -> None:
     for domain, problem, tasks in (WORLDS[0], WORLDS[3], WORLDS[6]):
-        opened = open_page(make_world(domain, problem, tasks).report.html, width=width, color_scheme=scheme)
+        opened = open_page(
+            make_world(domain, problem, tasks).report.html, width=width, color_scheme=scheme
+        )
         assert opened.page.evaluate("document.documentElement.scrollWidth") == width
         wide = opened.page.evaluate(
             """() => [...document.querySelectorAll('main *')].filter(e => !e.closest('svg, .scroller')
@@ -303,7 +348,9 @@ def contrast(opened: Opened, text: str, ground: str) -> float:
 def test_text_can_be_read(open_page: Opener) -> None:
     for scheme in ("light", "dark"):
         opened = open_page(make_world("t-map", "problem").report.html, color_scheme=scheme)
-        for text, ground in product(("--ink", "--soft", "--accent", "--bad"), ("--paper", "--panel")):
+        for text, ground in product(
+            ("--ink", "--soft", "--accent", "--bad"), ("--paper", "--panel")
+        ):
             assert contrast(opened, text, ground) >= 4.5, (scheme, text, ground)
 
 
@@ -326,7 +373,9 @@ def test_odd_languages_and_tasks(open_page: Opener, monkeypatch: pytest.MonkeyPa
     """No map; no state mapped; a task that is done before it begins."""
     language, domain, problem = make_language("t-map", "problem")
     bare = replace(language, states={})
-    done = replace(problem, goal=And(tuple(atom for atom in problem.init if atom.predicate == "at")))
+    done = replace(
+        problem, goal=And(tuple(atom for atom in problem.init if atom.predicate == "at"))
+    )
     monkeypatch.setattr("coordlang.report.data._PLACES", 1)
     for spoken, asked in [(language, problem), (bare, problem), (language, done)]:
         opened = open_page(make_report(spoken, domain, [asked], tasks_shown=1).html)
@@ -341,7 +390,11 @@ def test_odd_languages_and_tasks(open_page: Opener, monkeypatch: pytest.MonkeyPa
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("domain", "problem", "tasks"),
-    [("corridor", "problem", "all"), ("grid", "gwb7-3x5", "gwb7-3x5.tasks.json"), ("grid", "corners-10x10", None)],
+    [
+        ("corridor", "problem", "all"),
+        ("grid", "gwb7-3x5", "gwb7-3x5.tasks.json"),
+        ("grid", "corners-10x10", None),
+    ],
 )
 def test_large_languages(open_page: Opener, domain: str, problem: str, tasks: str | None) -> None:
     world = make_world(domain, problem, tasks, shown=30)

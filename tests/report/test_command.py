@@ -28,14 +28,28 @@ def test_a_page_is_written(coordlang: Command, language: Path, tmp_path: Path) -
     assert "written to stdout" in to_stdout.err
 
 
-def test_the_same_input_gives_the_same_bytes_in_other_processes(language: Path, tmp_path: Path) -> None:
+def test_the_same_input_gives_the_same_bytes_in_other_processes(
+    language: Path, tmp_path: Path
+) -> None:
     pages = []
     for seed in ("1", "2"):
         page = tmp_path / f"{seed}.html"
         done = subprocess.run(
-            [sys.executable, "-c", "from coordlang.cli import main; main()", "report", language, *FILES, "-o", page],
-            env={**os.environ, "PYTHONHASHSEED": seed}, check=False, capture_output=True, text=True,
-        )  # fmt: skip
+            [
+                sys.executable,
+                "-c",
+                "from coordlang.cli import main; main()",
+                "report",
+                language,
+                *FILES,
+                "-o",
+                page,
+            ],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            check=False,
+            capture_output=True,
+            text=True,
+        )
         assert done.returncode == 0, done.stderr
         pages.append(page.read_bytes())
     assert pages[0] == pages[1]
@@ -43,9 +57,16 @@ def test_the_same_input_gives_the_same_bytes_in_other_processes(language: Path, 
 
 def test_coordinates(coordlang: Command, language: Path, tmp_path: Path) -> None:
     sidecar = tmp_path / "mine.json"
-    sidecar.write_text('{"coordinates": {"c0-1": [9, 0], "c1-0": [0, 5], "c1-1": [9, 5], "c1-2": [20, 5]}}')
+    sidecar.write_text(
+        '{"coordinates": {"c0-1": [9, 0], "c1-0": [0, 5], "c1-1": [9, 5], "c1-2": [20, 5]}}'
+    )
     page = tmp_path / "report.html"
-    assert coordlang("report", language, *FILES, "-o", page, "--tasks-shown", "1", "--coordinates", sidecar).code == 0
+    assert (
+        coordlang(
+            "report", language, *FILES, "-o", page, "--tasks-shown", "1", "--coordinates", sidecar
+        ).code
+        == 0
+    )
     assert data_of(page.read_bytes())["places"][0] == {"name": "c0-1", "x": 9, "y": 0}
     # Beside the problem it needs no option.
     copy = tmp_path / "problem.pddl"
@@ -54,7 +75,9 @@ def test_coordinates(coordlang: Command, language: Path, tmp_path: Path) -> None
     assert coordlang("report", language, FILES[0], copy, "-o", page, "--tasks-shown", "1").code == 0
     assert data_of(page.read_bytes())["places"][0]["x"] == 9
     (tmp_path / "coordinates.json").write_text("[]")
-    assert coordlang("report", language, FILES[0], copy, "-o", page, "--tasks-shown", "1").code == 31
+    assert (
+        coordlang("report", language, FILES[0], copy, "-o", page, "--tasks-shown", "1").code == 31
+    )
 
 
 @pytest.mark.parametrize(

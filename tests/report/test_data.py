@@ -27,9 +27,12 @@ from tests.coordlang.random_models import random_model
 from tests.report.conftest import data_of, make_language, make_world, refuted
 
 WORLDS = [
-    ("t-map", "problem", "all"), ("lock", "both-in", "all"), ("handover", "two-doors", "all"), ("elevator", "two-calls", "all"),
+    ("t-map", "problem", "all"),
+    ("lock", "both-in", "all"),
+    ("handover", "two-doors", "all"),
+    ("elevator", "two-calls", "all"),
     ("grid", "three-robots-3x3", None),
-]  # fmt: skip
+]
 
 
 def listed_plans(task: dict[str, Any]) -> list[tuple[list[int], list[int]]]:
@@ -41,7 +44,10 @@ def listed_plans(task: dict[str, Any]) -> list[tuple[list[int], list[int]]]:
         if len(edges) == task["steps"]:
             found.append((edges, nodes))
         first = task["first"]
-        todo += [([*edges, e], [*nodes, task["target"][e]]) for e in range(first[nodes[-1]], first[nodes[-1] + 1])]
+        todo += [
+            ([*edges, e], [*nodes, task["target"][e]])
+            for e in range(first[nodes[-1]], first[nodes[-1] + 1])
+        ]
     return found
 
 
@@ -55,26 +61,33 @@ def test_plans_and_sentences(domain: str, problem: str, tasks: str | None) -> No
         assert task["plans"] == str(len(plans))
         assert task["complete"]
         said = Counter(
-            sentence(data["state_words"][task["nodes"]["state"][n]] for n in nodes) for _, nodes in plans
+            sentence(data["state_words"][task["nodes"]["state"][n]] for n in nodes)
+            for _, nodes in plans
         )
         assert task["all_sentences"] == len(said)
         for entry in task["sentences"]:
             words = tuple(entry["words"])
             assert entry["plans"] == str(said[words])
             mine = [
-                edges for edges, nodes in plans
+                edges
+                for edges, nodes in plans
                 if sentence(data["state_words"][task["nodes"]["state"][n]] for n in nodes) == words
-            ]  # fmt: skip
+            ]
             own = [
-                len({tuple(labels[edge] for edge in edges) for edges in mine}) for labels in task["labels"]
+                len({tuple(labels[edge] for edge in edges) for edges in mine})
+                for labels in task["labels"]
             ]
             assert entry["own"] == [str(number) for number in own]
             assert prod(own) >= len(mine)
-        assert [int(s["plans"]) for s in task["sentences"]] == sorted((said[tuple(s["words"])] for s in task["sentences"]), reverse=True)
+        assert [int(s["plans"]) for s in task["sentences"]] == sorted(
+            (said[tuple(s["words"])] for s in task["sentences"]), reverse=True
+        )
 
 
 def test_ranks_are_those_of_the_planner() -> None:
-    """Plan number k of the page (edges in order) is plan number k of the planner: same labels, same states."""
+    """Plan number k of the page (edges in order) is plan number k of the planner: same labels, same
+    states.
+    """
     for domain, problem, tasks in WORLDS:
         world = make_world(domain, problem, tasks)
         data, task = world.data, world.data["tasks"][0]
@@ -82,14 +95,19 @@ def test_ranks_are_those_of_the_planner() -> None:
         plans = Plans.of(spoken.space)
 
         def by_labels(way: tuple[list[int], list[int]], task: dict[str, Any] = task) -> list[int]:
-            # Edges of a node are in the order of labels, so that ways are ordered by their choices of edge.
+            # Edges of a node are in the order of labels, so that ways are ordered by their choices
+            # of edge.
             return [edge - task["first"][node] for edge, node in zip(way[0], way[1], strict=False)]
 
         for rank, (edges, nodes) in enumerate(sorted(listed_plans(task), key=by_labels)):
             plan = plans.unrank(rank)
             texts = [spoken.model.texts(step) for step in plan]
             assert [
-                tuple(data["labels"][robot][own[edge]]["text"] for robot, own in enumerate(task["labels"])) for edge in edges
+                tuple(
+                    data["labels"][robot][own[edge]]["text"]
+                    for robot, own in enumerate(task["labels"])
+                )
+                for edge in edges
             ] == [tuple(text or "idle" for text in step) for step in texts]
             keys = [spoken.model.codec.key(spoken.space.rows[s]) for s in plans.states(plan)]
             assert [key_of(data, task["nodes"]["state"][n]) for n in nodes] == keys
@@ -106,7 +124,9 @@ def test_random_models() -> None:
         random = Random(seed)
         domain, problem, options = random_model(seed, random.choice([2, 2, 3]))
         try:
-            candidates = (all_pairs if random.random() < 0.5 else from_problems)(domain, [problem], options)
+            candidates = (all_pairs if random.random() < 0.5 else from_problems)(
+                domain, [problem], options
+            )
             if not candidates.count or candidates.count > 400:
                 continue
             built = build_language(candidates, "greedy")
@@ -120,7 +140,11 @@ def test_random_models() -> None:
         unmapped += not data["places"]
         for task, part in zip(data["tasks"], parts, strict=True):
             plans = listed_plans(task)
-            assert task["plans"] == str(len(plans)) == str(sum(int(s["plans"]) for s in task["sentences"]))
+            assert (
+                task["plans"]
+                == str(len(plans))
+                == str(sum(int(s["plans"]) for s in task["sentences"]))
+            )
             assert not part.shown.spoken.covered or task["verified"]
             if task["witness"]:
                 requiring += 1
@@ -142,7 +166,8 @@ def test_large_tasks_are_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     assert 10 < len(part.edges) <= 60
     space, nodes = spoken.space, set(part.nodes.tolist())
     sources, targets = space.sources[part.edges].tolist(), space.target[part.edges].tolist()
-    # Every node but the start is led to, and every node but the goal's leads on: each way is a whole plan.
+    # Every node but the start is led to, and every node but the goal's leads on: each way is a
+    # whole plan.
     assert set(targets) | {spoken.start} == nodes
     assert set(sources) | {n for n in nodes if space.layer[n] == 0} == nodes
     drawn = graph.shown_sentences(spoken, part, 0)
@@ -155,7 +180,8 @@ def test_selection() -> None:
     language, domain, problem = make_language("t-map", "problem")
     every = select_tasks(language, domain, [problem], 200, 0)
     assert every.complete
-    # The problem's own task is the pair of its start and the only state with its goal: 131 further pairs.
+    # The problem's own task is the pair of its start and the only state with its goal: 131 further
+    # pairs.
     assert len(every.tasks) == 132 or len(every.tasks) == 133
     assert sum(task.witness is not None for task in every.tasks) in (12, 13)
     some = select_tasks(language, domain, [problem], 10, 0)
@@ -165,7 +191,10 @@ def test_selection() -> None:
     other = select_tasks(language, domain, [problem], 10, 1)
 
     def texts(selection: Any) -> list[Any]:
-        return [task.spoken.space.rows[task.spoken.space.state[task.spoken.start]].tolist() for task in selection.tasks]
+        return [
+            task.spoken.space.rows[task.spoken.space.state[task.spoken.start]].tolist()
+            for task in selection.tasks
+        ]
 
     assert texts(some) == texts(select_tasks(language, domain, [problem], 10, 0))
     assert texts(some) != texts(other)
@@ -195,7 +224,14 @@ def test_pages_that_would_be_too_large_show_fewer_tasks(monkeypatch: pytest.Monk
 
 def test_a_language_that_is_none_is_said_to_be_none() -> None:
     language, domain, problem = make_language("t-map", "problem")
-    task = data_of(make_report(refuted(language), domain, [problem], tasks_shown=2).html)["tasks"][0]
+    task = data_of(make_report(refuted(language), domain, [problem], tasks_shown=2).html)["tasks"][
+        0
+    ]
     assert task["verified"] is False
     assert task["violation"]["stops"] is not None
-    assert data_of(make_report(language, domain, [problem], tasks_shown=2).html)["tasks"][0]["violation"] is None
+    assert (
+        data_of(make_report(language, domain, [problem], tasks_shown=2).html)["tasks"][0][
+            "violation"
+        ]
+        is None
+    )

@@ -1,4 +1,6 @@
-"""Coordinates: from names, from files, by graph layout; nodes of layers in an order with few crossings."""
+"""Coordinates: from names, from files, by graph layout; nodes of layers in an order with few
+crossings.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,14 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.report.layout import from_names, graph_layout, layer_orders, place_layout, read_coordinates, spread
+from coordlang.report.layout import (
+    from_names,
+    graph_layout,
+    layer_orders,
+    place_layout,
+    read_coordinates,
+    spread,
+)
 from planners.errors import BadInput
 
 
@@ -53,7 +62,9 @@ def test_a_path_is_laid_out_straight_and_a_ring_round() -> None:
 def test_a_layout_is_the_same_each_time_and_finite() -> None:
     random = Random(3)
     for number in (1, 2, 7, 40):
-        links = [(a, b) for a in range(number) for b in range(a) if random.random() < 0.2]  # often in several parts
+        links = [
+            (a, b) for a in range(number) for b in range(a) if random.random() < 0.2
+        ]  # often in several parts
         first, second = graph_layout(number, links), graph_layout(number, links)
         assert (first == second).all()
         assert np.isfinite(first).all()
@@ -87,14 +98,22 @@ def test_layers_keep_their_nodes_and_cross_less() -> None:
         random = Random(seed)
         sizes = [random.randint(1, 6) for _ in range(4)]
         bounds = np.cumsum([0, *sizes]).tolist()
-        edges = sorted({
-            (random.randrange(bounds[k], bounds[k + 1]), random.randrange(bounds[k + 1], bounds[k + 2]))
-            for k in range(3) for _ in range(6)
-        })  # fmt: skip
+        edges = sorted(
+            {
+                (
+                    random.randrange(bounds[k], bounds[k + 1]),
+                    random.randrange(bounds[k + 1], bounds[k + 2]),
+                )
+                for k in range(3)
+                for _ in range(6)
+            }
+        )
         orders = layer_orders(sizes, edges)
         for k, size in enumerate(sizes):
             assert sorted(orders[bounds[k] : bounds[k + 1]]) == list(range(size))
-        given = [n - bounds[int(np.searchsorted(bounds, n, "right")) - 1] for n in range(bounds[-1])]
+        given = [
+            n - bounds[int(np.searchsorted(bounds, n, "right")) - 1] for n in range(bounds[-1])
+        ]
         better += crossings(given, sizes, edges) - crossings(orders, sizes, edges)
     assert better > 100
 
@@ -112,10 +131,19 @@ def test_coordinates_from_a_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["", "[]", "{}", '{"coordinates": []}', '{"coordinates": {"a": [1]}}', '{"coordinates": {"a": [1, "2"]}}',
-     '{"coordinates": {"a": [1, true]}}', '{"coordinates": {"a": [1, 1e400]}}', '{"coordinates": {"a": [0, 0], "b": [0, 0]}}',
-     '{"coordinates": {"a": [NaN, 0]}}'],
-)  # fmt: skip
+    [
+        "",
+        "[]",
+        "{}",
+        '{"coordinates": []}',
+        '{"coordinates": {"a": [1]}}',
+        '{"coordinates": {"a": [1, "2"]}}',
+        '{"coordinates": {"a": [1, true]}}',
+        '{"coordinates": {"a": [1, 1e400]}}',
+        '{"coordinates": {"a": [0, 0], "b": [0, 0]}}',
+        '{"coordinates": {"a": [NaN, 0]}}',
+    ],
+)
 def test_files_that_are_no_coordinates(text: str, tmp_path: Path) -> None:
     path = tmp_path / "coordinates.json"
     path.write_text(text)

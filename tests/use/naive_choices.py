@@ -1,4 +1,6 @@
-"""Choices by definition: plans are listed, projected and mixed; what a robot knows is read off all mixtures."""
+"""Choices by definition: plans are listed, projected and mixed; what a robot knows is read off all
+mixtures.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +44,9 @@ class Listed:
     def own(self) -> list[set[Own]]:
         """For each robot its own parts of the plans."""
         robots = len(self.spoken.model.robots)
-        return [{tuple(step[robot] for step in plan) for plan in self.plans} for robot in range(robots)]
+        return [
+            {tuple(step[robot] for step in plan) for plan in self.plans} for robot in range(robots)
+        ]
 
     @property
     def combinations(self) -> int:
@@ -51,7 +55,9 @@ class Listed:
     @cached_property
     def mixed(self) -> dict[tuple[Own, ...], Plan]:
         """Every combination of own parts, one for each robot, as a sequence of joint steps."""
-        return {chosen: tuple(zip(*chosen, strict=True)) for chosen in product(*map(sorted, self.own))}
+        return {
+            chosen: tuple(zip(*chosen, strict=True)) for chosen in product(*map(sorted, self.own))
+        }
 
     @property
     def mixes(self) -> bool:
@@ -64,7 +70,10 @@ class Listed:
         space, codec = self.spoken.space, self.spoken.model.codec
         plans = Plans(space, self.spoken.start, [])
         return {
-            chosen: [frozenset(codec.decode(space.rows[s])) & set(codec.facts) for s in plans.states(plan)]
+            chosen: [
+                frozenset(codec.decode(space.rows[s])) & set(codec.facts)
+                for s in plans.states(plan)
+            ]
             for chosen, plan in self.mixed.items()
         }
 
@@ -83,24 +92,42 @@ class Listed:
         return {own[:step] for own in self.own[robot] for step in range(len(own) + 1)}
 
     def least(self, robot: int, known: dict[Own, Known] | None = None) -> int:
-        """How many states the least automaton has: histories with different futures (Myhill and Nerode)."""
+        """How many states the least automaton has: histories with different futures (Myhill and
+        Nerode).
+        """
         return len({self._future(robot, history, known) for history in self.histories(robot)})
 
-    def _future(self, robot: int, history: Own, known: dict[Own, Known] | None) -> frozenset[object]:
+    def _future(
+        self, robot: int, history: Own, known: dict[Own, Known] | None
+    ) -> frozenset[object]:
         here = len(history)
         return frozenset(
-            (own[here:], tuple(known[own[:step]] for step in range(here, len(own) + 1)) if known else ())
+            (
+                own[here:],
+                tuple(known[own[:step]] for step in range(here, len(own) + 1)) if known else (),
+            )
             for own in self.own[robot]
             if own[:here] == history
         )
 
-    def fulfilling(self, robot: int, history: Own, detour: Detour, known: dict[Own, Known]) -> set[Own]:
+    def fulfilling(
+        self, robot: int, history: Own, detour: Detour, known: dict[Own, Known]
+    ) -> set[Own]:
         """The own parts that begin with ``history`` and make a detour from then on."""
-        return {own for own in self.own[robot] if own[: len(history)] == history and self._makes(robot, own, len(history), detour, known)}
+        return {
+            own
+            for own in self.own[robot]
+            if own[: len(history)] == history
+            and self._makes(robot, own, len(history), detour, known)
+        }
 
-    def _makes(self, robot: int, own: Own, here: int, detour: Detour, known: dict[Own, Known]) -> bool:
+    def _makes(
+        self, robot: int, own: Own, here: int, detour: Detour, known: dict[Own, Known]
+    ) -> bool:
         ahead = [known[own[:step]] for step in range(here, len(own) + 1)]
-        texts = [self.spoken.model.labels[robot][label] if label else "idle" for label in own[here:]]
+        texts = [
+            self.spoken.model.labels[robot][label] if label else "idle" for label in own[here:]
+        ]
         return (
             all(any(atom in true for true, _ in ahead) for atom in detour.visit)
             and all(all(atom in false for _, false in ahead) for atom in detour.avoid)
@@ -113,7 +140,9 @@ def like(pattern: str, text: str) -> bool:
     return re.fullmatch(re.escape(pattern).replace(r"\*", ".*"), text) is not None
 
 
-def listed(spoken: Spoken, most_plans: int, most_combinations: int) -> Iterator[tuple[tuple[int, ...], Listed]]:
+def listed(
+    spoken: Spoken, most_plans: int, most_combinations: int
+) -> Iterator[tuple[tuple[int, ...], Listed]]:
     """Every sentence of a task with what it leaves open; raises `naive.TooLarge`."""
     groups = sentences(spoken, most_plans)
     optimal = {plan for group in groups.values() for plan in group}

@@ -1,4 +1,6 @@
-"""Sentences by definition: every plan is listed, and its words are looked up in the language's own list of states."""
+"""Sentences by definition: every plan is listed, and its words are looked up in the language's own
+list of states.
+"""
 
 from __future__ import annotations
 
@@ -33,13 +35,18 @@ SHIPPED = [
     f"{path.parent.name}/{path.stem}"
     for path in sorted(DOMAINS.glob("*/*.pddl"))
     if path.name != "domain.pddl"
-    and (path.parent.name not in ("grid", "grid-joint") or path.stem in ("corners-4x4", "gw2-2x3", "gwb5-3x3", "three-cells"))
+    and (
+        path.parent.name not in ("grid", "grid-joint")
+        or path.stem in ("corners-4x4", "gw2-2x3", "gwb5-3x3", "three-cells")
+    )
 ] + ["grid/three-robots-3x3"]
 
 
 @cache
 def shipped(name: str) -> tuple[Candidates, Spoken]:
-    """The task of a shipped problem with the greedy language for it; actions remembered where plans are inseparable."""
+    """The task of a shipped problem with the greedy language for it; actions remembered where plans
+    are inseparable.
+    """
     folder, _, stem = name.partition("/")
     domain = read_domain(DOMAINS / folder / "domain.pddl")
     problem = read_problem(DOMAINS / folder / f"{stem}.pddl", domain)
@@ -54,9 +61,11 @@ def shipped(name: str) -> tuple[Candidates, Spoken]:
 
 
 def random_spoken(seed: int, robots: int) -> tuple[Candidates, Spoken]:
-    """A task of a random model, one of its longer ones, under a random partition; some states are left to the default.
+    """A task of a random model, one of its longer ones, under a random partition; some states are
+    left to the default.
 
-    No coordination language, mostly: saying and understanding, searching and wishing do not depend on it.
+    No coordination language, mostly: saying and understanding, searching and wishing do not depend
+    on it.
     """
     random = Random(seed)
     if seed % 2 == 0:
@@ -72,7 +81,9 @@ def random_spoken(seed: int, robots: int) -> tuple[Candidates, Spoken]:
         if seed % 2 == 0:
             candidates = from_problems(domain, [problem], options)
         else:
-            candidates = from_listed(domain, [problem], [long_task(random, domain, problem, options)], options)
+            candidates = from_listed(
+                domain, [problem], [long_task(random, domain, problem, options)], options
+            )
     except ProvedImpossible:
         assume(False)
     assume(0 < Plans.of(candidates.spaces[0]).count <= 300)
@@ -86,7 +97,9 @@ def random_spoken(seed: int, robots: int) -> tuple[Candidates, Spoken]:
     return candidates, spoken_in(candidates, language)
 
 
-def long_task(random: Random, domain: Domain, problem: Problem, options: ModelOptions) -> ListedTask:
+def long_task(
+    random: Random, domain: Domain, problem: Problem, options: ModelOptions
+) -> ListedTask:
     """From one reachable state to another one that is far from it, or to some of its literals."""
     loaded = build(domain, [problem], options)
     codec = loaded.model.codec
@@ -95,7 +108,10 @@ def long_task(random: Random, domain: Domain, problem: Problem, options: ModelOp
     farthest: list[tuple[int, int, list[int]]] = []
     for start in random.sample(range(len(space)), min(8, len(space))):
         layer, seen, depth = [start], {start}, 0
-        while after := sorted({t for s in layer for t in space.target[space.first[s] : space.first[s + 1]].tolist()} - seen):
+        while after := sorted(
+            {t for s in layer for t in space.target[space.first[s] : space.first[s + 1]].tolist()}
+            - seen
+        ):
             layer, depth = after, depth + 1
             seen.update(layer)
         farthest.append((depth, start, layer))
@@ -118,7 +134,10 @@ def by_sentence(spoken: Spoken) -> dict[tuple[str, ...], set[Plan]]:
     keys = [space.model.codec.key(row) for row in space.rows]
     groups: dict[tuple[str, ...], set[Plan]] = {}
     for plan in listed(space, spoken.task, MOST):
-        words = [language.states.get(keys[s], language.default) for s in Plans(space, spoken.start, []).states(plan)]
+        words = [
+            language.states.get(keys[s], language.default)
+            for s in Plans(space, spoken.start, []).states(plan)
+        ]
         said = tuple(word for n, word in enumerate(words) if n == 0 or word != words[n - 1])
         groups.setdefault(said, set()).add(plan)
     return groups

@@ -1,8 +1,10 @@
-"""Random models in which several robots have something to choose: which chores, and in which order; tools are few.
+"""Random models in which several robots have something to choose: which chores, and in which order;
+tools are few.
 
-Each robot has a few things to get done, each by one or by either of two chores.  No two chores with one tool can be done in
-one step; a chore may have to wait for another one, of any robot, and may undo one.  Small random models and graphs leave
-several robots with several subplans only now and then; these do it often.
+Each robot has a few things to get done, each by one or by either of two chores.  No two chores with
+one tool can be done in one step; a chore may have to wait for another one, of any robot, and may
+undo one.  Small random models and graphs leave several robots with several subplans only now and
+then; these do it often.
 """
 
 from __future__ import annotations
@@ -40,7 +42,12 @@ def random_chores(seed: int, robots: int) -> tuple[Domain, Problem, ModelOptions
                 facts += [f"(mine {robot} {chores[-1]})", f"(gets {chores[-1]} {things[-1]})"]
                 tool[chores[-1]] = random.randrange(tools)
     facts += [f"(clash {c} {d})" for c in chores for d in chores if c != d and tool[c] == tool[d]]
-    facts += [f"(before {c} {d})" for n, d in enumerate(chores) for c in chores[:n] if random.random() < 0.08]
+    facts += [
+        f"(before {c} {d})"
+        for n, d in enumerate(chores)
+        for c in chores[:n]
+        if random.random() < 0.08
+    ]
     if random.random() < 0.3 and len(chores) > 1:
         facts.append(f"(undoes {' '.join(random.sample(chores, 2))})")
     goal = [f"(got {t})" for t in things if random.random() < 0.9]

@@ -1,4 +1,6 @@
-"""The least automaton of any layered graph, however nondeterministic: far more so than robots' plans are."""
+"""The least automaton of any layered graph, however nondeterministic: far more so than robots'
+plans are.
+"""
 
 from __future__ import annotations
 
@@ -15,13 +17,23 @@ Word = tuple[int, ...]
 
 
 def random_graph(random: Random) -> tuple[PlanSpace, list[list[tuple[int, int]]], list[int]]:
-    """A plan space with made-up edges of one robot; its edges (label, target) by node; its true facts by node."""
+    """A plan space with made-up edges of one robot; its edges (label, target) by node; its true
+    facts by node.
+    """
     width, depth, labels = random.randint(1, 4), random.randint(0, 4), random.randint(1, 3)
-    tables: list[list[set[tuple[int, int]]]] = []  # from the start on: (label, number in the next layer)
+    tables: list[
+        list[set[tuple[int, int]]]
+    ] = []  # from the start on: (label, number in the next layer)
     size = 1
     for _ in range(depth):
         after = random.randint(1, width)
-        rows = [{(random.randrange(labels), random.randrange(after)) for _ in range(random.randint(1, 4))} for _ in range(size)]
+        rows = [
+            {
+                (random.randrange(labels), random.randrange(after))
+                for _ in range(random.randint(1, 4))
+            }
+            for _ in range(size)
+        ]
         used = sorted({to for row in rows for _, to in row})
         tables.append([{(label, used.index(to)) for label, to in row} for row in rows])
         size = len(used)
@@ -35,11 +47,19 @@ def random_graph(random: Random) -> tuple[PlanSpace, list[list[tuple[int, int]]]
     facts = [random.choice([0, 1, 3, 3, 3, 3]) for _ in edges]
     flat = [edge for own in edges for edge in own]
     space = PlanSpace(
-        model=None, rows=np.zeros((0, 1), np.uint64), state=np.arange(len(edges)), goal=np.zeros(len(edges), np.int64),
-        layer=np.repeat(np.arange(len(sizes)), sizes[::-1]), first=np.cumsum([0, *map(len, edges)]),
-        target=np.array([to for _, to in flat], np.int64), labels=np.array([[label] for label, _ in flat], np.int32).reshape(-1, 1),
-        cost=np.zeros(len(flat), np.int64), goals=(), starts=np.array([len(edges) - 1]), second=np.array([0]),
-    )  # fmt: skip
+        model=None,
+        rows=np.zeros((0, 1), np.uint64),
+        state=np.arange(len(edges)),
+        goal=np.zeros(len(edges), np.int64),
+        layer=np.repeat(np.arange(len(sizes)), sizes[::-1]),
+        first=np.cumsum([0, *map(len, edges)]),
+        target=np.array([to for _, to in flat], np.int64),
+        labels=np.array([[label] for label, _ in flat], np.int32).reshape(-1, 1),
+        cost=np.zeros(len(flat), np.int64),
+        goals=(),
+        starts=np.array([len(edges) - 1]),
+        second=np.array([0]),
+    )
     return space, edges, facts
 
 
@@ -54,7 +74,14 @@ def words(edges: list[list[tuple[int, int]]], depth: int) -> list[set[Word]]:
     """The beginnings of each length."""
     found: list[set[Word]] = [{()}]
     for _ in range(depth):
-        found.append({(*w, label) for w in found[-1] for node in reached(edges, w) for label, _ in edges[node]})
+        found.append(
+            {
+                (*w, label)
+                for w in found[-1]
+                for node in reached(edges, w)
+                for label, _ in edges[node]
+            }
+        )
     return found
 
 
@@ -88,14 +115,24 @@ def test_least_automaton_of_any_graph(annotated: bool) -> None:
             for word in here:
                 state = at(automaton, word)
                 assert automaton.step_of(state) == step
-                assert {label for label, _ in automaton.moves(state)} == {w[step] for w in whole if w[:step] == word and step < depth}
+                assert {label for label, _ in automaton.moves(state)} == {
+                    w[step] for w in whole if w[:step] == word and step < depth
+                }
                 assert automaton.left[state] == sum(w[:step] == word for w in whole)
                 if annotated:
                     assert automaton.known[state] == known(edges, facts, word)
-                futures.add(frozenset(
-                    (w[step:], tuple(known(edges, facts, w[:k]) for k in range(step, depth + 1)) if annotated else ())
-                    for w in whole if w[:step] == word
-                ))  # fmt: skip
+                futures.add(
+                    frozenset(
+                        (
+                            w[step:],
+                            tuple(known(edges, facts, w[:k]) for k in range(step, depth + 1))
+                            if annotated
+                            else (),
+                        )
+                        for w in whole
+                        if w[:step] == word
+                    )
+                )
                 subsets.add(frozenset(reached(edges, word)))
         assert len(automaton) == len(futures)
         seen["merged"] += len(subsets) > len(futures)

@@ -1,4 +1,6 @@
-"""A robot's choices against the definition: every combination is optimal, and no subplan is left out."""
+"""A robot's choices against the definition: every combination is optimal, and no subplan is left
+out.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,12 @@ from tests.use.random_chores import DOMAIN, random_chores
 #: Robots -> (plans of one task, combinations of one sentence) that the twin lists at most.
 SIZES = {2: (200, 400), 3: (120, 400)}
 #: (robots, random models): a few always, many with ``-m slow``.
-RUNS = [(2, 20), (3, 16), pytest.param(2, 400, marks=pytest.mark.slow), pytest.param(3, 250, marks=pytest.mark.slow)]
+RUNS = [
+    (2, 20),
+    (3, 16),
+    pytest.param(2, 400, marks=pytest.mark.slow),
+    pytest.param(3, 250, marks=pytest.mark.slow),
+]
 
 
 class Unsuitable(Exception):
@@ -49,7 +56,9 @@ _TASKS = 8
 
 
 def candidates_of(seed: int, robots: int) -> Candidates:
-    """A random model with all pairs of its states, or with one task and a partial goal; half of them chores."""
+    """A random model with all pairs of its states, or with one task and a partial goal; half of
+    them chores.
+    """
     chores = seed % 2 == 0
     domain, problem, options = (random_chores if chores else random_model)(seed, robots)
     if seed % 5 == 0:
@@ -72,10 +81,14 @@ def tasks_of(candidates: Candidates, seed: int) -> list[tuple[PlanSpace, int]]:
 
 
 def spoken_in(seed: int, robots: int) -> Iterator[Spoken]:
-    """A built and verified language in some of its candidate tasks; most of them with as few words as merging gives."""
+    """A built and verified language in some of its candidate tasks; most of them with as few words
+    as merging gives.
+    """
     candidates = candidates_of(seed, robots)
     small = len(candidates.rows) <= 8
-    method = ["greedy", "minimal" if small else "greedy", "exhaustive" if small else "greedy"][seed // 7 % 3]
+    method = ["greedy", "minimal" if small else "greedy", "exhaustive" if small else "greedy"][
+        seed // 7 % 3
+    ]
     try:
         language = build_language(candidates, method).language
     except Inseparable:
@@ -88,12 +101,18 @@ def spoken_in(seed: int, robots: int) -> Iterator[Spoken]:
 
 
 def merged(table: WordTable, candidates: Candidates, seed: int) -> WordTable:
-    """Words merged at random as long as it stays a language: sentences then leave more open, and mix more."""
+    """Words merged at random as long as it stays a language: sentences then leave more open, and
+    mix more.
+    """
     words = list(range(len(table.words)))
     pairs = list(combinations(words, 2))
     Random(seed).shuffle(pairs)
     for a, b in pairs[: 40 if len(candidates.model.robots) == 2 else 12]:
-        coarser = replace(table, word=np.where(table.word == b, a, table.word), default=a if table.default == b else table.default)
+        coarser = replace(
+            table,
+            word=np.where(table.word == b, a, table.word),
+            default=a if table.default == b else table.default,
+        )
         if verify(coarser, candidates.spaces).holds:
             table = coarser
     return table
@@ -110,7 +129,9 @@ def at_random(seed: int, robots: int) -> Iterator[Spoken]:
         yield Spoken(None, table, space, task, word[space.state], True)  # type: ignore[arg-type]
 
 
-def with_twins(make: Callable[[int, int], Iterator[Spoken]], robots: int, models: int) -> Iterator[tuple[int, Spoken, tuple[int, ...], Listed]]:
+def with_twins(
+    make: Callable[[int, int], Iterator[Spoken]], robots: int, models: int
+) -> Iterator[tuple[int, Spoken, tuple[int, ...], Listed]]:
     """(seed, task, sentence, what is listed of it) over many random models."""
     for seed in range(models):
         with suppress(Unsuitable):
@@ -125,7 +146,9 @@ def moves(automaton: Automaton) -> list[dict[int, int]]:
 
 
 def check_automata(found: Choices, twin: Listed) -> None:
-    """Each automaton accepts exactly the robot's own parts, is deterministic, and the least that knows what it knows."""
+    """Each automaton accepts exactly the robot's own parts, is deterministic, and the least that
+    knows what it knows.
+    """
     facts = found.spoken.model.codec.facts
     for own, parts in zip(found.robots, twin.own, strict=True):
         automaton = own.automaton
@@ -156,7 +179,9 @@ def check_automata(found: Choices, twin: Listed) -> None:
 
 
 def check_combinations(found: Choices, twin: Listed) -> None:
-    """Every combination of choices, stepped through all robots' monitors, is an optimal plan; they allow no others."""
+    """Every combination of choices, stepped through all robots' monitors, is an optimal plan; they
+    allow no others.
+    """
     labels = found.spoken.model.labels
     robots = found.spoken.model.robots
     for chosen in product(*(accepted(moves(own.automaton)) for own in found.robots)):
@@ -201,7 +226,9 @@ def test_every_combination_is_optimal(robots: int, models: int) -> None:
 
 @pytest.mark.parametrize(("robots", "models"), RUNS)
 def test_a_broken_language_is_found_out(robots: int, models: int) -> None:
-    """Under any partition the walk agrees with the list; where that says no, the property above fails."""
+    """Under any partition the walk agrees with the list; where that says no, the property above
+    fails.
+    """
     seen: Counter[bool] = Counter()
     for _, spoken, words, twin in with_twins(at_random, robots, models):
         found = choices(spoken, words)
@@ -218,7 +245,9 @@ def test_a_broken_language_is_found_out(robots: int, models: int) -> None:
 
 
 def check_violation(found: Choices, twin: Listed) -> None:
-    """What is shown: plans with the sentence, whose mixture is no optimal plan, and breaks where it says."""
+    """What is shown: plans with the sentence, whose mixture is no optimal plan, and breaks where it
+    says.
+    """
     assert found.mixtures is not None
     shown = found.mixtures.violation
     assert shown is not None
@@ -235,7 +264,9 @@ def check_violation(found: Choices, twin: Listed) -> None:
 
 @pytest.mark.parametrize(("robots", "models"), RUNS)
 def test_own_atoms_are_known(robots: int, models: int) -> None:
-    """Without all combinations: what the own subactions say is true in every mixture, and nothing else is said."""
+    """Without all combinations: what the own subactions say is true in every mixture, and nothing
+    else is said.
+    """
     seen: Counter[str] = Counter()
     for _, spoken, words, twin in with_twins(at_random, robots, models):
         if not twin.mixes:
@@ -259,7 +290,13 @@ def check_own_atoms(spoken: Spoken, own: RobotChoices, twin: Listed, seen: Count
         for step, label in enumerate((*part, None)):
             true, possible = own.automaton.known[state]
             for number, fact in enumerate(facts):
-                says = "true" if true >> number & 1 else "unknown" if possible >> number & 1 else "false"
+                says = (
+                    "true"
+                    if true >> number & 1
+                    else "unknown"
+                    if possible >> number & 1
+                    else "false"
+                )
                 seen[says] += 1
                 assert (says == "unknown") == (not mask >> number & 1)
                 assert says == "unknown" or fact in known[part[:step]][says == "false"]
@@ -269,12 +306,27 @@ def check_own_atoms(spoken: Spoken, own: RobotChoices, twin: Listed, seen: Count
 
 #: Every shipped domain; with three robots where there are some.
 SHIPPED = [
-    ("three-cells", "problem"), ("t-map", "problem"), ("corridor", "problem"), ("grid", "corners-3x3"),
-    ("grid", "three-robots-3x3"), ("grid-joint", "corners-3x3"), ("grid-joint", "t-map"), ("handover", "exchange"),
-    ("handover", "three-rooms"), ("two-arms", "*"), ("push-box", "around"), ("push-box", "three-robots"), ("tray", "*"),
-    ("vans", "*"), ("lock", "let-in"), ("lock", "three-robots"), ("charger", "queue"), ("charger", "three-robots"),
-    ("elevator", "two-calls"), ("elevator", "same-floor"),
-]  # fmt: skip
+    ("three-cells", "problem"),
+    ("t-map", "problem"),
+    ("corridor", "problem"),
+    ("grid", "corners-3x3"),
+    ("grid", "three-robots-3x3"),
+    ("grid-joint", "corners-3x3"),
+    ("grid-joint", "t-map"),
+    ("handover", "exchange"),
+    ("handover", "three-rooms"),
+    ("two-arms", "*"),
+    ("push-box", "around"),
+    ("push-box", "three-robots"),
+    ("tray", "*"),
+    ("vans", "*"),
+    ("lock", "let-in"),
+    ("lock", "three-robots"),
+    ("charger", "queue"),
+    ("charger", "three-robots"),
+    ("elevator", "two-calls"),
+    ("elevator", "same-floor"),
+]
 
 
 def shipped(folder: str, name: str) -> Iterator[Spoken]:
@@ -313,14 +365,21 @@ def test_shipped_domains(folder: str, name: str) -> None:
         if not twins:
             plan = next(iter(Plans.of(spoken.space, spoken.task)))
             states = Plans(spoken.space, spoken.start, []).states(plan)
-            words = naive.sentence([int(spoken.table.of_rows(spoken.space.rows[[s]])[0]) for s in states])
+            words = naive.sentence(
+                [int(spoken.table.of_rows(spoken.space.rows[[s]])[0]) for s in states]
+            )
             assert choices(spoken, words).guaranteed
     assert robots == 3 or not name.startswith("three-robots")
 
 
-@pytest.mark.parametrize(("folder", "name"), [("elevator", "*"), ("tray", "*"), ("grid-joint", "gw1-2x2"), ("handover", "exchange")])
+@pytest.mark.parametrize(
+    ("folder", "name"),
+    [("elevator", "*"), ("tray", "*"), ("grid-joint", "gw1-2x2"), ("handover", "exchange")],
+)
 def test_own_atoms_of_shipped_domains(folder: str, name: str) -> None:
-    """Conditional effects, whole joint actions and shared subactions: what is said to be known is known."""
+    """Conditional effects, whole joint actions and shared subactions: what is said to be known is
+    known.
+    """
     seen: Counter[str] = Counter()
     for spoken in shipped(folder, name):
         with suppress(naive.TooLarge):
@@ -349,9 +408,9 @@ def test_all_tasks_of_the_t_map() -> None:
 
 @pytest.mark.parametrize("robots", [2, 3])
 def test_choices_may_leave_the_sentence(robots: int) -> None:
-    """Each robot has two things to do, in any order, and the word says whether an even number of robots began with the
-    second.  The sentence leaves half of the plans open, and yet each robot both orders: every combination is optimal,
-    and half of them have the other sentence.
+    """Each robot has two things to do, in any order, and the word says whether an even number of
+    robots began with the second.  The sentence leaves half of the plans open, and yet each robot
+    both orders: every combination is optimal, and half of them have the other sentence.
     """
     names = [f"r{n}" for n in range(robots)]
     items = [(r, f"{r}{x}") for r in names for x in "ab"]
@@ -364,7 +423,10 @@ def test_choices_may_leave_the_sentence(robots: int) -> None:
     domain = parse_domain(Source("d", DOMAIN))
     candidates = from_problems(domain, [parse_problem(Source("p", text), domain)])
     space, codec = candidates.spaces[0], candidates.model.codec
-    begun = [{fact for fact in codec.decode(row) if fact.startswith("(done") and fact.endswith("b)")} for row in space.rows]
+    begun = [
+        {fact for fact in codec.decode(row) if fact.startswith("(done") and fact.endswith("b)")}
+        for row in space.rows
+    ]
     layer = dict(zip(space.state.tolist(), space.layer.tolist(), strict=True))
     word = np.array([1 + len(begun[s]) % 2 if layer[s] == 1 else 0 for s in range(len(space.rows))])
     table = WordTable(("start", "even", "odd"), space.rows, word, 0)
@@ -382,11 +444,15 @@ def test_too_many_are_refused_with_an_estimate(monkeypatch: pytest.MonkeyPatch) 
     spoken = next(shipped("grid", "corners-4x4"))
     words = spoken.words_of(sentence_of(spoken))
     fits = fitting(spoken, words)
-    with pytest.raises(OutOfMemory, match=r"after 1 of 6 steps their subsets have 1 members, at this rate about"):
+    with pytest.raises(
+        OutOfMemory, match=r"after 1 of 6 steps their subsets have 1 members, at this rate about"
+    ):
         determinise(fits, 0, most=0)
     monkeypatch.setattr("coordlang.use.choices.mixtures._SMALL", 0)
     monkeypatch.setattr("coordlang.use.choices.mixtures.memory_left", lambda: 0)
-    with pytest.raises(OutOfMemory, match=r"step 1 has \d+ combinations of what the robots may do") as caught:
+    with pytest.raises(
+        OutOfMemory, match=r"step 1 has \d+ combinations of what the robots may do"
+    ) as caught:
         choices(spoken, words, most=None)
     assert caught.value.exit_code == 22
     assert choices(spoken, words).mixtures is None

@@ -1,4 +1,6 @@
-"""What is exported against the definition: the plans that fit, listed; the formula, evaluated on plans."""
+"""What is exported against the definition: the plans that fit, listed; the formula, evaluated on
+plans.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +46,8 @@ BOTH = pytest.mark.parametrize("lot", ["few", pytest.param("many", marks=pytest.
 
 
 def random_spoken(seed: int) -> Spoken | None:
-    """A random task with a random partition of its reachable states, some of them left to the default.
+    """A random task with a random partition of its reachable states, some of them left to the
+    default.
 
     None where there is nothing to say, or too much to list.
     """
@@ -74,7 +77,9 @@ def random_spoken(seed: int) -> Spoken | None:
     else:
         word = [random.choice(words) for _ in keys]
     states = {key: w for key, w in zip(keys, word, strict=True) if random.random() < 0.9}
-    language = Language(words, states, words[-1], model.robots, Guarantee("random", 1, 1, False), {}, {}, {}, {})
+    language = Language(
+        words, states, words[-1], model.robots, Guarantee("random", 1, 1, False), {}, {}, {}, {}
+    )
     return next(speak_candidates(language, candidates))
 
 
@@ -88,7 +93,9 @@ def rich() -> Spoken:
     """A task with several sentences, one of which has several words and leaves several plans open."""
     for spoken in tasks("few"):
         sentences = by_sentence(spoken)
-        if len(sentences) > 1 and any(len(plans) > 1 and len(words) > 1 for words, plans in sentences.items()):
+        if len(sentences) > 1 and any(
+            len(plans) > 1 and len(words) > 1 for words, plans in sentences.items()
+        ):
             return spoken
     raise AssertionError("no such task")
 
@@ -121,7 +128,9 @@ def test_the_optimal_plans_are_the_plans_that_fit(lot: str) -> None:
 
 
 def test_the_random_tasks_are_worth_it() -> None:
-    """Some have several sentences, some sentences leave several plans open; some remember actions, some have three robots."""
+    """Some have several sentences, some sentences leave several plans open; some remember actions,
+    some have three robots.
+    """
     listed = [(spoken, by_sentence(spoken)) for spoken in tasks("few")]
     both = [any(len(p) > 1 for p in found.values()) for _, found in listed if len(found) > 1]
     assert (len(listed) >= 20, len(both) >= 4, sum(both) >= 3) == (True, True, True)
@@ -139,7 +148,12 @@ def test_one_term_in_every_state(lot: str) -> None:
         exact, tree = membership(spoken), membership(spoken, states=0)
         for found, most in ((exact, 1), (tree, 1), (membership(spoken, apart=False), len(rows))):
             for state, word in zip(states, words, strict=True):
-                true = [n for n, terms in enumerate(found.terms) for term in terms if satisfied(term, state)]
+                true = [
+                    n
+                    for n, terms in enumerate(found.terms)
+                    for term in terms
+                    if satisfied(term, state)
+                ]
                 assert set(true) == {word}
                 assert len(true) <= most
         assert tree.size <= len(set(states))
@@ -157,7 +171,8 @@ def test_a_word_named_in_two_ways_would_be_noticed(monkeypatch: pytest.MonkeyPat
     assert len(planned(export_pddl(rich(), words))) > len(plans)
 
 
-# LTLf by definition (De Giacomo and Vardi 2013): a formula is true at a place of a finite sequence of states.
+# LTLf by definition (De Giacomo and Vardi 2013): a formula is true at a place of a finite sequence
+# of states.
 
 
 def parse(text: str) -> tuple[object, ...]:
@@ -206,7 +221,9 @@ def symbols_in(spoken: Spoken, plan: Plan, symbols: dict[str, str]) -> list[froz
     """The states of a plan as the sets of symbols that hold."""
     plans = Plans.of(spoken.space, spoken.task)
     states = [set(spoken.model.codec.decode(spoken.space.rows[n])) for n in plans.states(plan)]
-    return [frozenset(symbol for symbol, atom in symbols.items() if atom in state) for state in states]
+    return [
+        frozenset(symbol for symbol, atom in symbols.items() if atom in state) for state in states
+    ]
 
 
 @BOTH
@@ -236,14 +253,18 @@ def test_no_word_may_be_skipped(t_map: tuple[Path, Path]) -> None:
     for words in sentences:
         exported = export_ltlf(spoken, words)
         held = {
-            other: true_at(parse(exported.formula), symbols_in(spoken, min(plans), exported.symbols), 0)
+            other: true_at(
+                parse(exported.formula), symbols_in(spoken, min(plans), exported.symbols), 0
+            )
             for other, plans in sentences.items()
         }
         assert held == {other: other == words for other in sentences}
 
 
 def test_an_independent_library_says_the_same() -> None:
-    parser = pytest.importorskip("flloat.parser.ltlf", reason="flloat is not installed").LTLfParser()
+    parser = pytest.importorskip(
+        "flloat.parser.ltlf", reason="flloat is not installed"
+    ).LTLfParser()
     answers = Counter[bool]()
     for spoken in tasks("few"):
         sentences = by_sentence(spoken)
@@ -252,7 +273,9 @@ def test_an_independent_library_says_the_same() -> None:
             formula = parser(exported.formula)
             for other, plans in islice(sentences.items(), 4):
                 states = symbols_in(spoken, min(plans), exported.symbols)
-                trace = [{symbol: symbol in state for symbol in exported.symbols} for state in states]
+                trace = [
+                    {symbol: symbol in state for symbol in exported.symbols} for state in states
+                ]
                 answers[held := bool(formula.truth(trace, 0))] += 1
                 assert held == (other == words)
     assert min(answers[True], answers[False]) > 5
@@ -266,11 +289,23 @@ def test_the_formula_over_words_is_the_same_with_their_formulas() -> None:
 
 
 def test_symbols_are_readable_and_stay_apart() -> None:
-    texts = ["(at r1 c0-1)", "(at r1 c0_1)", "(last r1 none)", "(true)", "(#)", "(END)", "(9)", "(f)"]
+    texts = [
+        "(at r1 c0-1)",
+        "(at r1 c0_1)",
+        "(last r1 none)",
+        "(true)",
+        "(#)",
+        "(END)",
+        "(9)",
+        "(f)",
+    ]
     found = symbols_of(texts)
     assert found[:3] == ["at_r1_c0_1", "at_r1_c0_1__2", "p_last_r1_none"]
     assert len(set(found)) == len(texts)
-    assert all(re.fullmatch(r"[a-z][a-z0-9_]*", s) and not s.startswith(("true", "end", "last")) for s in found)
+    assert all(
+        re.fullmatch(r"[a-z][a-z0-9_]*", s) and not s.startswith(("true", "end", "last"))
+        for s in found
+    )
 
 
 def test_a_sentence_that_no_plan_has() -> None:
@@ -328,7 +363,9 @@ def solve(folder: Path) -> tuple[str, list[str]]:
 
     up.environment.get_environment().credits_stream = None
     problem = PDDLReader().parse_problem(str(folder / "domain.pddl"), str(folder / "problem.pddl"))
-    with up.environment.get_environment().factory.OneshotPlanner(name="fast-downward-opt") as planner:
+    with up.environment.get_environment().factory.OneshotPlanner(
+        name="fast-downward-opt"
+    ) as planner:
         planner._fd_translate_options = ["--invariant-generation-max-time", "0"]
         answer = planner.solve(problem)
     assert answer.status == Status.SOLVED_OPTIMALLY
@@ -344,15 +381,24 @@ def test_out_to_fast_downward_and_back(
         assert (done.code, done.err) == (0, "")
         assert ("explicit" if limit else "select-then-apply") in done.out
         names = solve(folder)
-        (tmp_path / "sas_plan").write_text("".join(f"({name} )\n" for name in names) + "; cost = 4 (general cost)\n")
-        back = coordlang("export", minimal, *t_map, SENTENCE, "--limit", limit, "--back", tmp_path / "sas_plan")
+        (tmp_path / "sas_plan").write_text(
+            "".join(f"({name} )\n" for name in names) + "; cost = 4 (general cost)\n"
+        )
+        back = coordlang(
+            "export", minimal, *t_map, SENTENCE, "--limit", limit, "--back", tmp_path / "sas_plan"
+        )
         assert back.code == 0
         assert back.out.splitlines()[0] == "0: (move r2 c1-0 c1-1)"
         assert back.out.endswith("; makespan = 4\n")
-        assert back.out == coordlang("plans", *t_map, "--max", 1).out.split("\n", 1)[1].rstrip("\n") + "\n"
+        assert (
+            back.out
+            == coordlang("plans", *t_map, "--max", 1).out.split("\n", 1)[1].rstrip("\n") + "\n"
+        )
 
 
-def test_the_command_as_json(coordlang: Command, t_map: tuple[Path, Path], minimal: Path, tmp_path: Path) -> None:
+def test_the_command_as_json(
+    coordlang: Command, t_map: tuple[Path, Path], minimal: Path, tmp_path: Path
+) -> None:
     data = json.loads(coordlang("export", minimal, *t_map, SENTENCE, "--json").out)
     plain = coordlang("export", minimal, *t_map, SENTENCE)
     assert plain.out == data["domain"] + data["problem"]
@@ -360,10 +406,17 @@ def test_the_command_as_json(coordlang: Command, t_map: tuple[Path, Path], minim
     assert data["robots"] == ["r1", "r2"]
     assert {"r1": "(move r1 c0-1 c1-1)", "r2": None} in data["actions"].values()
     assert {} in data["actions"].values()
-    formula = json.loads(coordlang("export", minimal, *t_map, SENTENCE, "--to", "ltlf", "--json").out)
+    formula = json.loads(
+        coordlang("export", minimal, *t_map, SENTENCE, "--to", "ltlf", "--json").out
+    )
     assert formula["over_words"] == "(w0 & (w0 U (w2 & (w2 U (w1 & (w1 U G(w0)))))))"
-    assert coordlang("export", minimal, *t_map, SENTENCE, "--to", "ltlf").out == formula["formula"] + "\n"
-    written = coordlang("export", minimal, *t_map, SENTENCE, "--to", "ltlf", "-o", tmp_path / "sentence.ltlf")
+    assert (
+        coordlang("export", minimal, *t_map, SENTENCE, "--to", "ltlf").out
+        == formula["formula"] + "\n"
+    )
+    written = coordlang(
+        "export", minimal, *t_map, SENTENCE, "--to", "ltlf", "-o", tmp_path / "sentence.ltlf"
+    )
     assert (written.code, written.out) == (0, "")
     assert (tmp_path / "sentence.ltlf").read_text() == formula["formula"] + "\n"
 
@@ -403,10 +456,15 @@ def test_wrong_arguments(
 
 
 def test_a_task_that_the_language_does_not_cover(coordlang: Command, tmp_path: Path) -> None:
-    domain, problem = DOMAINS / "three-cells" / "domain.pddl", DOMAINS / "three-cells" / "problem.pddl"
+    domain, problem = (
+        DOMAINS / "three-cells" / "domain.pddl",
+        DOMAINS / "three-cells" / "problem.pddl",
+    )
     language, other = tmp_path / "language.json", tmp_path / "other.pddl"
     assert coordlang("build", domain, problem, "-o", language).code == 0
-    other.write_text(re.sub(r"\(:goal.*", "(:goal (at r1 c)))", problem.read_text(), flags=re.DOTALL))
+    other.write_text(
+        re.sub(r"\(:goal.*", "(:goal (at r1 c)))", problem.read_text(), flags=re.DOTALL)
+    )
     done = coordlang("export", language, domain, other, "w1 w0", "-o", tmp_path / "out")
     assert (done.code, "guarantees nothing" in done.err) == (1, True), done.err
     assert (tmp_path / "out" / "domain.pddl").exists()
@@ -436,13 +494,25 @@ def test_the_table_without_other_planners(export_counts: ModuleType) -> None:
 
 
 FOLDERS = [
-    "charger", "corridor", "elevator", "handover", "lock", "push-box", "t-map", "three-cells", "tray", "two-arms", "vans"
-]  # fmt: skip
+    "charger",
+    "corridor",
+    "elevator",
+    "handover",
+    "lock",
+    "push-box",
+    "t-map",
+    "three-cells",
+    "tray",
+    "two-arms",
+    "vans",
+]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("folder", FOLDERS)
-def test_other_planners_find_exactly_the_plans_that_fit(folder: str, export_counts: ModuleType) -> None:
+def test_other_planners_find_exactly_the_plans_that_fit(
+    folder: str, export_counts: ModuleType
+) -> None:
     pytest.importorskip("kstar_planner", reason="K* is not installed (extra oracles)")
     rows = [*export_counts.rows([folder], 300.0)]
     assert rows

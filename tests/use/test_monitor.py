@@ -1,4 +1,6 @@
-"""The run-time monitor: its answers against the definition, over all own subplans and all mixtures; its files."""
+"""The run-time monitor: its answers against the definition, over all own subplans and all mixtures;
+its files.
+"""
 
 from __future__ import annotations
 
@@ -49,8 +51,12 @@ def texts(spoken: Spoken, robot: int, own: Own) -> list[str | None]:
     return [spoken.model.labels[robot][label] if label else None for label in own]
 
 
-def random_detour(random: Random, spoken: Spoken, robot: int, left: set[Own], known: dict[Own, Known]) -> Detour:
-    """What tells two of the subplans that are left apart, or anything else; each kind not at all, once or twice."""
+def random_detour(
+    random: Random, spoken: Spoken, robot: int, left: set[Own], known: dict[Own, Known]
+) -> Detour:
+    """What tells two of the subplans that are left apart, or anything else; each kind not at all,
+    once or twice.
+    """
     one, other = random.choice(sorted(left)), random.choice(sorted(left))
 
     def some(of: set[str], elsewhere: set[str]) -> tuple[str, ...]:
@@ -59,7 +65,11 @@ def random_detour(random: Random, spoken: Spoken, robot: int, left: set[Own], kn
 
     def done(own: Own) -> set[str]:
         found = {text or "idle" for text in texts(spoken, robot, own)}
-        return found | ({f"{text.rsplit(' ', 1)[0]} *)" for text in found if " " in text} if random.random() < 0.3 else set())
+        return found | (
+            {f"{text.rsplit(' ', 1)[0]} *)" for text in found if " " in text}
+            if random.random() < 0.3
+            else set()
+        )
 
     def along(own: Own, value: int) -> list[frozenset[str]]:
         return [known[own[:step]][value] for step in range(len(own) + 1)]
@@ -99,7 +109,9 @@ def stepped(at: Monitor, text: str | None) -> Monitor:
 
 @pytest.mark.parametrize(("robots", "models"), RUNS)
 def test_detours_against_the_definition(robots: int, models: int) -> None:
-    """After a random beginning, two random detours one after the other: asked, then promised, then walked."""
+    """After a random beginning, two random detours one after the other: asked, then promised, then
+    walked.
+    """
     seen: Counter[str] = Counter()
     for seed, spoken, words, twin in with_twins(spoken_in, robots, models):
         random = Random(seed)
@@ -112,9 +124,17 @@ def test_detours_against_the_definition(robots: int, models: int) -> None:
 
 
 def check_detours(
-    random: Random, spoken: Spoken, twin: Listed, at: Monitor, robot: int, known: dict[Own, Known], seen: Counter[str]
+    random: Random,
+    spoken: Spoken,
+    twin: Listed,
+    at: Monitor,
+    robot: int,
+    known: dict[Own, Known],
+    seen: Counter[str],
 ) -> None:
-    """Promise, step, promise again: the answer, its witness, its count, and what is allowed then are by definition."""
+    """Promise, step, promise again: the answer, its witness, its count, and what is allowed then
+    are by definition.
+    """
     left = set(twin.own[robot])
     here = 0
     for _ in range(2):
@@ -126,7 +146,9 @@ def check_detours(
         left = {own for own in left if own[:here] == chosen[:here]}
         for number, fact in enumerate(spoken.model.codec.facts):
             true, false = known[chosen[:here]]
-            assert at.known(fact) == (True if fact in true else False if fact in false else None), number
+            assert at.known(fact) == (True if fact in true else False if fact in false else None), (
+                number
+            )
         detour = random_detour(random, spoken, robot, left, known)
         expected = twin.fulfilling(robot, chosen[:here], detour, known) & left
         answer = at.can(detour)
@@ -156,10 +178,16 @@ def test_monitor_by_hand(three_cells: Choices) -> None:
     assert at.known("(at r2 b)") is True
     assert at.can(visit="(at r2 b)", avoid="(at r2 c)")
     assert not at.can(never=None)
-    assert at.can(never="(move r2 * c)", visit=["(at r2 a)", "(at r2 b)"]).subplan == (None, "(move r2 b a)")
+    assert at.can(never="(move r2 * c)", visit=["(at r2 a)", "(at r2 b)"]).subplan == (
+        None,
+        "(move r2 b a)",
+    )
     assert not at.can(do="(move r2 b c)")
     assert at.can(do=["idle", "(move r2 * a)"]).subplans == 2
-    with pytest.raises(NotAllowed, match=r"step 1: r2 may not do \(move r2 b c\); it may do idle or \(move r2 b a\)") as caught:
+    with pytest.raises(
+        NotAllowed,
+        match=r"step 1: r2 may not do \(move r2 b c\); it may do idle or \(move r2 b a\)",
+    ) as caught:
         at.did("(move r2 b c)")
     assert (caught.value.step, caught.value.allowed) == (0, (None, "(move r2 b a)"))
     assert (at.step, at.remaining, at.history) == (0, 2, ())
@@ -178,7 +206,9 @@ def test_monitor_by_hand(three_cells: Choices) -> None:
 
 
 def test_a_promise_is_kept(corridor: Choices) -> None:
-    """In the corridor somebody has a detour to choose; a promise narrows what is allowed, step by step."""
+    """In the corridor somebody has a detour to choose; a promise narrows what is allowed, step by
+    step.
+    """
     for robot in corridor.spoken.model.robots:
         at = monitor(corridor, robot)
         if at.remaining > 1:
@@ -199,9 +229,13 @@ def test_a_promise_is_kept(corridor: Choices) -> None:
 
 def test_messages(three_cells: Choices) -> None:
     at = monitor(three_cells, "r1")
-    with pytest.raises(MonitorError, match=r"\(at r9 a\) is no atom that can change: there are \(at r1 a\), "):
+    with pytest.raises(
+        MonitorError, match=r"\(at r9 a\) is no atom that can change: there are \(at r1 a\), "
+    ):
         at.can(visit="(at r9 a)")
-    with pytest.raises(MonitorError, match=r"\(free a\) is no atom that can change: none is \(free \.\.\)"):
+    with pytest.raises(
+        MonitorError, match=r"\(free a\) is no atom that can change: none is \(free \.\.\)"
+    ):
         at.known("(free a)")
     with pytest.raises(MonitorError, match=r"'at r1 a' is no PDDL text"):
         at.can(avoid="at r1 a")
@@ -230,7 +264,10 @@ def test_a_robot_can_carry_it(three_cells: Choices, tmp_path: Path) -> None:
         "third = [m for m in sys.modules if m.split('.')[0] in ('numpy', 'planners', 'coordlang', 'msgspec')]; print(third)\n"
     )
     done = subprocess.run(
-        [sys.executable, "-I", "-S", "-c", program, str(tmp_path)], capture_output=True, text=True, check=True
+        [sys.executable, "-I", "-S", "-c", program, str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=True,
     )
     assert done.stdout.splitlines() == [
         "(None, '(move r2 b a)') (None, '(move r2 b a)')",
@@ -247,20 +284,33 @@ def test_from_the_file_as_from_the_object(corridor: Choices, tmp_path: Path) -> 
         while pairs:
             one, other = pairs.pop()
             assert one.allowed() == other.allowed()
-            assert (one.remaining, one.step, one.finished) == (other.remaining, other.step, other.finished)
+            assert (one.remaining, one.step, one.finished) == (
+                other.remaining,
+                other.step,
+                other.finished,
+            )
             pairs += [(stepped(one, text), stepped(other, text)) for text in one.allowed()]
 
 
 def test_large_counts_survive_the_file() -> None:
     """Above 2^53 the numbers are texts; a monitor counts for itself and agrees."""
     states: list[dict[str, Any]] = [
-        {"step": n, "left": 0, "next": {f"(go {k})": 2 * n + 1 + k % 2 for k in range(4)}, "true": [], "unknown": []} for n in range(1)
+        {
+            "step": n,
+            "left": 0,
+            "next": {f"(go {k})": 2 * n + 1 + k % 2 for k in range(4)},
+            "true": [],
+            "unknown": [],
+        }
+        for n in range(1)
     ]
     depth = 30
     for step in range(1, depth + 1):
         for half in range(2):
             after = {f"(go {k})": 2 * step + 1 + k % 2 for k in range(4)} if step < depth else {}
-            states.append({"step": step, "left": 0, "next": after, "true": [], "unknown": [], "half": half})
+            states.append(
+                {"step": step, "left": 0, "next": after, "true": [], "unknown": [], "half": half}
+            )
     for state in states:
         count = 4 ** (depth - state["step"])
         state["left"] = count if count <= 2**53 else str(count)

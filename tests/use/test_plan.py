@@ -35,14 +35,18 @@ def check(candidates: Candidates, spoken: Spoken, names: tuple[str, ...]) -> int
         assert any(without.plan in plans for plans in groups.values())
         for words, plans in list(groups.items())[:25]:
             for count_words in (True, False):
-                found = guided(spoken, spoken.words_of(words), name, terrain, count_words=count_words)
+                found = guided(
+                    spoken, spoken.words_of(words), name, terrain, count_words=count_words
+                )
                 assert found.plan in plans
                 assert found.words == spoken.words_of(words)
                 assert found.cost == without.cost
                 assert found.states <= found.expanded < found.generated + 1
                 searches += 1
             said, idle = texts(spoken.model, found.plan), spoken.model.keeps_idle
-            verdict = validate(loaded.domain, problem, loaded.team, said, init=init, goal=goal, allow_idle=idle)
+            verdict = validate(
+                loaded.domain, problem, loaded.team, said, init=init, goal=goal, allow_idle=idle
+            )
             assert verdict.valid, verdict.reason
     return searches
 
@@ -68,7 +72,9 @@ def test_random_models(robots: int, seed: int) -> None:
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 10**6), robots=st.sampled_from([2, 3]))
 def test_a_state_is_looked_at_once(seed: int, robots: int) -> None:
-    """By breadth every state is expanded once, whatever the sentence, and none that is farther than the goal."""
+    """By breadth every state is expanded once, whatever the sentence, and none that is farther than
+    the goal.
+    """
     _, spoken = random_spoken(seed, robots)
     space, model = spoken.space, spoken.model
     assume(model.cost == "makespan")
@@ -111,7 +117,8 @@ def test_a_sentence_of_longer_plans_only_is_no_sentence() -> None:
             guided(spoken, words)
 
 
-# -- the command ---------------------------------------------------------------------------------------------------
+# -- the command
+# ---------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -119,7 +126,9 @@ def files(language: Path, t_map: tuple[Path, Path]) -> tuple[Path, Path, Path]:
     return language, *t_map
 
 
-def test_prints_a_plan_with_its_sentence(coordlang: Command, files: tuple[Path, ...], tmp_path: Path) -> None:
+def test_prints_a_plan_with_its_sentence(
+    coordlang: Command, files: tuple[Path, ...], tmp_path: Path
+) -> None:
     path = tmp_path / "plan.txt"
     for sentence in ("w0 w1 w3 w2 w0", "w0 w2 w3 w1 w0"):
         for heuristic_name in ("relaxed", "manhattan", "blind"):
@@ -135,7 +144,12 @@ def test_json(coordlang: Command, files: tuple[Path, ...], tmp_path: Path) -> No
     outcome = coordlang("plan", *files, "w0 w1 w3 w2 w0", "--json")
     data = json.loads(outcome.out)
     assert outcome.err == ""
-    assert (data["sentence"], data["count"], data["optimal_cost"], len(data["plans"])) == ("w0 w1 w3 w2 w0", 1, 4, 1)
+    assert (data["sentence"], data["count"], data["optimal_cost"], len(data["plans"])) == (
+        "w0 w1 w3 w2 w0",
+        1,
+        4,
+        1,
+    )
     search = data["search"]
     assert search["expanded"] == 4 < search["without_sentence"]["expanded"]
     path = tmp_path / "plan.json"

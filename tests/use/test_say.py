@@ -54,7 +54,10 @@ def changed(spoken: Spoken, random: Random) -> Plan:
     if kind == "detour":
         return busy(spoken, random) if model.cost != "makespan" else detour(spoken, random)
     if not plan:
-        return tuple(tuple(random.randrange(len(own)) for own in model.labels) for _ in range(random.randint(0, 2)))
+        return tuple(
+            tuple(random.randrange(len(own)) for own in model.labels)
+            for _ in range(random.randint(0, 2))
+        )
     at = random.randrange(len(plan))
     if kind == "swap":
         other = random.randrange(len(plan))
@@ -81,7 +84,12 @@ def busy(spoken: Spoken, random: Random) -> Plan:
         random.shuffle(order)
         for chosen in order:
             try:
-                rest = search(model, PlanningTask("rest", steps.result[chosen], space.goals[space.goal[spoken.start]]))
+                rest = search(
+                    model,
+                    PlanningTask(
+                        "rest", steps.result[chosen], space.goals[space.goal[spoken.start]]
+                    ),
+                )
             except ProvedImpossible:
                 continue
             if rest.cost_of(0)[0] == left - 1:
@@ -110,12 +118,16 @@ def detour(spoken: Spoken, random: Random) -> Plan:
 
 
 def judged(candidates: Candidates, spoken: Spoken, plan: Plan, optimal: set[Plan]) -> str:
-    """What `say` does with a sequence of steps, compared with the plan checker and the list of optimal plans."""
+    """What `say` does with a sequence of steps, compared with the plan checker and the list of
+    optimal plans.
+    """
     loaded, model = candidates.loaded, candidates.model
     said: tuple[Texts, ...] = texts(model, plan)
     problem = loaded.problems[0]
     [(init, goal)] = ground_tasks(loaded.domain, problem, candidates.listed)
-    verdict = validate(loaded.domain, problem, loaded.team, said, init=init, goal=goal, allow_idle=model.keeps_idle)
+    verdict = validate(
+        loaded.domain, problem, loaded.team, said, init=init, goal=goal, allow_idle=model.keeps_idle
+    )
     if not verdict.valid:
         with pytest.raises(NotAPlan) as wrong:
             say(spoken, said)
@@ -149,15 +161,27 @@ def test_wrong_plans_of_random_models() -> None:
     assert min(seen[kind] for kind in ("goal", "no plan", "optimal", "longer", "dearer")) > 5, seen
 
 
-@pytest.mark.parametrize("name", ["handover/three-rooms", "lock/three-robots", "grid-joint/corners-4x4", "vans/one-van", "elevator/two-calls"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "handover/three-rooms",
+        "lock/three-robots",
+        "grid-joint/corners-4x4",
+        "vans/one-van",
+        "elevator/two-calls",
+    ],
+)
 def test_wrong_plans_of_shipped_domains(name: str) -> None:
     candidates, spoken = shipped(name)
     optimal = {plan for plans in by_sentence(spoken).values() for plan in plans}
     random = Random(name)
-    assert len({judged(candidates, spoken, changed(spoken, random), optimal) for _ in range(25)}) > 1
+    assert (
+        len({judged(candidates, spoken, changed(spoken, random), optimal) for _ in range(25)}) > 1
+    )
 
 
-# -- the command ---------------------------------------------------------------------------------------------------
+# -- the command
+# ---------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -169,7 +193,9 @@ def plan_text(coordlang: Command, t_map: tuple[Path, Path]) -> str:
     return coordlang("plans", *t_map, "--max", 1).out
 
 
-def test_says_what_plans_wrote(coordlang: Command, files: tuple[Path, ...], t_map: tuple[Path, Path], tmp_path: Path) -> None:
+def test_says_what_plans_wrote(
+    coordlang: Command, files: tuple[Path, ...], t_map: tuple[Path, Path], tmp_path: Path
+) -> None:
     path = tmp_path / "plans.json"
     path.write_text(coordlang("plans", *t_map, "--json").out)
     both = coordlang("say", *files, path)
@@ -185,17 +211,44 @@ def test_says_what_plans_wrote(coordlang: Command, files: tuple[Path, ...], t_ma
 @pytest.mark.parametrize(
     ("old", "new", "code", "message"),
     [
-        ("c1-0 c1-1)", "c1-0 c9-9)", 1, "plan.txt:2:1: this is no plan: in step 1, (move r2 c1-0 c9-9) is no action"),
-        ("1: (move r1 c0-1 c1-1)", "1: (move r1 c1-1 c0-1)", 1, "step 2 cannot be taken: r1 cannot (move r1 c1-1 c0-1) here"),
-        ("3: (move r2 c1-1 c0-1)", "", 1, "after 3 steps the goal is not reached: (at r2 c0-1) does not hold"),
-        ("; makespan", "5: (move r2 c0-1 c1-1)\n6: (move r2 c1-1 c0-1)\n; makespan", 1, "takes 7 steps, and 4 are enough: the goal holds before step 5"),
+        (
+            "c1-0 c1-1)",
+            "c1-0 c9-9)",
+            1,
+            "plan.txt:2:1: this is no plan: in step 1, (move r2 c1-0 c9-9) is no action",
+        ),
+        (
+            "1: (move r1 c0-1 c1-1)",
+            "1: (move r1 c1-1 c0-1)",
+            1,
+            "step 2 cannot be taken: r1 cannot (move r1 c1-1 c0-1) here",
+        ),
+        (
+            "3: (move r2 c1-1 c0-1)",
+            "",
+            1,
+            "after 3 steps the goal is not reached: (at r2 c0-1) does not hold",
+        ),
+        (
+            "; makespan",
+            "5: (move r2 c0-1 c1-1)\n6: (move r2 c1-1 c0-1)\n; makespan",
+            1,
+            "takes 7 steps, and 4 are enough: the goal holds before step 5",
+        ),
         ("0: (move r2 c1-0 c1-1)", "0:", 31, "plan.txt:2:1: expected '0: (action args)'"),
         ("3: (move r2 c1-1 c0-1)", "123456789: (move r2 c1-1 c0-1)", 31, "too many steps"),
         ("3: (move r2 c1-1 c0-1)", "4000000: (move r2 c1-1 c0-1)", 31, "too many steps"),
     ],
-)  # fmt: skip
+)
 def test_wrong_plan_files(
-    old: str, new: str, code: int, message: str, coordlang: Command, files: tuple[Path, ...], t_map: tuple[Path, Path], tmp_path: Path
+    old: str,
+    new: str,
+    code: int,
+    message: str,
+    coordlang: Command,
+    files: tuple[Path, ...],
+    t_map: tuple[Path, Path],
+    tmp_path: Path,
 ) -> None:
     path = tmp_path / "plan.txt"
     text = plan_text(coordlang, t_map)
@@ -206,19 +259,26 @@ def test_wrong_plan_files(
     assert message in outcome.err
 
 
-def test_which_plan_of_a_file_is_wrong(coordlang: Command, files: tuple[Path, ...], t_map: tuple[Path, Path], tmp_path: Path) -> None:
+def test_which_plan_of_a_file_is_wrong(
+    coordlang: Command, files: tuple[Path, ...], t_map: tuple[Path, Path], tmp_path: Path
+) -> None:
     path = tmp_path / "plans.json"
     data = json.loads(coordlang("plans", *t_map, "--json").out)
     data["plans"][1]["actions"].insert(0, [None, "idle"])
     path.write_text(json.dumps(data))
     outcome = coordlang("say", *files, path)
     assert (outcome.code, outcome.out) == (1, "")
-    assert "plan 2 of 2: this plan is not optimal: it takes 5 steps, and 4 are enough; with step 1 (r1 idles, r2 idles)" in outcome.err
+    assert (
+        "plan 2 of 2: this plan is not optimal: it takes 5 steps, and 4 are enough; with step 1 (r1 idles, r2 idles)"
+        in outcome.err
+    )
     path.write_text(json.dumps({"plans": []}))
     assert "there is no plan in it" in coordlang("say", *files, path).err
     data["plans"][1]["actions"][0] = [None, "(MOVE  r1 c0-1 c1-1)"]
     path.write_text(json.dumps(data))
-    assert "in step 1, r2 has no subaction (move r1 c0-1 c1-1)" in coordlang("say", *files, path).err
+    assert (
+        "in step 1, r2 has no subaction (move r1 c0-1 c1-1)" in coordlang("say", *files, path).err
+    )
     path.write_bytes(b"\xff\xfe0: (move")
     assert coordlang("say", *files, path).code == 31
 
@@ -254,23 +314,39 @@ def test_two_plans_of_one_step() -> None:
         only_one_plan(text.format(1, 1) + text.format(2, 2), Place("p"))
 
 
-@pytest.mark.parametrize("text", ["1: (a)\n0: (b)\n", "0.0: (a) [1]\n0.1: (b) [1]\n", "(a)\n(b)\n; cost = 2\n; done\n", "", "; x\n"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "1: (a)\n0: (b)\n",
+        "0.0: (a) [1]\n0.1: (b) [1]\n",
+        "(a)\n(b)\n; cost = 2\n; done\n",
+        "",
+        "; x\n",
+    ],
+)
 def test_one_plan_is_one(text: str) -> None:
     only_one_plan(text, Place("p"))
 
 
-def test_spelling_is_free(coordlang: Command, files: tuple[Path, ...], t_map: tuple[Path, Path], tmp_path: Path) -> None:
+def test_spelling_is_free(
+    coordlang: Command, files: tuple[Path, ...], t_map: tuple[Path, Path], tmp_path: Path
+) -> None:
     path = tmp_path / "plans.json"
     data = json.loads(coordlang("plans", *t_map, "--json").out)
     path.write_text(json.dumps(data))
     wanted = coordlang("say", *files, path).out
     for plan in data["plans"]:
-        plan["actions"] = [[t and t.upper().replace("(", " ( ").replace(" ", "  ") for t in step] for step in plan["actions"]]
+        plan["actions"] = [
+            [t and t.upper().replace("(", " ( ").replace(" ", "  ") for t in step]
+            for step in plan["actions"]
+        ]
     path.write_text(json.dumps(data))
     assert coordlang("say", *files, path).out == wanted
 
 
-def test_a_task_that_is_not_covered(coordlang: Command, t_map: tuple[Path, Path], tmp_path: Path) -> None:
+def test_a_task_that_is_not_covered(
+    coordlang: Command, t_map: tuple[Path, Path], tmp_path: Path
+) -> None:
     """Answered, with a warning and exit code 1."""
     domain, problem = t_map
     language, other, plan = tmp_path / "one.json", tmp_path / "other.pddl", tmp_path / "plan.txt"
@@ -295,7 +371,14 @@ def test_the_plan_with_an_initial_goal_state() -> None:
     candidates, spoken = shipped("three-cells/problem")
     space = spoken.space
     goal_node = int(np.flatnonzero(space.layer == 0)[0])
-    there = Spoken(spoken.language, spoken.table, replace(space, starts=np.array([goal_node])), 0, spoken.word, True)
+    there = Spoken(
+        spoken.language,
+        spoken.table,
+        replace(space, starts=np.array([goal_node])),
+        0,
+        spoken.word,
+        True,
+    )
     assert say(there, ()) == (int(spoken.word[goal_node]),)
     with pytest.raises(NotOptimal):
         say(there, [(None,) * len(candidates.model.robots)])

@@ -65,19 +65,29 @@ def near(spoken: Spoken, random: Random, sentences: list[tuple[str, ...]]) -> tu
     """A sentence with a word changed, left out or put in."""
     words = list(random.choice(sentences))
     at = random.randrange(len(words) + 1)
-    words[at : at + random.randint(0, 1)] = random.choices(spoken.language.words, k=random.randint(0, 1))
+    words[at : at + random.randint(0, 1)] = random.choices(
+        spoken.language.words, k=random.randint(0, 1)
+    )
     return tuple(w for n, w in enumerate(words) if n == 0 or w != words[n - 1])
 
 
-def check_broken(spoken: Spoken, words: tuple[str, ...], groups: dict[tuple[str, ...], set[Plan]]) -> None:
+def check_broken(
+    spoken: Spoken, words: tuple[str, ...], groups: dict[tuple[str, ...], set[Plan]]
+) -> None:
     if not words or words in groups:
         return
     with pytest.raises(NoPlanFits) as refused:
         understand(spoken, spoken.words_of(words))
     longest = max(k for k in range(len(words) + 1) if any(said[:k] == words[:k] for said in groups))
     assert refused.value.fitting == spoken.words_of(words)[:longest]
-    following = {said[longest] if len(said) > longest else None for said in groups if said[:longest] == words[:longest]}
-    assert {spoken.language.words[w] if w is not None else None for w in refused.value.next_words} == following
+    following = {
+        said[longest] if len(said) > longest else None
+        for said in groups
+        if said[:longest] == words[:longest]
+    }
+    assert {
+        spoken.language.words[w] if w is not None else None for w in refused.value.next_words
+    } == following
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -92,7 +102,8 @@ def test_every_sentence_of_a_random_model(robots: int, seed: int) -> None:
     check(random_spoken(seed, robots)[1], seed)
 
 
-# -- drawing -------------------------------------------------------------------------------------------------------
+# -- drawing
+# -------------------------------------------------------------------------------------------------------
 
 
 def largest(name: str) -> Dag:
@@ -111,11 +122,20 @@ def test_a_cut_dag_says_what_is_missing(name: str, most: int) -> None:
     small = dag(understand(spoken, spoken.words_of(words)), most)
     per_step = Counter(node.step for node in small.nodes)
     assert len(small.nodes) <= max(most, 2 * len(per_step))
-    assert small.cut == sum(node.merged for node in small.nodes) == len(whole.nodes) - sum(not n.merged for n in small.nodes)
+    assert (
+        small.cut
+        == sum(node.merged for node in small.nodes)
+        == len(whole.nodes) - sum(not n.merged for n in small.nodes)
+    )
     for step in per_step:
         assert sum(node.plans for node in small.nodes if node.step == step) == whole.count
         kept = [node.plans for node in small.nodes if node.step == step and not node.merged]
-        assert kept == sorted((node.plans for node in whole.nodes if node.step == step), reverse=True)[: len(kept)]
+        assert (
+            kept
+            == sorted((node.plans for node in whole.nodes if node.step == step), reverse=True)[
+                : len(kept)
+            ]
+        )
     assert (cut_note(small) is None) == (small.cut == 0)
     if small.cut:
         assert f"cut: {small.cut} nodes" in to_svg(small)
@@ -125,7 +145,14 @@ def test_a_cut_dag_says_what_is_missing(name: str, most: int) -> None:
         assert small == whole
 
 
-DRAWN = ["grid/corners-4x4", "three-cells/problem", "handover/three-rooms", "lock/three-robots", "elevator/two-calls", "grid-joint/corners-4x4"]
+DRAWN = [
+    "grid/corners-4x4",
+    "three-cells/problem",
+    "handover/three-rooms",
+    "lock/three-robots",
+    "elevator/two-calls",
+    "grid-joint/corners-4x4",
+]
 
 
 @pytest.mark.parametrize("name", DRAWN)
@@ -140,7 +167,9 @@ def test_the_picture_holds_everything(name: str) -> None:
         assert written[word] == number + graph.sentence.count(word)
     for robot in graph.robots:
         wanted = sum(min(3, len(edge.actions)) for edge in graph.edges)
-        assert sum(n for line, n in written.items() if line and line.startswith(f"{robot} ")) >= wanted
+        assert (
+            sum(n for line, n in written.items() if line and line.startswith(f"{robot} ")) >= wanted
+        )
     assert to_svg(graph) == text
     for x, y in re.findall(r'<text x="([-\d.]+)" y="([-\d.]+)"', text):
         assert 0 <= float(x) <= float(root.get("width", 0))
@@ -184,7 +213,9 @@ def luminance(colour: str) -> float:
     return 0.2126 * red + 0.7152 * green + 0.0722 * blue
 
 
-def test_a_task_without_steps_is_drawn(coordlang: Command, tmp_path: Path, t_map: tuple[Path, Path]) -> None:
+def test_a_task_without_steps_is_drawn(
+    coordlang: Command, tmp_path: Path, t_map: tuple[Path, Path]
+) -> None:
     domain, problem = t_map
     done, language = tmp_path / "done.pddl", tmp_path / "language.json"
     done.write_text(re.sub(r"\(:goal.*", "(:goal (and)))", problem.read_text(), flags=re.S))
@@ -195,7 +226,8 @@ def test_a_task_without_steps_is_drawn(coordlang: Command, tmp_path: Path, t_map
         assert outcome.out
 
 
-# -- the command ---------------------------------------------------------------------------------------------------
+# -- the command
+# ---------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -203,7 +235,9 @@ def files(language: Path, t_map: tuple[Path, Path]) -> tuple[Path, Path, Path]:
     return language, *t_map
 
 
-def test_lists_what_say_says(coordlang: Command, files: tuple[Path, ...], t_map: tuple[Path, Path], tmp_path: Path) -> None:
+def test_lists_what_say_says(
+    coordlang: Command, files: tuple[Path, ...], t_map: tuple[Path, Path], tmp_path: Path
+) -> None:
     path = tmp_path / "plans.json"
     path.write_text(coordlang("plans", *t_map, "--json").out)
     for sentence in coordlang("say", *files, path).out.splitlines():
@@ -211,7 +245,12 @@ def test_lists_what_say_says(coordlang: Command, files: tuple[Path, ...], t_map:
         assert coordlang("say", *files, path).out.strip() == sentence
         assert coordlang("understand", *files, sentence, "--count").out == "1\n"
         data = json.loads(coordlang("understand", *files, sentence, "--json").out)
-        assert (data["count"], data["complete"], data["covered"], data["sentence"]) == (1, True, True, sentence)
+        assert (data["count"], data["complete"], data["covered"], data["sentence"]) == (
+            1,
+            True,
+            True,
+            sentence,
+        )
         assert len(data["plans"]) == 1
         assert [edge["from"] for edge in data["edges"]] == list(range(len(data["nodes"]) - 1))
         only = json.loads(coordlang("understand", *files, sentence, "--json", "--count").out)
@@ -222,16 +261,32 @@ def test_samples_are_seeded(coordlang: Command, tmp_path: Path) -> None:
     files = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "corners-4x4.pddl"
     language = tmp_path / "language.json"
     assert coordlang("build", *files, "-o", language).code == 0
-    sentence = coordlang("plan", language, *files, "--wish", "most-plans").out.splitlines()[-1].partition("= ")[2]
+    sentence = (
+        coordlang("plan", language, *files, "--wish", "most-plans")
+        .out.splitlines()[-1]
+        .partition("= ")[2]
+    )
     first, again, other = (
-        coordlang("understand", language, *files, sentence, "--sample", 6, "--seed", seed).out for seed in (1, 1, 2)
+        coordlang("understand", language, *files, sentence, "--sample", 6, "--seed", seed).out
+        for seed in (1, 1, 2)
     )
     assert first == again != other
     assert first.count("; makespan = 6") == 6
     some = coordlang("understand", language, *files, sentence, "--max", 3)
     assert some.out.count("; makespan") == 3
     assert "3 of 16 plans listed" in some.err
-    cut = coordlang("understand", language, *files, sentence, "--format", "svg", "--nodes", 10, "-o", tmp_path / "x.svg")
+    cut = coordlang(
+        "understand",
+        language,
+        *files,
+        sentence,
+        "--format",
+        "svg",
+        "--nodes",
+        10,
+        "-o",
+        tmp_path / "x.svg",
+    )
     assert (cut.code, cut.out) == (0, "")
     assert "are drawn as" in cut.err
     assert ElementTree.parse(tmp_path / "x.svg").getroot().tag.endswith("svg")
@@ -244,9 +299,9 @@ def test_samples_are_seeded(coordlang: Command, tmp_path: Path) -> None:
         ("w0 w9", 31, "word 2 of the sentence, 'w9', is no word of this language"),
         ("w0 w0", 31, "twice in a row"),
         ("w1 w0", 1, "at the beginning no plan says 'w1'"),
-        ("w0 w1 w0", 1, 'after "w0 w1" no plan says \'w0\'\n  There plans say \'w3\'.'),
-        ("w0 w1 w3", 1, 'after "w0 w1 w3" no plan ends\n  There plans say \'w2\'.'),
-        ("w0 w1 w3 w2 w0 w1", 1, 'after "w0 w1 w3 w2 w0" no plan says \'w1\'\n  There plans end.'),
+        ("w0 w1 w0", 1, "after \"w0 w1\" no plan says 'w0'\n  There plans say 'w3'."),
+        ("w0 w1 w3", 1, "after \"w0 w1 w3\" no plan ends\n  There plans say 'w2'."),
+        ("w0 w1 w3 w2 w0 w1", 1, "after \"w0 w1 w3 w2 w0\" no plan says 'w1'\n  There plans end."),
     ],
 )
 def test_sentences_that_cannot_be_understood(
@@ -259,7 +314,11 @@ def test_sentences_that_cannot_be_understood(
 
 
 def test_options_that_do_not_go_together(coordlang: Command, files: tuple[Path, ...]) -> None:
-    for options in (["--count", "--max", 3], ["--format", "svg", "--sample", 2], ["--format", "dot", "--count"]):
+    for options in (
+        ["--count", "--max", 3],
+        ["--format", "svg", "--sample", 2],
+        ["--format", "dot", "--count"],
+    ):
         assert coordlang("understand", *files, "w0", *options).code == 2
 
 

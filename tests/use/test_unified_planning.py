@@ -1,4 +1,6 @@
-"""The engine inside unified-planning: its plans against ours and against unified-planning's own simulator and validator."""
+"""The engine inside unified-planning: its plans against ours and against unified-planning's own
+simulator and validator.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +52,9 @@ def solve(problem: Any, timeout: float | None = None, **params: Any) -> Any:
 def all_plans(problem: Any, **params: Any) -> list[Any]:
     with up.AnytimePlanner(name="coordlang", params=params) as planner:
         results = list(planner.get_solutions(problem))
-    assert [r.status for r in results] == [Status.INTERMEDIATE] * (len(results) - 1) + [Status.SOLVED_OPTIMALLY]
+    assert [r.status for r in results] == [Status.INTERMEDIATE] * (len(results) - 1) + [
+        Status.SOLVED_OPTIMALLY
+    ]
     return [r.plan for r in results]
 
 
@@ -60,10 +64,15 @@ def verdict(problem: Any, plan: Any, **params: Any) -> Any:
 
 
 def crossing(cells: int = 4) -> Any:
-    """Two robots on a star of cells (the T-map with four) trade places, one cell each; entering asks for a free cell."""
+    """Two robots on a star of cells (the T-map with four) trade places, one cell each; entering
+    asks for a free cell.
+    """
     cell, robot = up.UserType("Cell"), up.UserType("Robot")
     at = up.Fluent("At", up.BoolType(), r=robot, c=cell)
-    near, free = up.Fluent("near", up.BoolType(), a=cell, b=cell), up.Fluent("free", up.BoolType(), c=cell)
+    near, free = (
+        up.Fluent("near", up.BoolType(), a=cell, b=cell),
+        up.Fluent("free", up.BoolType(), c=cell),
+    )
     move = up.InstantaneousAction("Move", r=robot, a=cell, b=cell)
     for condition in (at(move.r, move.a), near(move.a, move.b), free(move.b)):
         move.add_precondition(condition)
@@ -97,7 +106,10 @@ def read(folder: str, problem: str) -> Any:
 
 def steps_of(found: Any, plan: PartialOrderPlan) -> list[list[str]]:
     """The labels of a partial-order plan, layer by layer, by its definition."""
-    before = {a: {b for b, later in plan.get_adjacency_list.items() if a in later} for a in plan.get_adjacency_list}
+    before = {
+        a: {b for b, later in plan.get_adjacency_list.items() if a in later}
+        for a in plan.get_adjacency_list
+    }
     depth: dict[Any, int] = {}
     while len(depth) < len(before):
         for action, earlier in before.items():
@@ -124,7 +136,9 @@ def our_steps(space: Any) -> list[list[list[str]]]:
         ("two-arms", "exchange", {"robots": ("arm1", "arm2")}),
     ],
 )
-def test_the_plans_are_those_of_the_pddl_files(folder: str, name: str, robots: dict[str, Any]) -> None:
+def test_the_plans_are_those_of_the_pddl_files(
+    folder: str, name: str, robots: dict[str, Any]
+) -> None:
     path = DOMAINS / folder
     choice = RobotChoice(tuple(robots.get("robots", ())))
     loaded = load(path / "domain.pddl", [path / f"{name}.pddl"], ModelOptions(choice))
@@ -192,10 +206,15 @@ def test_a_sequential_plan_forgets_the_steps() -> None:
 
 
 def agents(meet: bool = False) -> Any:
-    """Two agents with positions of their own, and what is free in the environment; the same as `crossing`."""
+    """Two agents with positions of their own, and what is free in the environment; the same as
+    `crossing`.
+    """
     problem = MultiAgentProblem("crossing")
     cell = up.UserType("Cell")
-    near, free = up.Fluent("near", up.BoolType(), a=cell, b=cell), up.Fluent("free", up.BoolType(), c=cell)
+    near, free = (
+        up.Fluent("near", up.BoolType(), a=cell, b=cell),
+        up.Fluent("free", up.BoolType(), c=cell),
+    )
     for fluent in (near, free):
         problem.ma_environment.add_fluent(fluent, default_initial_value=False)
     places = [up.Object(f"c{n}", cell) for n in range(4)]
@@ -208,7 +227,12 @@ def agents(meet: bool = False) -> Any:
         move = up.InstantaneousAction("Move", a=cell, b=cell)
         for condition in (at(move.a), near(move.a, move.b), free(move.b)):
             move.add_precondition(condition)
-        for fluent, value in ((at(move.a), False), (at(move.b), True), (free(move.b), False), (free(move.a), True)):
+        for fluent, value in (
+            (at(move.a), False),
+            (at(move.b), True),
+            (free(move.b), False),
+            (free(move.a), True),
+        ):
             move.add_effect(fluent, value)
         agent.add_action(move)
         problem.add_agent(agent)
@@ -245,7 +269,9 @@ def test_a_multi_agent_problem(own_goals: bool) -> None:
 
 
 def test_agents_of_different_kinds() -> None:
-    """One action name with different meanings, fluents of others (Dot), a private fluent; the guard opens, the guest enters."""
+    """One action name with different meanings, fluents of others (Dot), a private fluent; the guard
+    opens, the guest enters.
+    """
     problem = MultiAgentProblem("door")
     open_ = up.Fluent("open", up.BoolType())
     problem.ma_environment.add_fluent(open_, default_initial_value=False)
@@ -269,16 +295,19 @@ def test_agents_of_different_kinds() -> None:
     assert sorted(schema.name for schema in found.domain.schemas) == ["act", "act__2"]
     (plan,) = all_plans(problem)
     assert steps_of(found, plan) == [["(act guard)"], ["(act__2 guest)"]]
-    assert [f"{a.agent.name}.{a.action.name}" for a in plan.convert_to(PlanKind.SEQUENTIAL_PLAN, problem).actions] == [
-        "guard.act", "guest.act"
-    ]  # fmt: skip
+    assert [
+        f"{a.agent.name}.{a.action.name}"
+        for a in plan.convert_to(PlanKind.SEQUENTIAL_PLAN, problem).actions
+    ] == ["guard.act", "guest.act"]
 
 
 # Every feature of conditions and effects, against unified-planning's own simulator.
 
 
 def random_problem(seed: int) -> Any:
-    """One robot, three facts, actions with random formulas and conditional, universal and copying effects."""
+    """One robot, three facts, actions with random formulas and conditional, universal and copying
+    effects.
+    """
     random = Random(seed)
     robot, thing = up.UserType("robot"), up.UserType("thing")
     special = up.UserType("special", thing)
@@ -300,7 +329,13 @@ def random_problem(seed: int) -> Any:
             return up.Forall(up.Or(p(y), left), y)
         if kind == 6:
             return up.Exists(up.And(p(y), up.Not(up.Equals(y, x)), right), y)
-        return [up.And(left, right), up.Or(left, right), up.Not(left), up.Implies(left, right), up.Iff(left, right)][kind]
+        return [
+            up.And(left, right),
+            up.Or(left, right),
+            up.Not(left),
+            up.Implies(left, right),
+            up.Iff(left, right),
+        ][kind]
 
     for number in range(4):
         action = up.InstantaneousAction(f"a{number}", r=robot, x=thing)
@@ -309,7 +344,9 @@ def random_problem(seed: int) -> Any:
         v = up.Variable("v", thing)
         kind = random.randrange(4)
         if kind == 0:
-            action.add_effect(p(v), random.random() < 0.6, up.Or(q(), up.Equals(v, action.x)), forall=[v])
+            action.add_effect(
+                p(v), random.random() < 0.6, up.Or(q(), up.Equals(v, action.x)), forall=[v]
+            )
         elif kind == 1:
             action.add_effect(p(action.x), up.Iff(q(), p(things[0])))
         else:
@@ -324,7 +361,9 @@ def random_problem(seed: int) -> Any:
 
 
 def shortest(problem: Any) -> tuple[int, int] | None:
-    """The length and number of the shortest plans, by breadth-first search with unified-planning's simulator."""
+    """The length and number of the shortest plans, by breadth-first search with unified-planning's
+    simulator.
+    """
     with up.SequentialSimulator(problem) as simulator:
         start = simulator.get_initial_state()
         atoms = [*problem.initial_values]
@@ -342,7 +381,10 @@ def shortest(problem: Any) -> tuple[int, int] | None:
                 for action, args in simulator.get_applicable_actions(state):
                     after = simulator.apply(state, action, args)
                     if after is not None and key(after) not in seen:
-                        following[key(after)] = after, ways + following.get(key(after), (None, 0))[1]
+                        following[key(after)] = (
+                            after,
+                            ways + following.get(key(after), (None, 0))[1],
+                        )
             seen |= following.keys()
             layer, length = following, length + 1
     return None
@@ -374,7 +416,9 @@ def test_joint_actions() -> None:
     loaded = load(path / "domain.pddl", [path / "three-cells.pddl"])
     problem = read("grid-joint", "three-cells")
     parts: dict[str, dict[str, str | None]] = {
-        schema.name: {p.robot: f"({' '.join(p.template)})" if p.template else None for p in schema.parts}
+        schema.name: {
+            p.robot: f"({' '.join(p.template)})" if p.template else None for p in schema.parts
+        }
         for schema in read_domain(path / "domain.pddl").schemas
     }
     plans = all_plans(problem, subactions=parts)
@@ -412,7 +456,11 @@ def test_a_sentence_leaves_exactly_its_plans() -> None:
     assert len(all_plans(problem, language=language)) == len(everything)
     one = solve(problem, language=language, sentence=sentences[0].words)
     assert (one.status, one.log_messages) == (Status.SOLVED_OPTIMALLY, [])
-    wrong_word = " ".join((*sentences[0].words, *sentences[0].words[-2:])) if len(sentences[0].words) > 1 else "w1 w0 w1"
+    wrong_word = (
+        " ".join((*sentences[0].words, *sentences[0].words[-2:]))
+        if len(sentences[0].words) > 1
+        else "w1 w0 w1"
+    )
     none = solve(problem, language=language, sentence=wrong_word)
     assert none.status == Status.UNSOLVABLE_INCOMPLETELY
     assert "no optimal plan has the sentence" in str(none.log_messages)
@@ -420,10 +468,14 @@ def test_a_sentence_leaves_exactly_its_plans() -> None:
         solve(problem, language=language, sentence="hello")
 
 
-def test_a_language_file_for_the_problem_that_the_library_read(coordlang: Command, tmp_path: Path) -> None:
+def test_a_language_file_for_the_problem_that_the_library_read(
+    coordlang: Command, tmp_path: Path
+) -> None:
     path, file = DOMAINS / "handover", tmp_path / "language.json"
     assert coordlang("build", path / "domain.pddl", path / "two-doors.pddl", "-o", file).code == 0
-    told = json.loads(coordlang("explain", file, path / "domain.pddl", path / "two-doors.pddl", "--json").out)
+    told = json.loads(
+        coordlang("explain", file, path / "domain.pddl", path / "two-doors.pddl", "--json").out
+    )
     assert told
     problem = read("handover", "two-doors")
     result = solve(problem, language=str(file))
@@ -501,7 +553,9 @@ def test_the_factory_finds_the_engine_for_several_agents() -> None:
     with up.OneshotPlanner(problem_kind=agents().kind) as planner:
         assert planner.name == "coordlang"
     problem = agents()
-    with up.AnytimePlanner(problem_kind=problem.kind, anytime_guarantee=up.AnytimeGuarantee.OPTIMAL_PLANS) as planner:
+    with up.AnytimePlanner(
+        problem_kind=problem.kind, anytime_guarantee=up.AnytimeGuarantee.OPTIMAL_PLANS
+    ) as planner:
         assert planner.name == "coordlang"
 
 
@@ -522,7 +576,9 @@ def test_wrong_parameters(params: dict[str, Any], message: str) -> None:
 
 def test_who_the_robots_are() -> None:
     problem = crossing()
-    assert solve(problem, robots=problem.objects(problem.user_type("Robot"))).metrics["plans"] == "2"
+    assert (
+        solve(problem, robots=problem.objects(problem.user_type("Robot"))).metrics["plans"] == "2"
+    )
     assert solve(problem, robots=("R1", "R2")).metrics["plans"] == "2"
     assert solve(problem, robot_type=problem.user_type("Robot")).metrics["plans"] == "2"
     nobody = up.Problem("nobody")
@@ -544,12 +600,21 @@ def test_invalid_plans() -> None:
 
     assert verdict(problem, again(good)).status == Validity.VALID
     late = verdict(problem, again([*good[:1], *good[:1], *good]))
-    assert (late.status, late.reason) == (Validity.INVALID, FailedValidationReason.INAPPLICABLE_ACTION)
+    assert (late.status, late.reason) == (
+        Validity.INVALID,
+        FailedValidationReason.INAPPLICABLE_ACTION,
+    )
     assert str(late.inapplicable_action) == str(good[0])
     assert "step 2" in str(late.log_messages)
     short = verdict(problem, again(good[:-1]))
-    assert (short.status, short.reason) == (Validity.INVALID, FailedValidationReason.UNSATISFIED_GOALS)
-    twice = verdict(problem, PartialOrderPlan({ActionInstance(a.action, a.actual_parameters): [] for a in good[:2]}))
+    assert (short.status, short.reason) == (
+        Validity.INVALID,
+        FailedValidationReason.UNSATISFIED_GOALS,
+    )
+    twice = verdict(
+        problem,
+        PartialOrderPlan({ActionInstance(a.action, a.actual_parameters): [] for a in good[:2]}),
+    )
     assert (twice.status, twice.reason) == (Validity.INVALID, FailedValidationReason.MUTEX_CONFLICT)
 
 
@@ -572,13 +637,20 @@ def test_odd_names() -> None:
     plans = all_plans(problem)
     assert len(plans) == 2  # who does which
     assert {str(a) for a in plans[0].get_adjacency_list} in (
-        {"Do It(R 1, Not)", "Do It(r 1, not)"}, {"Do It(R 1, not)", "Do It(r 1, Not)"}
-    )  # fmt: skip
+        {"Do It(R 1, Not)", "Do It(r 1, not)"},
+        {"Do It(R 1, not)", "Do It(r 1, Not)"},
+    )
     assert sequential_verdicts(problem, plans[0]) == {Validity.VALID}
     names = Names()
     assert [names.of(n, n) for n in ("x", "X", "?x", "", "-", "object", "x")] == [
-        "x", "x__2", "_x", "x__3", "x__4", "object__2", "x"
-    ]  # fmt: skip
+        "x",
+        "x__2",
+        "_x",
+        "x__3",
+        "x__4",
+        "object__2",
+        "x",
+    ]
 
 
 def test_nothing_is_printed(capfd: pytest.CaptureFixture[str]) -> None:
@@ -602,4 +674,6 @@ def test_the_example_script() -> None:
     assert (done.returncode, done.stderr) == (0, "")
     lines = done.stdout.splitlines()
     assert [line.split()[0] for line in lines[:2]] == ["INTERMEDIATE", "SOLVED_OPTIMALLY"]
-    assert [line.split("leaves")[1] for line in lines[3:]] == [" 1 open; SOLVED_OPTIMALLY VALID"] * 2
+    assert [line.split("leaves")[1] for line in lines[3:]] == [
+        " 1 open; SOLVED_OPTIMALLY VALID"
+    ] * 2

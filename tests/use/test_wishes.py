@@ -33,7 +33,11 @@ def naive_value(spoken: Spoken, text: str) -> Value:
         return lambda words, _: len(words)
     if kind == "most-plans":
         return lambda _, plans: -len(plans)
-    grade = (lambda p: goes_first(spoken, p, argument)) if kind == "first" else (lambda p: passes(spoken, p, argument))
+    grade = (
+        (lambda p: goes_first(spoken, p, argument))
+        if kind == "first"
+        else (lambda p: passes(spoken, p, argument))
+    )
     return lambda _, plans: (max(map(grade, plans)), min(map(grade, plans)))
 
 
@@ -42,11 +46,18 @@ def goes_first(spoken: Spoken, plan: Plan, robot: str) -> int:
     model = spoken.model
     me = model.robots.index(robot)
     nothing = {a.label for a in model.actions if a.does_nothing and not a.parts}
-    active = [[step[r] != 0 and model.labels[r][step[r]] not in nothing for step in plan] for r in range(len(model.robots))]
+    active = [
+        [step[r] != 0 and model.labels[r][step[r]] not in nothing for step in plan]
+        for r in range(len(model.robots))
+    ]
     orders = []
     for other in range(len(model.robots)):
         if other != me:
-            differ = [(mine, theirs) for mine, theirs in zip(active[me], active[other], strict=True) if mine != theirs]
+            differ = [
+                (mine, theirs)
+                for mine, theirs in zip(active[me], active[other], strict=True)
+                if mine != theirs
+            ]
             orders.append("nobody" if not differ else "me" if differ[0][0] else "other")
     return 2 if "other" in orders else 1 if "nobody" in orders else 0
 
@@ -55,7 +66,10 @@ def passes(spoken: Spoken, plan: Plan, atoms: str) -> int:
     space = spoken.space
     wanted = {f"({part}" for part in atoms.split("(")[1:]}
     wanted = {part.strip() for part in wanted}
-    keys = [set(space.model.codec.decode(space.rows[s])) for s in Plans(space, spoken.start, []).states(plan)]
+    keys = [
+        set(space.model.codec.decode(space.rows[s]))
+        for s in Plans(space, spoken.start, []).states(plan)
+    ]
     return int(any(wanted <= key for key in keys))
 
 
@@ -66,7 +80,9 @@ def wishes_for(spoken: Spoken, random: Random) -> list[str]:
     atoms = [a for a in atoms if not a.startswith("(last ")]
     some = ["shortest", "most-plans", f"first:{random.choice(spoken.model.robots)}"]
     if atoms:
-        some.append("avoid:" + " ".join(sorted(random.sample(atoms, random.randint(1, len(atoms))))))
+        some.append(
+            "avoid:" + " ".join(sorted(random.sample(atoms, random.randint(1, len(atoms)))))
+        )
         some.append("avoid:" + random.choice(atoms))
     return random.sample(some, random.randint(1, 3))
 
@@ -89,7 +105,11 @@ def check(spoken: Spoken, texts: list[str]) -> Counter[str]:
     if texts == ["shortest"]:
         assert found.prefixes == len(words)
     seen = Counter(text.partition(":")[0] for text in texts if len(groups) > 1)
-    seen.update(f"{text.partition(':')[0]} {value}" for text, value in zip(texts, expected, strict=True) if isinstance(value, tuple))
+    seen.update(
+        f"{text.partition(':')[0]} {value}"
+        for text, value in zip(texts, expected, strict=True)
+        if isinstance(value, tuple)
+    )
     return seen
 
 
@@ -113,51 +133,82 @@ def test_random_models() -> None:
             seen.update(check(spoken, wishes_for(spoken, random)))
 
     compare()
-    kinds = ["shortest", "most-plans", "first", "avoid", "avoid (0, 0)", "avoid (1, 1)", "avoid (1, 0)"]
+    kinds = [
+        "shortest",
+        "most-plans",
+        "first",
+        "avoid",
+        "avoid (0, 0)",
+        "avoid (1, 1)",
+        "avoid (1, 0)",
+    ]
     kinds += ["first (0, 0)", "first (1, 1)", "first (2, 2)"]
     assert min(seen[kind] for kind in kinds) > 2, seen
     assert sum(seen[kind] for kind in ("first (2, 0)", "first (2, 1)", "first (1, 0)")) > 2, seen
 
 
 def random_graph(random: Random) -> Spoken:
-    """A layered graph of plans made up freely, with joint actions that lead to the same state; no model behind it."""
+    """A layered graph of plans made up freely, with joint actions that lead to the same state; no
+    model behind it.
+    """
     sizes = [random.randint(1, 3), *(random.randint(2, 5) for _ in range(random.randint(2, 6))), 1]
     offsets = [0, *accumulate(sizes)]
     edges: list[tuple[int, int, int]] = []
     for layer in range(1, len(sizes)):
         for node in range(offsets[layer], offsets[layer + 1]):
-            targets = random.choices(range(offsets[layer - 1], offsets[layer]), k=random.randint(1, 6))
+            targets = random.choices(
+                range(offsets[layer - 1], offsets[layer]), k=random.randint(1, 6)
+            )
             edges += [(node, target, label) for label, target in enumerate(sorted(targets))]
     table = np.array(edges).reshape(-1, 3)
     number = offsets[-1]
     none = np.zeros(0, np.int64)
     space = PlanSpace(
-        model=None, rows=none, state=np.arange(number), goal=np.zeros(number, np.int64),  # type: ignore[arg-type]
-        layer=np.repeat(np.arange(len(sizes)), sizes), first=np.searchsorted(table[:, 0], np.arange(number + 1)),
-        target=table[:, 1], labels=table[:, 2:].astype(np.int32), cost=np.zeros(len(table), np.int64), goals=(None,),  # type: ignore[arg-type]
-        starts=np.array([number - 1]), second=np.zeros(1, np.int64),
-    )  # fmt: skip
+        model=None,
+        rows=none,
+        state=np.arange(number),
+        goal=np.zeros(number, np.int64),  # type: ignore[arg-type]
+        layer=np.repeat(np.arange(len(sizes)), sizes),
+        first=np.searchsorted(table[:, 0], np.arange(number + 1)),
+        target=table[:, 1],
+        labels=table[:, 2:].astype(np.int32),
+        cost=np.zeros(len(table), np.int64),
+        goals=(None,),  # type: ignore[arg-type]
+        starts=np.array([number - 1]),
+        second=np.zeros(1, np.int64),
+    )
     word = np.array([random.randrange(random.choice([2, 3])) for _ in range(number)])
     return Spoken(None, None, space, 0, word, True)  # type: ignore[arg-type]
 
 
 def worst_state(grade_of: list[int]) -> PlanWish:
     """A plan is as good as the worst state that it passes."""
-    return PlanWish("worst", lambda s: (grade_of[s],), lambda m, _, s: (max(m[0], grade_of[s]),), lambda m: m[0], ("", "", ""))
+    return PlanWish(
+        "worst",
+        lambda s: (grade_of[s],),
+        lambda m, _, s: (max(m[0], grade_of[s]),),
+        lambda m: m[0],
+        ("", "", ""),
+    )
 
 
-#: Two beginnings come to the same nodes with different counts here, and the one with the larger bound is not the better one.
+#: Two beginnings come to the same nodes with different counts here, and the one with the larger
+#: bound is not the better one.
 DECIDED_BY_COUNTS = (11772, 14101, 15357)
 
 
 def test_random_graphs() -> None:
-    """Larger ones than small models have; the counts decide between beginnings that come to the same nodes."""
+    """Larger ones than small models have; the counts decide between beginnings that come to the
+    same nodes.
+    """
     seen: Counter[int] = Counter()
     for seed in [*range(200), *DECIDED_BY_COUNTS]:
         random = Random(seed)
         spoken = random_graph(random)
         space = spoken.space
-        grade_of = [int(random.random() < 0.15) + int(random.random() < 0.05) for _ in range(len(space))]
+        grade_of = [
+            int(random.random() < 0.15) + int(random.random() < 0.05) for _ in range(len(space))
+        ]
         groups: dict[tuple[int, ...], list[int]] = {}
         stack = [((spoken.start,), grade_of[spoken.start])]
         while stack:
@@ -166,7 +217,9 @@ def test_random_graphs() -> None:
                 groups.setdefault(sentence([int(spoken.word[n]) for n in path]), []).append(grade)
             after = space.target[space.first[path[-1]] : space.first[path[-1] + 1]].tolist()
             stack += [((*path, target), max(grade, grade_of[target])) for target in after]
-        wishes = random.sample(["shortest", "most-plans", worst_state(grade_of)], random.randint(1, 3))
+        wishes = random.sample(
+            ["shortest", "most-plans", worst_state(grade_of)], random.randint(1, 3)
+        )
         value = {
             "shortest": lambda words: len(words),
             "most-plans": lambda words: -len(groups[words]),  # noqa: B023
@@ -174,7 +227,12 @@ def test_random_graphs() -> None:
         best = min(
             groups,
             key=lambda words: (
-                *(value[w](words) if isinstance(w, str) else (max(groups[words]), min(groups[words])) for w in wishes),
+                *(
+                    value[w](words)
+                    if isinstance(w, str)
+                    else (max(groups[words]), min(groups[words]))
+                    for w in wishes
+                ),
                 len(words),
                 words,
             ),
@@ -192,7 +250,12 @@ def test_wishes_of_one_robot_are_against_those_of_the_other() -> None:
     one, other = (best_sentence(spoken, [read_wish(spoken, f"first:{r}")]) for r in ("r1", "r2"))
     assert one.values == other.values == ((0, 0),)
     assert one.words != other.words
-    assert goes_first(spoken, next(iter(by_sentence(spoken)[tuple(spoken.text(one.words).split())])), "r1") == 0
+    assert (
+        goes_first(
+            spoken, next(iter(by_sentence(spoken)[tuple(spoken.text(one.words).split())])), "r1"
+        )
+        == 0
+    )
 
 
 def test_a_search_that_is_too_large_says_so() -> None:
@@ -201,7 +264,20 @@ def test_a_search_that_is_too_large_says_so() -> None:
         best_sentence(spoken, [read_wish(spoken, "most-plans")], most=2)
 
 
-@pytest.mark.parametrize("text", ["", "best", "first:", "first:r9", "avoid:", "avoid:(at r1", "avoid:(at r1 c9-9)", "shortest:3", "avoid"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "best",
+        "first:",
+        "first:r9",
+        "avoid:",
+        "avoid:(at r1",
+        "avoid:(at r1 c9-9)",
+        "shortest:3",
+        "avoid",
+    ],
+)
 def test_wishes_that_are_none(text: str) -> None:
     with pytest.raises(UsageError):
         read_wish(shipped("t-map/problem")[1], text)
@@ -214,22 +290,27 @@ def test_spelling_of_wishes() -> None:
     assert read_wish(spoken, "avoid: ( AT r1  c1-1 )").text == "avoid:(at r1 c1-1)"  # type: ignore[union-attr]
 
 
-# -- the command ---------------------------------------------------------------------------------------------------
+# -- the command
+# ---------------------------------------------------------------------------------------------------
 
 
 def test_the_command_says_what_became_of_the_wishes(coordlang: Command, tmp_path: object) -> None:
     files = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "corners-3x3.pddl"
     language = f"{tmp_path}/language.json"
     assert coordlang("build", *files, "-o", language).code == 0
-    outcome = coordlang("plan", language, *files, "--wish", 'avoid:(at r1 c1-1)', "--wish", "most-plans")
+    outcome = coordlang(
+        "plan", language, *files, "--wish", "avoid:(at r1 c1-1)", "--wish", "most-plans"
+    )
     assert outcome.code == 0
     assert "avoid:(at r1 c1-1): in every plan it keeps away from (at r1 c1-1)\n" in outcome.err
     assert "most-plans: leaves" in outcome.err
     assert "c1-1" not in " ".join(line for line in outcome.out.splitlines() if "r1" in line)
-    data = json.loads(coordlang("plan", language, *files, "--wish", 'avoid:(at r1 c2-2)', "--wish", "shortest", "--json").out)
+    data = json.loads(
+        coordlang(
+            "plan", language, *files, "--wish", "avoid:(at r1 c2-2)", "--wish", "shortest", "--json"
+        ).out
+    )
     avoided, shortest = data["wishes"]
     assert (avoided["granted"], avoided["worst_plan"]) == (False, "it passes through (at r1 c2-2)")
     assert shortest == {"wish": "shortest", "value": len(data["sentence"].split())}
     assert coordlang("plan", language, *files, "--wish", "nothing").code == 2
-
-

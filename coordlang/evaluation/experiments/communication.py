@@ -31,7 +31,8 @@ SHOWN = 100
 
 
 def units(settings: Settings) -> list[Unit]:
-    # The most flexible language takes long, and is kept: `flexibility`, which starts sooner, builds it.
+    # The most flexible language takes long, and is kept: `flexibility`, which starts sooner, builds
+    # it.
     return compared_units("communication", settings, effort=1.5, flexible=1.5)
 
 
@@ -40,8 +41,12 @@ def run(unit: Unit, settings: Settings) -> Result:
     if "orders" in unit.parameters:
         candidates = world.candidates(settings.domains)
         found = {}
-        for name, words in greedy_in_orders(candidates, unit.parameters["orders"], unit.random(settings.seed)):
-            measured = flexibility(candidates.spaces, [words[space.state] for space in candidates.spaces])
+        for name, words in greedy_in_orders(
+            candidates, unit.parameters["orders"], unit.random(settings.seed)
+        ):
+            measured = flexibility(
+                candidates.spaces, [words[space.state] for space in candidates.spaces]
+            )
             shorter = measured.first_words < measured.steps + 1
             found[name] = [int(shorter.sum()), round(float(measured.first_saving.mean()), 6)]
         return {"differing_and_saving": found}
@@ -64,7 +69,9 @@ def measures(tasks: Sequence[Said]) -> Result:
         "saving_last": mean([task.saving(len(task.last)) for task in tasks], 6),
         "saving_expected": mean([task.saving(task.expected_words) for task in tasks], 6),
         "saving_most": mean([task.saving(task.fewest_words) for task in tasks], 6),
-        "saving_of_actions": mean([1 - len(task.first) / task.steps for task in tasks if task.steps], 6),
+        "saving_of_actions": mean(
+            [1 - len(task.first) / task.steps for task in tasks if task.steps], 6
+        ),
         "states": [task.steps + 1 for task in tasks][:MOST_LISTED],
         "first_words": [len(task.first) for task in tasks][:MOST_LISTED],
     }
@@ -104,9 +111,24 @@ def _headlines(found: Compared) -> tuple[Headline, ...]:
     greedy, least = results
     there = "saving_differing"
     return (
-        (f"{row}: saving, all tasks", percent(SAVING_ALL), percent(greedy["saving"]), percent(least["saving"])),
-        (f"{row}: saving where shorter", percent(SAVING_DIFFERING), percent(greedy[there]), percent(least[there])),
-        (f"{row}: tasks with a shorter sentence", f"{DIFFERING}", f"{greedy['differing']}", f"{least['differing']}"),
+        (
+            f"{row}: saving, all tasks",
+            percent(SAVING_ALL),
+            percent(greedy["saving"]),
+            percent(least["saving"]),
+        ),
+        (
+            f"{row}: saving where shorter",
+            percent(SAVING_DIFFERING),
+            percent(greedy[there]),
+            percent(least[there]),
+        ),
+        (
+            f"{row}: tasks with a shorter sentence",
+            f"{DIFFERING}",
+            f"{greedy['differing']}",
+            f"{least['differing']}",
+        ),
     )
 
 
@@ -123,20 +145,31 @@ def _table(records: Sequence[Record], world: bool = False) -> str:
     for record in records:
         r = record.result
         name = TITLES[record.unit.parameters["method"]]
-        rows.append([
-            f"{record.unit.parameters['world']}, {name}" if world else name,
-            r["words"],
-            f"{r['differing']:,} of {r['tasks']:,}",
-            percent(r["saving_differing"]) if r["differing"] else None,
-            percent(r["saving"]),
-            percent(r["saving_last"]),
-            percent(r["saving_expected"]),
-            percent(r["saving_most"]),
-        ])  # fmt: skip
+        rows.append(
+            [
+                f"{record.unit.parameters['world']}, {name}" if world else name,
+                r["words"],
+                f"{r['differing']:,} of {r['tasks']:,}",
+                percent(r["saving_differing"]) if r["differing"] else None,
+                percent(r["saving"]),
+                percent(r["saving_last"]),
+                percent(r["saving_expected"]),
+                percent(r["saving_most"]),
+            ]
+        )
     if not world and records and records[0].unit.parameters["world"] == ROW:
         paper = [f"{DIFFERING} of 956", percent(SAVING_DIFFERING), percent(SAVING_ALL)]
         rows.insert(0, ["paper", 4, *paper, None, None, None])
-    head = ("language", "words", "sentence shorter", "saving there", "saving, all", "last plan", "any plan", "shortest")
+    head = (
+        "language",
+        "words",
+        "sentence shorter",
+        "saving there",
+        "saving, all",
+        "last plan",
+        "any plan",
+        "shortest",
+    )
     return table(head, rows)
 
 
@@ -153,10 +186,18 @@ def _told_orders(record: Record) -> str:
 
 def _first_tasks(records: Sequence[Record]) -> Any:
     reference = records[0].result
-    differing = [n for n, (s, w) in enumerate(zip(reference["states"], reference["first_words"], strict=True)) if w < s]
+    differing = [
+        n
+        for n, (s, w) in enumerate(zip(reference["states"], reference["first_words"], strict=True))
+        if w < s
+    ]
     shown = differing[:SHOWN]
     series = [
-        Series(r.unit.parameters["method"], TITLES[r.unit.parameters["method"]], [r.result["first_words"][n] for n in shown])
+        Series(
+            r.unit.parameters["method"],
+            TITLES[r.unit.parameters["method"]],
+            [r.result["first_words"][n] for n in shown],
+        )
         for r in records
         if r.unit.parameters["method"] in ("greedy", "minimal")
     ]
@@ -169,7 +210,11 @@ def _savings(records: Sequence[Record]) -> Any:
         r, method = record.result, record.unit.parameters["method"]
         savings = [100 * (1 - w / s) for s, w in zip(r["states"], r["first_words"], strict=True)]
         paper = 100 * SAVING_ALL if record.unit.parameters["world"] == ROW else None
-        panels.append(Panel(method, f"{TITLES[method]} ({r['words']} words)", savings, 100 * r["saving"], paper))
+        panels.append(
+            Panel(
+                method, f"{TITLES[method]} ({r['words']} words)", savings, 100 * r["saving"], paper
+            )
+        )
     longest = max(records[0].result["states"])
     bounds = [100 * (k - 0.5) / longest for k in range(longest + 1)]
     return histograms(panels, bounds, "communication saving (%)", "tasks", 1)
@@ -186,7 +231,11 @@ def _differences(row: str, records: Sequence[Record], orders: Sequence[Record]) 
     )
     if orders:
         savings = [saving for _, saving in orders[0].result["differing_and_saving"].values()]
-        reached = "the paper's is among them" if min(savings) <= SAVING_ALL <= max(savings) else "none gives the paper's"
+        reached = (
+            "the paper's is among them"
+            if min(savings) <= SAVING_ALL <= max(savings)
+            else "none gives the paper's"
+        )
         text += f" {len(savings)} orders give {percent(min(savings))} to {percent(max(savings))} for first plans, {reached}."
     return (
         f"{text} The last plans in our order save {percent(greedy['saving_last'])}, the plans with the shortest sentences "

@@ -6,7 +6,17 @@ from collections.abc import Sequence
 from typing import Any
 
 from coordlang.evaluation.lab.plots import Panel, histograms
-from coordlang.evaluation.lab.recipe import Figure, Headline, Recipe, Record, Result, Section, Settings, Unit, table
+from coordlang.evaluation.lab.recipe import (
+    Figure,
+    Headline,
+    Recipe,
+    Record,
+    Result,
+    Section,
+    Settings,
+    Unit,
+    table,
+)
 from coordlang.evaluation.material.compared import Compared, compared_units
 from coordlang.evaluation.material.languages import TITLES, language_for
 from coordlang.evaluation.material.orders import NATURAL, greedy_in_orders
@@ -25,16 +35,24 @@ def run(unit: Unit, settings: Settings) -> Result:
     if "orders" in unit.parameters:
         candidates = world.candidates(settings.domains)
         found = {}
-        for name, words in greedy_in_orders(candidates, unit.parameters["orders"], unit.random(settings.seed)):
-            measured = flexibility(candidates.spaces, [words[space.state] for space in candidates.spaces])
-            found[name] = [round(float(measured.first.mean()), 3), round(float(measured.expected.mean()), 3)]
+        for name, words in greedy_in_orders(
+            candidates, unit.parameters["orders"], unit.random(settings.seed)
+        ):
+            measured = flexibility(
+                candidates.spaces, [words[space.state] for space in candidates.spaces]
+            )
+            found[name] = [
+                round(float(measured.first.mean()), 3),
+                round(float(measured.expected.mean()), 3),
+            ]
         return {"open_and_expected": found}
     candidates, language = language_for(world, unit.parameters["method"], settings)
     return {"words": len(language.words), **measures(list(said_in(candidates, language)))}
 
 
 def measures(tasks: Sequence[Said]) -> Result:
-    """Plans left open by the sentence of each task's first plan, and in expectation over all its plans.
+    """Plans left open by the sentence of each task's first plan, and in expectation over all its
+    plans.
 
     ``several``: tasks in which the first plan's sentence leaves more than one plan open.
     """
@@ -79,8 +97,18 @@ def _headlines(found: Compared) -> tuple[Headline, ...]:
     greedy, least = results
     there = "open_several"
     return (
-        (f"{row}: plans open, all tasks", f"{OPEN_ALL}", f"{greedy['open']:.1f}", f"{least['open']:.1f}"),
-        (f"{row}: plans open where several", f"{OPEN_SEVERAL}", f"{greedy[there]:.1f}", f"{least[there]:.1f}"),
+        (
+            f"{row}: plans open, all tasks",
+            f"{OPEN_ALL}",
+            f"{greedy['open']:.1f}",
+            f"{least['open']:.1f}",
+        ),
+        (
+            f"{row}: plans open where several",
+            f"{OPEN_SEVERAL}",
+            f"{greedy[there]:.1f}",
+            f"{least[there]:.1f}",
+        ),
         (f"{row}: tasks with several", f"{SEVERAL}", f"{greedy['several']}", f"{least['several']}"),
     )
 
@@ -97,19 +125,30 @@ def _table(records: Sequence[Record], world: bool = False) -> str:
     for record in records:
         r = record.result
         name = TITLES[record.unit.parameters["method"]]
-        rows.append([
-            f"{record.unit.parameters['world']}, {name}" if world else name,
-            r["words"],
-            f"{r['open']:.1f}",
-            f"{r['several']:,} of {r['tasks']:,}",
-            f"{r['open_several']:.1f}" if r["several"] else None,
-            f"{r['open_last']:.1f}",
-            f"{r['expected']:.1f}",
-            f"{r['plans']:.1f}",
-        ])  # fmt: skip
+        rows.append(
+            [
+                f"{record.unit.parameters['world']}, {name}" if world else name,
+                r["words"],
+                f"{r['open']:.1f}",
+                f"{r['several']:,} of {r['tasks']:,}",
+                f"{r['open_several']:.1f}" if r["several"] else None,
+                f"{r['open_last']:.1f}",
+                f"{r['expected']:.1f}",
+                f"{r['plans']:.1f}",
+            ]
+        )
     if not world and records and records[0].unit.parameters["world"] == ROW:
         rows.insert(0, ["paper", 4, OPEN_ALL, f"{SEVERAL} of 956", OPEN_SEVERAL, None, None, None])
-    head = ("language", "words", "open", "several", "open there", "last plan", "any plan", "optimal plans")
+    head = (
+        "language",
+        "words",
+        "open",
+        "several",
+        "open there",
+        "last plan",
+        "any plan",
+        "optimal plans",
+    )
     return table(head, rows)
 
 
@@ -131,7 +170,9 @@ def _open(records: Sequence[Record]) -> Any:
     for record in records:
         r, method = record.result, record.unit.parameters["method"]
         paper = OPEN_ALL if record.unit.parameters["world"] == ROW else None
-        panels.append(Panel(method, f"{TITLES[method]} ({r['words']} words)", r["first"], r["open"], paper))
+        panels.append(
+            Panel(method, f"{TITLES[method]} ({r['words']} words)", r["first"], r["open"], paper)
+        )
     most = max(max(r.result["first"]) for r in records)
     width = max(1, -(-most // 20))
     bounds = [0.5 + width * k for k in range(-(-most // width) + 1)]

@@ -1,7 +1,9 @@
-"""A coordination game: the speaker proposes until the listener accepts, plans in one game, sentences in the other.
+"""A coordination game: the speaker proposes until the listener accepts, plans in one game,
+sentences in the other.
 
-The listener likes ``k`` of the task's optimal plans, drawn at random.  It accepts a plan that it likes, and a sentence that
-some plan which it likes has.  The speaker does not know them and proposes nothing twice.
+The listener likes ``k`` of the task's optimal plans, drawn at random.  It accepts a plan that it
+likes, and a sentence that some plan which it likes has.  The speaker does not know them and
+proposes nothing twice.
 """
 
 from __future__ import annotations
@@ -17,7 +19,17 @@ from typing import Any
 
 from coordlang.evaluation.lab.interval import mean_interval
 from coordlang.evaluation.lab.plots import Series, lines
-from coordlang.evaluation.lab.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit, done, table
+from coordlang.evaluation.lab.recipe import (
+    Figure,
+    Recipe,
+    Record,
+    Result,
+    Section,
+    Settings,
+    Unit,
+    done,
+    table,
+)
 from coordlang.evaluation.material.languages import TITLES, language_for
 from coordlang.evaluation.material.said import said_in
 from coordlang.evaluation.material.suite import OTHERS, WORLDS
@@ -42,7 +54,9 @@ def run(unit: Unit, settings: Settings) -> Result:
     world = WORLDS[unit.parameters["world"]]
     candidates, language = language_for(world, unit.parameters["method"], settings)
     # A task's game depends on its numbers of plans alone; a language makes few different ones.
-    tasks = [tuple(sorted(task.plans.values(), reverse=True)) for task in said_in(candidates, language)]
+    tasks = [
+        tuple(sorted(task.plans.values(), reverse=True)) for task in said_in(candidates, language)
+    ]
     result: Result = {"words": len(language.words), "tasks": len(tasks), "liked": list(LIKED)}
     different = Counter(tasks)
     exact: dict[str, list[float]] = {"plan": [], "sentence": [], "widest": []}
@@ -51,13 +65,19 @@ def run(unit: Unit, settings: Settings) -> Result:
         sums = [Fraction(0)] * 3
         for sizes, number in different.items():
             k = min(liked, sum(sizes))
-            values = (expected_for_plans(sum(sizes), k), expected_for_sentences(sizes, k), expected_widest_first(sizes, k))
+            values = (
+                expected_for_plans(sum(sizes), k),
+                expected_for_sentences(sizes, k),
+                expected_widest_first(sizes, k),
+            )
             sums = [total + number * value for total, value in zip(sums, values, strict=True)]
         for name, total in zip(exact, sums, strict=True):
             exact[name].append(round(float(total / len(tasks)), 6))
         games = []
         for number in range(settings.samples):
-            random = Random(f"{settings.seed} {world.name} {liked} {number}")  # the same games for every language
+            random = Random(
+                f"{settings.seed} {world.name} {liked} {number}"
+            )  # the same games for every language
             games.append(play(random.choice(tasks), liked, random))
         played["plan"].append([plan for plan, _ in games])
         played["sentence"].append([sentence for _, sentence in games])
@@ -65,7 +85,9 @@ def run(unit: Unit, settings: Settings) -> Result:
 
 
 def play(sizes: Sequence[int], liked: int, random: Random) -> tuple[int, int]:
-    """Proposals of one game each, with plans and with sentences; ``sizes``: the numbers of plans of the sentences."""
+    """Proposals of one game each, with plans and with sentences; ``sizes``: the numbers of plans of
+    the sentences.
+    """
     owner = [sentence for sentence, number in enumerate(sizes) for _ in range(number)]
     likes = set(random.sample(range(len(owner)), min(liked, len(owner))))
     plans = random.sample(range(len(owner)), len(owner))
@@ -77,15 +99,18 @@ def play(sizes: Sequence[int], liked: int, random: Random) -> tuple[int, int]:
 
 
 def expected_for_plans(plans: int, liked: int) -> Fraction:
-    """Expected proposals until one of ``liked`` plans among ``plans`` is proposed, in random order: (N + 1) / (k + 1)."""
+    """Expected proposals until one of ``liked`` plans among ``plans`` is proposed, in random order:
+    (N + 1) / (k + 1).
+    """
     return Fraction(plans + 1, liked + 1)
 
 
 def expected_for_sentences(sizes: Sequence[int], liked: int) -> Fraction:
-    """The same for sentences in random order: with m of D sentences acceptable it is (D + 1) / (m + 1).
+    """The same for sentences in random order: with m of D sentences acceptable it is (D + 1) / (m +
+    1).
 
-    How many of the sets of ``liked`` plans meet exactly m sentences is the coefficient of ``x^liked y^m`` in the product of
-    ``1 + y ((1 + x)^n - 1)`` over the sentences with n plans each.
+    How many of the sets of ``liked`` plans meet exactly m sentences is the coefficient of ``x^liked
+    y^m`` in the product of ``1 + y ((1 + x)^n - 1)`` over the sentences with n plans each.
     """
     ways = {(0, 0): 1}
     for n in sizes:
@@ -95,12 +120,18 @@ def expected_for_sentences(sizes: Sequence[int], liked: int) -> Fraction:
                 key = (taken + more, met + 1)
                 after[key] = after.get(key, 0) + number * comb(n, more)
         ways = after
-    shares = (number * Fraction(len(sizes) + 1, met + 1) for (taken, met), number in ways.items() if taken == liked)
+    shares = (
+        number * Fraction(len(sizes) + 1, met + 1)
+        for (taken, met), number in ways.items()
+        if taken == liked
+    )
     return sum(shares, Fraction(0)) / comb(sum(sizes), liked)
 
 
 def expected_widest_first(sizes: Sequence[int], liked: int) -> Fraction:
-    """The same for sentences that leave most plans open first: the sum over j of the chance that the first j all fail."""
+    """The same for sentences that leave most plans open first: the sum over j of the chance that
+    the first j all fail.
+    """
     left = sum(sizes)
     ways = comb(left, liked)
     result = Fraction(0)
@@ -116,11 +147,16 @@ def section(records: Sequence[Record]) -> Section:
     for name in dict.fromkeys(r.unit.parameters["world"] for r in found):
         here = [r for r in found if r.unit.parameters["world"] == name]
         runs = here[0].unit.parameters["runs"]
-        blocks += [f"{name}, {here[0].result['tasks']:,} tasks, means of {runs} games and exact expectations:", _table(here)]
+        blocks += [
+            f"{name}, {here[0].result['tasks']:,} tasks, means of {runs} games and exact expectations:",
+            _table(here),
+        ]
         if name == ROW:
             alt = f"Proposals until accepted on {ROW}, plans against sentences, by liked plans"
             blocks.append(Figure("game", alt, partial(_drawn, here)))
-    return Section(tuple(blocks), _differences([r for r in found if r.unit.parameters["world"] == ROW]))
+    return Section(
+        tuple(blocks), _differences([r for r in found if r.unit.parameters["world"] == ROW])
+    )
 
 
 _DEFINITION = """\
@@ -136,7 +172,10 @@ def _table(records: Sequence[Record]) -> str:
     kinds: list[tuple[str, Result, str]] = [("plan", plan, "plan")]
     for record in records:
         title = TITLES[record.unit.parameters["method"]]
-        kinds += [(f"sentence, {title}", record.result, "sentence"), (f"{title}, widest first", record.result, "widest")]
+        kinds += [
+            (f"sentence, {title}", record.result, "sentence"),
+            (f"{title}, widest first", record.result, "widest"),
+        ]
     for label, result, what in kinds:
         row: list[object] = [label]
         for n in range(len(result["liked"])):
@@ -151,7 +190,13 @@ def _drawn(records: Sequence[Record]) -> Any:
 
     def played(kind: str, label: str, result: Result, what: str) -> Series:
         ends = [mean_interval(games) for games in result["played"][what]]
-        return Series(kind, label, [fmean(g) for g in result["played"][what]], [e[0] for e in ends], [e[1] for e in ends])
+        return Series(
+            kind,
+            label,
+            [fmean(g) for g in result["played"][what]],
+            [e[0] for e in ends],
+            [e[1] for e in ends],
+        )
 
     runs = records[0].unit.parameters["runs"]
     first = records[0].result
@@ -161,7 +206,9 @@ def _drawn(records: Sequence[Record]) -> Any:
         method = record.unit.parameters["method"]
         series.append(played(method, f"sentence, {TITLES[method]}", record.result, "sentence"))
         exact.append(Series(method, f"{TITLES[method]}, exact", record.result["exact"]["sentence"]))
-    return lines(liked, series, "plans that the listener likes (k)", "proposals until accepted", exact)
+    return lines(
+        liked, series, "plans that the listener likes (k)", "proposals until accepted", exact
+    )
 
 
 def _differences(records: Sequence[Record]) -> tuple[str, ...]:
@@ -172,7 +219,8 @@ def _differences(records: Sequence[Record]) -> tuple[str, ...]:
         f"**Coordination game.** The order of the paper's proposals and the values of its figure are not known to us; our "
         f"expectations on {ROW} for k = 1 are {first['exact']['plan'][0]:.2f} plans against "
         + ", ".join(
-            f"{r.result['exact']['sentence'][0]:.2f} sentences ({TITLES[r.unit.parameters['method']]})" for r in records
+            f"{r.result['exact']['sentence'][0]:.2f} sentences ({TITLES[r.unit.parameters['method']]})"
+            for r in records
         )
         + ".",
     )

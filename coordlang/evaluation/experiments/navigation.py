@@ -1,8 +1,9 @@
 """Robust navigation: a human stands in the way, seen only once execution has started.
 
-Robots deliver in a warehouse (`coordlang.evaluation.material.warehouse`).  For all tasks of a delivery plans or sentences are agreed
-on before anybody moves.  Then a human is seen, in a random cell that is no corner, who stays there.  A plan fails if any
-robot would enter that cell.  Under a sentence each robot picks among its own choices.
+Robots deliver in a warehouse (`coordlang.evaluation.material.warehouse`).  For all tasks of a
+delivery plans or sentences are agreed on before anybody moves.  Then a human is seen, in a random
+cell that is no corner, who stays there.  A plan fails if any robot would enter that cell.  Under a
+sentence each robot picks among its own choices.
 """
 
 from __future__ import annotations
@@ -34,7 +35,12 @@ from coordlang.evaluation.material.warehouse import LAYOUTS, WAREHOUSES, deliver
 METHODS = ("greedy", "separating", "minimal")
 #: Languages that are not found within minutes: an unfinished one would depend on the machine.
 UNFINISHED = {
-    *((f"open {size}", layout, method) for size in ("4x4", "5x5") for layout in LAYOUTS for method in METHODS[1:]),
+    *(
+        (f"open {size}", layout, method)
+        for size in ("4x4", "5x5")
+        for layout in LAYOUTS
+        for method in METHODS[1:]
+    ),
     *((f"ring {size}", "along", "minimal") for size in ("3x4", "3x5", "4x4")),
     ("ring 3x5", "across", "minimal"),
 }
@@ -49,13 +55,22 @@ def units(settings: Settings) -> list[Unit]:
             for method in METHODS:
                 if (name, layout, method) in UNFINISHED:
                     continue
-                parameters = {"warehouse": name, "layout": layout, "method": method, "samples": settings.samples}
+                parameters = {
+                    "warehouse": name,
+                    "layout": layout,
+                    "method": method,
+                    "samples": settings.samples,
+                }
                 effort = 30.0 if name == "open 5x5" else 5.0
-                found.append(Unit("navigation", f"{name}/{layout}/{method}", parameters, world.files, effort))
+                found.append(
+                    Unit("navigation", f"{name}/{layout}/{method}", parameters, world.files, effort)
+                )
     for world in OTHERS[: 1 if settings.quick else None]:
         for method in METHODS:
             parameters = {"world": world.name, "method": method, "samples": settings.samples}
-            found.append(Unit("navigation", f"{world.name}/{method}", parameters, world.files, 10.0))
+            found.append(
+                Unit("navigation", f"{world.name}/{method}", parameters, world.files, 10.0)
+            )
     return found
 
 
@@ -69,7 +84,9 @@ def run(unit: Unit, settings: Settings) -> Result:
         every = deliveries(rows, columns, asked["layout"])
         candidates, language = language_for(world, asked["method"], settings, listed_tasks(every))
         trials = warehouse_trials(candidates, language, every)
-    random = Random(f"{settings.seed} {unit.key.rsplit('/', 1)[0]}")  # the same draws for every language
+    random = Random(
+        f"{settings.seed} {unit.key.rsplit('/', 1)[0]}"
+    )  # the same draws for every language
     return {
         "words": len(language.words),
         "trials": len(trials.trials),
@@ -123,18 +140,32 @@ def _table(records: Sequence[Record]) -> str:
     for record in records:
         r, asked = record.result, record.unit.parameters
         few, many, exact = r["few"], r["many"], r["exact"]
-        rows.append([
-            f"{asked.get('warehouse', asked.get('world'))}, {TITLES[asked['method']]}",
-            r["words"],
-            f"{few['plan']} / {few['runs']}",
-            f"{few['sentence']} / {few['runs']}",
-            _share(many["plan"], many["runs"]),
-            _share(many["sentence"], many["runs"]),
-            *(percent(exact[what]) if exact else None for what in ("plan", "sentence", "possible")),
-        ])  # fmt: skip
+        rows.append(
+            [
+                f"{asked.get('warehouse', asked.get('world'))}, {TITLES[asked['method']]}",
+                r["words"],
+                f"{few['plan']} / {few['runs']}",
+                f"{few['sentence']} / {few['runs']}",
+                _share(many["plan"], many["runs"]),
+                _share(many["sentence"], many["runs"]),
+                *(
+                    percent(exact[what]) if exact else None
+                    for what in ("plan", "sentence", "possible")
+                ),
+            ]
+        )
     runs = f"{records[0].result['many']['runs']:,}"
-    head = ("map, language", "words", "plan", "sentence", f"plan, {runs} runs", f"sentence, {runs} runs", "plan, exact",
-            "sentence, exact", "possible")  # fmt: skip
+    head = (
+        "map, language",
+        "words",
+        "plan",
+        "sentence",
+        f"plan, {runs} runs",
+        f"sentence, {runs} runs",
+        "plan, exact",
+        "sentence, exact",
+        "possible",
+    )
     return table(head, rows)
 
 
@@ -180,7 +211,10 @@ def _differences(records: Sequence[Record]) -> tuple[str, ...]:
         "**Robust navigation.** The paper's map and rates are not known to us, so nothing can be compared. On our maps a "
         f"sentence adds {min(gains):.1f} to {max(gains):.1f} points to the plan's success rate"
     )
-    return (text + (f", and on {len(lower)} of {len(records)} it loses." if lower else ", and never loses."),)
+    return (
+        text
+        + (f", and on {len(lower)} of {len(records)} it loses." if lower else ", and never loses."),
+    )
 
 
 RECIPE = Recipe("navigation", "Robust navigation: a human in the way", units, run, section)

@@ -37,7 +37,9 @@ def units(settings: Settings) -> list[Unit]:
         found += [_unit(row, heuristic, method, None) for method in METHODS]
     for world in OTHERS[: 1 if settings.quick else None]:
         for heuristic in ("relaxed", "blind"):
-            found += [_unit(world.name, heuristic, method, 3 * settings.samples) for method in METHODS]
+            found += [
+                _unit(world.name, heuristic, method, 3 * settings.samples) for method in METHODS
+            ]
     return found
 
 
@@ -45,7 +47,9 @@ def _unit(world: str, heuristic: str, method: str, samples: int | None) -> Unit:
     """``samples`` tasks drawn at random; None: all."""
     parameters = {"world": world, "heuristic": heuristic, "method": method, "samples": samples}
     effort = 20.0 if heuristic == "relaxed" else 10.0
-    return Unit("planning_cost", f"{world}/{heuristic}/{method}", parameters, WORLDS[world].files, effort)
+    return Unit(
+        "planning_cost", f"{world}/{heuristic}/{method}", parameters, WORLDS[world].files, effort
+    )
 
 
 def run(unit: Unit, settings: Settings) -> Result:
@@ -72,8 +76,9 @@ def run(unit: Unit, settings: Settings) -> Result:
 
 
 def expansions(spoken: Spoken, heuristic: str, terrain: Terrain) -> tuple[int, int, int]:
-    """Nodes expanded by A* without a sentence; with that of the plan it finds, pruning only as in the paper; and with the
-    words still to be said as a bound, too."""
+    """Nodes expanded by A* without a sentence; with that of the plan it finds, pruning only as in
+    the paper; and with the words still to be said as a bound, too.
+    """
     alone = guided(spoken, None, heuristic, terrain)
     pruned = guided(spoken, alone.words, heuristic, terrain, count_words=False)
     bounded = guided(spoken, alone.words, heuristic, terrain)
@@ -103,10 +108,17 @@ def section(records: Sequence[Record]) -> Section:
 
 
 def _headlines(row: str, records: Sequence[Record]) -> tuple[Headline, ...]:
-    of = {r.unit.parameters["method"]: r.result for r in records if r.unit.parameters["heuristic"] == "manhattan"}
+    of = {
+        r.unit.parameters["method"]: r.result
+        for r in records
+        if r.unit.parameters["heuristic"] == "manhattan"
+    }
     if row != ROW or not {"greedy", "minimal"} <= of.keys():
         return ()
-    greedy, least = (f"{of[method]['alone'] / max(1, of[method]['pruned']):.2f}" for method in ("greedy", "minimal"))
+    greedy, least = (
+        f"{of[method]['alone'] / max(1, of[method]['pruned']):.2f}"
+        for method in ("greedy", "minimal")
+    )
     return ((f"{row}: A* with a sentence, times fewer nodes", f"{PLANNING_RATIO}", greedy, least),)
 
 
@@ -122,29 +134,43 @@ def _table(records: Sequence[Record], world: bool = False) -> str:
     for record in records:
         r, asked = record.result, record.unit.parameters
         name = f"{asked['heuristic']}, {TITLES[asked['method']]}"
-        rows.append([
-            f"{asked['world']}, {name}" if world else name,
-            r["tasks"],
-            f"{r['alone'] / r['tasks']:.1f}",
-            f"{r['pruned'] / r['tasks']:.1f}",
-            f"{r['bounded'] / r['tasks']:.1f}",
-            f"{r['alone'] / max(1, r['pruned']):.2f}",
-            f"{r['mean_ratio_pruned']:.2f}",
-            f"{r['alone'] / max(1, r['bounded']):.2f}",
-            f"{r['more']:,}",
-        ])  # fmt: skip
-    head = ("search", "tasks", "nodes alone", "pruned", "bounded", "times fewer", "per task", "bounded: times fewer",
-            "tasks with more")  # fmt: skip
+        rows.append(
+            [
+                f"{asked['world']}, {name}" if world else name,
+                r["tasks"],
+                f"{r['alone'] / r['tasks']:.1f}",
+                f"{r['pruned'] / r['tasks']:.1f}",
+                f"{r['bounded'] / r['tasks']:.1f}",
+                f"{r['alone'] / max(1, r['pruned']):.2f}",
+                f"{r['mean_ratio_pruned']:.2f}",
+                f"{r['alone'] / max(1, r['bounded']):.2f}",
+                f"{r['more']:,}",
+            ]
+        )
+    head = (
+        "search",
+        "tasks",
+        "nodes alone",
+        "pruned",
+        "bounded",
+        "times fewer",
+        "per task",
+        "bounded: times fewer",
+        "tasks with more",
+    )
     return table(head, rows)
 
 
 def _drawn(records: Sequence[Record]) -> Any:
     heuristics = list(dict.fromkeys(r.unit.parameters["heuristic"] for r in records))
     ratio = {
-        (r.unit.parameters["heuristic"], r.unit.parameters["method"]): r.result["alone"] / max(1, r.result["pruned"])
+        (r.unit.parameters["heuristic"], r.unit.parameters["method"]): r.result["alone"]
+        / max(1, r.result["pruned"])
         for r in records
     }
-    paper = Series("paper", "paper", [PLANNING_RATIO if h == "manhattan" else None for h in heuristics])
+    paper = Series(
+        "paper", "paper", [PLANNING_RATIO if h == "manhattan" else None for h in heuristics]
+    )
     series = [Series(m, TITLES[m], [ratio.get((h, m)) for h in heuristics]) for m in METHODS]
     return by_category(heuristics, [paper, *series], "times fewer nodes (pruned)", level=1)
 

@@ -1,8 +1,10 @@
-"""The motivating scenario: a place of interest appears, one robot makes a detour, and the other one never knows.
+"""The motivating scenario: a place of interest appears, one robot makes a detour, and the other one
+never knows.
 
-On the map `corridor` two robots trade rooms through a corridor with one passing place.  They have agreed on the sentence of
-the first optimal plan.  Then a place becomes interesting that robot 1 would not pass.  If one of its choices under the
-sentence goes there, it goes; robot 2 does its own part as before, and both are still on an optimal plan.
+On the map `corridor` two robots trade rooms through a corridor with one passing place.  They have
+agreed on the sentence of the first optimal plan.  Then a place becomes interesting that robot 1
+would not pass.  If one of its choices under the sentence goes there, it goes; robot 2 does its own
+part as before, and both are still on an optimal plan.
 """
 
 from __future__ import annotations
@@ -38,19 +40,25 @@ from planners.search.plans import Plan, Plans
 METHODS = ("greedy", "separating", "minimal")
 CORRIDOR = World("corridor", "corridor", "problem", "problem")
 #: The cells of the two rooms.
-ROOMS = tuple(tuple(f"c{row}-{column}" for row in range(3) for column in columns) for columns in ((0, 1), (7, 8)))
-#: The scenario that is drawn: where robots 1 and 2 start and go to, and the place that becomes interesting.
+ROOMS = tuple(
+    tuple(f"c{row}-{column}" for row in range(3) for column in columns)
+    for columns in ((0, 1), (7, 8))
+)
+#: The scenario that is drawn: where robots 1 and 2 start and go to, and the place that becomes
+#: interesting.
 START, GOAL, PLACE = ("c0-0", "c0-8"), ("c2-8", "c2-0"), "c2-7"
 
 
 def trading_rooms() -> tuple[ListedTask, ...]:
-    """The candidate tasks: robot 1 from any cell of the left room to any of the right one, robot 2 the other way."""
+    """The candidate tasks: robot 1 from any cell of the left room to any of the right one, robot 2
+    the other way.
+    """
     left, right = ROOMS
     return tuple(
         ListedTask(_at(start), _at(goal))
         for start in product(left, right)
         for goal in product(right, left)
-    )  # fmt: skip
+    )
 
 
 def _at(cells: Sequence[str]) -> tuple[str, ...]:
@@ -60,7 +68,13 @@ def _at(cells: Sequence[str]) -> tuple[str, ...]:
 def units(settings: Settings) -> list[Unit]:
     methods = ("greedy",) if settings.quick else METHODS
     found = [
-        Unit("scenario", f"corridor/{method}", {"world": "corridor", "method": method, "samples": None}, CORRIDOR.files, 15.0)
+        Unit(
+            "scenario",
+            f"corridor/{method}",
+            {"world": "corridor", "method": method, "samples": None},
+            CORRIDOR.files,
+            15.0,
+        )
         for method in methods
     ]
     for world in OTHERS[: 1 if settings.quick else None]:
@@ -88,9 +102,10 @@ def run(unit: Unit, settings: Settings) -> Result:
 def freedom(spoken: Sequence[Spoken]) -> dict[str, int]:
     """Things that robots may do beyond their part of the first plan, summed over tasks and robots.
 
-    A thing is a cell that a robot enters, or a subaction where there are no cells.  ``plan``: things in its part of the
-    agreed plan; ``sentence``: further ones in its choices under the plan's sentence; ``optimal``: further ones in all
-    optimal plans of the task, which would take another agreement.
+    A thing is a cell that a robot enters, or a subaction where there are no cells.  ``plan``:
+    things in its part of the agreed plan; ``sentence``: further ones in its choices under the
+    plan's sentence; ``optimal``: further ones in all optimal plans of the task, which would take
+    another agreement.
     """
     plan = sentence = optimal = 0
     sayings: Sayings | None = None
@@ -114,7 +129,9 @@ def _things(model: JointModel, robot: int, labels: set[int]) -> set[str]:
 
 
 def detour(spoken: Spoken) -> Result:
-    """What happens when `PLACE` becomes interesting: the agreed parts, and robot 1's when it goes there."""
+    """What happens when `PLACE` becomes interesting: the agreed parts, and robot 1's when it goes
+    there.
+    """
     sayings = Sayings(spoken)
     plan, words = sayings.first(spoken.task)
     model = spoken.model
@@ -129,12 +146,21 @@ def detour(spoken: Spoken) -> Result:
         "detour": None,
     }
     plans = Plans.of(spoken.space, spoken.task)
-    # All parts of robot 1 that go there on some optimal plan, and those that would do with robot 2's agreed part.
-    parts = {tuple(step[0] for step in other) for other in plans if wanted & {step[0] for step in other}}
+    # All parts of robot 1 that go there on some optimal plan, and those that would do with robot
+    # 2's agreed part.
+    parts = {
+        tuple(step[0] for step in other) for other in plans if wanted & {step[0] for step in other}
+    }
     fitting = [part for part in parts if plans.rank(_mixed(part, plan)) is not None]
     found |= {"plans": plans.count, "parts": len(parts), "parts_that_fit": len(fitting)}
     if ways:
-        way = max(ways, key=lambda w: (sum(a == b for a, b in zip(w, agreed, strict=True)), tuple(-x for x in w)))
+        way = max(
+            ways,
+            key=lambda w: (
+                sum(a == b for a, b in zip(w, agreed, strict=True)),
+                tuple(-x for x in w),
+            ),
+        )
         executed = _mixed(way, plan)
         found["detour"] = _walk(model, executed, 0)
         found["optimal"] = plans.rank(executed) is not None
@@ -145,7 +171,9 @@ def subplans(automaton: Automaton) -> list[tuple[int, ...]]:
     """All subplans that an automaton accepts, as label numbers."""
     found: list[tuple[tuple[int, ...], int]] = [((), 0)]
     for _ in automaton.layers[1:]:
-        found = [((*way, label), to) for way, state in found for label, to in automaton.moves(state)]
+        found = [
+            ((*way, label), to) for way, state in found for label, to in automaton.moves(state)
+        ]
     return [way for way, _ in found]
 
 
@@ -158,7 +186,9 @@ def _walk(model: JointModel, plan: Plan, robot: int) -> list[str]:
     """The cells of a robot, step by step."""
     cells = [START[robot]]
     for step in plan:
-        cells.append((place_of(model.labels[robot][step[robot]]) if step[robot] else None) or cells[-1])
+        cells.append(
+            (place_of(model.labels[robot][step[robot]]) if step[robot] else None) or cells[-1]
+        )
     return cells
 
 
@@ -215,16 +245,26 @@ def _table(records: Sequence[Record]) -> str:
         r, asked = record.result, record.unit.parameters
         name = f"{asked['world']}, {TITLES[asked['method']]}"
         robots = r["tasks"]
-        rows.append([
-            name,
-            r["words"],
-            r["tasks"],
-            f"{r['plan'] / robots:.2f}",
-            f"{r['sentence'] / robots:.2f}",
-            f"{r['optimal'] / robots:.2f}",
-            percent(r["sentence"] / r["optimal"]) if r["optimal"] else None,
-        ])  # fmt: skip
-    head = ("world, language", "words", "tasks", "in the plan", "more under the sentence", "more in optimal plans", "share")
+        rows.append(
+            [
+                name,
+                r["words"],
+                r["tasks"],
+                f"{r['plan'] / robots:.2f}",
+                f"{r['sentence'] / robots:.2f}",
+                f"{r['optimal'] / robots:.2f}",
+                percent(r["sentence"] / r["optimal"]) if r["optimal"] else None,
+            ]
+        )
+    head = (
+        "world, language",
+        "words",
+        "tasks",
+        "in the plan",
+        "more under the sentence",
+        "more in optimal plans",
+        "share",
+    )
     return table(head, rows)
 
 
@@ -232,10 +272,18 @@ def _drawn(record: Record) -> Any:
     r = record.result["drawn"]
     agreed = [Path("r1", r["agreed"][0]), Path("r2", r["agreed"][1])]
     executed = [Path("r1", r["detour"]), Path("r2", r["agreed"][1])]
-    cells = {cell for room in ROOMS for cell in room} | {cell for path in (*agreed, *executed) for cell in path.cells}
+    cells = {cell for room in ROOMS for cell in room} | {
+        cell for path in (*agreed, *executed) for cell in path.cells
+    }
     with drawing(8.2, 6.4, rows=2) as (figure, [above, below]):
         draw_map(above, cells, agreed, None, "agreed: the first optimal plan")
-        draw_map(below, cells, executed, PLACE, f"executed: {PLACE} has become interesting, r1 passes it, r2 is not told")
+        draw_map(
+            below,
+            cells,
+            executed,
+            PLACE,
+            f"executed: {PLACE} has become interesting, r1 passes it, r2 is not told",
+        )
         return figure
 
 

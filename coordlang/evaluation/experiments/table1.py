@@ -8,7 +8,17 @@ from typing import Any
 
 from coordlang.building import build_language
 from coordlang.evaluation.lab.plots import Series, by_category
-from coordlang.evaluation.lab.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit, done, table
+from coordlang.evaluation.lab.recipe import (
+    Figure,
+    Recipe,
+    Record,
+    Result,
+    Section,
+    Settings,
+    Unit,
+    done,
+    table,
+)
 from coordlang.evaluation.material.orders import ORDERS, greedy_in_orders
 from coordlang.evaluation.material.paper import TABLE_1
 from coordlang.evaluation.material.suite import OTHERS, ROWS, WORLDS
@@ -26,7 +36,8 @@ METHODS = (
     ("exhaustive", "exhaustive", False),
 )
 QUICK = ("GW1", "GW2", "GWB5", "tray")
-#: Brute force, which mixes all pairs of plans, is begun up to so many of them, and ended after so many seconds.
+#: Brute force, which mixes all pairs of plans, is begun up to so many of them, and ended after so
+#: many seconds.
 MOST_PAIRS, BRUTE_SECONDS = 500_000, 10.0
 #: Seconds that the slow rows take with SAT, roughly; the others are done in a second or two.
 _SLOW = {"GW4": 60.0, "GW3": 10.0, "GWB4": 8.0, "GWB3": 8.0}
@@ -38,7 +49,12 @@ def units(settings: Settings) -> list[Unit]:
         if settings.quick and world.name not in QUICK:
             continue
         for name, method, alpha_only in METHODS:
-            parameters = {"world": world.name, "column": name, "method": method, "alpha_only": alpha_only}
+            parameters = {
+                "world": world.name,
+                "column": name,
+                "method": method,
+                "alpha_only": alpha_only,
+            }
             effort = 0.5 if method == "greedy" else _SLOW.get(world.name, 1.0)
             if method == "exhaustive":
                 if world not in ROWS:
@@ -46,7 +62,11 @@ def units(settings: Settings) -> list[Unit]:
                 parameters["seconds"] = min(BRUTE_SECONDS, settings.unit_limit)
                 effort = BRUTE_SECONDS
             found.append(Unit("table1", f"{world.name}/{name}", parameters, world.files, effort))
-        parameters = {"world": world.name, "column": "orders", "orders": 10 if settings.quick else ORDERS}
+        parameters = {
+            "world": world.name,
+            "column": "orders",
+            "orders": 10 if settings.quick else ORDERS,
+        }
         found.append(Unit("table1", f"{world.name}/orders", parameters, world.files, 2.0))
     return found
 
@@ -60,7 +80,10 @@ def run(unit: Unit, settings: Settings) -> Result:
     if asked["method"] == "exhaustive":
         return brute_force(candidates, asked["seconds"], settings.seed)
     built = build_language(
-        candidates, asked["method"], seed=settings.seed, alpha_only=asked["alpha_only"] and asked["method"] != "greedy"
+        candidates,
+        asked["method"],
+        seed=settings.seed,
+        alpha_only=asked["alpha_only"] and asked["method"] != "greedy",
     )
     guarantee = built.language.guarantee
     return {
@@ -89,25 +112,41 @@ def brute_force(candidates: Candidates, seconds: float, seed: int) -> Result:
     except OutOfTime:
         return found | {"why": "out of time"}
     if built.stopped is not None:
-        return found | {"why": "out of time" if isinstance(built.stopped, OutOfTime) else "out of memory"}
-    return found | {"words": built.language.guarantee.size, "partitions": int(built.figures["partitions"])}
+        return found | {
+            "why": "out of time" if isinstance(built.stopped, OutOfTime) else "out of memory"
+        }
+    return found | {
+        "words": built.language.guarantee.size,
+        "partitions": int(built.figures["partitions"]),
+    }
 
 
 def pairs_of_plans(candidates: Candidates) -> int:
     """How many pairs of optimal plans all tasks have: what brute force mixes."""
-    return sum(counted[n] ** 2 for space in candidates.spaces for counted in (counts(space),) for n in space.starts)
+    return sum(
+        counted[n] ** 2
+        for space in candidates.spaces
+        for counted in (counts(space),)
+        for n in space.starts
+    )
 
 
 def section(records: Sequence[Record]) -> Section:
     of: dict[str, dict[str, Record]] = {}
     for record in done(records):
-        of.setdefault(record.unit.parameters["world"], {})[record.unit.parameters["column"]] = record
+        of.setdefault(record.unit.parameters["world"], {})[record.unit.parameters["column"]] = (
+            record
+        )
     rows = [world.name for world in ROWS if "greedy" in of.get(world.name, {})]
     others = [world.name for world in OTHERS if "greedy" in of.get(world.name, {})]
     blocks: list[str | Figure] = [
         _DEFINITION,
         _words(rows, of),
-        Figure("table1-words", "Words of every row of Table 1, by method, beside the paper's", lambda: _drawn(rows, of)),
+        Figure(
+            "table1-words",
+            "Words of every row of Table 1, by method, beside the paper's",
+            lambda: _drawn(rows, of),
+        ),
         "Seconds of processor time, from the PDDL text to the verified language (the paper's on its author's machine):",
         _seconds(rows, of),
     ]
@@ -151,14 +190,26 @@ def _words(names: Sequence[str], of: dict[str, dict[str, Record]]) -> str:
         if paper and paper.exact:
             words = [f"{paper.words} (exact {paper.exact})"]
         words += [greedy["words"], f"{min(orders)} to {max(orders)}" if orders else None]
-        words += [_starred(of[name].get(column)) for column in ("least alpha", "separating", "minimal")]
+        words += [
+            _starred(of[name].get(column)) for column in ("least alpha", "separating", "minimal")
+        ]
         if paper:
             brute = of[name].get("exhaustive")
             words.append(brute.result["words"] if brute else None)
         counted = [greedy["tasks"], greedy["states"], greedy["divergences"]]
         rows.append([name, *counted, *words])
-    head = ["row", "tasks", "states", "divergences", "paper", "greedy", "greedy, orders", "least alpha", "separating",
-            "minimal"]  # fmt: skip
+    head = [
+        "row",
+        "tasks",
+        "states",
+        "divergences",
+        "paper",
+        "greedy",
+        "greedy, orders",
+        "least alpha",
+        "separating",
+        "minimal",
+    ]
     return table(head + ["exhaustive"] * any(name in TABLE_1 for name in names), rows)
 
 
@@ -184,9 +235,17 @@ def _seconds(names: Sequence[str], of: dict[str, dict[str, Record]]) -> str:
     for name in names:
         found = [of[name].get(column) for column in columns]
         brute = of[name].get("exhaustive")
-        told = f"{brute.cpu:.2f}" if brute and brute.result["words"] else brute.result["why"] if brute else None
+        told = (
+            f"{brute.cpu:.2f}"
+            if brute and brute.result["words"]
+            else brute.result["why"]
+            if brute
+            else None
+        )
         paper = TABLE_1[name]
-        theirs = f"{paper.seconds:,.1f}" + (f" (exact {paper.exact_seconds})" if paper.exact_seconds else "")
+        theirs = f"{paper.seconds:,.1f}" + (
+            f" (exact {paper.exact_seconds})" if paper.exact_seconds else ""
+        )
         rows.append([name, theirs, *(f"{r.cpu:.2f}" if r else None for r in found), told])
     return table(("row", "paper", *columns, "exhaustive"), rows)
 
@@ -214,20 +273,28 @@ def _drawn(names: Sequence[str], of: dict[str, dict[str, Record]]) -> Any:
 
 def _differences(names: Sequence[str], of: dict[str, dict[str, Record]]) -> tuple[str, ...]:
     told = []
-    wrong = [n for n in names if (of[n]["greedy"].result["tasks"], of[n]["greedy"].result["states"])
-             != (TABLE_1[n].tasks, TABLE_1[n].states)]  # fmt: skip
+    wrong = [
+        n
+        for n in names
+        if (of[n]["greedy"].result["tasks"], of[n]["greedy"].result["states"])
+        != (TABLE_1[n].tasks, TABLE_1[n].states)
+    ]
     if wrong:
         told.append(f"**Tasks or states** differ from the paper's on {', '.join(wrong)}.")
     told += _about_orders(names, of)
     told += _about_alpha(names, of)
-    ratios = [TABLE_1[n].words / of[n]["minimal"].result["words"] for n in names if "minimal" in of[n]]
+    ratios = [
+        TABLE_1[n].words / of[n]["minimal"].result["words"] for n in names if "minimal" in of[n]
+    ]
     if ratios:
         exact = " and ".join(n for n, paper in TABLE_1.items() if paper.exact)
         told.append(
             f"**The least number of words** is {min(ratios):.1f} to {max(ratios):.1f} times smaller than the paper's (median "
             f"{median(ratios):.1f}), which has an exact value for {exact} only."
         )
-    slow = [n for n in names if "exhaustive" in of[n] and of[n]["exhaustive"].result["words"] is None]
+    slow = [
+        n for n in names if "exhaustive" in of[n] and of[n]["exhaustive"].result["words"] is None
+    ]
     if slow:
         told.append(
             f"**Brute force** ends within {BRUTE_SECONDS:g} s on {len(names) - len(slow)} of {len(names)} rows; where tasks "
@@ -252,11 +319,17 @@ def _about_orders(names: Sequence[str], of: dict[str, dict[str, Record]]) -> lis
 
 
 def _about_alpha(names: Sequence[str], of: dict[str, dict[str, Record]]) -> list[str]:
-    least = {n: of[n]["least alpha"] for n in names if "least alpha" in of[n] and _proved(of[n]["least alpha"])}
+    least = {
+        n: of[n]["least alpha"]
+        for n in names
+        if "least alpha" in of[n] and _proved(of[n]["least alpha"])
+    }
     below = [n for n, record in least.items() if TABLE_1[n].words < record.result["words"]]
     if not below:
         return []
-    listed = ", ".join(f"{n} ({TABLE_1[n].words} against {least[n].result['words']})" for n in below)
+    listed = ", ".join(
+        f"{n} ({TABLE_1[n].words} against {least[n].result['words']})" for n in below
+    )
     return [
         f"**Fewer words than alpha allows.** On {listed} the paper's greedy method reports fewer words than any partition "
         "has that separates all first differences, as is proved. So its condition must be a weaker one there; with last "

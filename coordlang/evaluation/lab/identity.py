@@ -1,4 +1,6 @@
-"""What a result depends on, as hashes: results of other code, files or parameters are not taken for these."""
+"""What a result depends on, as hashes: results of other code, files or parameters are not taken for
+these.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,14 @@ from coordlang.evaluation.lab.recipe import Settings, Unit
 #: Packages whose versions are recorded with each result.
 _PACKAGES = ("coordlang", "numpy", "python-sat", "tarski")
 #: Below `coordlang`: what only renders, and changes no result.
-_RENDERING = ("cli", "report", "explanation", "certificate", "evaluation/lab/plots.py", "evaluation/lab/page.py")
+_RENDERING = (
+    "cli",
+    "report",
+    "explanation",
+    "certificate",
+    "evaluation/lab/plots.py",
+    "evaluation/lab/page.py",
+)
 
 
 @cache

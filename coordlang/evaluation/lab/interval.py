@@ -11,7 +11,8 @@ _Z = 1.959963984540054
 def wilson(successes: int, runs: int) -> tuple[float, float]:
     """The 95 % confidence interval of a proportion, by Wilson's score (1927).
 
-    It stays within 0 .. 1 and says something even where all runs or none succeed.  Raises `ValueError` without runs.
+    It stays within 0 .. 1 and says something even where all runs or none succeed.  Raises
+    `ValueError` without runs.
     """
     if runs < 1 or not 0 <= successes <= runs:
         raise ValueError(f"{successes} successes in {runs} runs")
@@ -25,7 +26,9 @@ def wilson(successes: int, runs: int) -> tuple[float, float]:
 
 
 def mean_interval(values: list[float]) -> tuple[float, float]:
-    """The 95 % confidence interval of a mean, by the normal approximation; the mean itself for a single value."""
+    """The 95 % confidence interval of a mean, by the normal approximation; the mean itself for a
+    single value.
+    """
     number = len(values)
     mean = sum(values) / number
     if number < 2:

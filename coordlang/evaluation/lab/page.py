@@ -1,4 +1,6 @@
-"""The results told on one page: every experiment with its tables and figures, and what differs from the paper, and why."""
+"""The results told on one page: every experiment with its tables and figures, and what differs from
+the paper, and why.
+"""
 
 from __future__ import annotations
 
@@ -15,11 +17,15 @@ from coordlang.language.file import write_atomically
 
 def sections(records: Mapping[str, Sequence[Record]]) -> dict[str, Section]:
     """The sections of the experiments that have results, in their order."""
-    return {name: recipe.section(records[name]) for name, recipe in RECIPES.items() if records.get(name)}
+    return {
+        name: recipe.section(records[name]) for name, recipe in RECIPES.items() if records.get(name)
+    }
 
 
 def write_page(results: Results, page: Path, png: bool = True) -> tuple[Path, ...]:
-    """Draw the figures of all results of a folder into it, and write the page beside them; the files written."""
+    """Draw the figures of all results of a folder into it, and write the page beside them; the
+    files written.
+    """
     lines = {name: list(results.lines(name).values()) for name in RECIPES}
     told = sections({name: [record_of(line) for line in found] for name, found in lines.items()})
     written = [page]
@@ -38,13 +44,22 @@ def page_text(lines: Sequence[Line], told: Mapping[str, Section], where: str) ->
     parts = [_head(lines)]
     headlines = [headline for section in told.values() for headline in section.headlines]
     if headlines:
-        parts += ["## The paper's values and ours", table(("measure", "paper", "ours, greedy", "ours, minimal"), headlines)]
+        parts += [
+            "## The paper's values and ours",
+            table(("measure", "paper", "ours, greedy", "ours, minimal"), headlines),
+        ]
     differences = [difference for section in told.values() for difference in section.differences]
     if differences:
-        parts += ["## What differs from the paper, and why", "\n".join(f"- {difference}" for difference in differences)]
+        parts += [
+            "## What differs from the paper, and why",
+            "\n".join(f"- {difference}" for difference in differences),
+        ]
     unfinished = [line for line in lines if line["status"] != "done"]
     if unfinished:
-        parts += ["## What did not end within its limits", "\n".join(_unfinished(line) for line in unfinished)]
+        parts += [
+            "## What did not end within its limits",
+            "\n".join(_unfinished(line) for line in unfinished),
+        ]
     for name, section in told.items():
         parts += [f"## {RECIPES[name].title}", f"`coordlang evaluate {name}`"]
         parts += [_block(block, where) for block in section.blocks]
@@ -55,7 +70,9 @@ def _head(lines: Sequence[Line]) -> str:
     seeds = sorted({line["seed"] for line in lines})
     limits = sorted({line["unit_limit"] for line in lines})
     seconds = sum(line["cpu"] for line in lines)
-    versions = sorted({f"{name} {number}" for line in lines for name, number in line["versions"].items()})
+    versions = sorted(
+        {f"{name} {number}" for line in lines for name, number in line["versions"].items()}
+    )
     return f"""\
 # Evaluation
 
@@ -78,4 +95,8 @@ def _unfinished(line: Line) -> str:
 def _block(block: str | Figure, where: str) -> str:
     if isinstance(block, str):
         return block
-    return f"![{block.alt}]({where}/{block.name}.svg)" if where != "." else f"![{block.alt}]({block.name}.svg)"
+    return (
+        f"![{block.alt}]({where}/{block.name}.svg)"
+        if where != "."
+        else f"![{block.alt}]({block.name}.svg)"
+    )

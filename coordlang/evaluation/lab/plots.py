@@ -1,4 +1,6 @@
-"""The kinds of figures that experiments draw, in one style: colour-blind safe, every series also with a marker of its own."""
+"""The kinds of figures that experiments draw, in one style: colour-blind safe, every series also
+with a marker of its own.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Okabe and Ito's colours (2008), told apart with every kind of colour vision; and a marker for each series.
+#: Okabe and Ito's colours (2008), told apart with every kind of colour vision; and a marker for
+#: each series.
 _COLOURS = {
     "paper": ("#000000", "D"),
     "plan": ("#D55E00", "s"),
@@ -46,7 +49,8 @@ _STYLE: Any = {
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """Values to draw, None where there is none; ``low`` and ``high`` are intervals around them, ``exact`` what they estimate.
+    """Values to draw, None where there is none; ``low`` and ``high`` are intervals around them,
+    ``exact`` what they estimate.
 
     ``kind`` chooses colour and marker, ``label`` is what the legend says.
     """
@@ -60,8 +64,12 @@ class Series:
 
 
 @contextmanager
-def drawing(width: float, height: float, panels: int = 1, rows: int = 1) -> Iterator[tuple[Figure, list[Axes]]]:
-    """An empty figure (inches) with its axes side by side, in rows, in our style and away from any display."""
+def drawing(
+    width: float, height: float, panels: int = 1, rows: int = 1
+) -> Iterator[tuple[Figure, list[Axes]]]:
+    """An empty figure (inches) with its axes side by side, in rows, in our style and away from any
+    display.
+    """
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -95,7 +103,8 @@ def colour(kind: str) -> str:
 def by_category(
     categories: Sequence[str], series: Sequence[Series], unit: str, *, level: float | None = None
 ) -> Figure:
-    """Markers over categories, with intervals where the series has them; ``unit`` labels the value axis.
+    """Markers over categories, with intervals where the series has them; ``unit`` labels the value
+    axis.
 
     ``level``: a value that means no difference.
     """
@@ -104,12 +113,16 @@ def by_category(
         if level is not None:
             axes.axhline(level, color=_GREY, linewidth=1.0, zorder=1)
         if any(one.exact for one in series):
-            axes.plot([], [], color="#222222", marker="_", linestyle="none", markersize=10, label="exact")
+            axes.plot(
+                [], [], color="#222222", marker="_", linestyle="none", markersize=10, label="exact"
+            )
         axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0)
         return figure
 
 
-def _draw_categories(axes: Axes, categories: Sequence[str], series: Sequence[Series], unit: str) -> None:
+def _draw_categories(
+    axes: Axes, categories: Sequence[str], series: Sequence[Series], unit: str
+) -> None:
     width = 0.72 / max(1, len(series))
     for number, one in enumerate(series):
         hue, marker = _COLOURS[one.kind]
@@ -120,10 +133,19 @@ def _draw_categories(axes: Axes, categories: Sequence[str], series: Sequence[Ser
             for at, n in zip(x, shown, strict=True):
                 low, high = one.low[n], one.high[n]
                 if low is not None and high is not None:
-                    axes.plot([at, at], [low, high], color=hue, linewidth=2, solid_capstyle="butt", zorder=2)
+                    axes.plot(
+                        [at, at],
+                        [low, high],
+                        color=hue,
+                        linewidth=2,
+                        solid_capstyle="butt",
+                        zorder=2,
+                    )
         if one.exact:
             exact = [_numbers(one.exact)[n] for n in shown]
-            axes.plot(x, exact, color="#222222", marker="_", linestyle="none", markersize=10, zorder=4)
+            axes.plot(
+                x, exact, color="#222222", marker="_", linestyle="none", markersize=10, zorder=4
+            )
         hollow = one.kind == "paper"
         axes.plot(
             x,
@@ -140,7 +162,10 @@ def _draw_categories(axes: Axes, categories: Sequence[str], series: Sequence[Ser
         )
     slanted = sum(map(len, categories)) > 36
     axes.set_xticks(
-        range(len(categories)), categories, rotation=35 if slanted else 0, ha="right" if slanted else "center"
+        range(len(categories)),
+        categories,
+        rotation=35 if slanted else 0,
+        ha="right" if slanted else "center",
     )
     axes.set_xlim(-0.6, len(categories) - 0.4)
     for n in range(1, len(categories)):
@@ -151,18 +176,39 @@ def _draw_categories(axes: Axes, categories: Sequence[str], series: Sequence[Ser
 
 
 def lines(
-    x: Sequence[float], series: Sequence[Series], x_label: str, unit: str, dashed: Sequence[Series] = ()
+    x: Sequence[float],
+    series: Sequence[Series],
+    x_label: str,
+    unit: str,
+    dashed: Sequence[Series] = (),
 ) -> Figure:
-    """Lines over numbers (``series``: with markers and intervals; ``dashed``: without, the exact values)."""
+    """Lines over numbers (``series``: with markers and intervals; ``dashed``: without, the exact
+    values).
+    """
     with drawing(6.4, 3.8) as (figure, [axes]):
         for one in dashed:
-            axes.plot(x, _numbers(one.values), color=colour(one.kind), linestyle="--", linewidth=1.4, label=one.label)
+            axes.plot(
+                x,
+                _numbers(one.values),
+                color=colour(one.kind),
+                linestyle="--",
+                linewidth=1.4,
+                label=one.label,
+            )
         width = (max(x) - min(x)) / 60 if len(x) > 1 else 0.1
         for number, one in enumerate(series):
             hue, marker = _COLOURS[one.kind]
             at = [v + (number - (len(series) - 1) / 2) * width for v in x]
             shown = _numbers(one.values)
-            axes.plot(at, shown, color=hue, marker=marker, linestyle="none", markersize=6.5, label=one.label)
+            axes.plot(
+                at,
+                shown,
+                color=hue,
+                marker=marker,
+                linestyle="none",
+                markersize=6.5,
+                label=one.label,
+            )
             for place, low, high in zip(at, _numbers(one.low), _numbers(one.high), strict=False):
                 axes.plot([place, place], [low, high], color=hue, linewidth=1.6)
         axes.set_xlabel(x_label)
@@ -179,14 +225,24 @@ def _numbers(values: Sequence[float | None]) -> list[float]:
 
 
 def per_task(plan: Sequence[float], sentence: Sequence[Series], unit: str) -> Figure:
-    """The paper's figure of communication: one column for each task, the plan's length above the sentences'."""
+    """The paper's figure of communication: one column for each task, the plan's length above the
+    sentences'.
+    """
     x = range(1, len(plan) + 1)
     with drawing(9.0, 3.4) as (figure, [axes]):
         axes.bar(x, plan, width=1.0, color="#d9d9d9", label="plan", zorder=1)
         for one in sentence:
             hue, marker = _COLOURS[one.kind]
             shown = _numbers(one.values)
-            axes.plot(x, shown, linestyle="none", marker=marker, markersize=3.6, color=hue, label=one.label)
+            axes.plot(
+                x,
+                shown,
+                linestyle="none",
+                marker=marker,
+                markersize=3.6,
+                color=hue,
+                label=one.label,
+            )
         axes.set_xlabel("tasks, in their order")
         axes.set_ylabel(unit)
         axes.set_xlim(0.5, len(plan) + 0.5)
@@ -198,7 +254,9 @@ def per_task(plan: Sequence[float], sentence: Sequence[Series], unit: str) -> Fi
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """A histogram: the values of one kind, its mean and, where there is one, the paper's mean of the same thing."""
+    """A histogram: the values of one kind, its mean and, where there is one, the paper's mean of
+    the same thing.
+    """
 
     kind: str
     title: str
@@ -207,15 +265,27 @@ class Panel:
     paper: float | None
 
 
-def histograms(panels: Sequence[Panel], bounds: Sequence[float], x_label: str, unit: str, decimals: int = 2) -> Figure:
+def histograms(
+    panels: Sequence[Panel], bounds: Sequence[float], x_label: str, unit: str, decimals: int = 2
+) -> Figure:
     """Distributions side by side on one scale, with their means and the paper's drawn in."""
     with drawing(3.2 * len(panels) + 0.6, 3.3, len(panels)) as (figure, found):
         for axes, panel in zip(found, panels, strict=True):
-            axes.hist(panel.values, bins=list(bounds), color=colour(panel.kind), edgecolor="white", linewidth=0.5)
-            axes.axvline(panel.mean, color="#222222", linewidth=1.6, label=f"mean {panel.mean:.{decimals}f}")
+            axes.hist(
+                panel.values,
+                bins=list(bounds),
+                color=colour(panel.kind),
+                edgecolor="white",
+                linewidth=0.5,
+            )
+            axes.axvline(
+                panel.mean, color="#222222", linewidth=1.6, label=f"mean {panel.mean:.{decimals}f}"
+            )
             if panel.paper is not None:
                 label = f"paper {panel.paper:.{decimals}f}"
-                axes.axvline(panel.paper, color="#222222", linestyle="--", linewidth=1.6, label=label)
+                axes.axvline(
+                    panel.paper, color="#222222", linestyle="--", linewidth=1.6, label=label
+                )
             axes.set_title(panel.title, fontsize=10)
             axes.set_xlabel(x_label)
             axes.legend(loc="upper right", fontsize=9)

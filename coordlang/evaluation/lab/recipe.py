@@ -21,9 +21,10 @@ Status = Literal["done", "out of time", "out of memory"]
 class Settings:
     """How experiments are run.
 
-    ``samples`` is the number of random runs (the paper: 100); where intervals are wanted, a hundred times as many are
-    made.  ``quick``: the smallest rows and sizes only.  ``unit_limit``: seconds for one piece of work.  ``domains``: the
-    folder of the shipped domains.  ``cache``: where languages are kept between pieces of work.
+    ``samples`` is the number of random runs (the paper: 100); where intervals are wanted, a hundred
+    times as many are made.  ``quick``: the smallest rows and sizes only.  ``unit_limit``: seconds
+    for one piece of work.  ``domains``: the folder of the shipped domains.  ``cache``: where
+    languages are kept between pieces of work.
     """
 
     domains: Path
@@ -43,8 +44,9 @@ class Settings:
 class Unit:
     """A piece of work of an experiment.
 
-    ``key`` names it among the others; ``parameters`` (JSON data) say what is to be done, ``files`` (below the folder of the
-    domains) what is read.  ``effort`` is a guess of its seconds: long ones are started first.
+    ``key`` names it among the others; ``parameters`` (JSON data) say what is to be done, ``files``
+    (below the folder of the domains) what is read.  ``effort`` is a guess of its seconds: long ones
+    are started first.
     """
 
     experiment: str
@@ -62,7 +64,8 @@ class Unit:
 class Record:
     """What became of a unit; ``result`` is empty unless it is done.
 
-    ``seconds`` is wall time, ``cpu`` the processor's seconds, which depend less on what else the machine does.
+    ``seconds`` is wall time, ``cpu`` the processor's seconds, which depend less on what else the
+    machine does.
     """
 
     unit: Unit
@@ -81,13 +84,16 @@ class Figure:
     draw: Callable[[], Drawing]
 
 
-#: A line of the first table of the page: what was measured, the paper's value, ours with greedy and with minimal words.
+#: A line of the first table of the page: what was measured, the paper's value, ours with greedy and
+#: with minimal words.
 Headline = tuple[str, str, str, str]
 
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """An experiment told: Markdown blocks and figures in their order, and what differs from the paper, with the reason."""
+    """An experiment told: Markdown blocks and figures in their order, and what differs from the
+    paper, with the reason.
+    """
 
     blocks: tuple[str | Figure, ...]
     differences: tuple[str, ...] = ()
@@ -100,7 +106,8 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """An experiment: ``units`` lists its pieces of work, ``run`` does one, ``section`` tells their results.
+    """An experiment: ``units`` lists its pieces of work, ``run`` does one, ``section`` tells their
+    results.
 
     ``section`` gets the records of all units, in the order of ``units``.
     """

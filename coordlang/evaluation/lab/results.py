@@ -1,4 +1,6 @@
-"""Results on disk: one JSON line for each piece of work, appended as soon as it is done, so that a killed run can go on."""
+"""Results on disk: one JSON line for each piece of work, appended as soon as it is done, so that a
+killed run can go on.
+"""
 
 from __future__ import annotations
 
@@ -22,9 +24,9 @@ Line = dict[str, Any]
 class Results:
     """A folder of results: ``NAME.jsonl`` for each experiment.
 
-    A line holds ``id`` (the hash of all that the result depends on), ``experiment``, ``key``, ``parameters``, ``status``,
-    ``result``, ``seconds`` (wall), ``cpu``, ``seed``, ``unit_limit``, ``inputs`` (file -> SHA-256), ``versions`` and ``code``
-    (SHA-256 of the source).
+    A line holds ``id`` (the hash of all that the result depends on), ``experiment``, ``key``,
+    ``parameters``, ``status``, ``result``, ``seconds`` (wall), ``cpu``, ``seed``, ``unit_limit``,
+    ``inputs`` (file -> SHA-256), ``versions`` and ``code`` (SHA-256 of the source).
     """
 
     def __init__(self, folder: Path) -> None:
@@ -39,14 +41,17 @@ class Results:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Raise `UsageError` if another process writes here; the system unlocks when a process dies."""
+        """Raise `UsageError` if another process writes here; the system unlocks when a process
+        dies.
+        """
         lock = self.folder / ".lock"
         with open(lock, "w") as file:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
                 raise UsageError(
-                    f"another run writes its results into {self.folder}", remedy="Wait for it, or say --results DIR."
+                    f"another run writes its results into {self.folder}",
+                    remedy="Wait for it, or say --results DIR.",
                 ) from None
             yield
         with suppress(OSError):
@@ -79,8 +84,8 @@ class Results:
     def known(self, units: Sequence[Unit], settings: Settings) -> dict[str, Record]:
         """The units (by experiment/key) that need not be run again.
 
-        One that ran out of time under a smaller limit than ``settings.unit_limit`` is run again, and so is one that ran
-        out of memory.
+        One that ran out of time under a smaller limit than ``settings.unit_limit`` is run again,
+        and so is one that ran out of memory.
         """
         lines = {name: self.lines(name) for name in sorted({unit.experiment for unit in units})}
         found = {}
@@ -90,7 +95,9 @@ class Results:
                 continue
             if line["status"] == "out of time" and line["unit_limit"] < settings.unit_limit:
                 continue
-            found[name_of(unit)] = Record(unit, line["status"], line["result"], line["seconds"], line["cpu"])
+            found[name_of(unit)] = Record(
+                unit, line["status"], line["result"], line["seconds"], line["cpu"]
+            )
         return found
 
     def start(self, experiment: str) -> None:

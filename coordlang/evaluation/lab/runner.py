@@ -1,4 +1,6 @@
-"""Runs pieces of work in processes of their own, keeps every result at once, and leaves out what is known already."""
+"""Runs pieces of work in processes of their own, keeps every result at once, and leaves out what is
+known already.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,9 @@ class Progress:
 
 
 class UnitFailed(CoordlangError):
-    """A piece of work ended with an error that is no limit: a bug, or a file that is not as it should be."""
+    """A piece of work ended with an error that is no limit: a bug, or a file that is not as it
+    should be.
+    """
 
 
 def run(
@@ -46,8 +50,9 @@ def run(
 ) -> dict[str, list[Record]]:
     """Run experiments; the records of each, in the order of its units.
 
-    What ``results`` holds already is not run again.  Every record is on the disk before the next piece of work starts in
-    its process: a run that is killed at any moment goes on from there.  The records do not depend on ``jobs``.
+    What ``results`` holds already is not run again.  Every record is on the disk before the next
+    piece of work starts in its process: a run that is killed at any moment goes on from there.  The
+    records do not depend on ``jobs``.
     """
     units = [unit for recipe in recipes for unit in recipe.units(settings)]
     with results.locked():
@@ -58,7 +63,12 @@ def run(
         before = len(known)
         progress(Progress(before, len(units), before, ()))
         with _workers(min(jobs, len(todo)), settings) as workers:
-            for record in _records(workers, todo, settings, lambda r: progress(Progress(len(known), len(units), before, r))):
+            for record in _records(
+                workers,
+                todo,
+                settings,
+                lambda r: progress(Progress(len(known), len(units), before, r)),
+            ):
                 results.append(record, settings)
                 known[name_of(record.unit)] = record
         found: dict[str, list[Record]] = {recipe.name: [] for recipe in recipes}
@@ -75,7 +85,9 @@ class _Worker:
     def __init__(self, settings: Settings) -> None:
         context = get_context("spawn")
         self.connection, theirs = context.Pipe()
-        self._process: BaseProcess = context.Process(target=_work, args=(theirs, settings, os.getpid()), daemon=True)
+        self._process: BaseProcess = context.Process(
+            target=_work, args=(theirs, settings, os.getpid()), daemon=True
+        )
         self._process.start()
         theirs.close()
         self.unit: Unit | None = None
@@ -86,7 +98,9 @@ class _Worker:
         self.connection.send(unit)
 
     def receive(self) -> Record:
-        """What became of the unit; a process that died had no memory left (the system kills those first)."""
+        """What became of the unit; a process that died had no memory left (the system kills those
+        first).
+        """
         assert self.unit is not None
         unit, self.unit = self.unit, None
         try:
@@ -180,7 +194,8 @@ def _attempt(unit: Unit, settings: Settings) -> Record | str:
     since, busy = perf_counter(), process_time()
     try:
         with time_limit(settings.unit_limit):
-            # As it will be read again: a run that goes on tells the same as one that was never stopped.
+            # As it will be read again: a run that goes on tells the same as one that was never
+            # stopped.
             result = json.loads(json.dumps(RECIPES[unit.experiment].run(unit, settings)))
     except OutOfTime:
         status, result = "out of time", {}

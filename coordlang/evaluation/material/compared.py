@@ -1,4 +1,6 @@
-"""What the experiments that compare languages on one row of Table 1 share: their units, and their records by kind."""
+"""What the experiments that compare languages on one row of Table 1 share: their units, and their
+records by kind.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +13,11 @@ from coordlang.evaluation.material.orders import ORDERS
 from coordlang.evaluation.material.suite import OTHERS, QUICK_ROW, ROW, WORLDS
 
 
-def compared_units(experiment: str, settings: Settings, effort: float, flexible: float) -> list[Unit]:
-    """A unit for each language of the row and of the worlds that are no grids, and one for the orders of the row.
+def compared_units(
+    experiment: str, settings: Settings, effort: float, flexible: float
+) -> list[Unit]:
+    """A unit for each language of the row and of the worlds that are no grids, and one for the
+    orders of the row.
 
     ``effort`` of a language, ``flexible`` of the most flexible one.
     """
@@ -29,7 +34,9 @@ def compared_units(experiment: str, settings: Settings, effort: float, flexible:
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """The records that came to their end: of the languages of ``row``, of its orders, of other worlds."""
+    """The records that came to their end: of the languages of ``row``, of its orders, of other
+    worlds.
+    """
 
     row: str
     languages: list[Record]
@@ -43,12 +50,22 @@ class Compared:
         ended = done(records)
         return cls(
             row,
-            [r for r in ended if r.unit.parameters["world"] == row and "method" in r.unit.parameters],
+            [
+                r
+                for r in ended
+                if r.unit.parameters["world"] == row and "method" in r.unit.parameters
+            ],
             [r for r in ended if "orders" in r.unit.parameters],
             [r for r in ended if r.unit.parameters["world"] != row],
         )
 
     def greedy_and_minimal(self) -> tuple[Result, Result] | None:
-        """Results to be put beside the paper's; None if it is not the paper's row, or one of them is missing."""
+        """Results to be put beside the paper's; None if it is not the paper's row, or one of them
+        is missing.
+        """
         of = {record.unit.parameters["method"]: record.result for record in self.languages}
-        return (of["greedy"], of["minimal"]) if self.row == ROW and {"greedy", "minimal"} <= of.keys() else None
+        return (
+            (of["greedy"], of["minimal"])
+            if self.row == ROW and {"greedy", "minimal"} <= of.keys()
+            else None
+        )

@@ -1,8 +1,10 @@
-"""Something turns out to be impossible after everybody has committed: do the plan and the sentence survive it?
+"""Something turns out to be impossible after everybody has committed: do the plan and the sentence
+survive it?
 
-A *hazard* forbids some subactions.  A robot that has committed to a plan survives if its part needs none of them.  One that
-has committed to a sentence survives if one of its own choices (`coordlang.use.choices.choices`) needs none of them; it picks among
-those, and looks at nobody else.
+A *hazard* forbids some subactions.  A robot that has committed to a plan survives if its part needs
+none of them.  One that has committed to a sentence survives if one of its own choices
+(`coordlang.use.choices.choices`) needs none of them; it picks among those, and looks at nobody
+else.
 """
 
 from __future__ import annotations
@@ -32,7 +34,9 @@ class Hazard:
 
     def breaks(self, plan: Plan) -> bool:
         """Does some robot's part of the plan need what is forbidden?"""
-        return any(label in own for step in plan for label, own in zip(step, self.forbidden, strict=True))
+        return any(
+            label in own for step in plan for label, own in zip(step, self.forbidden, strict=True)
+        )
 
     def spares(self, space: PlanSpace) -> NDArray[np.bool_]:
         """The edges of a plan space that need nothing forbidden."""
@@ -44,8 +48,10 @@ class Hazard:
 
 @dataclass(frozen=True, slots=True)
 class Odds:
-    """Exact shares for one task and one hazard: of its optimal plans, how many survive; of plans drawn uniformly, how many
-    have a sentence that survives; and whether any optimal plan survives at all (what a new agreement could save)."""
+    """Exact shares for one task and one hazard: of its optimal plans, how many survive; of plans
+    drawn uniformly, how many have a sentence that survives; and whether any optimal plan survives
+    at all (what a new agreement could save).
+    """
 
     plan: float
     sentence: float
@@ -74,7 +80,9 @@ class Sayings:
         return plan, self._sentence(task, plan)
 
     def first(self, task: int) -> tuple[Plan, tuple[int, ...]]:
-        """The first optimal plan of a task in the order of `planners.search.plans.Plans`, and its sentence."""
+        """The first optimal plan of a task in the order of `planners.search.plans.Plans`, and its
+        sentence.
+        """
         space, node, plan = self.spoken.space, int(self.spoken.space.starts[task]), []
         while space.layer[node] > 0:
             edge = int(space.first[node])
@@ -104,8 +112,12 @@ class Sayings:
         """What each robot may do under a sentence of a task."""
         if (task, words) not in self._own:
             one = self.spoken
-            fits = fitting(Spoken(one.language, one.table, one.space, task, one.word, one.covered), words)
-            self._own[task, words] = [determinise(fits, robot) for robot in range(len(one.model.robots))]
+            fits = fitting(
+                Spoken(one.language, one.table, one.space, task, one.word, one.covered), words
+            )
+            self._own[task, words] = [
+                determinise(fits, robot) for robot in range(len(one.model.robots))
+            ]
         return self._own[task, words]
 
 
@@ -125,7 +137,9 @@ def has_way(automaton: Automaton, forbidden: frozenset[int]) -> bool:
     """Is there a subplan without forbidden labels?"""
     alive = {0}
     for _ in automaton.layers[1:]:
-        alive = {to for state in alive for label, to in automaton.moves(state) if label not in forbidden}
+        alive = {
+            to for state in alive for label, to in automaton.moves(state) if label not in forbidden
+        }
     return bool(alive)
 
 
@@ -134,9 +148,9 @@ def exact_odds(
 ) -> list[list[Odds]]:
     """`Odds` of every task of a plan space (rows) and every hazard (columns).
 
-    A sentence's plans are RC-free, so there is a plan with the sentence that survives exactly if every robot has a surviving
-    choice: the surviving sentences are those of the surviving plans.  Raises `OutOfMemory` where there are too many sentences
-    (see `sentence_counts`).
+    A sentence's plans are RC-free, so there is a plan with the sentence that survives exactly if
+    every robot has a surviving choice: the surviving sentences are those of the surviving plans.
+    Raises `OutOfMemory` where there are too many sentences (see `sentence_counts`).
     """
     every = sentence_counts(space, word, most=most)
     starts = space.starts.tolist()
@@ -149,7 +163,9 @@ def exact_odds(
     return found
 
 
-def _odds(every: Mapping[tuple[int, ...], int], left: Mapping[tuple[int, ...], int], total: int) -> Odds:
+def _odds(
+    every: Mapping[tuple[int, ...], int], left: Mapping[tuple[int, ...], int], total: int
+) -> Odds:
     plans = sum(left.values())
     said = sum(every[words] for words in left)
     return Odds(plans / total, said / total, plans > 0)

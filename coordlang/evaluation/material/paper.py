@@ -7,9 +7,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class PaperRow:
-    """A row of Table 1: candidate tasks, reachable states, words of the paper's greedy method, its seconds.
+    """A row of Table 1: candidate tasks, reachable states, words of the paper's greedy method, its
+    seconds.
 
-    ``exact`` is the least number of words where the paper's exhaustive search ended, ``exact_seconds`` what it took.
+    ``exact`` is the least number of words where the paper's exhaustive search ended,
+    ``exact_seconds`` what it took.
     """
 
     tasks: int
@@ -35,9 +37,11 @@ TABLE_1 = {
     "GWB8": PaperRow(956, 132, 4, 140.3),
 }
 
-#: GWB7: mean communication saving over the tasks whose sentence is shorter than the plan, how many those are, and over all.
+#: GWB7: mean communication saving over the tasks whose sentence is shorter than the plan, how many
+#: those are, and over all.
 SAVING_DIFFERING, DIFFERING, SAVING_ALL = 0.333, 784, 0.273
-#: GWB7: plans open to the listener, averaged over all tasks, and over those with more than one, and how many those are.
+#: GWB7: plans open to the listener, averaged over all tasks, and over those with more than one, and
+#: how many those are.
 OPEN_ALL, OPEN_SEVERAL, SEVERAL = 12.1, 14.7, 774
 #: A* without a sentence expands so many times the nodes that it expands with one.
 PLANNING_RATIO = 1.6

@@ -1,4 +1,6 @@
-"""What the plans of every candidate task say in a language: its sentences, and how many plans each of them has."""
+"""What the plans of every candidate task say in a language: its sentences, and how many plans each
+of them has.
+"""
 
 from __future__ import annotations
 
@@ -28,8 +30,9 @@ MOST_LISTED = 1000
 class Said:
     """The sentences of one task.
 
-    ``steps``: the joint steps of its optimal plans.  ``plans``: sentence -> how many of them have it, exactly.  ``first`` and
-    ``last``: the sentences of the first and of the last plan in the order of `planners.search.plans.Plans`.
+    ``steps``: the joint steps of its optimal plans.  ``plans``: sentence -> how many of them have
+    it, exactly.  ``first`` and ``last``: the sentences of the first and of the last plan in the
+    order of `planners.search.plans.Plans`.
     """
 
     steps: int
@@ -58,7 +61,9 @@ class Said:
         return min(map(len, self.plans))
 
     def saving(self, words: Fraction | int) -> float:
-        """Communication saving of a sentence: the share of the plan's states (steps + 1) that need no word."""
+        """Communication saving of a sentence: the share of the plan's states (steps + 1) that need
+        no word.
+        """
         return float(1 - Fraction(words) / (self.steps + 1))
 
 
@@ -81,15 +86,18 @@ def said(space: PlanSpace, word: Ints) -> list[Said]:
 def sentence_counts(
     space: PlanSpace, word: Ints, keep: NDArray[np.bool_] | None = None, most: int | None = None
 ) -> list[Mapping[Words, int]]:
-    """For each node: sentence -> how many plans from there have it; only plans over edges of ``keep`` where it is given.
+    """For each node: sentence -> how many plans from there have it; only plans over edges of
+    ``keep`` where it is given.
 
-    Backward over the plan graph, for all tasks at once: O(edges * sentences of a node).  Raises `OutOfMemory` when that
-    becomes more than ``most`` steps.
+    Backward over the plan graph, for all tasks at once: O(edges * sentences of a node).  Raises
+    `OutOfMemory` when that becomes more than ``most`` steps.
     """
     words: list[int] = word.tolist()
     plans: list[Mapping[Words, int]] = []
     work = 0
-    bounds = zip(space.first[:-1].tolist(), space.first[1:].tolist(), space.layer.tolist(), strict=True)
+    bounds = zip(
+        space.first[:-1].tolist(), space.first[1:].tolist(), space.layer.tolist(), strict=True
+    )
     for node, (low, high, layer) in enumerate(bounds):
         if layer == 0:
             plans.append({(words[node],): 1})
@@ -108,10 +116,14 @@ def sentence_counts(
 
 
 def _ends(space: PlanSpace, word: Ints, which: int) -> list[Words]:
-    """For each node the sentence of the plan that always takes edge number ``which`` (0: first, -1: last)."""
+    """For each node the sentence of the plan that always takes edge number ``which`` (0: first, -1:
+    last).
+    """
     words: list[int] = word.tolist()
     found: list[Words] = []
-    for node, (low, high) in enumerate(zip(space.first[:-1].tolist(), space.first[1:].tolist(), strict=True)):
+    for node, (low, high) in enumerate(
+        zip(space.first[:-1].tolist(), space.first[1:].tolist(), strict=True)
+    ):
         if low == high:
             found.append((words[node],))
         else:

@@ -1,4 +1,6 @@
-"""Trials: a task is agreed on, something turns out to be impossible, and the plan or the sentence survives it or not."""
+"""Trials: a task is agreed on, something turns out to be impossible, and the plan or the sentence
+survives it or not.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ MOST_SENTENCES = 2_000_000
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """Tasks (by number) to be done one after the other, and the hazard that appears when they begin."""
+    """Tasks (by number) to be done one after the other, and the hazard that appears when they
+    begin.
+    """
 
     tasks: tuple[int, ...]
     hazard: int
@@ -35,7 +39,9 @@ class Trials:
     trials: tuple[Trial, ...]
 
     def sample(self, runs: int, random: Random) -> dict[str, int]:
-        """Successes in random trials: the same task, hazard and plan for both, the sentence being that plan's."""
+        """Successes in random trials: the same task, hazard and plan for both, the sentence being
+        that plan's.
+        """
         plan = sentence = 0
         for _ in range(runs):
             trial = self.trials[random.randrange(len(self.trials))]
@@ -46,7 +52,8 @@ class Trials:
         return {"runs": runs, "plan": plan, "sentence": sentence}
 
     def exact(self) -> dict[str, float] | None:
-        """Success rates over all trials, plans drawn uniformly; *possible*: some optimal plan would have done.
+        """Success rates over all trials, plans drawn uniformly; *possible*: some optimal plan would
+        have done.
 
         None where there are too many sentences to look at all of them.
         """
@@ -59,7 +66,9 @@ class Trials:
         return {
             "plan": round(fmean(_product([o.plan for o in legs]) for legs in found), 6),
             "sentence": round(fmean(_product([o.sentence for o in legs]) for legs in found), 6),
-            "possible": round(fmean(_product([float(o.possible) for o in legs]) for legs in found), 6),
+            "possible": round(
+                fmean(_product([float(o.possible) for o in legs]) for legs in found), 6
+            ),
         }
 
 
@@ -75,11 +84,15 @@ def _only(candidates: Candidates, language: Language) -> Sayings:
     return Sayings(next(iter(speak_candidates(language, candidates))))
 
 
-def warehouse_trials(candidates: Candidates, language: Language, every: Sequence[Delivery]) -> Trials:
+def warehouse_trials(
+    candidates: Candidates, language: Language, every: Sequence[Delivery]
+) -> Trials:
     sayings = _only(candidates, language)
     model = candidates.model
     corners = {cell for delivery in every for cell in delivery.start}
-    cells = sorted({cell for fact in model.codec.facts for cell in [fact.strip("()").split()[2]]} - corners)
+    cells = sorted(
+        {cell for fact in model.codec.facts for cell in [fact.strip("()").split()[2]]} - corners
+    )
     hazards = tuple(human_in(model, cell) for cell in cells)
     number = _task_numbers(sayings.spoken)
     trials = [
@@ -91,7 +104,9 @@ def warehouse_trials(candidates: Candidates, language: Language, every: Sequence
 
 
 def _task_numbers(spoken: Spoken) -> dict[tuple[Corners, Corners], int]:
-    """The task of each leg; tasks are grouped by goal in a plan space, so they are found by their states."""
+    """The task of each leg; tasks are grouped by goal in a plan space, so they are found by their
+    states.
+    """
     space, codec = spoken.space, spoken.model.codec
     found = {}
     for task, start in enumerate(space.starts.tolist()):
@@ -109,15 +124,26 @@ def _corners(key: str) -> Corners:
 
 
 def subaction_trials(candidates: Candidates, language: Language) -> Trials:
-    """On other worlds a subaction turns out to be impossible that some optimal plan of the task needs."""
+    """On other worlds a subaction turns out to be impossible that some optimal plan of the task
+    needs.
+    """
     sayings = _only(candidates, language)
     model, space = candidates.model, sayings.spoken.space
-    used = sorted({(robot, label) for robot in range(len(model.robots)) for label in set(space.labels[:, robot].tolist())})
+    used = sorted(
+        {
+            (robot, label)
+            for robot in range(len(model.robots))
+            for label in set(space.labels[:, robot].tolist())
+        }
+    )
     does_nothing = {action.label for action in model.actions if action.does_nothing}
     hazards = []
     for robot, label in used:
         if label and model.labels[robot][label] not in does_nothing:
-            forbidden = tuple(frozenset([label]) if i == robot else frozenset[int]() for i in range(len(model.robots)))
+            forbidden = tuple(
+                frozenset([label]) if i == robot else frozenset[int]()
+                for i in range(len(model.robots))
+            )
             hazards.append(Hazard(f"{model.robots[robot]} {model.labels[robot][label]}", forbidden))
     trials = []
     met = [_starts_meeting(sayings.spoken, hazard) for hazard in hazards]
@@ -133,5 +159,7 @@ def _starts_meeting(spoken: Spoken, hazard: Hazard) -> list[bool]:
     meets = [False] * len(space)
     bounds = zip(space.first[:-1].tolist(), space.first[1:].tolist(), strict=True)
     for node, (low, high) in enumerate(bounds):
-        meets[node] = bool(hit[low:high].any()) or any(meets[t] for t in space.target[low:high].tolist())
+        meets[node] = bool(hit[low:high].any()) or any(
+            meets[t] for t in space.target[low:high].tolist()
+        )
     return [meets[node] for node in space.starts.tolist()]

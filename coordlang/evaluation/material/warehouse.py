@@ -1,8 +1,9 @@
 """Deliveries in a warehouse: which tasks they are, and where a human may stand.
 
-The warehouse is a map with storage in the corners S1, S2 at its left end and dispatch in D1, D2 at its right end.  Two robots
-start in random corners.  Robot i fetches at S_i and brings to D_i, or the other way round.  That is two tasks, one after the
-other: to where they fetch, then to where they bring; the second starts when both are done with the first.
+The warehouse is a map with storage in the corners S1, S2 at its left end and dispatch in D1, D2 at
+its right end.  Two robots start in random corners.  Robot i fetches at S_i and brings to D_i, or
+the other way round.  That is two tasks, one after the other: to where they fetch, then to where
+they bring; the second starts when both are done with the first.
 """
 
 from __future__ import annotations
@@ -41,8 +42,12 @@ class Delivery:
 
     @property
     def legs(self) -> tuple[tuple[Corners, Corners], ...]:
-        """The tasks, one after the other; nothing is to be done for the first if the robots stand where they fetch."""
-        return tuple(leg for leg in ((self.start, self.fetch), (self.fetch, self.bring)) if leg[0] != leg[1])
+        """The tasks, one after the other; nothing is to be done for the first if the robots stand
+        where they fetch.
+        """
+        return tuple(
+            leg for leg in ((self.start, self.fetch), (self.fetch, self.bring)) if leg[0] != leg[1]
+        )
 
 
 def deliveries(rows: int, columns: int, layout: str) -> tuple[Delivery, ...]:
@@ -73,7 +78,9 @@ def human_in(model: JointModel, cell: str) -> Hazard:
     return Hazard(
         cell,
         tuple(
-            frozenset(n for n, text in enumerate(labels) if n and text.strip("()").split()[-1] == cell)
+            frozenset(
+                n for n, text in enumerate(labels) if n and text.strip("()").split()[-1] == cell
+            )
             for labels in model.labels
         ),
     )

@@ -1,7 +1,8 @@
 """A robot's subplans as the smallest deterministic automaton over its own subactions.
 
-The robot's subplans are what the plans of a plan space are when only its own subactions are seen.  All of them have one
-length, so the automaton has no cycles and its states lie in layers, one a step.
+The robot's subplans are what the plans of a plan space are when only its own subactions are seen.
+All of them have one length, so the automaton has no cycles and its states lie in layers, one a
+step.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from planners.limits import memory_left
 from planners.search.plan_space import PlanSpace
 from planners.search.tuples import unique_tuples
 
-#: What the robot knows in a state: (atoms certainly true, atoms possibly true), as sets of bits: fact k is bit k.
+#: What the robot knows in a state: (atoms certainly true, atoms possibly true), as sets of bits:
+#: fact k is bit k.
 Knowledge = tuple[int, int]
 
 #: Bytes that one member of a subset takes, with its share of everything else.
@@ -32,11 +34,13 @@ _SMALL = 1 << 24
 
 @dataclass(frozen=True, slots=True)
 class Automaton:
-    """A deterministic automaton over one robot's label numbers (0: idle); state 0 is where it starts.
+    """A deterministic automaton over one robot's label numbers (0: idle); state 0 is where it
+    starts.
 
-    ``layers[k]`` are the states after k steps (joint steps done by all); those of the last layer are final.  The moves of
-    state s are ``label[first[s]:first[s + 1]]`` to ``target[..]``, sorted by label.  ``left[s]`` is the exact number of
-    subplans from s on; every state has some.  ``known[s]`` is what the robot knows there; all empty where nothing was asked.
+    ``layers[k]`` are the states after k steps (joint steps done by all); those of the last layer
+    are final.  The moves of state s are ``label[first[s]:first[s + 1]]`` to ``target[..]``, sorted
+    by label.  ``left[s]`` is the exact number of subplans from s on; every state has some.
+    ``known[s]`` is what the robot knows there; all empty where nothing was asked.
     """
 
     layers: tuple[range, ...]
@@ -69,15 +73,17 @@ def determinise(
 ) -> Automaton:
     """The least automaton of robot number ``robot`` over the (one task's) plans of a plan space.
 
-    Without ``truth`` it is the minimal deterministic automaton that accepts exactly the robot's subplans.  With ``truth``
-    (number of a state in ``space.rows`` -> its true facts as bits) it also says in each state what is known there: the
-    facts that have one value in all joint states that plans with the same own beginning can be in.  Then it is the least
-    automaton that accepts the subplans and says this (a Moore machine: states are merged that agree on the knowledge, now
+    Without ``truth`` it is the minimal deterministic automaton that accepts exactly the robot's
+    subplans.  With ``truth`` (number of a state in ``space.rows`` -> its true facts as bits) it
+    also says in each state what is known there: the facts that have one value in all joint states
+    that plans with the same own beginning can be in.  Then it is the least automaton that accepts
+    the subplans and says this (a Moore machine: states are merged that agree on the knowledge, now
     and after every continuation).
 
-    Three passes over the layers: nodes that nothing tells apart are one (upwards), subset construction (downwards), equal
-    futures are one (upwards).  Linear but for the subsets, of which there may be exponentially many: raises `OutOfMemory`
-    with an estimate before they fill the memory, or when they have more than ``most`` members in all.
+    Three passes over the layers: nodes that nothing tells apart are one (upwards), subset
+    construction (downwards), equal futures are one (upwards).  Linear but for the subsets, of which
+    there may be exponentially many: raises `OutOfMemory` with an estimate before they fill the
+    memory, or when they have more than ``most`` members in all.
     """
     layers, start = _quotient(space, robot, truth)
     moves: list[list[dict[int, int]]] = []
@@ -89,7 +95,12 @@ def determinise(
         following: dict[tuple[int, ...], int] = {}
         here: list[dict[int, int]] = []
         for subset in subsets:
-            here.append({own: following.setdefault(to, len(following)) for own, to in _after(layer, subset).items()})
+            here.append(
+                {
+                    own: following.setdefault(to, len(following))
+                    for own, to in _after(layer, subset).items()
+                }
+            )
             members += len(subset)
             if len(here) % 1024 == 0:
                 _check(space, robot, members, most, depth, len(layers) - 1)
@@ -99,27 +110,39 @@ def determinise(
     return minimised(moves, outputs)
 
 
-def minimised(moves: Sequence[Sequence[Mapping[int, int]]], known: Sequence[Sequence[Knowledge]]) -> Automaton:
-    """The least automaton of a deterministic one given in layers: states are merged that agree on everything to come.
+def minimised(
+    moves: Sequence[Sequence[Mapping[int, int]]], known: Sequence[Sequence[Knowledge]]
+) -> Automaton:
+    """The least automaton of a deterministic one given in layers: states are merged that agree on
+    everything to come.
 
-    ``moves[k][s]`` leads from state s of layer k by a label to a state of layer k + 1; layer 0 has one state.
+    ``moves[k][s]`` leads from state s of layer k by a label to a state of layer k + 1; layer 0 has
+    one state.
     """
     classes: list[list[int]] = []
     merged: list[list[tuple[Knowledge, tuple[tuple[int, int], ...]]]] = []
     for here, output in zip(reversed(moves), reversed(known), strict=True):
         below = classes[-1] if classes else []
         number: dict[tuple[Knowledge, tuple[tuple[int, int], ...]], int] = {}
-        classes.append([
-            number.setdefault((said, tuple(sorted((own, below[to]) for own, to in move.items()))), len(number))
-            for said, move in zip(output, here, strict=True)
-        ])  # fmt: skip
+        classes.append(
+            [
+                number.setdefault(
+                    (said, tuple(sorted((own, below[to]) for own, to in move.items()))), len(number)
+                )
+                for said, move in zip(output, here, strict=True)
+            ]
+        )
         merged.append(list(number))
     merged.reverse()
     return _numbered(merged)
 
 
-def _numbered(merged: Sequence[Sequence[tuple[Knowledge, tuple[tuple[int, int], ...]]]]) -> Automaton:
-    """States in the order in which a walk by layers and labels meets them: the same automaton has the same numbers."""
+def _numbered(
+    merged: Sequence[Sequence[tuple[Knowledge, tuple[tuple[int, int], ...]]]],
+) -> Automaton:
+    """States in the order in which a walk by layers and labels meets them: the same automaton has
+    the same numbers.
+    """
     order = [0]
     bounds, first, label, target, known = [0], [0], [], [], []
     for layer in merged:
@@ -155,10 +178,13 @@ class _Layer:
     truth: list[int]
 
 
-def _quotient(space: PlanSpace, robot: int, truth: Mapping[int, int] | None) -> tuple[list[_Layer], int]:
+def _quotient(
+    space: PlanSpace, robot: int, truth: Mapping[int, int] | None
+) -> tuple[list[_Layer], int]:
     """The layers in classes, the goal's first, and the class of the start.
 
-    Nodes are one class if they agree on ``truth`` and lead by the same own labels to the same classes.
+    Nodes are one class if they agree on ``truth`` and lead by the same own labels to the same
+    classes.
 
     Merging them changes no set of own continuations (a bisimulation), and makes subsets small.
     """
@@ -168,7 +194,9 @@ def _quotient(space: PlanSpace, robot: int, truth: Mapping[int, int] | None) -> 
         low, high = int(space.first[span.start]), int(space.first[span.stop])
         degrees = np.diff(space.first[span.start : span.stop + 1])
         source = np.repeat(np.arange(span.stop - span.start), degrees)
-        table = np.column_stack((source, space.labels[low:high, robot], place[space.target[low:high]]))
+        table = np.column_stack(
+            (source, space.labels[low:high, robot], place[space.target[low:high]])
+        )
         bounds = [int(column.max(initial=0)) + 1 for column in table.T]
         table, _ = unique_tuples(table.astype(np.int64), bounds)
         ends = np.searchsorted(table[:, 0], np.arange(span.stop - span.start + 1)).tolist()
@@ -213,7 +241,9 @@ def _knowledge(layer: _Layer, subset: tuple[int, ...]) -> Knowledge:
     return reduce(and_, truth), reduce(or_, truth)
 
 
-def _check(space: PlanSpace, robot: int, members: int, most: int | None, depth: int, steps: int) -> None:
+def _check(
+    space: PlanSpace, robot: int, members: int, most: int | None, depth: int, steps: int
+) -> None:
     size = members * _MEMBER_BYTES
     if (most is None or members <= most) and (size < _SMALL or size < memory_left()):
         return

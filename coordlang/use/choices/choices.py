@@ -1,7 +1,9 @@
-"""A robot's choices: exactly the subplans that it may follow under a sentence, whatever the others choose from theirs.
+"""A robot's choices: exactly the subplans that it may follow under a sentence, whatever the others
+choose from theirs.
 
-The optimal plans with one sentence are RC-free, so every combination of one own subplan for each robot is an optimal plan.
-Robot i's subplans are therefore the own parts of those plans, no more and no fewer.
+The optimal plans with one sentence are RC-free, so every combination of one own subplan for each
+robot is an optimal plan. Robot i's subplans are therefore the own parts of those plans, no more and
+no fewer.
 """
 
 from __future__ import annotations
@@ -20,17 +22,20 @@ from planners.errors import OutOfMemory
 from planners.search.plan_space import PlanSpace
 from planners.search.tuples import EdgeIndex
 
-#: Combinations of the robots' moves beyond which exact knowledge is not tried, unless it was asked for.
+#: Combinations of the robots' moves beyond which exact knowledge is not tried, unless it was asked
+#: for.
 MOST = 2_000_000
 
-#: How what is known in an automaton's states was found: over every combination of all robots' choices, or from the
-#: robot's own subactions alone.
+#: How what is known in an automaton's states was found: over every combination of all robots'
+#: choices, or from the robot's own subactions alone.
 Atoms = Literal["exact", "own"]
 
 
 @dataclass(frozen=True, slots=True)
 class RobotChoices:
-    """One robot's choices: an automaton that accepts its subplans, and says what the robot knows in each state."""
+    """One robot's choices: an automaton that accepts its subplans, and says what the robot knows in
+    each state.
+    """
 
     robot: int
     automaton: Automaton
@@ -41,8 +46,8 @@ class RobotChoices:
 class Choices:
     """All robots' choices under one sentence (``words``: word numbers) of one task.
 
-    ``fits`` are the plans with the sentence.  ``mixtures`` holds every combination of the choices, or is None where there
-    are too many to walk.
+    ``fits`` are the plans with the sentence.  ``mixtures`` holds every combination of the choices,
+    or is None where there are too many to walk.
     """
 
     spoken: Spoken
@@ -53,7 +58,9 @@ class Choices:
 
     @property
     def guaranteed(self) -> bool:
-        """Is every combination optimal?  Proved by walking them all, or else by the language's own guarantee."""
+        """Is every combination optimal?  Proved by walking them all, or else by the language's own
+        guarantee.
+        """
         return self.spoken.covered if self.mixtures is None else self.mixtures.holds
 
 
@@ -65,12 +72,14 @@ def choices(
 ) -> Choices:
     """The choices of every robot under a sentence.
 
-    What is known in a state is exact (`coordlang.use.choices.automaton.determinise`) where all combinations of choices can be
-    walked with at most ``most`` joint moves (None: as many as the memory holds) and all of them are optimal.  Elsewhere
-    only the atoms are known that the robot's own subactions alone change.
+    What is known in a state is exact (`coordlang.use.choices.automaton.determinise`) where all
+    combinations of choices can be walked with at most ``most`` joint moves (None: as many as the
+    memory holds) and all of them are optimal.  Elsewhere only the atoms are known that the robot's
+    own subactions alone change.
 
-    ``index``: see `coordlang.use.choices.mixtures.mix`.  Raises `coordlang.use.sentence.fitting.NoPlanFits`, and `OutOfMemory` if the
-    automata, or with ``most=None`` the combinations, do not fit into the memory.
+    ``index``: see `coordlang.use.choices.mixtures.mix`.  Raises
+    `coordlang.use.sentence.fitting.NoPlanFits`, and `OutOfMemory` if the automata, or with
+    ``most=None`` the combinations, do not fit into the memory.
     """
     fits = fitting(spoken, words)
     robots = range(len(spoken.model.robots))
@@ -90,7 +99,9 @@ def _with_knowledge(
 ) -> RobotChoices:
     if mixtures is not None and mixtures.space is not None:
         with suppress(OutOfMemory):  # the combinations are checked all the same
-            return RobotChoices(robot, determinise(mixtures.space, robot, _truth(mixtures.space), most), "exact")
+            return RobotChoices(
+                robot, determinise(mixtures.space, robot, _truth(mixtures.space), most), "exact"
+            )
     own = OwnAtoms.of(spoken.model, robot)
     start = _bits(spoken.space, int(spoken.space.state[spoken.start]))
     return RobotChoices(robot, know_own(plain, own, start), "own")

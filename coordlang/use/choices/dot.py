@@ -1,4 +1,6 @@
-"""Robots' choices drawn: their automata in Graphviz' language, one cluster a robot, one rank a step."""
+"""Robots' choices drawn: their automata in Graphviz' language, one cluster a robot, one rank a
+step.
+"""
 
 from __future__ import annotations
 
@@ -14,22 +16,30 @@ from planners.joint.model import IDLE
 def to_dot(choices: Choices, robots: Sequence[int] | None = None) -> str:
     """A digraph of all robots' automata, or of those with these numbers.
 
-    In a state stand its number, how many own subplans are left, and the atoms known to be true that tell it from the other
-    states of its step.
+    In a state stand its number, how many own subplans are left, and the atoms known to be true that
+    tell it from the other states of its step.
     """
     chosen = choices.robots if robots is None else [choices.robots[robot] for robot in robots]
-    lines = ["digraph choices {", "  rankdir=LR; node [shape=box, style=rounded, fontsize=10]; edge [fontsize=10];"]
+    lines = [
+        "digraph choices {",
+        "  rankdir=LR; node [shape=box, style=rounded, fontsize=10]; edge [fontsize=10];",
+    ]
     for own in chosen:
         lines += _cluster(choices, own)
     return "\n".join([*lines, "}"]) + "\n"
 
 
 def distinguishing(choices: Choices, own: RobotChoices, states: range) -> list[list[str]]:
-    """For each state of one step the atoms known to be true there, without those known to be true in all of them."""
+    """For each state of one step the atoms known to be true there, without those known to be true
+    in all of them.
+    """
     known = own.automaton.known[states.start : states.stop]
     everywhere = reduce(and_, (true for true, _ in known))
     facts = choices.spoken.model.codec.facts
-    return [[text for bit, text in enumerate(facts) if (true & ~everywhere) >> bit & 1] for true, _ in known]
+    return [
+        [text for bit, text in enumerate(facts) if (true & ~everywhere) >> bit & 1]
+        for true, _ in known
+    ]
 
 
 def _cluster(choices: Choices, own: RobotChoices) -> list[str]:
@@ -42,7 +52,9 @@ def _cluster(choices: Choices, own: RobotChoices) -> list[str]:
             text = "\n".join([f"{state}: {automaton.left[state]:,} left", *atoms])
             final = ", peripheries=2" if step == len(automaton.layers) - 1 else ""
             lines.append(f"    r{own.robot}s{state} [label={quoted(text)}{final}];")
-        lines.append("    {rank=same; " + " ".join(f"r{own.robot}s{state};" for state in states) + "}")
+        lines.append(
+            "    {rank=same; " + " ".join(f"r{own.robot}s{state};" for state in states) + "}"
+        )
     for state in range(len(automaton)):
         for label, to in automaton.moves(state):
             text = labels[label] if label else IDLE

@@ -40,7 +40,9 @@ def to_bytes(choices: Choices, robots: Sequence[int] | None = None) -> bytes:
 
 
 def monitor(choices: Choices, robot: str) -> Monitor:
-    """A run-time monitor of one robot's choices.  Raises `coordlang.use.choices.monitor.MonitorError` for an unknown robot."""
+    """A run-time monitor of one robot's choices.  Raises
+    `coordlang.use.choices.monitor.MonitorError` for an unknown robot.
+    """
     names = choices.spoken.model.robots
     return Monitor(to_data(choices, [names.index(robot)] if robot in names else None), robot)
 
@@ -65,9 +67,13 @@ def _robot(choices: Choices, own: RobotChoices) -> dict[str, Any]:
             {
                 "step": steps[state],
                 "left": json_count(automaton.left[state]),
-                "next": {labels[label] if label else IDLE: to for label, to in automaton.moves(state)},
+                "next": {
+                    labels[label] if label else IDLE: to for label, to in automaton.moves(state)
+                },
                 "true": [n for bit, n in number.items() if automaton.known[state][0] >> bit & 1],
-                "unknown": [n for bit, n in number.items() if _unknown(automaton, state) >> bit & 1],
+                "unknown": [
+                    n for bit, n in number.items() if _unknown(automaton, state) >> bit & 1
+                ],
             }
             for state in range(len(automaton))
         ],

@@ -1,7 +1,8 @@
-"""Every combination of the robots' choices, walked: are they all optimal, and in which states can they be?
+"""Every combination of the robots' choices, walked: are they all optimal, and in which states can
+they be?
 
-A direct proof, from the definition, for one task and one sentence: nodes are ``(a_1 .. a_n, y)``, the state of each robot's
-automaton and the plan-space node that all of them together have reached.
+A direct proof, from the definition, for one task and one sentence: nodes are ``(a_1 .. a_n, y)``,
+the state of each robot's automaton and the plan-space node that all of them together have reached.
 """
 
 from __future__ import annotations
@@ -31,8 +32,9 @@ _SMALL = 1 << 24
 class Mixtures:
     """What the robots can do together when each takes its choices as it likes.
 
-    ``space``: all of it, again as a plan space of one task, its nodes being ``(a_1 .. a_n, y)``; None if some combination
-    is no optimal plan, and then ``violation`` shows one.  ``nodes`` counts what was walked.
+    ``space``: all of it, again as a plan space of one task, its nodes being ``(a_1 .. a_n, y)``;
+    None if some combination is no optimal plan, and then ``violation`` shows one.  ``nodes`` counts
+    what was walked.
     """
 
     space: PlanSpace | None
@@ -47,7 +49,9 @@ class Mixtures:
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """The joint moves out of one layer: numbers of nodes in it and in the next one, labels, plan-space edges."""
+    """The joint moves out of one layer: numbers of nodes in it and in the next one, labels,
+    plan-space edges.
+    """
 
     source: Ints
     target: Ints
@@ -65,11 +69,12 @@ def mix(
 ) -> Mixtures:
     """Walk all combinations of the robots' subplans in the task's optimal plans, layer by layer.
 
-    ``fits`` are the plans with the sentence ``words``, ``automata`` each robot's subplans in them; ``index`` is
-    ``EdgeIndex.of(spoken.space)``, to be given when many sentences of one plan space are asked for.
+    ``fits`` are the plans with the sentence ``words``, ``automata`` each robot's subplans in them;
+    ``index`` is ``EdgeIndex.of(spoken.space)``, to be given when many sentences of one plan space
+    are asked for.
 
-    At most (product of the automata's layers) * (layer of the plan space) nodes.  Raises `OutOfMemory` with an estimate
-    before they fill the memory, or beyond ``most`` joint moves.
+    At most (product of the automata's layers) * (layer of the plan space) nodes.  Raises
+    `OutOfMemory` with an estimate before they fill the memory, or beyond ``most`` joint moves.
     """
     space = spoken.space
     index = index or EdgeIndex.of(space)
@@ -84,7 +89,9 @@ def mix(
         edge = _edges(index, table[source, robots], labels)
         broken = np.flatnonzero(edge < 0)
         if len(broken):
-            found = _violation(spoken, fits, words, steps, int(source[broken[0]]), labels[broken[0]].tolist())
+            found = _violation(
+                spoken, fits, words, steps, int(source[broken[0]]), labels[broken[0]].tolist()
+            )
             return Mixtures(None, found, walked)
         reached = np.column_stack((after, space.target[edge]))
         table, number = unique_tuples(reached, [*(len(a) for a in automata), len(space)])
@@ -160,7 +167,10 @@ def _violation(
         done.append(step.labels[arrival].tolist())
         row = int(step.source[arrival])
     done.reverse()
-    paths = [_with_beginning(spoken, fits, robot, [own[robot] for own in done]) for robot in range(len(labels))]
+    paths = [
+        _with_beginning(spoken, fits, robot, [own[robot] for own in done])
+        for robot in range(len(labels))
+    ]
     trail = Trail(spoken.start, tuple(zip(*paths, strict=True)))
     return describe_failure(spoken.space, trail, tuple(spoken.table.words[w] for w in words))
 
@@ -197,14 +207,18 @@ def _same_edges(spoken: Spoken, plan: Sequence[Sequence[int]]) -> list[int]:
     return path
 
 
-def _check(automata: Sequence[Automaton], table: Ints, step: int, held: int, most: int | None) -> None:
+def _check(
+    automata: Sequence[Automaton], table: Ints, step: int, held: int, most: int | None
+) -> None:
     """Estimate a layer's joint moves before they are made."""
     size = np.ones(len(table))
     for robot, own in enumerate(automata):
         size *= np.diff(own.first)[table[:, robot]]
     moves = float(size.sum())
     needed = held + moves * (48 + 24 * len(automata))
-    if (most is not None and moves + held / 40 > most) or (needed > _SMALL and needed > memory_left()):
+    if (most is not None and moves + held / 40 > most) or (
+        needed > _SMALL and needed > memory_left()
+    ):
         states = " x ".join(f"{len(own.layers[step]):,}" for own in automata)
         raise OutOfMemory(
             f"step {step + 1} has {moves:,.0f} combinations of what the robots may do ({states} states of their "

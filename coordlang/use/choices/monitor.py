@@ -1,7 +1,9 @@
-"""A robot's choices at run time: what may it do next, and are the detours that it wants still possible?
+"""A robot's choices at run time: what may it do next, and are the detours that it wants still
+possible?
 
-This file needs Python's standard library and nothing else, so that a robot can carry it: copy it beside a choices file
-(docs/formats.md), which ``coordlang choices --format json`` writes.  Neither PDDL nor a planner is needed then.
+This file needs Python's standard library and nothing else, so that a robot can carry it: copy it
+beside a choices file (docs/formats.md), which ``coordlang choices --format json`` writes.  Neither
+PDDL nor a planner is needed then.
 """
 
 from __future__ import annotations
@@ -18,7 +20,8 @@ FORMAT = "coordlang/choices"
 VERSION = 1
 IDLE = "idle"
 
-#: Where a monitor is: a state of the automaton, and which parts of the detour are made already (bits).
+#: Where a monitor is: a state of the automaton, and which parts of the detour are made already
+#: (bits).
 Position = tuple[int, int]
 
 #: One text or several; None is idling.
@@ -30,9 +33,13 @@ class MonitorError(ValueError):
 
 
 class NotAllowed(MonitorError):
-    """The robot did what it may not do; ``step`` counts from 0, ``allowed`` are what it could have done (None: idle)."""
+    """The robot did what it may not do; ``step`` counts from 0, ``allowed`` are what it could have
+    done (None: idle).
+    """
 
-    def __init__(self, robot: str, did: str | None, step: int, allowed: Sequence[str | None]) -> None:
+    def __init__(
+        self, robot: str, did: str | None, step: int, allowed: Sequence[str | None]
+    ) -> None:
         could = " or ".join(text or IDLE for text in allowed)
         may = f"it may do {could}" if allowed else "all its steps are done"
         super().__init__(f"step {step + 1}: {robot} may not do {did or IDLE}; {may}")
@@ -47,10 +54,11 @@ class NotPossible(MonitorError):
 class Detour:
     """What a robot wants of its remaining steps; all of it at once.
 
-    ``visit``: atoms, each known to be true in the present or in some later state.  ``avoid``: atoms known to be false in the
-    present and in every later state.  ``do``: patterns of own subactions, each done at least once from now on;
-    ``never``: patterns that are not done any more.  In a pattern ``*`` stands for any text, ``(move r1 * c3)``; ``idle`` is
-    idling.  *Known* means: whatever the others choose.
+    ``visit``: atoms, each known to be true in the present or in some later state.  ``avoid``: atoms
+    known to be false in the present and in every later state.  ``do``: patterns of own subactions,
+    each done at least once from now on; ``never``: patterns that are not done any more.  In a
+    pattern ``*`` stands for any text, ``(move r1 * c3)``; ``idle`` is idling.  *Known* means:
+    whatever the others choose.
     """
 
     visit: tuple[str, ...] = ()
@@ -73,7 +81,8 @@ class Detour:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Whether a detour is still possible: ``subplan`` is one way to do it (the first in order), ``subplans`` their number.
+    """Whether a detour is still possible: ``subplan`` is one way to do it (the first in order),
+    ``subplans`` their number.
 
     True in a condition iff it is possible.
     """
@@ -108,20 +117,29 @@ class Monitor:
         try:
             _check_moves(entry["states"])
             self._load(data["sentence"], entry)
-            _check_counts(entry["states"], [self._left.get((state, 0)) for state in range(len(entry["states"]))])
+            _check_counts(
+                entry["states"],
+                [self._left.get((state, 0)) for state in range(len(entry["states"]))],
+            )
         except (KeyError, TypeError, IndexError, AttributeError) as error:
-            raise MonitorError(f"this is no choices file: {type(error).__name__}: {error}") from None
+            raise MonitorError(
+                f"this is no choices file: {type(error).__name__}: {error}"
+            ) from None
 
     def _load(self, sentence: str, entry: Mapping[str, Any]) -> None:
         self.robot: str = entry["robot"]
         self.sentence = sentence
-        #: "exact": known over every combination of the robots' choices; "own": from own subactions alone.
+        #: "exact": known over every combination of the robots' choices; "own": from own subactions
+        #: alone.
         self.atoms: str = entry["atoms"]
         self._facts: dict[str, int] = {text: number for number, text in enumerate(entry["facts"])}
         self._others: frozenset[str] = frozenset(entry["others"])
         states = entry["states"]
         self._next: list[dict[str | None, int]] = [
-            {None if text == IDLE else text: to for text, to in sorted(state["next"].items(), key=_idle_first)}
+            {
+                None if text == IDLE else text: to
+                for text, to in sorted(state["next"].items(), key=_idle_first)
+            }
             for state in states
         ]
         self._true: list[frozenset[int]] = [frozenset(state["true"]) for state in states]
@@ -171,7 +189,9 @@ class Monitor:
         return self._promised
 
     def allowed(self) -> tuple[str | None, ...]:
-        """What the robot may do next (None: idle), sorted, idling first; nothing when it has finished."""
+        """What the robot may do next (None: idle), sorted, idling first; nothing when it has
+        finished.
+        """
         return tuple(text for text, _ in self._moves(self._promised, self._left, self._position))
 
     def did(self, subaction: str | None) -> None:
@@ -199,7 +219,8 @@ class Monitor:
         return fact in self._true[state]
 
     def can(self, detour: Detour | None = None, /, **wanted: Texts) -> Answer:
-        """Can all this still be had at once, promises kept?  ``can(visit="(at r1 c)", never="idle")``; see `Detour`.
+        """Can all this still be had at once, promises kept?  ``can(visit="(at r1 c)",
+        never="idle")``; see `Detour`.
 
         O(automaton * 2^(visits and dos)).
         """
@@ -222,7 +243,9 @@ class Monitor:
         """
         if not self.can(detour, **wanted):
             kept = " together with what was promised before" if self._promised != Detour() else ""
-            raise NotPossible(f"step {self.step + 1}: {self.robot} has no subplan left for this{kept}")
+            raise NotPossible(
+                f"step {self.step + 1}: {self.robot} has no subplan left for this{kept}"
+            )
         self._promised = self._promised & (detour or Detour()) & Detour.of(**wanted)
         position = self._enter(self._promised, *self._position)
         assert position is not None
@@ -252,8 +275,12 @@ class Monitor:
         return self._enter(detour, self._next[state][text], kept)
 
     def _counts(self, detour: Detour, start: Position) -> dict[Position, int]:
-        """How many subplans from each position make the detour, for all positions from ``start`` on."""
-        whole = sum(1 << 2 * bit for bit in range(len(detour.visit))) + sum(2 << 2 * bit for bit in range(len(detour.do)))
+        """How many subplans from each position make the detour, for all positions from ``start``
+        on.
+        """
+        whole = sum(1 << 2 * bit for bit in range(len(detour.visit))) + sum(
+            2 << 2 * bit for bit in range(len(detour.do))
+        )
         after: dict[Position, list[Position]] = {}
         layer = [start]
         while layer:
@@ -264,7 +291,9 @@ class Monitor:
         left: dict[Position, int] = {}
         for position in reversed(after):
             final = not self._next[position[0]]
-            left[position] = int(position[1] == whole) if final else sum(left[to] for to in after[position])
+            left[position] = (
+                int(position[1] == whole) if final else sum(left[to] for to in after[position])
+            )
         return left
 
     def _moves(
@@ -285,8 +314,16 @@ class Monitor:
 
     def _similar(self, atom: str) -> str:
         head = atom.strip("()").split(" ")[0]
-        alike = [text for text in (*self._facts, *sorted(self._others)) if text.strip("()").split(" ")[0] == head]
-        return f"there are {', '.join(alike[:8])}{' ..' if len(alike) > 8 else ''}" if alike else f"none is ({head} ..)"
+        alike = [
+            text
+            for text in (*self._facts, *sorted(self._others))
+            if text.strip("()").split(" ")[0] == head
+        ]
+        return (
+            f"there are {', '.join(alike[:8])}{' ..' if len(alike) > 8 else ''}"
+            if alike
+            else f"none is ({head} ..)"
+        )
 
 
 def _entry(data: Any, robot: str | None) -> Any:
@@ -294,26 +331,38 @@ def _entry(data: Any, robot: str | None) -> Any:
     if not isinstance(data, Mapping) or data.get("format") != FORMAT:
         raise MonitorError(f'expected a choices file: {{"format": "{FORMAT}", ..}}')
     if data.get("version") != VERSION or data.get("version") is True:
-        raise MonitorError(f"choices file version {data.get('version')!r}; this program reads version {VERSION}")
+        raise MonitorError(
+            f"choices file version {data.get('version')!r}; this program reads version {VERSION}"
+        )
     try:
         entries = {entry["robot"]: entry for entry in data["choices"]}
         if robot is None and len(entries) != 1:
             raise MonitorError(f"whose choices? The file has those of {', '.join(entries)}")
         if robot is not None and robot not in entries:
-            raise MonitorError(f"the file has no choices of {robot}; it has those of {', '.join(entries)}")
+            raise MonitorError(
+                f"the file has no choices of {robot}; it has those of {', '.join(entries)}"
+            )
     except (KeyError, TypeError, AttributeError) as error:
         raise MonitorError(f"this is no choices file: {type(error).__name__}: {error}") from None
     return entries[robot] if robot is not None else next(iter(entries.values()))
 
 
 def _check_moves(states: Sequence[Mapping[str, Any]]) -> None:
-    """Raise unless there are states and every one leads to states of the next step, from state 0 in step 0."""
+    """Raise unless there are states and every one leads to states of the next step, from state 0 in
+    step 0.
+    """
     if not states or states[0]["step"] != 0:
         raise MonitorError("the automaton has no state 0 in step 0")
     for number, state in enumerate(states):
         for to in state["next"].values():
-            if isinstance(to, bool) or not number < to < len(states) or states[to]["step"] != state["step"] + 1:
-                raise MonitorError(f"state {number} does not lead to a state of step {state['step'] + 1}")
+            if (
+                isinstance(to, bool)
+                or not number < to < len(states)
+                or states[to]["step"] != state["step"] + 1
+            ):
+                raise MonitorError(
+                    f"state {number} does not lead to a state of step {state['step'] + 1}"
+                )
 
 
 def _check_counts(states: Sequence[Mapping[str, Any]], left: Sequence[int | None]) -> None:
@@ -321,7 +370,9 @@ def _check_counts(states: Sequence[Mapping[str, Any]], left: Sequence[int | None
     steps = max(state["step"] for state in states)
     for number, (state, count) in enumerate(zip(states, left, strict=True)):
         if str(state["left"]) != str(count):
-            raise MonitorError(f"state {number} says {state['left']} subplans are left, but there are {count or 0}")
+            raise MonitorError(
+                f"state {number} says {state['left']} subplans are left, but there are {count or 0}"
+            )
         if not state["next"] and state["step"] != steps:
             raise MonitorError(f"state {number} ends after {state['step']} of {steps} steps")
 

@@ -1,4 +1,6 @@
-"""The atoms that a robot's own subactions alone change: what it knows without asking what the others may do."""
+"""The atoms that a robot's own subactions alone change: what it knows without asking what the
+others may do.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +12,15 @@ from planners.grounding import GroundEffect
 from planners.joint.model import JointModel, show
 from planners.pddl.lifted import TRUE
 
-#: What a subaction does to an atom, certainly: True adds it, False deletes it, None leaves it as it is.
+#: What a subaction does to an atom, certainly: True adds it, False deletes it, None leaves it as it
+#: is.
 Change = bool | None
 
 
 @dataclass(frozen=True, slots=True)
 class OwnAtoms:
-    """The facts of which every change is certain from the robot's own label: ``mask`` has their bits, ``others`` the rest.
+    """The facts of which every change is certain from the robot's own label: ``mask`` has their
+    bits, ``others`` the rest.
 
     ``adds`` and ``deletes`` have the bits that each label number changes.
     """
@@ -30,8 +34,8 @@ class OwnAtoms:
     def of(cls, model: JointModel, robot: int) -> OwnAtoms:
         """Read off the ground actions, without regard to what is reachable.
 
-        A fact is own if no action without this robot changes it, no conditional effect does, and two (joint) actions with the
-        same own part change it in the same way.
+        A fact is own if no action without this robot changes it, no conditional effect does, and
+        two (joint) actions with the same own part change it in the same way.
         """
         changes: list[dict[int, Change]] = [{} for _ in model.labels[robot]]
         foreign = 0
@@ -52,7 +56,9 @@ class OwnAtoms:
                 foreign |= _bits({f: c for f, c in variants[0].items() if other.get(f) != c})
         mask = ((1 << len(model.codec.facts)) - 1) & ~foreign
         adds = (_bits({f: c for f, c in change.items() if c}) & mask for change in changes)
-        deletes = (_bits({f: c for f, c in change.items() if c is False}) & mask for change in changes)
+        deletes = (
+            _bits({f: c for f, c in change.items() if c is False}) & mask for change in changes
+        )
         return cls(mask, foreign, tuple(adds), tuple(deletes))
 
 
@@ -80,7 +86,9 @@ def know_own(automaton: Automaton, own: OwnAtoms, start: int) -> Automaton:
 
 
 def _changes(model: JointModel, effects: Sequence[GroundEffect]) -> tuple[dict[int, Change], int]:
-    """What effects certainly do to each fact, and the facts that they change under a condition only."""
+    """What effects certainly do to each fact, and the facts that they change under a condition
+    only.
+    """
     done: dict[int, Change] = {}
     unsure = 0
     for effect in effects:

@@ -1,8 +1,9 @@
 """A sentence as a formula of linear temporal logic over finite traces.
 
-LTLf: De Giacomo and Vardi, *Linear temporal logic and linear dynamic logic on finite traces* (IJCAI 2013).  The text is
-that of the Python packages flloat and ltlf2dfa, which most others read as well: ``!``, ``&``, ``|``, ``U`` (until),
-``G`` (always), and symbols of lower-case letters, digits and ``_``.
+LTLf: De Giacomo and Vardi, *Linear temporal logic and linear dynamic logic on finite traces* (IJCAI
+2013).  The text is that of the Python packages flloat and ltlf2dfa, which most others read as well:
+``!``, ``&``, ``|``, ``U`` (until), ``G`` (always), and symbols of lower-case letters, digits and
+``_``.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ _TAKEN = re.compile(r"[^a-z]|true|false|last|end|tt|ff")
 class SentenceFormula:
     """A sentence in LTLf.
 
-    ``formula`` is satisfied by the states of a plan exactly if the plan has the sentence, as long as the plan passes
-    through states that the language maps, or that lie on optimal plans of the task.  ``over_words`` is the same
-    formula with the words as symbols, and ``words`` has each word's formula.  ``symbols``: symbol -> PDDL atom; symbols
-    hold in a state as their atoms do.
+    ``formula`` is satisfied by the states of a plan exactly if the plan has the sentence, as long
+    as the plan passes through states that the language maps, or that lie on optimal plans of the
+    task.  ``over_words`` is the same formula with the words as symbols, and ``words`` has each
+    word's formula.  ``symbols``: symbol -> PDDL atom; symbols hold in a state as their atoms do.
     """
 
     formula: str
@@ -38,8 +39,9 @@ class SentenceFormula:
 def export_ltlf(spoken: Spoken, words: Sequence[int]) -> SentenceFormula:
     """The sentence ``words`` as a formula over the states of a plan, the initial state first.
 
-    A plan has the sentence w0 w1 .. wk exactly if it is in w0 for a while, then in w1, and so on, and in wk to the end:
-    ``w0 & (w0 U (w1 & (w1 U .. G(wk))))``.  Raises `NoPlanFits` if no optimal plan does.
+    A plan has the sentence w0 w1 .. wk exactly if it is in w0 for a while, then in w1, and so on,
+    and in wk to the end: ``w0 & (w0 U (w1 & (w1 U .. G(wk))))``.  Raises `NoPlanFits` if no optimal
+    plan does.
     """
     fitting(spoken, words)
     terms = membership(spoken, apart=False).terms

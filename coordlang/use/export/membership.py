@@ -25,8 +25,8 @@ _STATES = 20_000
 class Membership:
     """For each word its terms: a state belongs to the word exactly if one of them holds.
 
-    This holds for every state that the language maps and every state on an optimal plan of the task.  Elsewhere nothing
-    is promised: terms of several words may hold, or none.
+    This holds for every state that the language maps and every state on an optimal plan of the
+    task.  Elsewhere nothing is promised: terms of several words may hold, or none.
     """
 
     terms: tuple[tuple[Term, ...], ...]
@@ -40,9 +40,9 @@ class Membership:
 def membership(spoken: Spoken, *, apart: bool = True, states: int = _STATES) -> Membership:
     """The words of a language as terms: those of their formulas (`coordlang.explanation`).
 
-    Exactly one term holds in each state; at least one, and shorter ones, if they need not be ``apart``.  For more than
-    ``states`` states they are the leaves of a decision tree: found faster, up to twice as many, but never more than
-    states.
+    Exactly one term holds in each state; at least one, and shorter ones, if they need not be
+    ``apart``.  For more than ``states`` states they are the leaves of a decision tree: found
+    faster, up to twice as many, but never more than states.
     """
     rows = spoken.space.rows[np.unique(spoken.space.state)]
     rows, _ = unique_rows(np.concatenate((spoken.table.rows, rows)))
@@ -51,7 +51,9 @@ def membership(spoken: Spoken, *, apart: bool = True, states: int = _STATES) -> 
     atoms, holds = truth(spoken.model, rows)
     facts = _Facts({atom: number for number, atom in enumerate(atoms)}, holds)
     formulas = word_formulas(spoken.language, spoken.model, rows)
-    covers = [[_term(literals) for literals in formulas[word].conditions()] for word in spoken.table.words]
+    covers = [
+        [_term(literals) for literals in formulas[word].conditions()] for word in spoken.table.words
+    ]
     return Membership(tuple(tuple(disjoint(facts, cover) if apart else cover) for cover in covers))
 
 
@@ -70,10 +72,11 @@ class _Facts:
 
 
 def disjoint(facts: _Facts, terms: Sequence[Term]) -> list[Term]:
-    """Terms that hold in the same states, no two in the same state: larger ones first, of others only what is left.
+    """Terms that hold in the same states, no two in the same state: larger ones first, of others
+    only what is left.
 
-    ``t`` without ``a & b`` is ``t & !a`` or ``t & a & !b`` (the disjoint sharp of two-level minimisation); parts in
-    which there is no state are dropped.
+    ``t`` without ``a & b`` is ``t & !a`` or ``t & a & !b`` (the disjoint sharp of two-level
+    minimisation); parts in which there is no state are dropped.
     """
     found: list[tuple[Term, NDArray[np.bool_]]] = []
     for term in sorted(terms, key=lambda t: -int(facts.where(t).sum())):
@@ -99,13 +102,17 @@ def disjoint(facts: _Facts, terms: Sequence[Term]) -> list[Term]:
 def _term(literals: Sequence[str]) -> Term:
     """``("(at r1 a)", "(not (at r2 b))")`` as a term."""
     return {
-        text.removeprefix("(not ")[:-1] if text.startswith("(not (") else text: not text.startswith("(not (")
+        text.removeprefix("(not ")[:-1] if text.startswith("(not (") else text: not text.startswith(
+            "(not ("
+        )
         for text in literals
     }
 
 
 def _tree(spoken: Spoken, rows: Rows) -> Membership:
-    """A binary decision tree; each test is the one that tells most about the word (least entropy, as in ID3)."""
+    """A binary decision tree; each test is the one that tells most about the word (least entropy,
+    as in ID3).
+    """
     word = spoken.table.of_rows(rows)
     atoms, values = truth(spoken.model, rows)
     terms: list[list[Term]] = [[] for _ in spoken.table.words]

@@ -1,21 +1,25 @@
 """A task under a sentence as plain PDDL, so that any planner can take part.
 
-The plain task of `planners.classical` gets one more fact per word said so far, and after each joint step two actions without
-cost: the state is *named* by its word, and then the sentence *stays* at this word or *goes on* to the next one.
+The plain task of `planners.classical` gets one more fact per word said so far, and after each joint
+step two actions without cost: the state is *named* by its word, and then the sentence *stays* at
+this word or *goes on* to the next one.
 
 Why its optimal plans are exactly the plans that fit, one to one:
 
-1. Without naming, its plans stand one to one for the joint plans of the task, at the same cost (`planners.classical`).
-   Naming costs nothing and only forbids.  So no plan is cheaper than an optimal plan of the task.
-2. In a state on an optimal plan of the task exactly one naming is possible, that of its word (`membership`), and after
-   it at most one action: which one, the word decides.  So an optimal plan of the task has at most one counterpart, and
-   has it exactly if its words are, one after another, those of the sentence.
-3. Some plan fits (`fitting`), so the optimal cost is that of the task.  Then each plan of that cost is an optimal plan
-   of the task, passes only through states on optimal plans of the task, and by 2 it fits.
+1. Without naming, its plans stand one to one for the joint plans of the task, at the same cost
+   (`planners.classical`). Naming costs nothing and only forbids.  So no plan is cheaper than an
+   optimal plan of the task.
+2. In a state on an optimal plan of the task exactly one naming is possible, that of its word
+   (`membership`), and after it at most one action: which one, the word decides.  So an optimal plan
+   of the task has at most one counterpart, and has it exactly if its words are, one after another,
+   those of the sentence.
+3. Some plan fits (`fitting`), so the optimal cost is that of the task.  Then each plan of that cost
+   is an optimal plan of the task, passes only through states on optimal plans of the task, and by 2
+   it fits.
 
-States elsewhere never matter to optimal plans, so this needs no list of all states, and holds for tasks that the
-language does not cover, too.  A plan of higher cost says the sentence as far as it stays in states that the language
-maps.
+States elsewhere never matter to optimal plans, so this needs no list of all states, and holds for
+tasks that the language does not cover, too.  A plan of higher cost says the sentence as far as it
+stays in states that the language maps.
 """
 
 from __future__ import annotations
@@ -42,9 +46,10 @@ Choice = tuple[int, int]
 class Exported:
     """A task under a sentence for other planners.
 
-    ``domain`` and ``problem`` are PDDL text; ``plain`` is the same as data.  ``choices`` says for each action, by its name
-    in the PDDL, which robots choose what in it: all of them (explicit form), one, or none (bookkeeping).  ``cost`` is the
-    total cost of an optimal plan, ``terms`` the number of terms that tell which word a state belongs to.
+    ``domain`` and ``problem`` are PDDL text; ``plain`` is the same as data.  ``choices`` says for
+    each action, by its name in the PDDL, which robots choose what in it: all of them (explicit
+    form), one, or none (bookkeeping).  ``cost`` is the total cost of an optimal plan, ``terms`` the
+    number of terms that tell which word a state belongs to.
     """
 
     model: JointModel
@@ -58,7 +63,8 @@ class Exported:
     def joint_plan(self, names: Sequence[str]) -> Plan:
         """The joint plan that a plan of the exported problem stands for; ``names`` are its actions.
 
-        Raises `BadInput` for an action that the problem does not have, or a plan that ends within a step.
+        Raises `BadInput` for an action that the problem does not have, or a plan that ends within a
+        step.
         """
         steps: list[dict[int, int]] = [{}]
         for place, name in enumerate(names, 1):
@@ -75,20 +81,24 @@ class Exported:
         for number, step in enumerate(done, 1):
             if len(step) < len(self.model.robots):
                 missing = [r for i, r in enumerate(self.model.robots) if i not in step]
-                raise BadInput(f"in step {number} of the plan {missing[0]} chooses nothing: the plan is cut off")
+                raise BadInput(
+                    f"in step {number} of the plan {missing[0]} chooses nothing: the plan is cut off"
+                )
         return tuple(tuple(step[robot] for robot in range(len(self.model.robots))) for step in done)
 
 
 def export_pddl(spoken: Spoken, words: Sequence[int], limit: int = 2000) -> Exported:
-    """The task under the sentence ``words``: its optimal plans are exactly the plans that fit, one to one.
+    """The task under the sentence ``words``: its optimal plans are exactly the plans that fit, one
+    to one.
 
-    The cost of a plan is that of the joint plan: ``plain.cost`` of the total cost is (makespan, second component).
+    The cost of a plan is that of the joint plan: ``plain.cost`` of the total cost is (makespan,
+    second component).
 
     Parameters
     ----------
     limit
-        Up to this many plain actions every joint action is written as one; beyond, robots choose one after another
-        (see `planners.classical.compile_plain`).
+        Up to this many plain actions every joint action is written as one; beyond, robots choose
+        one after another (see `planners.classical.compile_plain`).
 
     Raises `NoPlanFits` if there is nothing to plan.
     """
@@ -100,7 +110,9 @@ def export_pddl(spoken: Spoken, words: Sequence[int], limit: int = 2000) -> Expo
     choices = [_choices(model, plain, action) for action in plain.actions]
     tests = membership(spoken)
     out = _Naming(spoken, words, plain, tests)
-    actions = [out.within(action, chosen) for action, chosen in zip(plain.actions, choices, strict=True)]
+    actions = [
+        out.within(action, chosen) for action, chosen in zip(plain.actions, choices, strict=True)
+    ]
     actions += out.actions()
     plain = replace(
         plain,
@@ -118,14 +130,18 @@ def export_pddl(spoken: Spoken, words: Sequence[int], limit: int = 2000) -> Expo
 
 
 def plan_names(text: str) -> list[str]:
-    """The actions in a plan file of another planner: one ``(name)`` a line, perhaps with a step before it.
+    """The actions in a plan file of another planner: one ``(name)`` a line, perhaps with a step
+    before it.
 
     Comments (``;``) are left out.  Raises `BadInput` for a line that is none.
     """
     names = []
     for number, raw in enumerate(text.splitlines(), 1):
         line = raw.split(";")[0].strip()
-        match = re.fullmatch(r"(?:\d+(?:\.\d+)?\s*:\s*)?(?:\(\s*([^\s()]+)\s*\)|([^\s()]+?)(?:\(\))?)(?:\s*\[.*\])?", line)
+        match = re.fullmatch(
+            r"(?:\d+(?:\.\d+)?\s*:\s*)?(?:\(\s*([^\s()]+)\s*\)|([^\s()]+?)(?:\(\))?)(?:\s*\[.*\])?",
+            line,
+        )
         if match:
             names.append(match[1] or match[2])
         elif line:
@@ -134,13 +150,24 @@ def plan_names(text: str) -> list[str]:
 
 
 class _Naming:
-    """The facts and actions that name states and follow the sentence; facts by number, as in `PlainTask`."""
+    """The facts and actions that name states and follow the sentence; facts by number, as in
+    `PlainTask`.
+    """
 
-    def __init__(self, spoken: Spoken, words: Sequence[int], plain: PlainTask, tests: Membership) -> None:
-        self.model, self.words, self.tests, self.table = spoken.model, words, tests, spoken.table.words
+    def __init__(
+        self, spoken: Spoken, words: Sequence[int], plain: PlainTask, tests: Membership
+    ) -> None:
+        self.model, self.words, self.tests, self.table = (
+            spoken.model,
+            words,
+            tests,
+            spoken.table.words,
+        )
         self.facts, self.init = list(plain.facts), set[int]()
         self.known = {show(atom): number for atom, number in self.model.evaluator.facts.items()}
-        self.remembered = sorted({a for terms in tests.terms for t in terms for a in t if a.startswith("(last ")})
+        self.remembered = sorted(
+            {a for terms in tests.terms for t in terms for a in t if a.startswith("(last ")}
+        )
         if self.model.remembers:
             key = self.model.codec.decode(spoken.space.rows[spoken.space.state[spoken.start]])
             for atom in self.remembered:
@@ -162,7 +189,9 @@ class _Naming:
         return len(self.facts) - 1
 
     def within(self, action: PlainAction, chosen: Sequence[Choice]) -> PlainAction:
-        """An action of the plain task: what ends a step leads to naming, and what is remembered is noted."""
+        """An action of the plain task: what ends a step leads to naming, and what is remembered is
+        noted.
+        """
         conditions, adds, deletes = {*action.preconditions}, {*action.adds}, {*action.deletes}
         if self.explicit:
             conditions.add((self.between, True))
@@ -188,7 +217,11 @@ class _Naming:
         for word, named in self.named.items():
             for number, term in enumerate(self.tests.terms[word], 1):
                 conditions = (*self._conditions(term), (self.naming, True))
-                found.append(self._free(f"name {self.table[word]} {number}", conditions, (named,), (self.naming,)))
+                found.append(
+                    self._free(
+                        f"name {self.table[word]} {number}", conditions, (named,), (self.naming,)
+                    )
+                )
         for place, (word, said) in enumerate(zip(self.words, self.said, strict=True)):
             here = ((self.named[word], True), (said, True))
             stay = f"stay in word {place + 1} {self.table[word]}"
@@ -206,7 +239,9 @@ class _Naming:
         return found
 
     def _goal(self, plain: PlainTask) -> tuple[Condition, ...]:
-        """The whole sentence is said, and the last state is named; ``reach the goal`` consumes the time to act."""
+        """The whole sentence is said, and the last state is named; ``reach the goal`` consumes the
+        time to act.
+        """
         conditions = {*plain.goal, (self.said[-1], True)}
         if all(number < self.own or number == self.between for number, _ in plain.goal):
             conditions.add((self.between, True))
@@ -216,9 +251,15 @@ class _Naming:
         return sorted((self.known[atom], value) for atom, value in term.items())
 
     def _free(
-        self, name: str, conditions: Sequence[Condition], adds: Sequence[int], deletes: Sequence[int]
+        self,
+        name: str,
+        conditions: Sequence[Condition],
+        adds: Sequence[int],
+        deletes: Sequence[int],
     ) -> PlainAction:
-        return PlainAction(name, tuple(sorted(conditions)), tuple(sorted(adds)), tuple(sorted(deletes)), 0)
+        return PlainAction(
+            name, tuple(sorted(conditions)), tuple(sorted(adds)), tuple(sorted(deletes)), 0
+        )
 
 
 def _choices(model: JointModel, plain: PlainTask, action: PlainAction) -> tuple[Choice, ...]:

@@ -17,10 +17,12 @@ _ENTRY_BYTES = 200
 
 @dataclass(frozen=True, slots=True)
 class Wished:
-    """The best sentence: ``words``, the exact number of ``plans`` that it leaves open, and what became of each wish.
+    """The best sentence: ``words``, the exact number of ``plans`` that it leaves open, and what
+    became of each wish.
 
-    ``values`` has one value for each wish: the number of words, the number of plans, or (grade of the worst plan left
-    open, grade of the best).  ``prefixes`` is how many beginnings of sentences were looked at.
+    ``values`` has one value for each wish: the number of words, the number of plans, or (grade of
+    the worst plan left open, grade of the best).  ``prefixes`` is how many beginnings of sentences
+    were looked at.
     """
 
     words: tuple[int, ...]
@@ -30,20 +32,24 @@ class Wished:
 
 
 def best_sentence(spoken: Spoken, wishes: Sequence[Wish], most: int | None = None) -> Wished:
-    """The best sentence of the task for wishes in order of weight: the second one decides where the first is equal, ..
+    """The best sentence of the task for wishes in order of weight: the second one decides where the
+    first is equal, ..
 
     - ``shortest``: fewest words;
     - ``most-plans``: most optimal plans have it;
-    - a `PlanWish`: the worst plan that the sentence leaves open has the best grade, then the best plan has.  The robots may
-      end up with any of these plans, so the worst one is what the sentence promises.
+    - a `PlanWish`: the worst plan that the sentence leaves open has the best grade, then the best
+      plan has.  The robots may end up with any of these plans, so the worst one is what the
+      sentence promises.
 
-    Of sentences that are equal in all wishes the one with fewest words is taken, then the first by word numbers.
+    Of sentences that are equal in all wishes the one with fewest words is taken, then the first by
+    word numbers.
 
-    Best-first search over beginnings of sentences, with an exact bound on what any end can give; beginnings that lead to the
-    same nodes with the same counts are one.  ``shortest`` alone takes as many beginnings as the sentence has words.  The
-    other wishes ask for the best string of a nondeterministic automaton, which has no polynomial algorithm in general
-    (for ``most-plans`` cf. Lyngsø and Pedersen 2002 on hidden Markov models): raises `OutOfMemory` when the beginnings
-    have more than ``most`` entries, or more than the memory holds.
+    Best-first search over beginnings of sentences, with an exact bound on what any end can give;
+    beginnings that lead to the same nodes with the same counts are one.  ``shortest`` alone takes
+    as many beginnings as the sentence has words.  The other wishes ask for the best string of a
+    nondeterministic automaton, which has no polynomial algorithm in general (for ``most-plans`` cf.
+    Lyngsø and Pedersen 2002 on hidden Markov models): raises `OutOfMemory` when the beginnings have
+    more than ``most`` entries, or more than the memory holds.
     """
     graph = _Graph.of(spoken, wishes)
     start = _Beginning((graph.word[0],), {0: 1}, None)
@@ -80,8 +86,9 @@ class _End:
 
 @dataclass(frozen=True, slots=True)
 class _Beginning:
-    """The beginning of a sentence: ``counts`` has how many beginnings of plans come to each point with the first state of
-    its last word.  ``end`` is there for a whole sentence."""
+    """The beginning of a sentence: ``counts`` has how many beginnings of plans come to each point
+    with the first state of its last word.  ``end`` is there for a whole sentence.
+    """
 
     words: tuple[int, ...]
     counts: dict[int, int]
@@ -90,12 +97,14 @@ class _Beginning:
 
 @dataclass(frozen=True, slots=True)
 class _Graph:
-    """The task's plans as paths of *points*: pairs of a plan-space node and what the wishes remember there.
+    """The task's plans as paths of *points*: pairs of a plan-space node and what the wishes
+    remember there.
 
-    Points are numbered from the start on, layer by layer.  ``following[p]`` holds pairs (point, number of joint actions);
-    ``node`` and ``word`` are those of each point.  The rest bounds the ends of plans from p on: ``more[p]`` is the least
-    number of further words, ``grades[p]`` the least grade for each `PlanWish`, and ``open[p]``, if most plans are wished for,
-    has for each next word (-1: the end) how many plans from p can have one sentence with it, at most.
+    Points are numbered from the start on, layer by layer.  ``following[p]`` holds pairs (point,
+    number of joint actions); ``node`` and ``word`` are those of each point.  The rest bounds the
+    ends of plans from p on: ``more[p]`` is the least number of further words, ``grades[p]`` the
+    least grade for each `PlanWish`, and ``open[p]``, if most plans are wished for, has for each
+    next word (-1: the end) how many plans from p can have one sentence with it, at most.
     """
 
     wishes: tuple[Wish, ...]
@@ -108,7 +117,9 @@ class _Graph:
 
     @classmethod
     def of(cls, spoken: Spoken, wishes: Sequence[Wish]) -> _Graph:
-        following, node, memories = _points(spoken, [wish for wish in wishes if isinstance(wish, PlanWish)])
+        following, node, memories = _points(
+            spoken, [wish for wish in wishes if isinstance(wish, PlanWish)]
+        )
         word = [int(spoken.word[n]) for n in node]
         graph = cls(tuple(wishes), following, node, word, [0] * len(node), [()] * len(node), [])
         if "most-plans" in wishes:
@@ -122,24 +133,32 @@ class _Graph:
         for point in range(len(self.node) - 1, -1, -1):
             here, after = self.word[point], self.following[point]
             if not after:
-                self.grades[point] = tuple(w.grade(m) for w, m in zip(plan_wishes, memories[point], strict=True))
+                self.grades[point] = tuple(
+                    w.grade(m) for w, m in zip(plan_wishes, memories[point], strict=True)
+                )
                 if self.open:
                     self.open[point][-1] = 1
                 continue
             self.more[point] = min(self.more[q] + (self.word[q] != here) for q, _ in after)
-            self.grades[point] = tuple(map(min, zip(*(self.grades[q] for q, _ in after), strict=True)))
+            self.grades[point] = tuple(
+                map(min, zip(*(self.grades[q] for q, _ in after), strict=True))
+            )
             if self.open:
                 table = self.open[point]
                 for q, number in after:
                     if self.word[q] != here:
-                        table[self.word[q]] = table.get(self.word[q], 0) + number * max(self.open[q].values())
+                        table[self.word[q]] = table.get(self.word[q], 0) + number * max(
+                            self.open[q].values()
+                        )
                     else:
                         for word, plans in self.open[q].items():
                             table[word] = table.get(word, 0) + number * plans
 
     def rest(self, beginning: _Beginning) -> object:
         """What the ends of a sentence and their values depend on."""
-        return beginning.words[-1], frozenset(beginning.counts.items() if self.open else beginning.counts)
+        return beginning.words[-1], frozenset(
+            beginning.counts.items() if self.open else beginning.counts
+        )
 
     def after(self, beginning: _Beginning) -> list[_Beginning]:
         """The beginnings with one word more, and the sentence that ends here if some plan does."""
@@ -172,11 +191,15 @@ class _Graph:
         return tuple(worth[wish] if isinstance(wish, str) else next(grades) for wish in self.wishes)
 
     def bound(self, beginning: _Beginning) -> tuple[object, ...]:
-        """The best values that any sentence with this beginning can have, the smaller the better; the length last."""
+        """The best values that any sentence with this beginning can have, the smaller the better;
+        the length last.
+        """
         if beginning.end is not None:
             values = self.values(beginning)
-            signs = (-v if wish == "most-plans" and isinstance(v, int) else v
-                     for wish, v in zip(self.wishes, values, strict=True))  # fmt: skip
+            signs = (
+                -v if wish == "most-plans" and isinstance(v, int) else v
+                for wish, v in zip(self.wishes, values, strict=True)
+            )
             return (*signs, len(beginning.words))
         length = len(beginning.words) + min(self.more[p] for p in beginning.counts)
         grades = iter(self._best_grades(beginning))
@@ -198,19 +221,26 @@ class _Graph:
         return max(total.values())
 
     def _best_grades(self, beginning: _Beginning) -> list[tuple[int, int]]:
-        """(Worst, best) at least: some node's plans go on, and all that came to this node can go on in the same way."""
+        """(Worst, best) at least: some node's plans go on, and all that came to this node can go on
+        in the same way.
+        """
         by_node: dict[int, list[tuple[int, ...]]] = {}
         for point in beginning.counts:
             by_node.setdefault(self.node[point], []).append(self.grades[point])
         best = map(min, zip(*(self.grades[p] for p in beginning.counts), strict=True))
-        worst = map(min, zip(*(tuple(map(max, zip(*g, strict=True))) for g in by_node.values()), strict=True))
+        worst = map(
+            min,
+            zip(*(tuple(map(max, zip(*g, strict=True))) for g in by_node.values()), strict=True),
+        )
         return list(zip(worst, best, strict=True))
 
 
 def _points(
     spoken: Spoken, wishes: Sequence[PlanWish]
 ) -> tuple[list[list[tuple[int, int]]], list[int], list[tuple[Memory, ...]]]:
-    """The points that plans pass, layer by layer: what follows each of them, its node, its memories."""
+    """The points that plans pass, layer by layer: what follows each of them, its node, its
+    memories.
+    """
     space = spoken.space
     start = spoken.start, tuple(wish.start(int(space.state[spoken.start])) for wish in wishes)
     number = {start: 0}
@@ -222,7 +252,10 @@ def _points(
         after: dict[int, int] = {}
         for target, step in zip(targets, labels, strict=True):
             state = int(space.state[target]) if wishes else 0
-            there = target, tuple(w.step(m, step, state) for w, m in zip(wishes, memories, strict=True))
+            there = (
+                target,
+                tuple(w.step(m, step, state) for w, m in zip(wishes, memories, strict=True)),
+            )
             if there not in number:
                 number[there] = len(points)
                 points.append(there)

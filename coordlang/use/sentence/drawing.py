@@ -8,7 +8,8 @@ from coordlang.use.sentence.understanding import Dag, DagEdge, DagNode
 from planners.joint.model import NO_FACT, own_text
 from planners.joint.states import split_atoms
 
-#: Colours that people of every colour vision tell apart (Okabe and Ito 2008).  Words carry their names as well.
+#: Colours that people of every colour vision tell apart (Okabe and Ito 2008).  Words carry their
+#: names as well.
 COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442", "#999999")
 
 _ATOMS_SHOWN = 6
@@ -18,7 +19,9 @@ _LONGEST = 40
 
 @dataclass(frozen=True, slots=True)
 class Ink:
-    """The colour of a word, and the colour of text on it; ``again``: every colour is in use already."""
+    """The colour of a word, and the colour of text on it; ``again``: every colour is in use
+    already.
+    """
 
     fill: str
     text: str
@@ -42,11 +45,13 @@ def node_lines(dag: Dag) -> list[list[str]]:
     states = [set(a) for a, node in zip(atoms, dag.nodes, strict=True) if not node.merged]
     always = set.intersection(*states) if len(states) > 1 else set()
     return [
-        [f"{node.merged:,} more states"] if node.merged
-        else [NO_FACT] if not own
+        [f"{node.merged:,} more states"]
+        if node.merged
+        else [NO_FACT]
+        if not own
         else _shortened([_plain(a) for a in own if a not in always], _ATOMS_SHOWN, "atoms")
         for node, own in zip(dag.nodes, atoms, strict=True)
-    ]  # fmt: skip
+    ]
 
 
 def edge_lines(dag: Dag, edge: DagEdge) -> list[str]:
@@ -110,7 +115,9 @@ def _dot_node(node: DagNode, lines: list[str], ink: dict[str, Ink]) -> str:
     if node.merged:
         return f'label={quoted(text)}, style="dashed,rounded"'
     own = ink[node.word]
-    look = f'fillcolor="{own.fill}", fontcolor="{own.text}"' + (", peripheries=2" if own.again else "")
+    look = f'fillcolor="{own.fill}", fontcolor="{own.text}"' + (
+        ", peripheries=2" if own.again else ""
+    )
     return f"label={quoted(text)}, tooltip={quoted(node.key)}, {look}"
 
 
@@ -126,7 +133,11 @@ def _plain(atom: str) -> str:
 
 def _shortened(lines: list[str], most: int, noun: str) -> list[str]:
     lines = [_clipped(line) for line in lines]
-    return lines if len(lines) <= most else [*lines[: most - 1], f"and {len(lines) - most + 1} more {noun}"]
+    return (
+        lines
+        if len(lines) <= most
+        else [*lines[: most - 1], f"and {len(lines) - most + 1} more {noun}"]
+    )
 
 
 def _clipped(text: str) -> str:

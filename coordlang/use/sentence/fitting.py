@@ -18,11 +18,14 @@ from planners.search.plan_space import PlanSpace
 class NoPlanFits(Refuted):
     """No optimal plan of the task has this sentence.
 
-    ``fitting`` is the longest beginning of the sentence that some plan still says, and ``next_words`` what plans with
-    that beginning can say after it (``None`` among them: such a plan may end there).
+    ``fitting`` is the longest beginning of the sentence that some plan still says, and
+    ``next_words`` what plans with that beginning can say after it (``None`` among them: such a plan
+    may end there).
     """
 
-    def __init__(self, spoken: Spoken, words: Sequence[int], length: int, following: Sequence[int | None]) -> None:
+    def __init__(
+        self, spoken: Spoken, words: Sequence[int], length: int, following: Sequence[int | None]
+    ) -> None:
         names = [f"say {spoken.table.words[w]!r}" if w is not None else "end" for w in following]
         said = f'after "{spoken.text(words[:length])}"' if length else "at the beginning"
         wrong = f"says {spoken.table.words[words[length]]!r}" if length < len(words) else "ends"
@@ -37,9 +40,9 @@ class NoPlanFits(Refuted):
 def fitting(spoken: Spoken, words: Sequence[int]) -> PlanSpace:
     """The task's optimal plans with the sentence ``words``: again a plan space, of one task.
 
-    Its nodes are pairs (plan-space node, how many words have been said), each on some fitting plan, so that
-    `planners.search.plans.Plans.of` counts, ranks and samples exactly the plans that fit.  ``state``, ``goal`` and the table of
-    states are those of ``spoken.space``.
+    Its nodes are pairs (plan-space node, how many words have been said), each on some fitting plan,
+    so that `planners.search.plans.Plans.of` counts, ranks and samples exactly the plans that fit.
+    ``state``, ``goal`` and the table of states are those of ``spoken.space``.
 
     O(nodes * words), in numpy layer by layer.  Raises `NoPlanFits` if there is none.
     """
@@ -68,7 +71,9 @@ def fitting(spoken: Spoken, words: Sequence[int]) -> PlanSpace:
     return _plan_space(spoken, layers, steps, ends)
 
 
-def _no_plan(spoken: Spoken, words: Sequence[int], layers: Sequence[tuple[Ints, Ints]]) -> NoPlanFits:
+def _no_plan(
+    spoken: Spoken, words: Sequence[int], layers: Sequence[tuple[Ints, Ints]]
+) -> NoPlanFits:
     """How far plans follow the sentence, and what they say then."""
     space, word = spoken.space, spoken.word
     furthest = max(int(place.max()) for _, place in layers if len(place))

@@ -21,8 +21,9 @@ from planners.search.plans import Plan
 class Search:
     """What an A* search found, and its work.
 
-    ``cost`` is (makespan, second component); ``words`` the plan's sentence.  ``expanded`` counts the nodes whose joint
-    steps were looked at, ``states`` the different states among them, ``generated`` the nodes put into the queue.
+    ``cost`` is (makespan, second component); ``words`` the plan's sentence.  ``expanded`` counts
+    the nodes whose joint steps were looked at, ``states`` the different states among them,
+    ``generated`` the nodes put into the queue.
     """
 
     plan: Plan
@@ -35,9 +36,11 @@ class Search:
 
 @dataclass(frozen=True, slots=True)
 class Terrain:
-    """States met by searches with one language over one model, numbered, with their words and joint steps.
+    """States met by searches with one language over one model, numbered, with their words and joint
+    steps.
 
-    It only saves work: searches of many tasks, or with and without a sentence, expand the same states.
+    It only saves work: searches of many tasks, or with and without a sentence, expand the same
+    states.
     """
 
     model: JointModel
@@ -77,8 +80,8 @@ def guided(
 ) -> Search:
     """An optimal plan of the task with the sentence ``words``; any optimal plan for None.
 
-    ``name`` is the heuristic (`planners.search.bounds.HEURISTICS`); see `astar` for the rest.  Raises `NoPlanFits` when no
-    optimal plan has the sentence.
+    ``name`` is the heuristic (`planners.search.bounds.HEURISTICS`); see `astar` for the rest.
+    Raises `NoPlanFits` when no optimal plan has the sentence.
     """
     space = spoken.space
     terrain = terrain or Terrain(spoken.model, spoken.table)
@@ -101,19 +104,21 @@ def astar(
     *,
     count_words: bool = True,
 ) -> Search | None:
-    """An optimal plan with the sentence ``words``, if it is the sentence of an optimal plan; any optimal plan without one.
+    """An optimal plan with the sentence ``words``, if it is the sentence of an optimal plan; any
+    optimal plan without one.
 
     For another sentence it may find a longer plan or none.
 
-    With a sentence a node is a state and *places*: how many words may have been said there.  What does not fit is pruned: a
-    step stays in its word or goes on to the next one, and a goal state counts at the last word.  All the places of a
-    state are expanded together, and a state only at the least cost at which it was met: an optimal plan is at none of its
-    states later than it could be.  A word takes a step at least, so with ``count_words`` the words still to say are a
-    lower bound, too (the paper only prunes).
+    With a sentence a node is a state and *places*: how many words may have been said there.  What
+    does not fit is pruned: a step stays in its word or goes on to the next one, and a goal state
+    counts at the last word.  All the places of a state are expanded together, and a state only at
+    the least cost at which it was met: an optimal plan is at none of its states later than it could
+    be.  A word takes a step at least, so with ``count_words`` the words still to say are a lower
+    bound, too (the paper only prunes).
 
-    Costs are lexicographic: steps, second component.  The next node is one with least (steps + bound, second component),
-    then least bound, then most words said, then the one whose predecessor was expanded last, then the one with the
-    smallest labels.
+    Costs are lexicographic: steps, second component.  The next node is one with least (steps +
+    bound, second component), then least bound, then most words said, then the one whose predecessor
+    was expanded last, then the one with the smallest labels.
     """
     [start] = terrain.numbers(init[None, :])
     if words is not None and (not words or terrain.word[start] != words[0]):
@@ -125,7 +130,10 @@ def astar(
     known = _Heights(terrain, goal, bound)
     known.meet([start])
     best = {start: (0, 0)}
-    met, waiting = {start: 1}, {start: 1}  # bits of the places met at the best cost, and of those not expanded yet
+    met, waiting = (
+        {start: 1},
+        {start: 1},
+    )  # bits of the places met at the best cost, and of those not expanded yet
     before: dict[tuple[int, int], tuple[tuple[int, int], tuple[int, ...]]] = {}
     queue = [((known.height[start], 0), known.height[start], last, 0, 0, start)]
     looked: set[int] = set()
@@ -149,7 +157,11 @@ def astar(
             goes_on = words is not None and terrain.word[target] != terrain.word[state]
             fresh = here << 1 & places.get(terrain.word[target], 0) if goes_on else here
             reached = (depth + 1, second + cost)
-            if not fresh or known.height[target] >= FAR or (target in best and best[target] < reached):
+            if (
+                not fresh
+                or known.height[target] >= FAR
+                or (target in best and best[target] < reached)
+            ):
                 continue
             if target not in best or reached < best[target]:
                 best[target], met[target], waiting[target] = reached, 0, 0
@@ -159,7 +171,10 @@ def astar(
             if fresh > waiting[target]:  # a place further on than those that wait
                 left = last + 1 - fresh.bit_length()
                 height = max(known.height[target], left) if count_words else known.height[target]
-                heappush(queue, ((reached[0] + height, reached[1]), height, left, -expanded, order, target))
+                heappush(
+                    queue,
+                    ((reached[0] + height, reached[1]), height, left, -expanded, order, target),
+                )
                 generated += 1
             met[target] |= fresh
             waiting[target] |= fresh
@@ -181,7 +196,9 @@ class _Heights:
         if fresh:
             rows = np.stack([self.terrain.rows[state] for state in fresh])
             self.height.update(zip(fresh, self.bound(rows).tolist(), strict=True))
-            self.reached.update(zip(fresh, self.terrain.model.holds(self.goal, rows).tolist(), strict=True))
+            self.reached.update(
+                zip(fresh, self.terrain.model.holds(self.goal, rows).tolist(), strict=True)
+            )
 
 
 def _way(

@@ -1,7 +1,8 @@
 """The plans that a sentence leaves open as an SVG picture that needs nothing else to be read.
 
-Layers go from left to right: joint states in boxes with a band in the colour of their word, and between them the joint
-actions.  Every edge's text is an item of a column of its own, so that no text lies on another one.
+Layers go from left to right: joint states in boxes with a band in the colour of their word, and
+between them the joint actions.  Every edge's text is an item of a column of its own, so that no
+text lies on another one.
 """
 
 from __future__ import annotations
@@ -10,7 +11,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from xml.sax.saxutils import escape
 
-from coordlang.use.sentence.drawing import Ink, cut_note, edge_lines, headline, inks, node_lines, plans_text
+from coordlang.use.sentence.drawing import (
+    Ink,
+    cut_note,
+    edge_lines,
+    headline,
+    inks,
+    node_lines,
+    plans_text,
+)
 from coordlang.use.sentence.understanding import Dag
 
 # Pixels.  Text is monospaced, so that its width is known.
@@ -28,7 +37,9 @@ _SWEEPS = 12
 
 @dataclass(slots=True)
 class _Item:
-    """A box of a column: a node or the text of an edge.  ``before`` and ``after`` are its neighbours' numbers."""
+    """A box of a column: a node or the text of an edge.  ``before`` and ``after`` are its
+    neighbours' numbers.
+    """
 
     width: float
     height: float
@@ -54,23 +65,42 @@ def to_svg(dag: Dag) -> str:
     title = [headline(dag), dag.task, *([note] if note else [])]
     width = max(x + _MARGIN, 2 * _MARGIN + _CHAR * 1.2 * max(map(len, title)), _chips_end(dag))
     body = [*_heading(dag, ink, title), *_column_heads(columns, lefts, items)]
-    centre = {n: lefts[k] + max(items[m].width for m in column) / 2 for k, column in enumerate(columns) for n in column}
+    centre = {
+        n: lefts[k] + max(items[m].width for m in column) / 2
+        for k, column in enumerate(columns)
+        for n in column
+    }
     nodes = len(dag.nodes)
     for number, edge in enumerate(dag.edges):
         dashed = bool(dag.nodes[edge.source].merged or dag.nodes[edge.target].merged)
-        body += _edge(items, centre, edge.source, nodes + number, edge.target, texts[number], dashed)
+        body += _edge(
+            items, centre, edge.source, nodes + number, edge.target, texts[number], dashed
+        )
     for number, node in enumerate(dag.nodes):
-        body += _node(items[number], centre[number], node.word, lines[number], plans_text(node.plans), node.key, ink)
+        body += _node(
+            items[number],
+            centre[number],
+            node.word,
+            lines[number],
+            plans_text(node.plans),
+            node.key,
+            ink,
+        )
     return "\n".join([*_open(width, height, title[0], dag.task), *body, "</svg>"]) + "\n"
 
 
-def _items(dag: Dag, lines: Sequence[list[str]], texts: Sequence[list[str]]) -> tuple[list[_Item], list[list[int]]]:
+def _items(
+    dag: Dag, lines: Sequence[list[str]], texts: Sequence[list[str]]
+) -> tuple[list[_Item], list[list[int]]]:
     """The boxes, nodes first, and the columns from left to right: nodes, texts, nodes, .."""
     items = [
-        _Item(_CHAR * max(len(s) for s in [*own, f"{node.word}  {plans_text(node.plans)}"]) + 2 * _PAD,
-              _BAND + _LINE * len(own) + (_PAD if own else 0))
+        _Item(
+            _CHAR * max(len(s) for s in [*own, f"{node.word}  {plans_text(node.plans)}"])
+            + 2 * _PAD,
+            _BAND + _LINE * len(own) + (_PAD if own else 0),
+        )
         for node, own in zip(dag.nodes, lines, strict=True)
-    ]  # fmt: skip
+    ]
     columns: list[list[int]] = []
     for layer in dag.layers:
         columns += [list(layer), []]
@@ -96,7 +126,9 @@ def _place(items: list[_Item], columns: list[list[int]]) -> None:
             for n in column:
                 neighbours = items[n].before if forward else items[n].after
                 centres = [items[m].y + items[m].height / 2 for m in neighbours]
-                wanted[n] = sum(centres) / len(centres) if centres else items[n].y + items[n].height / 2
+                wanted[n] = (
+                    sum(centres) / len(centres) if centres else items[n].y + items[n].height / 2
+                )
             column.sort(key=lambda n: (wanted[n], n))
             _stack(items, column, [wanted[n] - items[n].height / 2 for n in column])
     top = min(item.y for item in items)
@@ -105,9 +137,11 @@ def _place(items: list[_Item], columns: list[list[int]]) -> None:
 
 
 def _stack(items: list[_Item], column: Sequence[int], wanted: Sequence[float]) -> None:
-    """Put a column's boxes below each other, as near as can be to where they are wanted (least squares).
+    """Put a column's boxes below each other, as near as can be to where they are wanted (least
+    squares).
 
-    With the heights above subtracted this is isotonic regression: pools of boxes that touch move together.
+    With the heights above subtracted this is isotonic regression: pools of boxes that touch move
+    together.
     """
     offsets, pools = 0.0, []
     for n, y in zip(column, wanted, strict=True):
@@ -115,7 +149,10 @@ def _stack(items: list[_Item], column: Sequence[int], wanted: Sequence[float]) -
         offsets += items[n].height + _GAP
         while len(pools) > 1 and pools[-2][0] > pools[-1][0]:
             mean, size = pools.pop()
-            pools[-1] = [(pools[-1][0] * pools[-1][1] + mean * size) / (pools[-1][1] + size), pools[-1][1] + size]
+            pools[-1] = [
+                (pools[-1][0] * pools[-1][1] + mean * size) / (pools[-1][1] + size),
+                pools[-1][1] + size,
+            ]
     places = [mean for mean, size in pools for _ in range(int(size))]
     offsets = 0.0
     for n, place in zip(column, places, strict=True):
@@ -138,11 +175,16 @@ def _open(width: float, height: float, title: str, task: str) -> list[str]:
 
 def _heading(dag: Dag, ink: dict[str, Ink], title: Sequence[str]) -> list[str]:
     """The title, the task, the note about a cut, and the sentence as coloured words."""
-    out = [_text(_MARGIN, 28, title[0], size=14, weight="bold"), _text(_MARGIN, 46, dag.task, colour="#555")]
+    out = [
+        _text(_MARGIN, 28, title[0], size=14, weight="bold"),
+        _text(_MARGIN, 46, dag.task, colour="#555"),
+    ]
     x = float(_MARGIN)
     for word in dag.sentence:
         width = _CHAR * len(word) + 2 * _PAD
-        out.append(f'<rect x="{x:.1f}" y="56" width="{width:.1f}" height="{_BAND}" rx="4" fill="{ink[word].fill}"/>')
+        out.append(
+            f'<rect x="{x:.1f}" y="56" width="{width:.1f}" height="{_BAND}" rx="4" fill="{ink[word].fill}"/>'
+        )
         out.append(_text(x + _PAD, 69, word, colour=ink[word].text, weight="bold"))
         x += width + 6
     if len(title) > 2:
@@ -154,17 +196,33 @@ def _chips_end(dag: Dag) -> float:
     return 2 * _MARGIN + sum(_CHAR * len(word) + 2 * _PAD + 6 for word in dag.sentence)
 
 
-def _column_heads(columns: Sequence[Sequence[int]], lefts: Sequence[float], items: Sequence[_Item]) -> list[str]:
+def _column_heads(
+    columns: Sequence[Sequence[int]], lefts: Sequence[float], items: Sequence[_Item]
+) -> list[str]:
     out = []
     for k, (column, left) in enumerate(zip(columns, lefts, strict=True)):
         centre = left + max((items[n].width for n in column), default=0) / 2
-        name = f"step {k // 2 + 1}" if k % 2 else "start" if k == 0 else "end" if k == len(columns) - 1 else ""
+        name = (
+            f"step {k // 2 + 1}"
+            if k % 2
+            else "start"
+            if k == 0
+            else "end"
+            if k == len(columns) - 1
+            else ""
+        )
         out.append(_text(centre, _HEAD + 10, name, colour="#777", anchor="middle"))
     return out
 
 
 def _node(
-    item: _Item, centre: float, word: str, lines: Sequence[str], plans: str, key: str, ink: dict[str, Ink]
+    item: _Item,
+    centre: float,
+    word: str,
+    lines: Sequence[str],
+    plans: str,
+    key: str,
+    ink: dict[str, Ink],
 ) -> list[str]:
     left = centre - item.width / 2
     box = f'x="{left:.1f}" y="{item.y:.1f}" width="{item.width:.1f}" height="{item.height:.1f}" rx="4"'
@@ -177,16 +235,29 @@ def _node(
         dashes = ' stroke-dasharray="2 2"' if own.again else ""
         out.append(f'<rect {box} fill="{own.fill}"/>')
         out.append(_text(left + _PAD, item.y + 13, word, colour=own.text, weight="bold"))
-        out.append(_text(left + item.width - _PAD, item.y + 13, plans, colour=own.text, anchor="end"))
+        out.append(
+            _text(left + item.width - _PAD, item.y + 13, plans, colour=own.text, anchor="end")
+        )
         y, h = item.y + _BAND, item.height - _BAND
-        out.append(f'<path d="M{left:.1f},{y:.1f} h{item.width:.1f} v{h:.1f} h-{item.width:.1f} z" fill="#ffffff"/>')
+        out.append(
+            f'<path d="M{left:.1f},{y:.1f} h{item.width:.1f} v{h:.1f} h-{item.width:.1f} z" fill="#ffffff"/>'
+        )
         out.append(f'<rect {box} fill="none" stroke="{own.fill}" stroke-width="1.5"{dashes}/>')
-    out += [_text(left + _PAD, item.y + _BAND + _LINE * (k + 1) - 2, line) for k, line in enumerate(lines)]
+    out += [
+        _text(left + _PAD, item.y + _BAND + _LINE * (k + 1) - 2, line)
+        for k, line in enumerate(lines)
+    ]
     return [*out, "</g>"]
 
 
 def _edge(
-    items: Sequence[_Item], centre: dict[int, float], source: int, text: int, target: int, lines: Sequence[str], dashed: bool
+    items: Sequence[_Item],
+    centre: dict[int, float],
+    source: int,
+    text: int,
+    target: int,
+    lines: Sequence[str],
+    dashed: bool,
 ) -> list[str]:
     """A curve to the text, the text, and a curve on to the target."""
     a, b, c = items[source], items[text], items[target]
@@ -198,7 +269,9 @@ def _edge(
     out = []
     if lines:
         out.append(f'<path d="{_curve(x1, y1, x2 - 2, y2)}" {line}{look}/>')
-        out.append(f'<path d="{_curve(x3 + 2, y2, x4 - 1, y4)}" {line}{look} marker-end="url(#head)"/>')
+        out.append(
+            f'<path d="{_curve(x3 + 2, y2, x4 - 1, y4)}" {line}{look} marker-end="url(#head)"/>'
+        )
         out += [_text(x2 + _PAD / 2, b.y + _LINE * (k + 1) - 3, own) for k, own in enumerate(lines)]
     else:
         path = f"{_curve(x1, y1, x2, y2)} {_curve(x3, y2, x4 - 1, y4).replace('M', 'L')}"
@@ -212,7 +285,14 @@ def _curve(x1: float, y1: float, x2: float, y2: float) -> str:
 
 
 def _text(
-    x: float, y: float, text: str, *, colour: str = "#000", size: int = _FONT, weight: str = "", anchor: str = ""
+    x: float,
+    y: float,
+    text: str,
+    *,
+    colour: str = "#000",
+    size: int = _FONT,
+    weight: str = "",
+    anchor: str = "",
 ) -> str:
     extra = f' font-size="{size}"' * (size != _FONT) + f' font-weight="{weight}"' * bool(weight)
     extra += f' text-anchor="{anchor}"' * bool(anchor)

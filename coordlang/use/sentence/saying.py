@@ -20,10 +20,13 @@ from planners.search.plans import Plan
 class NotAPlan(Refuted):
     """These joint steps are no plan of the task.
 
-    ``step`` is the first step that cannot be taken, from 0; the plan's length if only the goal fails at the end.
+    ``step`` is the first step that cannot be taken, from 0; the plan's length if only the goal
+    fails at the end.
     """
 
-    def __init__(self, step: int, reason: str, place: Place | None = None, remedy: str | None = None) -> None:
+    def __init__(
+        self, step: int, reason: str, place: Place | None = None, remedy: str | None = None
+    ) -> None:
         super().__init__(f"this is no plan: {reason}", place=place, remedy=remedy)
         self.step = step
 
@@ -31,8 +34,8 @@ class NotAPlan(Refuted):
 class NotOptimal(Refuted):
     """A plan of the task, but not an optimal one: only optimal plans have a sentence.
 
-    ``step`` is the first step, from 0, with which it is the beginning of no optimal plan any more; ``excess`` is its
-    cost above the optimal one: (steps, second component).
+    ``step`` is the first step, from 0, with which it is the beginning of no optimal plan any more;
+    ``excess`` is its cost above the optimal one: (steps, second component).
     """
 
     def __init__(self, step: int, excess: tuple[int, int], reason: str) -> None:
@@ -44,8 +47,9 @@ class NotOptimal(Refuted):
 def say(spoken: Spoken, plan: Sequence[Texts]) -> tuple[int, ...]:
     """The sentence of an optimal plan (the paper's TSC), as word numbers; `Spoken.text` writes it.
 
-    ``plan[k][i]`` is the subaction of robot i in step k as text, None if it idles (as `planners.search.plan_file.read_plans`
-    gives it).  O(steps) expansions.  Raises `NotAPlan` or `NotOptimal` with the first step that breaks.
+    ``plan[k][i]`` is the subaction of robot i in step k as text, None if it idles (as
+    `planners.search.plan_file.read_plans` gives it).  O(steps) expansions.  Raises `NotAPlan` or
+    `NotOptimal` with the first step that breaks.
     """
     numbers, rows, second = follow(spoken, plan)
     space, node = spoken.space, spoken.start
@@ -62,7 +66,9 @@ def say(spoken: Spoken, plan: Sequence[Texts]) -> tuple[int, ...]:
 
 
 def follow(spoken: Spoken, plan: Sequence[Texts]) -> tuple[Plan, list[Rows], int]:
-    """The label numbers, the states and the second cost of a plan, optimal or not.  Raises `NotAPlan`."""
+    """The label numbers, the states and the second cost of a plan, optimal or not.  Raises
+    `NotAPlan`.
+    """
     model, space = spoken.model, spoken.space
     row = space.rows[space.state[spoken.start]]
     rows, second, numbers = [row], 0, []
@@ -72,9 +78,10 @@ def follow(spoken: Spoken, plan: Sequence[Texts]) -> tuple[Plan, list[Rows], int
         found = (steps.labels == labels).all(axis=1).nonzero()[0]
         if not len(found):
             raise NotAPlan(
-                number, f"step {number + 1} cannot be taken: {model.why_not(rows[-1], labels)}",
+                number,
+                f"step {number + 1} cannot be taken: {model.why_not(rows[-1], labels)}",
                 remedy=f"The state before it is {model.state_text(rows[-1])}.",
-            )  # fmt: skip
+            )
         rows.append(steps.result[found[0]])
         second += int(steps.cost[found[0]])
         numbers.append(labels)
@@ -86,12 +93,15 @@ def follow(spoken: Spoken, plan: Sequence[Texts]) -> tuple[Plan, list[Rows], int
 def read_plan_file(path: str | Path, model: JointModel) -> list[tuple[Texts, ...]]:
     """The plans of a plan file (docs/formats.md), in the spelling of the model.
 
-    Raises `BadInput` for a file that is none or holds no plan, `NotAPlan` for an action that the problem does not have.
+    Raises `BadInput` for a file that is none or holds no plan, `NotAPlan` for an action that the
+    problem does not have.
     """
     try:
         plans = read_plans(path, model)
     except NoSuchAction as error:
-        raise NotAPlan(error.step, f"in step {error.step + 1}, {error.what}", place=error.place) from None
+        raise NotAPlan(
+            error.step, f"in step {error.step + 1}, {error.what}", place=error.place
+        ) from None
     if not plans:
         raise BadInput("there is no plan in it", place=Place(str(path)))
     return [tuple(tuple(map(_spelling, step)) for step in plan) for plan in plans]
@@ -112,9 +122,10 @@ def _numbers(model: JointModel, step: Texts, number: int) -> tuple[int, ...]:
             if text is not None and text not in own
         )
         raise NotAPlan(
-            number, f"in step {number + 1}, {robot} has no subaction {text}",
+            number,
+            f"in step {number + 1}, {robot} has no subaction {text}",
             remedy="It is misspelt, belongs to another robot, or can never be applied in this problem.",
-        )  # fmt: skip
+        )
     return found
 
 

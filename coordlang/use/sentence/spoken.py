@@ -23,9 +23,9 @@ from planners.search.plan_space import PlanSpace, search
 class Spoken:
     """A language with the optimal plans of one task.
 
-    ``space`` may hold further tasks: this one is number ``task`` of ``space.starts``.  ``word`` has the word number of
-    every plan-space node.  ``covered``: is it one of the candidate tasks that the language was built for?  For any other
-    one nothing is guaranteed.
+    ``space`` may hold further tasks: this one is number ``task`` of ``space.starts``.  ``word`` has
+    the word number of every plan-space node.  ``covered``: is it one of the candidate tasks that
+    the language was built for?  For any other one nothing is guaranteed.
     """
 
     language: Language
@@ -47,12 +47,14 @@ class Spoken:
     def words_of(self, text: str | Sequence[str]) -> tuple[int, ...]:
         """Word numbers of a sentence, ``"w2 w0"`` or ``("w2", "w0")``.
 
-        Raises `BadInput` for an empty sentence, a word that the language does not have, or one that is said twice
-        in a row, which no sentence does.
+        Raises `BadInput` for an empty sentence, a word that the language does not have, or one that
+        is said twice in a row, which no sentence does.
         """
         words = text.split() if isinstance(text, str) else list(text)
         if not words:
-            raise BadInput("the sentence is empty", remedy="It begins with the word of the initial state.")
+            raise BadInput(
+                "the sentence is empty", remedy="It begins with the word of the initial state."
+            )
         known = {word: number for number, word in enumerate(self.table.words)}
         for place, word in enumerate(words, 1):
             if word not in known:
@@ -81,18 +83,22 @@ def speak(
 ) -> Spoken:
     """A language in the task of a PDDL problem.
 
-    Raises `BadInput` when domain or problem are not the language's, `ProvedImpossible` for an unsolvable task.
+    Raises `BadInput` when domain or problem are not the language's, `ProvedImpossible` for an
+    unsolvable task.
     """
     place = place or Place("the language file")
     check_source(language, domain, [problem], place)
     recorded = ground_tasks(domain, problem, recorded_list(language), place)
     options = options or options_of(language)
-    # What can be true depends on where tasks start: the states that the language speaks of must be possible here.
+    # What can be true depends on where tasks start: the states that the language speaks of must be
+    # possible here.
     inits = [init for init, _ in recorded]
     loaded = build(domain, [problem], options, inits=inits)
     unknown = _atoms(language) - loaded.model.codec.index.keys()
     if unknown:
-        (extra, _), *_ = ground_tasks(domain, problem, [ListedTask(tuple(sorted(unknown)), ())], place)
+        (extra, _), *_ = ground_tasks(
+            domain, problem, [ListedTask(tuple(sorted(unknown)), ())], place
+        )
         loaded = build(domain, [problem], options, inits=[*inits, extra])
     space = search(loaded.model, loaded.tasks[0])
     table = WordTable.of(language, loaded.model)
@@ -109,11 +115,13 @@ def speak_candidates(language: Language, candidates: Candidates) -> Iterator[Spo
             yield Spoken(language, table, space, task, word, True)
 
 
-def _covers(language: Language, space: PlanSpace, recorded: Sequence[tuple[frozenset[Atom], Formula]]) -> bool:
+def _covers(
+    language: Language, space: PlanSpace, recorded: Sequence[tuple[frozenset[Atom], Formula]]
+) -> bool:
     """Whether the (one) task of a plan space is a candidate task of the language.
 
-    The guarantee is about a task's optimal plans, so a task with the same optimal plans as a candidate is one too:
-    under ``--tasks all``, a task whose optimal plans all end in one state.
+    The guarantee is about a task's optimal plans, so a task with the same optimal plans as a
+    candidate is one too: under ``--tasks all``, a task whose optimal plans all end in one state.
     """
     model = space.model
     row = space.rows[space.state[space.starts[0]]]
@@ -123,7 +131,8 @@ def _covers(language: Language, space: PlanSpace, recorded: Sequence[tuple[froze
             model.codec.key(state) in language.states for state in (row, space.rows[ends[0]])
         )
     return any(
-        _literals(goal) == _literals(space.goals[0]) and (model.state(init) == row).all() for init, goal in recorded
+        _literals(goal) == _literals(space.goals[0]) and (model.state(init) == row).all()
+        for init, goal in recorded
     )
 
 

@@ -17,9 +17,11 @@ from planners.search.plans import Plan, Plans, counts
 
 @dataclass(frozen=True, slots=True)
 class Understood:
-    """A sentence in one task: ``fits`` are the optimal plans that have it, ``plans`` the same counted and listed.
+    """A sentence in one task: ``fits`` are the optimal plans that have it, ``plans`` the same
+    counted and listed.
 
-    In ``fits`` a node is a joint state and how many words have been said; every node is on some plan.
+    In ``fits`` a node is a joint state and how many words have been said; every node is on some
+    plan.
     """
 
     spoken: Spoken
@@ -34,10 +36,11 @@ class Understood:
 
 
 def understand(spoken: Spoken, words: Sequence[int]) -> Understood:
-    """The optimal plans of the task with the sentence ``words`` (word numbers, see `Spoken.words_of`).
+    """The optimal plans of the task with the sentence ``words`` (word numbers, see
+    `Spoken.words_of`).
 
-    O(plan-space edges * words), however many plans there are.  Raises `NoPlanFits`, which says where the sentence
-    first breaks.
+    O(plan-space edges * words), however many plans there are.  Raises `NoPlanFits`, which says
+    where the sentence first breaks.
     """
     fits = fitting(spoken, words)
     return Understood(spoken, tuple(words), fits, Plans.of(fits))
@@ -47,8 +50,8 @@ def understand(spoken: Spoken, words: Sequence[int]) -> Understood:
 class DagNode:
     """A joint state after ``step`` joint steps, with ``said`` words of the sentence.
 
-    ``plans`` is the number of fitting plans through it.  ``key`` is the state; in a DAG that was cut, ``merged`` > 0
-    nodes of a step that are drawn as one have no key of their own.
+    ``plans`` is the number of fitting plans through it.  ``key`` is the state; in a DAG that was
+    cut, ``merged`` > 0 nodes of a step that are drawn as one have no key of their own.
     """
 
     step: int
@@ -61,7 +64,9 @@ class DagNode:
 
 @dataclass(frozen=True, slots=True)
 class DagEdge:
-    """The joint actions from one node (number in `Dag.nodes`) to another: each one a text or None (idle) per robot."""
+    """The joint actions from one node (number in `Dag.nodes`) to another: each one a text or None
+    (idle) per robot.
+    """
 
     source: int
     target: int
@@ -72,7 +77,8 @@ class DagEdge:
 class Dag:
     """The plans that a sentence leaves open, as the paths of a layered graph.
 
-    ``nodes`` are sorted by step, the most plans first.  ``cut`` is how many nodes were merged; 0: nothing is missing.
+    ``nodes`` are sorted by step, the most plans first.  ``cut`` is how many nodes were merged; 0:
+    nothing is missing.
     """
 
     sentence: tuple[str, ...]
@@ -87,15 +93,18 @@ class Dag:
     def layers(self) -> list[range]:
         """The numbers of the nodes of each step."""
         steps = self.nodes[-1].step + 1
-        bounds = [next(n for n, node in enumerate(self.nodes) if node.step == step) for step in range(steps)]
+        bounds = [
+            next(n for n, node in enumerate(self.nodes) if node.step == step)
+            for step in range(steps)
+        ]
         return [range(a, b) for a, b in pairwise([*bounds, len(self.nodes)])]
 
 
 def dag(understood: Understood, most: int | None = None) -> Dag:
     """The fitting plans as a DAG of at most about ``most`` nodes (None: all).
 
-    A larger one is cut in its breadth: every step keeps the nodes that most plans pass through, at least one, and the
-    others of a step are merged into one.
+    A larger one is cut in its breadth: every step keeps the nodes that most plans pass through, at
+    least one, and the others of a step are merged into one.
     """
     spoken, space = understood.spoken, understood.fits
     through = _plans_through(space)
@@ -110,7 +119,9 @@ def dag(understood: Understood, most: int | None = None) -> Dag:
         for node in kept:
             number[node] = len(nodes)
             key = codec.key(space.rows[space.state[node]])
-            nodes.append(DagNode(step, key, spoken.table.words[word[node]], said[node], through[node]))
+            nodes.append(
+                DagNode(step, key, spoken.table.words[word[node]], said[node], through[node])
+            )
         others = here[len(kept) :]
         if others:
             number.update(dict.fromkeys(others, len(nodes)))
@@ -122,8 +133,12 @@ def dag(understood: Understood, most: int | None = None) -> Dag:
     return Dag(sentence, task, spoken.model.robots, understood.count, tuple(nodes), edges, cut)
 
 
-def understood_data(understood: Understood, listed: Sequence[Plan], graph: Dag | None) -> dict[str, Any]:
-    """The JSON form: a plan file (docs/formats.md) with the sentence, the guarantee and, if given, the DAG."""
+def understood_data(
+    understood: Understood, listed: Sequence[Plan], graph: Dag | None
+) -> dict[str, Any]:
+    """The JSON form: a plan file (docs/formats.md) with the sentence, the guarantee and, if given,
+    the DAG.
+    """
     spoken = understood.spoken
     data = {
         "sentence": spoken.text(understood.words),
@@ -133,12 +148,23 @@ def understood_data(understood: Understood, listed: Sequence[Plan], graph: Dag |
     }
     if graph is not None:
         data["nodes"] = [
-            {"merged": node.merged, "step": node.step, "plans": json_count(node.plans)} if node.merged else
-            {"state": node.key, "word": node.word, "said": node.said, "step": node.step, "plans": json_count(node.plans)}
+            {"merged": node.merged, "step": node.step, "plans": json_count(node.plans)}
+            if node.merged
+            else {
+                "state": node.key,
+                "word": node.word,
+                "said": node.said,
+                "step": node.step,
+                "plans": json_count(node.plans),
+            }
             for node in graph.nodes
-        ]  # fmt: skip
+        ]
         data["edges"] = [
-            {"from": edge.source, "to": edge.target, "actions": [list(action) for action in edge.actions]}
+            {
+                "from": edge.source,
+                "to": edge.target,
+                "actions": [list(action) for action in edge.actions],
+            }
             for edge in graph.edges
         ]
     return data
@@ -182,10 +208,14 @@ def _said(understood: Understood) -> tuple[dict[int, int], dict[int, int]]:
     return said, word
 
 
-def _edges(space: PlanSpace, number: dict[int, int], nodes: Sequence[DagNode]) -> tuple[DagEdge, ...]:
+def _edges(
+    space: PlanSpace, number: dict[int, int], nodes: Sequence[DagNode]
+) -> tuple[DagEdge, ...]:
     """Edges by pair of nodes; those from and to merged nodes without their many joint actions."""
     found: dict[tuple[int, int], list[tuple[str | None, ...]]] = {}
-    for source, target, labels in zip(space.sources.tolist(), space.target.tolist(), space.labels.tolist(), strict=True):
+    for source, target, labels in zip(
+        space.sources.tolist(), space.target.tolist(), space.labels.tolist(), strict=True
+    ):
         ends = number[source], number[target]
         actions = found.setdefault(ends, [])
         if not (nodes[ends[0]].merged or nodes[ends[1]].merged):

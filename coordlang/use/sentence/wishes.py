@@ -16,10 +16,12 @@ Memory = tuple[int, ...]
 
 @dataclass(frozen=True, slots=True)
 class PlanWish:
-    """A wish about single plans, as a small automaton that reads a plan and gives it a grade, the lower the better.
+    """A wish about single plans, as a small automaton that reads a plan and gives it a grade, the
+    lower the better.
 
-    ``start`` gives the memory in the initial state, ``step`` the memory after a joint step into a state, ``grade`` the
-    grade of a plan by the memory at its end.  A state is given by its number in the plan space's table.
+    ``start`` gives the memory in the initial state, ``step`` the memory after a joint step into a
+    state, ``grade`` the grade of a plan by the memory at its end.  A state is given by its number
+    in the plan space's table.
     """
 
     text: str
@@ -34,7 +36,9 @@ Wish = str | PlanWish
 
 
 def read_wish(spoken: Spoken, text: str) -> Wish:
-    """``shortest``, ``most-plans``, ``first:ROBOT`` or ``avoid:ATOMS``.  Raises `UsageError` for anything else."""
+    """``shortest``, ``most-plans``, ``first:ROBOT`` or ``avoid:ATOMS``.  Raises `UsageError` for
+    anything else.
+    """
     kind, _, argument = text.strip().partition(":")
     if text.strip() in ("shortest", "most-plans"):
         return text.strip()
@@ -51,16 +55,22 @@ def read_wish(spoken: Spoken, text: str) -> Wish:
 def first(model: JointModel, robot: str) -> PlanWish:
     """The robot goes first.
 
-    A robot *acts* in a step if it neither idles nor does a subaction that is as good as idling.  Robot r goes before
-    robot q in a plan if, in the first step in which one of the two acts and the other one does not, it is r that acts.
-    Grades: 0 if r goes before every other robot, 2 if some other robot goes before r, else 1.
+    A robot *acts* in a step if it neither idles nor does a subaction that is as good as idling.
+    Robot r goes before robot q in a plan if, in the first step in which one of the two acts and the
+    other one does not, it is r that acts. Grades: 0 if r goes before every other robot, 2 if some
+    other robot goes before r, else 1.
     """
     if robot not in model.robots:
-        raise UsageError(f"--wish first:{robot}: there is no such robot",
-                         remedy=f"The robots are {', '.join(model.robots)}.")  # fmt: skip
+        raise UsageError(
+            f"--wish first:{robot}: there is no such robot",
+            remedy=f"The robots are {', '.join(model.robots)}.",
+        )
     place = model.robots.index(robot)
     nothing = {action.label for action in model.actions if action.does_nothing and not action.parts}
-    acts = [[label > 0 and text not in nothing for label, text in enumerate(own)] for own in model.labels]
+    acts = [
+        [label > 0 and text not in nothing for label, text in enumerate(own)]
+        for own in model.labels
+    ]
     late = (-1,)
     others = tuple(other for other in range(len(model.robots)) if other != place)
 
@@ -76,12 +86,18 @@ def first(model: JointModel, robot: str) -> PlanWish:
     def grade(memory: Memory) -> int:
         return 2 if memory == late else 1 if memory else 0
 
-    grades = (f"{robot} goes first", f"nobody goes before {robot}", f"another robot goes before {robot}")
+    grades = (
+        f"{robot} goes first",
+        f"nobody goes before {robot}",
+        f"another robot goes before {robot}",
+    )
     return PlanWish(f"first:{robot}", lambda _: others, step, grade, grades)
 
 
 def avoid(spoken: Spoken, atoms: str) -> PlanWish:
-    """No state of the plan, the first and last included, has all of these atoms.  Grades: 0 if so, else 1."""
+    """No state of the plan, the first and last included, has all of these atoms.  Grades: 0 if so,
+    else 1.
+    """
     codec = spoken.model.codec
     try:
         wanted = split_atoms(" ".join(atoms.lower().split()).replace("( ", "(").replace(" )", ")"))
@@ -91,10 +107,15 @@ def avoid(spoken: Spoken, atoms: str) -> PlanWish:
     if not wanted:
         raise UsageError('--wish avoid: expected atoms, as in avoid:"(at r1 c1-1)"')
     mask = row[: codec.fact_words]
-    hit: list[int] = ((spoken.space.rows[:, : codec.fact_words] & mask) == mask).all(axis=1).astype(int).tolist()
+    hit: list[int] = (
+        ((spoken.space.rows[:, : codec.fact_words] & mask) == mask).all(axis=1).astype(int).tolist()
+    )
     text = " ".join(wanted)
     grades = (f"it keeps away from {text}", f"it passes through {text}")
     return PlanWish(
-        f"avoid:{text}", lambda state: (hit[state],), lambda memory, _, state: (memory[0] or hit[state],),
-        lambda memory: memory[0], grades,
-    )  # fmt: skip
+        f"avoid:{text}",
+        lambda state: (hit[state],),
+        lambda memory, _, state: (memory[0] or hit[state],),
+        lambda memory: memory[0],
+        grades,
+    )

@@ -26,7 +26,11 @@ from unified_planning.engines import (
     ValidationResult,
     ValidationResultStatus,
 )
-from unified_planning.engines.mixins import AnytimePlannerMixin, OneshotPlannerMixin, PlanValidatorMixin
+from unified_planning.engines.mixins import (
+    AnytimePlannerMixin,
+    OneshotPlannerMixin,
+    PlanValidatorMixin,
+)
 from unified_planning.exceptions import UPUsageError
 from unified_planning.model import ProblemKind
 from unified_planning.model.problem_kind_versioning import LATEST_PROBLEM_KIND_VERSION
@@ -41,7 +45,15 @@ from coordlang.use.unified import NAME
 from coordlang.use.unified.plans import NoSteps, of_up, to_up
 from coordlang.use.unified.translation import Subactions, Translated, translate
 from planners.check.validate import validate
-from planners.errors import BadInput, CoordlangError, OutOfMemory, OutOfTime, ProvedImpossible, Unsupported, UsageError
+from planners.errors import (
+    BadInput,
+    CoordlangError,
+    OutOfMemory,
+    OutOfTime,
+    ProvedImpossible,
+    Unsupported,
+    UsageError,
+)
 from planners.limits import time_limit
 from planners.loading import ModelOptions, build
 from planners.pddl.robots import RobotChoice
@@ -53,14 +65,21 @@ _FEATURES = {
     "problem_class": ("ACTION_BASED", "ACTION_BASED_MULTI_AGENT"),
     "typing": ("FLAT_TYPING", "HIERARCHICAL_TYPING"),
     "conditions_kind": (
-        "NEGATIVE_CONDITIONS", "DISJUNCTIVE_CONDITIONS", "EQUALITIES", "EXISTENTIAL_CONDITIONS", "UNIVERSAL_CONDITIONS",
+        "NEGATIVE_CONDITIONS",
+        "DISJUNCTIVE_CONDITIONS",
+        "EQUALITIES",
+        "EXISTENTIAL_CONDITIONS",
+        "UNIVERSAL_CONDITIONS",
     ),
     "effects_kind": (
-        "CONDITIONAL_EFFECTS", "FORALL_EFFECTS", "STATIC_FLUENTS_IN_BOOLEAN_ASSIGNMENTS", "FLUENTS_IN_BOOLEAN_ASSIGNMENTS",
+        "CONDITIONAL_EFFECTS",
+        "FORALL_EFFECTS",
+        "STATIC_FLUENTS_IN_BOOLEAN_ASSIGNMENTS",
+        "FLUENTS_IN_BOOLEAN_ASSIGNMENTS",
     ),
     "multi_agent": ("AGENT_SPECIFIC_PRIVATE_GOAL", "AGENT_SPECIFIC_PUBLIC_GOAL"),
     "quality_metrics": ("MAKESPAN",),
-}  # fmt: skip
+}
 _PLANS = (PlanKind.PARTIAL_ORDER_PLAN, PlanKind.SEQUENTIAL_PLAN, PlanKind.TIME_TRIGGERED_PLAN)
 
 
@@ -79,17 +98,19 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
     Parameters
     ----------
     robots, robot_type, unowned
-        Who acts, in a problem without agents: objects or their names; a type or its name; who owns actions without a
-        robot ("error", "environment" or "shared").  Without them the robots are found as in PDDL (docs/pddl.md).
+        Who acts, in a problem without agents: objects or their names; a type or its name; who owns
+        actions without a robot ("error", "environment" or "shared").  Without them the robots are
+        found as in PDDL (docs/pddl.md).
     subactions
         Each action is a whole joint step: action -> robot -> its part, as in joint-action PDDL.
     cost, remember_actions
         As on the command line.
     language, sentence
-        A language (or the name of its file) and a sentence: only plans that fit.  The language brings robots and cost.
+        A language (or the name of its file) and a sentence: only plans that fit.  The language
+        brings robots and cost.
     plan_kind
-        The kind of the plans, a `PlanKind`: partial-order (default), sequential or time-triggered.  Where each action is a
-        whole step, or there is one robot, sequential is the default.
+        The kind of the plans, a `PlanKind`: partial-order (default), sequential or time-triggered.
+        Where each action is a whole step, or there is one robot, sequential is the default.
     """
 
     def __init__(
@@ -111,13 +132,21 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         if sentence is not None and language is None:
             raise UPUsageError("a sentence needs its language")
         if plan_kind is not None and plan_kind not in _PLANS:
-            raise UPUsageError(f"{plan_kind}: plans are partial-order, sequential or time-triggered")
+            raise UPUsageError(
+                f"{plan_kind}: plans are partial-order, sequential or time-triggered"
+            )
         self._robots = [r if isinstance(r, str) else r.name for r in robots]
-        self._robot_type = robot_type if robot_type is None or isinstance(robot_type, str) else robot_type.name
+        self._robot_type = (
+            robot_type if robot_type is None or isinstance(robot_type, str) else robot_type.name
+        )
         self._unowned, self._cost, self._remember = unowned, cost, remember_actions
         self._subactions, self._sentence, self._plan_kind = subactions, sentence, plan_kind
         try:
-            self._language = language if language is None or isinstance(language, Language) else read_language(language)
+            self._language = (
+                language
+                if language is None or isinstance(language, Language)
+                else read_language(language)
+            )
         except BadInput as error:
             raise UPUsageError(str(error)) from None
 
@@ -127,7 +156,9 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
 
     @staticmethod
     def supported_kind() -> ProblemKind:
-        """Costs of actions and lengths of plans are no metrics here: the makespan always comes first."""
+        """Costs of actions and lengths of plans are no metrics here: the makespan always comes
+        first.
+        """
         kind = ProblemKind(version=LATEST_PROBLEM_KIND_VERSION)
         for group, features in _FEATURES.items():
             for feature in features:
@@ -157,7 +188,11 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
     # Planning.
 
     def _solve(
-        self, problem: Any, heuristic: Any = None, timeout: float | None = None, output_stream: Any = None
+        self,
+        problem: Any,
+        heuristic: Any = None,
+        timeout: float | None = None,
+        output_stream: Any = None,
     ) -> PlanGenerationResult:
         _ignored(heuristic=heuristic, output_stream=output_stream)
         solved = self._solved(problem, timeout)
@@ -182,7 +217,13 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
                 yield self._none(_Status.TIMEOUT, f"{number} of {plans.count} plans in time")
                 return
             last = number == plans.count - 1
-            yield self._result(self._done(problem) if last else _Status.INTERMEDIATE, solved, plans, number, problem)
+            yield self._result(
+                self._done(problem) if last else _Status.INTERMEDIATE,
+                solved,
+                plans,
+                number,
+                problem,
+            )
 
     def _solved(self, problem: Any, timeout: float | None) -> _Solved | PlanGenerationResult:
         """The plans as a graph; or the result that says why there are none."""
@@ -212,14 +253,24 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
             loaded = build(found.domain, [found.problem], self._options(found))
             return _Solved(found, search(loaded.model, loaded.tasks[0]), None)
         spoken = self._speak(found)
-        space = spoken.space if self._sentence is None else fitting(spoken, spoken.words_of(self._sentence))
+        space = (
+            spoken.space
+            if self._sentence is None
+            else fitting(spoken, spoken.words_of(self._sentence))
+        )
         return _Solved(found, space, spoken)
 
     def _speak(self, found: Translated) -> Spoken:
-        """The language in this problem; texts are not compared, because the problem has none of its own."""
+        """The language in this problem; texts are not compared, because the problem has none of its
+        own.
+        """
         assert self._language is not None
         domain = {key: value for key, value in self._language.domain.items() if key != "sha256"}
-        model = {k: v for k, v in self._language.model.items() if k not in ("problem_sha256", "world_sha256")}
+        model = {
+            k: v
+            for k, v in self._language.model.items()
+            if k not in ("problem_sha256", "world_sha256")
+        }
         language = replace(self._language, domain=domain, model=model)
         return speak(language, found.domain, found.problem, self._options(found))
 
@@ -229,9 +280,17 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         if self._language is not None:
             remember = self._remember or None
             return options_of(
-                self._language, robots=robots, unowned=self._unowned, cost=self._cost, remember_actions=remember
+                self._language,
+                robots=robots,
+                unowned=self._unowned,
+                cost=self._cost,
+                remember_actions=remember,
             )
-        kind = None if self._robot_type is None else found.types.get(self._robot_type, self._robot_type)
+        kind = (
+            None
+            if self._robot_type is None
+            else found.types.get(self._robot_type, self._robot_type)
+        )
         choice = RobotChoice(robots, kind, self._unowned or "error")  # type: ignore[arg-type]
         return ModelOptions(choice, self._cost or "makespan", self._remember)  # type: ignore[arg-type]
 
@@ -242,11 +301,18 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         return _Status.SOLVED_OPTIMALLY if ours else _Status.SOLVED_SATISFICING
 
     def _result(
-        self, status: PlanGenerationResultStatus, solved: _Solved, plans: Plans, number: int, problem: Any
+        self,
+        status: PlanGenerationResultStatus,
+        solved: _Solved,
+        plans: Plans,
+        number: int,
+        problem: Any,
     ) -> PlanGenerationResult:
         plan = plans.unrank(number)
         whole = plans.space.model.is_joint_action or len(plans.space.model.robots) == 1
-        kind = self._plan_kind or (PlanKind.SEQUENTIAL_PLAN if whole else PlanKind.PARTIAL_ORDER_PLAN)
+        kind = self._plan_kind or (
+            PlanKind.SEQUENTIAL_PLAN if whole else PlanKind.PARTIAL_ORDER_PLAN
+        )
         messages = []
         if solved.spoken is not None and not solved.spoken.covered:
             text = "the language does not cover this task: it guarantees nothing here"
@@ -259,12 +325,16 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         return PlanGenerationResult(status, up_plan, self.name, metrics, messages)
 
     def _none(self, status: PlanGenerationResultStatus, why: str) -> PlanGenerationResult:
-        return PlanGenerationResult(status, None, self.name, log_messages=[LogMessage(LogLevel.INFO, why)])
+        return PlanGenerationResult(
+            status, None, self.name, log_messages=[LogMessage(LogLevel.INFO, why)]
+        )
 
     # Validation.
 
     def _validate(self, problem: Any, plan: Any) -> ValidationResult:
-        """By the rules of joint steps (`planners.check.validate`); under a sentence the plan must be optimal and fit, too."""
+        """By the rules of joint steps (`planners.check.validate`); under a sentence the plan must
+        be optimal and fit, too.
+        """
         try:
             found = translate(problem, self._subactions)
             loaded = build(found.domain, [found.problem], self._options(found))
@@ -289,12 +359,20 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
                 return self._invalid(str(error), None)
             if said != spoken.words_of(self._sentence):
                 return self._invalid(f'the sentence of this plan is "{spoken.text(said)}"', None)
-        return ValidationResult(ValidationResultStatus.VALID, self.name, metrics={"makespan": str(len(steps))})
+        return ValidationResult(
+            ValidationResultStatus.VALID, self.name, metrics={"makespan": str(len(steps))}
+        )
 
-    def _invalid(self, why: str, reason: FailedValidationReason | None, action: Any = None) -> ValidationResult:
+    def _invalid(
+        self, why: str, reason: FailedValidationReason | None, action: Any = None
+    ) -> ValidationResult:
         messages = [LogMessage(LogLevel.INFO, why)]
         return ValidationResult(
-            ValidationResultStatus.INVALID, self.name, messages, reason=reason, inapplicable_action=action
+            ValidationResultStatus.INVALID,
+            self.name,
+            messages,
+            reason=reason,
+            inapplicable_action=action,
         )
 
 

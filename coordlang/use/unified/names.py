@@ -7,12 +7,25 @@ from collections.abc import Hashable
 
 #: What PDDL or its readers take for something of their own.
 _RESERVED = frozenset(
-    ["and", "or", "not", "imply", "forall", "exists", "when", "either", "object", "increase", "total-cost"]
+    [
+        "and",
+        "or",
+        "not",
+        "imply",
+        "forall",
+        "exists",
+        "when",
+        "either",
+        "object",
+        "increase",
+        "total-cost",
+    ]
 )
 
 
 class Names:
-    """Names of one kind (types, predicates, actions or objects): each thing gets a PDDL name of its own.
+    """Names of one kind (types, predicates, actions or objects): each thing gets a PDDL name of its
+    own.
 
     What is a PDDL name already, in lower case, is kept if nobody has it.
     """

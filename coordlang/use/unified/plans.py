@@ -1,9 +1,10 @@
 """Joint plans as unified-planning's plans, and back.
 
-A joint plan is a sequence of steps in each of which several robots act.  A *partial-order plan* says exactly this: every
-action of a step comes before every action of the next one.  Actions that share a step do not interfere, so that each of its
-linearisations is a plan, too.  A *time-triggered plan* says it with times 0, 1, ..  A *sequential plan* forgets which
-actions share a step, and different joint plans may become equal.
+A joint plan is a sequence of steps in each of which several robots act.  A *partial-order plan*
+says exactly this: every action of a step comes before every action of the next one.  Actions that
+share a step do not interfere, so that each of its linearisations is a plan, too.  A *time-triggered
+plan* says it with times 0, 1, ..  A *sequential plan* forgets which actions share a step, and
+different joint plans may become equal.
 """
 
 from __future__ import annotations
@@ -43,10 +44,14 @@ def to_up(found: Translated, plans: Plans, plan: Plan, kind: Any, environment: A
     return PartialOrderPlan({**after, **{action: [] for action in last}}, environment)
 
 
-def of_up(found: Translated, model: JointModel, team: Team, plan: Any) -> list[tuple[Texts, tuple[Any, ...]]]:
-    """The joint steps of a unified-planning plan: what each robot does, and the actions that say it.
+def of_up(
+    found: Translated, model: JointModel, team: Team, plan: Any
+) -> list[tuple[Texts, tuple[Any, ...]]]:
+    """The joint steps of a unified-planning plan: what each robot does, and the actions that say
+    it.
 
-    A partial-order plan is read layer by layer, each action as early as its predecessors allow.  Raises `NoSteps`.
+    A partial-order plan is read layer by layer, each action as early as its predecessors allow.
+    Raises `NoSteps`.
     """
     result = []
     for actions in _steps(plan):
@@ -55,14 +60,18 @@ def of_up(found: Translated, model: JointModel, team: Team, plan: Any) -> list[t
             text = label(found, action)
             for robot, part in _parts(model, team, found, text):
                 if step[robot] is not None:
-                    raise NoSteps(f"{model.robots[robot]} does {step[robot]} and {part} in one step")
+                    raise NoSteps(
+                        f"{model.robots[robot]} does {step[robot]} and {part} in one step"
+                    )
                 step[robot] = part
         result.append((tuple(step), tuple(actions)))
     return result
 
 
 def label(found: Translated, action: Any) -> str:
-    """The ground action that an action instance stands for, as PDDL text.  Raises `KeyError` for a foreign action."""
+    """The ground action that an action instance stands for, as PDDL text.  Raises `KeyError` for a
+    foreign action.
+    """
     agent = None
     if action.agent is not None:
         agent = next(name for name, a in found.agents.items() if a.name == action.agent.name)
@@ -78,7 +87,9 @@ def _actions(plans: Plans, plan: Plan) -> list[list[str]]:
     if isinstance(model.stepper, WholeActions):
         rows = space.rows[plans.states(plan)][:, : model.codec.fact_words]
         return [[model.stepper.name(row, step)] for row, step in zip(rows, plan, strict=False)]
-    return [[text for text in dict.fromkeys(model.texts(step)) if text is not None] for step in plan]
+    return [
+        [text for text in dict.fromkeys(model.texts(step)) if text is not None] for step in plan
+    ]
 
 
 def _instance(found: Translated, text: str) -> Any:
@@ -89,7 +100,9 @@ def _instance(found: Translated, text: str) -> Any:
     if None in members:
         return ActionInstance(members[None], tuple(found.objects[arg] for arg in args))
     agent, *rest = args
-    return ActionInstance(members[agent], tuple(found.objects[arg] for arg in rest), found.agents[agent])
+    return ActionInstance(
+        members[agent], tuple(found.objects[arg] for arg in rest), found.agents[agent]
+    )
 
 
 def _steps(plan: Any) -> Sequence[Sequence[Any]]:

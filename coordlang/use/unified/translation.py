@@ -1,7 +1,8 @@
 """A unified-planning problem as PDDL, with the way back.
 
-The text is written here, not by unified-planning's own writers: those for several agents write one file per agent and
-lose goals of agents, and this way one writer does for both classes of problems.  It is then read like any other PDDL.
+The text is written here, not by unified-planning's own writers: those for several agents write one
+file per agent and lose goals of agents, and this way one writer does for both classes of problems.
+It is then read like any other PDDL.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.sexpr import Source
 
-#: Action -> robot -> its part, as in joint-action PDDL: ``{"swap": {"r1": "(move ?a ?b)", "r2": "(move ?b ?a)"}}``.
+#: Action -> robot -> its part, as in joint-action PDDL: ``{"swap": {"r1": "(move ?a ?b)", "r2":
+#: "(move ?b ?a)"}}``.
 Subactions = Mapping[str, Mapping[str, str | None]]
 
 _AGENT = "?agent"
@@ -26,8 +28,9 @@ _AGENT = "?agent"
 class Translated:
     """A unified-planning problem as PDDL.
 
-    ``schemas`` maps each action schema to the actions it stands for, by agent (None where there are no agents);
-    ``objects`` and ``agents`` map PDDL names to objects and agents, ``types`` type names to PDDL names.
+    ``schemas`` maps each action schema to the actions it stands for, by agent (None where there are
+    no agents); ``objects`` and ``agents`` map PDDL names to objects and agents, ``types`` type
+    names to PDDL names.
     """
 
     domain: Domain
@@ -46,8 +49,9 @@ class Translated:
 def translate(problem: Any, subactions: Subactions | None = None) -> Translated:
     """PDDL for a `unified_planning.model.Problem` or a `MultiAgentProblem`.
 
-    Boolean fluents over objects, instantaneous actions.  An agent becomes an object, its own fluents get it as their first
-    argument, and its actions ``:agent``; goals of agents are goals.  With ``subactions`` an action is a whole joint step.
+    Boolean fluents over objects, instantaneous actions.  An agent becomes an object, its own
+    fluents get it as their first argument, and its actions ``:agent``; goals of agents are goals.
+    With ``subactions`` an action is a whole joint step.
 
     Raises `Unsupported` for anything else, `BadInput` for a problem without a robot.
     """
@@ -97,21 +101,42 @@ class _Writer:
             for action in self.problem.actions:
                 name = self.actions.of(action.name, action.name)
                 parts = subactions.get(action.name, {})
-                comments = [f"  ; subaction {robot} {text or 'idle'}" for robot, text in parts.items()]
+                comments = [
+                    f"  ; subaction {robot} {text or 'idle'}" for robot, text in parts.items()
+                ]
                 actions.append("\n".join([f"(:action {name}", *comments, *self.body(action, None)]))
                 schemas[name] = {None: action}
         facts = self.facts()
         goals = [self.text(goal, None) for goal in self.problem.goals]
         for agent in self.agents:
             goals += [self.text(g, agent) for g in (*agent.public_goals, *agent.private_goals)]
-        objects = [f"  {self.objects.of(o.name, o.name)} - {self.type_name(o.type)}" for o in self.problem.all_objects]
+        objects = [
+            f"  {self.objects.of(o.name, o.name)} - {self.type_name(o.type)}"
+            for o in self.problem.all_objects
+        ]
         objects += [f"  {self.agent_name(a)} - {self.own_type(a)}" for a in self.agents]
         # Constants, because actions may name objects.
-        domain = ["(define (domain up)", "(:types", *self.type_lines(), ")", "(:constants", *objects, ")", "(:predicates"]
+        domain = [
+            "(define (domain up)",
+            "(:types",
+            *self.type_lines(),
+            ")",
+            "(:constants",
+            *objects,
+            ")",
+            "(:predicates",
+        ]
         domain += [f"  {line}" for line in self.declared.values()]
         domain += [")", *actions, ")", ""]
         task = ["(define (problem up-task) (:domain up)", "(:init"]
-        task += [*(f"  {fact}" for fact in facts), ")", "(:goal (and", *(f"  {goal}" for goal in goals), ")))", ""]
+        task += [
+            *(f"  {fact}" for fact in facts),
+            ")",
+            "(:goal (and",
+            *(f"  {goal}" for goal in goals),
+            ")))",
+            "",
+        ]
         return "\n".join(domain), "\n".join(task), schemas
 
     def agent_actions(self) -> tuple[list[str], dict[str, dict[str | None, Any]]]:
@@ -128,17 +153,23 @@ class _Writer:
             name = self.actions.of(key, key[0])
             types = list(dict.fromkeys(self.own_type(by_name[str(member)]) for member in members))
             whose = f"(either {' '.join(types)})" if len(types) > 1 else types[0]
-            actions.append("\n".join([f"(:action {name}", f"  :agent {_AGENT} - {whose}", *key[1:]]))
+            actions.append(
+                "\n".join([f"(:action {name}", f"  :agent {_AGENT} - {whose}", *key[1:]])
+            )
             schemas[name] = members
         return actions, schemas
 
     def body(self, action: Any, agent: Any) -> list[str]:
         """Parameters, precondition and effect."""
         if type(action).__name__ != "InstantaneousAction":
-            raise Unsupported(f"{type(action).__name__} {action.name!r}: only instantaneous actions are supported")
+            raise Unsupported(
+                f"{type(action).__name__} {action.name!r}: only instantaneous actions are supported"
+            )
         if action.simulated_effect is not None:
             raise Unsupported(f"action {action.name!r} has simulated effects")
-        parameters = " ".join(f"{self.parameter(p)} - {self.type_name(p.type)}" for p in action.parameters)
+        parameters = " ".join(
+            f"{self.parameter(p)} - {self.type_name(p.type)}" for p in action.parameters
+        )
         conditions = [self.text(c, agent, inside=True) for c in action.preconditions]
         effects = [text for effect in action.effects for text in self.effect(effect, agent)]
         return [
@@ -150,7 +181,9 @@ class _Writer:
     def effect(self, effect: Any, agent: Any) -> Iterable[str]:
         """An assignment; of a value that is not constant both cases."""
         if not effect.is_assignment():
-            raise Unsupported(f"the effect {effect}: only assignments of truth values are supported")
+            raise Unsupported(
+                f"the effect {effect}: only assignments of truth values are supported"
+            )
         atom = self.text(effect.fluent, agent, inside=True)
         value, condition = effect.value, effect.condition
         cases = [(value, atom), (None, f"(not {atom})")]
@@ -169,13 +202,17 @@ class _Writer:
         found = []
         for fluent, value in self.problem.initial_values.items():
             if not value.is_bool_constant():
-                raise Unsupported(f"the initial value {fluent} := {value}: only truth values are supported")
+                raise Unsupported(
+                    f"the initial value {fluent} := {value}: only truth values are supported"
+                )
             if value.is_true():
                 found.append(self.text(fluent, None))
         return sorted(found)
 
     def text(self, node: Any, agent: Any, *, inside: bool = False) -> str:
-        """An expression as PDDL; own fluents are those of ``agent``, which is a variable ``inside`` its actions."""
+        """An expression as PDDL; own fluents are those of ``agent``, which is a variable ``inside``
+        its actions.
+        """
         if node.is_bool_constant():
             return "(and)" if node.is_true() else "(or)"
         if node.is_fluent_exp():
@@ -206,7 +243,10 @@ class _Writer:
             return self.parameter(node.parameter())
         if node.is_variable_exp():
             return self.variable(node.variable())
-        raise Unsupported(f"the term {node}", remedy="Object fluents can be compiled away: USERTYPE_FLUENTS_REMOVING.")
+        raise Unsupported(
+            f"the term {node}",
+            remedy="Object fluents can be compiled away: USERTYPE_FLUENTS_REMOVING.",
+        )
 
     def variables(self, variables: Sequence[Any]) -> str:
         return " ".join(f"{self.variable(v)} - {self.type_name(v.type)}" for v in variables)
@@ -220,14 +260,18 @@ class _Writer:
     def predicate(self, fluent: Any, owner: Any) -> str:
         """The predicate of a fluent; agents' own fluents with equal name and parameters share one."""
         if not fluent.type.is_bool_type():
-            raise Unsupported(f"fluent {fluent.name!r} of type {fluent.type}: only Boolean fluents are supported",
-                              remedy="Object fluents can be compiled away: USERTYPE_FLUENTS_REMOVING.")  # fmt: skip
+            raise Unsupported(
+                f"fluent {fluent.name!r} of type {fluent.type}: only Boolean fluents are supported",
+                remedy="Object fluents can be compiled away: USERTYPE_FLUENTS_REMOVING.",
+            )
         types = tuple(self.type_name(p.type) for p in fluent.signature)
         key = (fluent.name, types, owner is not None)
         name = self.predicates.of(key, fluent.name)
         if name not in self.declared:
             whose = [f"?a - {self.agent_type()}"] if owner is not None else []
-            self.declared[name] = f"({' '.join((name, *whose, *(f'?x{n} - {t}' for n, t in enumerate(types))))})"
+            self.declared[name] = (
+                f"({' '.join((name, *whose, *(f'?x{n} - {t}' for n, t in enumerate(types))))})"
+            )
         return name
 
     def type_name(self, kind: Any) -> str:
@@ -240,13 +284,20 @@ class _Writer:
 
     def own_type(self, agent: Any) -> str:
         """A type for one agent alone, if some action is not for all of them."""
-        return self.agent_type() if not self.apart else self.types.of(("agent", agent.name), f"agent-{agent.name}")
+        return (
+            self.agent_type()
+            if not self.apart
+            else self.types.of(("agent", agent.name), f"agent-{agent.name}")
+        )
 
     def agent_name(self, agent: Any) -> str:
         return self.objects.of(("agent", agent.name), agent.name)
 
     def type_lines(self) -> list[str]:
-        kinds = [(self.type_name(t), self.type_name(t.father) if t.father else "object") for t in self.problem.user_types]
+        kinds = [
+            (self.type_name(t), self.type_name(t.father) if t.father else "object")
+            for t in self.problem.user_types
+        ]
         kinds += [(self.own_type(agent), self.agent_type()) for agent in self.agents if self.apart]
         if self.agents:
             kinds.append((self.agent_type(), "object"))
