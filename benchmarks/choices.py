@@ -18,7 +18,7 @@ from coordlang.tasks.candidates import from_listed
 from coordlang.tasks.task_file import read_task_file
 from coordlang.use.choices.choices import choices
 from coordlang.use.choices.file import to_bytes
-from coordlang.use.sentence.spoken import speak_candidates
+from coordlang.use.sentence.task_language import languages_in_tasks
 from planners.pddl import read_domain, read_problem
 from planners.search.tuples import EdgeIndex
 
@@ -34,7 +34,7 @@ def main(name: str = "gwb7-3x5") -> None:
     seconds, walked, size, sentences = 0.0, 0, 0, 0
     states: list[int] = []
     subplans: list[int] = []
-    for spoken in speak_candidates(language, candidates):
+    for spoken in languages_in_tasks(language, candidates):
         for sentence in task_sentences(spoken.space, spoken.task, spoken.table):
             words = spoken.words_of(sentence.words)
             start = process_time()

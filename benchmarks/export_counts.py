@@ -31,8 +31,8 @@ from coordlang.language.words import sentence
 from coordlang.required.miscoordination import Inseparable
 from coordlang.tasks.candidates import from_problems
 from coordlang.use.export.pddl import Exported, export_pddl
-from coordlang.use.sentence.fitting import fitting
-from coordlang.use.sentence.spoken import Spoken, speak_candidates
+from coordlang.use.sentence.fitting_plans import fitting
+from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 from planners.errors import CoordlangError, OutOfMemory
 from planners.loading import ModelOptions
 from planners.pddl import read_domain, read_problem
@@ -92,7 +92,7 @@ def problem_rows(
     except Inseparable:  # no state tells its plans apart; the last actions do
         candidates = from_problems(domain, [problem], ModelOptions(remember_actions=True))
         language = build_language(candidates, method).language
-    spoken = next(speak_candidates(language, candidates))
+    spoken = next(languages_in_tasks(language, candidates))
     for words in two_sentences(spoken):
         last = None
         for limit in (2000, 0):
@@ -104,7 +104,7 @@ def problem_rows(
             last = exported.plain.form
 
 
-def two_sentences(spoken: Spoken) -> list[tuple[int, ...]]:
+def two_sentences(spoken: TaskLanguage) -> list[tuple[int, ...]]:
     """The sentence of most and that of fewest plans; of the first and the last plan where there are
     too many to compare.
     """
@@ -121,7 +121,7 @@ def two_sentences(spoken: Spoken) -> list[tuple[int, ...]]:
 
 def row(
     name: str,
-    spoken: Spoken,
+    spoken: TaskLanguage,
     words: tuple[int, ...],
     exported: Exported,
     seconds: float,
@@ -156,7 +156,7 @@ def row(
     )
 
 
-def by_listing(spoken: Spoken, plans: Plans, words: tuple[int, ...]) -> int | None:
+def by_listing(spoken: TaskLanguage, plans: Plans, words: tuple[int, ...]) -> int | None:
     """The definition: of all optimal plans those whose states' words, repeated ones collapsed, are
     the sentence.
     """

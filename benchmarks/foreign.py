@@ -195,7 +195,7 @@ def k_star(row: Row, cost: str) -> dict[str, object]:
 
     from kstar_planner.planners import plan_topk
 
-    from planners.classical import compile_plain, to_pddl
+    from planners.classical import compile_classical, to_pddl
     from planners.search.plans import Plans
 
     loaded = load(row, cost)
@@ -205,7 +205,7 @@ def k_star(row: Row, cost: str) -> dict[str, object]:
     ours = Plans.of(space).count
     if ours > 20_000:
         return {"why": f"not asked ({ours:.3g})"}
-    plain = compile_plain(loaded.model, loaded.tasks[0], limit=20_000)
+    plain = compile_classical(loaded.model, loaded.tasks[0], limit=20_000)
     with tempfile.TemporaryDirectory() as name, redirect_stdout(sys.stderr):
         files = Path(name) / "domain.pddl", Path(name) / "problem.pddl"
         for path, text in zip(files, to_pddl(plain), strict=True):
@@ -231,10 +231,10 @@ def load(row: Row, cost: str, *, remember_actions: bool = False) -> Any:
     from planners.loading import ModelOptions, build
     from planners.pddl import read_domain, read_problem
     from planners.pddl.factored import read_factored
-    from planners.pddl.robots import RobotChoice
+    from planners.pddl.robots import RobotSelection
 
     words = dict(zip(row.options[::2], row.options[1::2], strict=True))
-    choice = RobotChoice(
+    choice = RobotSelection(
         tuple(words["--robots"].split(",")) if "--robots" in words else (),
         words.get("--robot-type"),
         words.get("--unowned", "error"),  # type: ignore[arg-type]
@@ -318,7 +318,7 @@ def build(language: Language, seconds: float) -> dict[str, object]:
     guarantee = built.language.guarantee
     return {
         "tasks": candidates.count,
-        "requiring": built.alphas.requiring,
+        "requiring": built.first_differences.requiring,
         "states": candidates.states,
         "greedy": first.language.guarantee.size,
         "words": guarantee.size,

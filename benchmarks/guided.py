@@ -18,7 +18,7 @@ The paper reports 1.6 times fewer nodes on GWB7.  For each language and heuristi
 
 "pruned" is the paper's search: what does not fit the sentence is pruned, nothing else.  "+words"
 also takes the number of words still to say as a lower bound on the steps.  Ties are broken as
-`coordlang.use.sentence.guided.astar` says.  All plans found are checked to be optimal and to have
+`coordlang.use.sentence.astar.astar` says.  All plans found are checked to be optimal and to have
 the sentence.
 """
 
@@ -33,8 +33,8 @@ from table1 import ROWS, candidates_of
 
 from coordlang.building import build_language
 from coordlang.language.sentences import task_sentences
-from coordlang.use.sentence.guided import Terrain, guided
-from coordlang.use.sentence.spoken import Spoken, speak_candidates
+from coordlang.use.sentence.astar import ExpandedStates, plan_under_sentence
+from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 
 
 @dataclass(slots=True)
@@ -56,14 +56,16 @@ class Sums:
             self.ratios[kind] = self.ratios.get(kind, 0.0) + without / nodes
 
 
-def run(spoken: Spoken, terrain: Terrain, heuristic: str, count_words: bool, sums: Sums) -> int:
+def run(
+    spoken: TaskLanguage, terrain: ExpandedStates, heuristic: str, count_words: bool, sums: Sums
+) -> int:
     """One task; the number of searches."""
-    without = guided(spoken, None, heuristic, terrain)
+    without = plan_under_sentence(spoken, None, heuristic, terrain)
     nodes = {}
     said = task_sentences(spoken.space, spoken.task, spoken.table)
     sentences = {spoken.words_of(sentence.words): sentence.plans for sentence in said}
     for words in sentences:
-        found = guided(spoken, words, heuristic, terrain, count_words=count_words)
+        found = plan_under_sentence(spoken, words, heuristic, terrain, count_words=count_words)
         assert (found.words, found.cost) == (words, without.cost)
         nodes[words] = found.expanded
     plans = sum(sentences.values())
@@ -107,8 +109,8 @@ def main() -> int:
         candidates = candidates_of(row)
         for method in arguments.method or ["greedy", "minimal"]:
             language = build_language(candidates, method).language
-            spoken = list(speak_candidates(language, candidates))
-            terrain = Terrain(candidates.model, spoken[0].table)
+            spoken = list(languages_in_tasks(language, candidates))
+            terrain = ExpandedStates(candidates.model, spoken[0].table)
             for heuristic in arguments.heuristic or ["manhattan", "blind", "relaxed"]:
                 for count_words in (False, True):
                     start, sums = perf_counter(), Sums()

@@ -97,7 +97,7 @@ def run(step: str, path: Path, states: int, words: int) -> None:
     show((f"{LOOKED_UP:,} look-ups", path.suffix[1:], "", f"{process_time() - start:.1f}", "", ""))
 
 
-class measured:  # noqa: N801  (reads like a verb)
+class measured:
     def __init__(self, step: str, path: Path) -> None:
         self.step, self.path = step, path
 

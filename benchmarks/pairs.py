@@ -84,7 +84,7 @@ def main(wanted: list[str]) -> int:
             if guarantee.proved_minimal
             else f"{guarantee.lower_bound}..{guarantee.size}",
             " ".join(str(language.size) for language in languages),
-            joint.alphas.nodes,
+            joint.first_differences.nodes,
             sum(language.nodes for language in languages),
             f"{middle - start:.1f}",
             f"{perf_counter() - middle:.1f}",

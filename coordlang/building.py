@@ -8,11 +8,11 @@ from time import perf_counter
 from typing import Literal
 
 from coordlang.certificate import Certificate, certify
-from coordlang.language.file import signed
+from coordlang.language.file import with_provenance
 from coordlang.language.warping import Clause
 from coordlang.language.words import Guarantee, Language, WordTable, name_words, words_of_states
 from coordlang.required.composition_walk import walk
-from coordlang.required.divergences import Alphas, alphas, states_on_plans
+from coordlang.required.divergences import FirstDifferences, first_differences, states_on_plans
 from coordlang.required.miscoordination import Inseparable, inseparable
 from coordlang.tasks.candidates import Candidates, require_solvable
 from coordlang.verification.by_definition import Verdict, verify
@@ -35,7 +35,7 @@ class Built:
     """
 
     language: Language
-    alphas: Alphas
+    first_differences: FirstDifferences
     states: int
     verdict: Verdict
     figures: Mapping[str, float]
@@ -73,7 +73,7 @@ def build_language(
         if witness is not None:
             raise Inseparable(witness)
     progress("walking pairs of plans")
-    found = alphas(candidates.spaces)
+    found = first_differences(candidates.spaces)
     clock.note("coordination")
     checked: list[_Checked] = []
 
@@ -108,7 +108,7 @@ def build_language(
     clock.note("verify")
     size = len(best.language.words)
     guarantee = Guarantee(method, size, outcome.lower_bound, size == outcome.lower_bound)
-    language = signed(
+    language = with_provenance(
         replace(best.language, guarantee=guarantee), candidates, {"program": "coordlang"}
     )
     if overlap and outcome.stopped is None:

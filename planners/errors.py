@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
-    """A place in a file, for messages: ``file:line:column`` (both counted from 1)."""
+class Position:
+    """A position in a file, for messages: ``file:line:column`` (both counted from 1)."""
 
     file: str
     line: int = 0
@@ -30,7 +30,7 @@ class CoordlangError(Exception):
     ----------
     what
         One sentence: what is wrong.
-    place
+    position
         The file position it was found at, where there is one.
     remedy
         One sentence: what the user can do.
@@ -41,15 +41,17 @@ class CoordlangError(Exception):
     #: A program that coordlang relies on failed (the other codes are set below).
     exit_code = 32
 
-    def __init__(self, what: str, *, place: Place | None = None, remedy: str | None = None) -> None:
+    def __init__(
+        self, what: str, *, position: Position | None = None, remedy: str | None = None
+    ) -> None:
         super().__init__(what)
         self.what = what
-        self.place = place
+        self.position = position
         self.remedy = remedy
         self.reached: str | None = None
 
     def __str__(self) -> str:
-        text = f"{self.place}: {self.what}" if self.place else self.what
+        text = f"{self.position}: {self.what}" if self.position else self.what
         return "\n  ".join((text, *(line for line in (self.reached, self.remedy) if line)))
 
 

@@ -12,11 +12,11 @@ from itertools import combinations, product
 import numpy as np
 
 from planners.grounding import GroundAction
-from planners.joint.composition import Composition
+from planners.joint.composition import ComposingStepper
 from planners.joint.interference import conflict, footprint
 from planners.joint.model import JointModel, show
 from planners.joint.states import Rows, find_rows, unique_rows
-from planners.loading import Loaded
+from planners.loading import PlanningInstance
 from planners.pddl.lifted import (
     And,
     Atom,
@@ -74,7 +74,7 @@ class Inspection:
     goal: str
 
 
-def inspect(loaded: Loaded) -> Inspection:
+def inspect(loaded: PlanningInstance) -> Inspection:
     """Inspect a loaded domain and its first problem.
 
     O(pairs of subactions) for the interference count.
@@ -150,7 +150,7 @@ def _speaks_of_others(action: GroundAction) -> bool:
     return bool(touched.partners or touched.excluded)
 
 
-def _objects(loaded: Loaded) -> dict[str, int]:
+def _objects(loaded: PlanningInstance) -> dict[str, int]:
     """How many objects each type has; untyped ones count as ``object``."""
     domain = loaded.domain
     types = [
@@ -187,7 +187,7 @@ def _nobody(atoms: frozenset[StepAtom]) -> str:
 
 def _interfering(model: JointModel) -> int:
     """Pairs of subactions of different robots that may not share a step."""
-    if not isinstance(model.stepper, Composition):
+    if not isinstance(model.stepper, ComposingStepper):
         return 0
     return sum(int(np.count_nonzero(~table[1:, 1:])) for table in model.stepper.tables.values())
 
@@ -197,12 +197,12 @@ def _example(model: JointModel, init: Rows) -> str | None:
     start, some states.
     """
     stepper = model.stepper
-    if not isinstance(stepper, Composition):
+    if not isinstance(stepper, ComposingStepper):
         return None
     own = [[a for a in model.actions if i in a.owners] for i in range(len(model.robots))]
     layer = seen = init[None, :]
     while len(layer) and len(seen) <= _LOOK_AT:
-        choices = stepper.choices(np.ascontiguousarray(layer[:, : model.codec.fact_words]))
+        choices = stepper.choices(np.ascontiguousarray(layer[:, : model.codec.fact_blocks]))
         for state, (i, j) in product(range(len(layer)), combinations(range(len(own)), 2)):
             mine, theirs = (
                 labels[first[state] : first[state + 1]]

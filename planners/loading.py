@@ -6,19 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from planners.errors import BadInput, Place, UsageError
+from planners.errors import BadInput, Position, UsageError
 from planners.grounding import FEWER, GroundAction, ground_actions, ground_goal
 from planners.grounding.networks import apply_network
-from planners.joint.composition import Composition
+from planners.joint.composition import ComposingStepper
 from planners.joint.conditions import Evaluator
-from planners.joint.joint_actions import WholeActions
+from planners.joint.joint_actions import JointActionStepper
 from planners.joint.model import IDLE, Cost, Goal, JointModel, show
 from planners.joint.states import Rows, StateCodec
 from planners.limits import reaching
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import TRUE, Atom, Domain, Problem, StepAtom
 from planners.pddl.robots import (
-    RobotChoice,
+    RobotSelection,
     Team,
     find_team,
     fluent_predicates,
@@ -36,7 +36,7 @@ class ModelOptions:
     model.
     """
 
-    robots: RobotChoice = field(default_factory=RobotChoice)
+    robots: RobotSelection = field(default_factory=RobotSelection)
     cost: Cost = "makespan"
     remember_actions: bool = False
     idle: tuple[str, ...] | None = None
@@ -44,18 +44,18 @@ class ModelOptions:
 
 @dataclass(frozen=True, slots=True)
 class PlanningTask:
-    """A task ``(I, G)`` of a joint model: an initial row and a goal; ``place`` is the file that it
-    is from.
+    """A task ``(I, G)`` of a joint model: an initial row and a goal; ``position`` is the file that
+    it is from.
     """
 
     name: str
     init: Rows
     goal: Goal
-    place: Place | None = None
+    position: Position | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Loaded:
+class PlanningInstance:
     """A joint model with the files and options it was made from and one task per problem."""
 
     domain: Domain
@@ -68,10 +68,10 @@ class Loaded:
 
 def load(
     domain: str | Path, problems: Sequence[str | Path], options: ModelOptions | None = None
-) -> Loaded:
+) -> PlanningInstance:
     """Read PDDL files and build their joint model.
 
-    Raises `BadInput`, `Unsupported` or `UsageError` with place and remedy.
+    Raises `BadInput`, `Unsupported` or `UsageError` with position and remedy.
     """
     lifted = read_domain(domain)
     return build(lifted, [read_problem(p, lifted) for p in problems], options)
@@ -82,7 +82,7 @@ def build(
     problems: Sequence[Problem],
     options: ModelOptions | None = None,
     inits: Sequence[frozenset[Atom]] = (),
-) -> Loaded:
+) -> PlanningInstance:
     """The joint model of problems over the same objects and statics.
 
     ``inits`` are the fluents of further initial states (of a task file): what can be true, and
@@ -108,13 +108,15 @@ def build(
         team = without_idle_environment(team, (i for action in actions for i in action.owners))
         model = _joint_model(domain, problems, team, actions, starts, options)
     tasks = tuple(task_of(model, domain, problem) for problem in problems)
-    return Loaded(domain, tuple(problems), model, tasks, options, team)
+    return PlanningInstance(domain, tuple(problems), model, tasks, options, team)
 
 
 def task_of(model: JointModel, domain: Domain, problem: Problem) -> PlanningTask:
     """The planning task of a problem."""
     goal = ground_goal(domain, problem, problem.goal)
-    return PlanningTask(problem.name, model.state(problem.init), goal, Place(problem.source.name))
+    return PlanningTask(
+        problem.name, model.state(problem.init), goal, Position(problem.source.name)
+    )
 
 
 def _check_same_world(domain: Domain, first: Problem, other: Problem) -> None:
@@ -123,16 +125,16 @@ def _check_same_world(domain: Domain, first: Problem, other: Problem) -> None:
     if first.objects != other.objects:
         odd = sorted({*first.objects.items()} ^ {*other.objects.items()})[0][0]
         raise BadInput(
-            f"object {odd!r} is not the same in all problems", place=objects, remedy=remedy
+            f"object {odd!r} is not the same in all problems", position=objects, remedy=remedy
         )
     changed = static_atoms(domain, first) ^ static_atoms(domain, other)
     if changed:
         odd = min(show(atom) for atom in changed)
         raise BadInput(
-            f"static fact {odd} is not the same in all problems", place=init, remedy=remedy
+            f"static fact {odd} is not the same in all problems", position=init, remedy=remedy
         )
     if first.values != other.values:
-        raise BadInput("function values differ between the problems", place=init, remedy=remedy)
+        raise BadInput("function values differ between the problems", position=init, remedy=remedy)
 
 
 def _joint_model(
@@ -174,12 +176,16 @@ def _joint_model(
         else domain.is_joint_action or not _always_has_nothing_to_do(i, own, actions, starts)
         for i, own in enumerate(subactions)
     )
-    stepper: Composition | WholeActions
+    stepper: ComposingStepper | JointActionStepper
     if domain.is_joint_action:
-        places = {schema.name: domain.source.place(schema.offset) for schema in domain.schemas}
-        stepper = WholeActions(codec, evaluator, robots, labels, actions, options.cost, places)
+        positions = {
+            schema.name: domain.source.position(schema.offset) for schema in domain.schemas
+        }
+        stepper = JointActionStepper(
+            codec, evaluator, robots, labels, actions, options.cost, positions
+        )
     else:
-        stepper = Composition(codec, evaluator, robots, subactions, keeps_idle, options.cost)
+        stepper = ComposingStepper(codec, evaluator, robots, subactions, keeps_idle, options.cost)
     return JointModel(
         name=domain.name,
         robots=robots,
@@ -239,4 +245,4 @@ def _natural_label(text: str) -> tuple[object, ...]:
     return tuple(natural(word) for word in text.strip("()").split())
 
 
-__all__ = ["Loaded", "ModelOptions", "PlanningTask", "build", "load", "task_of"]
+__all__ = ["ModelOptions", "PlanningInstance", "PlanningTask", "build", "load", "task_of"]

@@ -9,7 +9,13 @@ from itertools import combinations
 import numpy as np
 
 from coordlang.language.warping import Clause, Pair
-from coordlang.vocabulary.sat import Colouring, Undecided, by_demand, reduce, solved
+from coordlang.vocabulary.sat import (
+    PartitionProblem,
+    Undecided,
+    most_constrained_first,
+    reduce,
+    solved,
+)
 
 #: Conflicts after which the checking solver comes back.
 _SLICE = 10_000
@@ -72,7 +78,9 @@ def encode(clauses: Sequence[Clause], size: int) -> Cnf:
     ``word``, has word w - 1. Any partition can be named like that, so the formula stays satisfiable
     if it was.
     """
-    states = by_demand(sorted({s for clause in clauses for p in clause for s in p}), clauses)
+    states = most_constrained_first(
+        sorted({s for clause in clauses for p in clause for s in p}), clauses
+    )
     counter = iter(range(1, 2**62))
     word = {s: tuple(next(counter) for _ in range(size)) for s in states}
     pairs = sorted({p for clause in clauses for p in clause})
@@ -127,12 +135,14 @@ def core(clauses: Iterable[Clause], size: int) -> list[Clause]:
 
 def _in_the_way(clauses: Sequence[Clause], size: int) -> list[Clause]:
     """Clauses that some partition, found under those before, broke; short ones first."""
-    states = by_demand(sorted({s for clause in clauses for p in clause for s in p}), clauses)
+    states = most_constrained_first(
+        sorted({s for clause in clauses for p in clause for s in p}), clauses
+    )
     pairs = np.array([p for clause in clauses for p in sorted(clause)], np.int64).reshape(-1, 2)
     bounds = np.cumsum([0, *(len(clause) for clause in clauses)])[:-1]
     words = np.zeros(max(states, default=0) + 1, np.int64)
     kept: list[Clause] = []
-    colouring = Colouring(states, size)
+    colouring = PartitionProblem(states, size)
     try:
         while (partition := colouring.solve(_EASY)) is not None:
             words[list(partition)] = list(partition.values())

@@ -12,7 +12,7 @@ from typing import Any
 import msgspec
 
 from coordlang.language.file import write_atomically
-from planners.errors import BadInput, Place
+from planners.errors import BadInput, Position
 
 FORMAT = "coordlang/certificate"
 VERSION = 1
@@ -72,7 +72,7 @@ def write_certificate(certificate: Certificate, path: str | Path) -> None:
 
 def read_certificate(path: str | Path) -> Certificate:
     """Read a certificate file.  Raises `BadInput` for anything else."""
-    place = Place(str(path))
+    position = Position(str(path))
     try:
         data = sys.stdin.buffer.read() if str(path) == "-" else Path(path).read_bytes()
         if data[:2] == b"\x1f\x8b":
@@ -81,12 +81,14 @@ def read_certificate(path: str | Path) -> Certificate:
         if head.format != FORMAT or head.version != VERSION:
             raise BadInput(
                 f"format {head.format!r} version {head.version!r}, expected {FORMAT!r} version {VERSION}",
-                place=place,
+                position=position,
             )
         return msgspec.json.decode(data, type=Certificate)
     except FileNotFoundError:
-        raise BadInput("there is no such file", place=place) from None
+        raise BadInput("there is no such file", position=position) from None
     except (OSError, EOFError, zlib.error) as error:
-        raise BadInput(f"cannot be read: {error}", place=place) from None
+        raise BadInput(f"cannot be read: {error}", position=position) from None
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise BadInput(f"this is no certificate, or it is cut off: {error}", place=place) from None
+        raise BadInput(
+            f"this is no certificate, or it is cut off: {error}", position=position
+        ) from None

@@ -17,7 +17,7 @@ import click
 
 if TYPE_CHECKING:
     from coordlang.tasks.candidates import Candidates
-    from planners.loading import Loaded, ModelOptions
+    from planners.loading import ModelOptions, PlanningInstance
 
 EXIT_UNPROVED = 3
 EXIT_INTERRUPTED = 130
@@ -203,9 +203,9 @@ class GivenOptions:
 
     def options(self) -> ModelOptions:
         from planners.loading import ModelOptions
-        from planners.pddl.robots import RobotChoice
+        from planners.pddl.robots import RobotSelection
 
-        choice = RobotChoice(self.robots, self.robot_type, self.unowned or "error")
+        choice = RobotSelection(self.robots, self.robot_type, self.unowned or "error")
         return ModelOptions(choice, self.cost or "makespan", self.remember_actions)
 
     def for_language(self, language: Any) -> ModelOptions:
@@ -267,14 +267,16 @@ def make_candidates(
     """The candidate tasks that ``--tasks`` asks for; without it the problems' own."""
     from coordlang.tasks.candidates import all_pairs, from_listed, from_problems
     from coordlang.tasks.task_file import read_task_file
-    from planners.errors import Place
+    from planners.errors import Position
 
     if tasks is None:
         return from_problems(lifted, read, options, skip_unsolvable=skip_unsolvable)
     if tasks == "all":
         return all_pairs(lifted, read, options)
     listed = read_task_file(tasks)
-    return from_listed(lifted, read, listed, options, Place(tasks), skip_unsolvable=skip_unsolvable)
+    return from_listed(
+        lifted, read, listed, options, Position(tasks), skip_unsolvable=skip_unsolvable
+    )
 
 
 def check_outputs(
@@ -418,14 +420,14 @@ def planning_files(
 
 
 def task_files(function: Callable[..., Any]) -> Callable[..., Any]:
-    """DOMAIN PROBLEM, or ``--factored DIR`` in their place; the command gets a `Loaded` maker as
-    ``load``.
+    """DOMAIN PROBLEM, or ``--factored DIR`` in their place; the command gets a `PlanningInstance`
+    maker as ``load``.
     """
 
     @planning_files("DOMAIN PROBLEM", most=1)
     @functools.wraps(function)
     def wrapped(pddl: PlanningFiles, given: GivenOptions, **arguments: Any) -> Any:
-        def load() -> Loaded:
+        def load() -> PlanningInstance:
             from planners.loading import build
 
             domain, problems = pddl.read()

@@ -11,7 +11,7 @@ import click
 from coordlang.cli.app import limits, model_options, task_files
 
 if TYPE_CHECKING:
-    from planners.loading import Loaded
+    from planners.loading import PlanningInstance
 
 
 @click.command(name="check")
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @model_options
 @task_files
 @limits
-def command(as_json: bool, load: Callable[[], Loaded]) -> int:
+def command(as_json: bool, load: Callable[[], PlanningInstance]) -> int:
     """Compare our optimal cost with Fast Downward's (through unified-planning).
 
     Exit 0: equal.  1: they differ.  11: both prove that there is no plan.

@@ -96,14 +96,14 @@ def command(
     With --did and the detours: what one robot may do next, and whether the detours can still be
     had, all at once.
     """
-    from coordlang.cli.speaking import read_spoken, write
+    from coordlang.cli.speaking import read_task_language, write
     from coordlang.use.choices.choices import MOST, choices
     from coordlang.use.choices.dot import to_dot
     from coordlang.use.choices.file import to_bytes
 
     form = form_of(form, as_json)
     check_outputs([("-o", output)], [language, domain, problem])
-    spoken = read_spoken(language, domain, problem, given)
+    spoken = read_task_language(language, domain, problem, given)
     chosen = _numbers(spoken.model.robots, whose)
     found = choices(spoken, spoken.words_of(sentence), most=None if check else MOST)
     if did or visit or avoid or do or never:

@@ -19,12 +19,12 @@ from coordlang.cli.app import (
 )
 
 if TYPE_CHECKING:
-    from coordlang.explanation.asks import Asked
     from coordlang.explanation.cover import Cover
-    from coordlang.explanation.telling import Telling
+    from coordlang.explanation.demands import SentenceDemands
+    from coordlang.explanation.descriptions import WordDescriptions
     from coordlang.explanation.words import Mapped
     from coordlang.language.sentences import TaskSentence
-    from coordlang.use.sentence.spoken import Spoken
+    from coordlang.use.sentence.task_language import TaskLanguage
 
 _SENTENCES_SHOWN = 10
 
@@ -58,21 +58,23 @@ def command(
     """Show a language: each word as a short formula, and with --task what the sentences of a task
     ask of each robot.
     """
-    from coordlang.explanation.telling import telling
+    from coordlang.explanation.descriptions import describe_words
     from coordlang.explanation.words import all_covers, mapped_states
     from coordlang.language.file import read_language
     from coordlang.language.sentences import task_sentences
-    from coordlang.use.sentence.spoken import speak
-    from planners.errors import Place
+    from coordlang.use.sentence.task_language import language_in_task
+    from planners.errors import Position
 
     if sentence is not None and not task:
         raise click.UsageError("--sentence: only with --task")
     read = read_language(language)
     lifted, (lifted_problem,) = read_files(domain, (problem,))
-    spoken = speak(read, lifted, lifted_problem, given.for_language(read), Place(language))
+    spoken = language_in_task(
+        read, lifted, lifted_problem, given.for_language(read), Position(language)
+    )
     mapped = mapped_states(read, spoken.model)
     formulas = all_covers(mapped)
-    told = telling(mapped, formulas, each)
+    told = describe_words(mapped, formulas, each)
     if not as_json:
         click.echo(
             _words(spoken, mapped, told) + "\n"
@@ -100,8 +102,8 @@ def command(
     return 0
 
 
-def _only(spoken: Spoken, sentences: list[TaskSentence], sentence: str) -> list[TaskSentence]:
-    from coordlang.use.sentence.fitting import fitting
+def _only(spoken: TaskLanguage, sentences: list[TaskSentence], sentence: str) -> list[TaskSentence]:
+    from coordlang.use.sentence.fitting_plans import fitting
 
     words = spoken.words_of(sentence)
     said = [s for s in sentences if s.words == tuple(spoken.table.words[w] for w in words)]
@@ -110,22 +112,26 @@ def _only(spoken: Spoken, sentences: list[TaskSentence], sentence: str) -> list[
     return said
 
 
-def _asked(spoken: Spoken, formulas: dict[str, Cover], sentence: TaskSentence) -> Asked:
-    from coordlang.explanation.asks import asked
-    from coordlang.use.sentence.fitting import fitting
+def _asked(
+    spoken: TaskLanguage, formulas: dict[str, Cover], sentence: TaskSentence
+) -> SentenceDemands:
+    from coordlang.explanation.demands import sentence_demands
+    from coordlang.use.sentence.fitting_plans import fitting
 
-    return asked(fitting(spoken, spoken.words_of(sentence.words)), spoken.table, formulas)
+    return sentence_demands(
+        fitting(spoken, spoken.words_of(sentence.words)), spoken.table, formulas
+    )
 
 
 def _data(
-    spoken: Spoken,
+    spoken: TaskLanguage,
     mapped: Mapped,
     formulas: dict[str, Cover],
-    told: Telling,
+    told: WordDescriptions,
     sentences: list[TaskSentence],
-    asks: list[Asked],
+    asks: list[SentenceDemands],
 ) -> dict[str, Any]:
-    from coordlang.explanation.text import asked_data, cover_data, shown
+    from coordlang.explanation.text import cover_data, demands_data, shown
     from coordlang.tasks.candidates import describe
     from planners.search.plan_file import json_count
 
@@ -138,7 +144,7 @@ def _data(
         for s in sentences
     ]
     for entry, ask in zip(listed, asks, strict=False):
-        entry |= asked_data(ask)
+        entry |= demands_data(ask)
     return {
         "words": dict(zip(mapped.words, mapped.states, strict=True)),
         "default": spoken.language.default,
@@ -159,7 +165,7 @@ def _data(
     }
 
 
-def _words(spoken: Spoken, mapped: Mapped, told: Telling) -> str:
+def _words(spoken: TaskLanguage, mapped: Mapped, told: WordDescriptions) -> str:
     from coordlang.explanation.text import telling_text
 
     language = spoken.language
@@ -190,8 +196,10 @@ def _words(spoken: Spoken, mapped: Mapped, told: Telling) -> str:
     return "\n".join(lines)
 
 
-def _task(spoken: Spoken, number: int, sentences: list[TaskSentence], asks: list[Asked]) -> str:
-    from coordlang.explanation.text import asked_text
+def _task(
+    spoken: TaskLanguage, number: int, sentences: list[TaskSentence], asks: list[SentenceDemands]
+) -> str:
+    from coordlang.explanation.text import demands_text
     from coordlang.tasks.candidates import describe
     from planners.search.plans import Plans
 
@@ -207,7 +215,7 @@ def _task(spoken: Spoken, number: int, sentences: list[TaskSentence], asks: list
         )
     for place, sentence in enumerate(sentences[:_SENTENCES_SHOWN]):
         if asks:
-            lines += ["", asked_text(asks[place])]
+            lines += ["", demands_text(asks[place])]
         else:
             lines.append(
                 f'  "{" ".join(sentence.words)}" leaves {counted(sentence.plans, "plan")} open.'

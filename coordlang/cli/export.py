@@ -25,7 +25,7 @@ from coordlang.cli.app import (
 if TYPE_CHECKING:
     from coordlang.use.export.ltlf import SentenceFormula
     from coordlang.use.export.pddl import Exported
-    from coordlang.use.sentence.spoken import Spoken
+    from coordlang.use.sentence.task_language import TaskLanguage
 
 
 @click.command(name="export")
@@ -81,7 +81,7 @@ def command(
 
     Exit 1: no plan fits, or the language does not cover the task and guarantees nothing for it.
     """
-    from coordlang.cli.speaking import covered, read_spoken
+    from coordlang.cli.speaking import covered, read_task_language
     from coordlang.use.export.ltlf import export_ltlf
     from coordlang.use.export.pddl import export_pddl
 
@@ -95,7 +95,7 @@ def command(
         check_outputs(written, inputs, makes_folder=True)
     else:
         check_outputs([("-o", output)], inputs)
-    spoken = read_spoken(language, domain, problem, given)
+    spoken = read_task_language(language, domain, problem, given)
     words = spoken.words_of(sentence)
     if target == "ltlf":
         _write_formula(export_ltlf(spoken, words), output, as_json)
@@ -169,7 +169,7 @@ def _write_formula(formula: SentenceFormula, output: str | None, as_json: bool) 
 
 
 def _write_plan(
-    spoken: Spoken,
+    spoken: TaskLanguage,
     words: tuple[int, ...],
     exported: Exported,
     back: str,
@@ -179,28 +179,28 @@ def _write_plan(
     """A plan of the exported problem, which must be an optimal one, as an ordinary plan file."""
     from coordlang.cli.speaking import write
     from coordlang.use.export.pddl import plan_names
-    from coordlang.use.sentence.fitting import fitting
-    from planners.errors import BadInput, Place, Refuted
+    from coordlang.use.sentence.fitting_plans import fitting
+    from planners.errors import BadInput, Position, Refuted
     from planners.search.plan_file import only_one_plan, to_ipc, to_json
     from planners.search.plans import Plans
 
-    place = Place(back)
+    place = Position(back)
     try:
         text = sys.stdin.read() if back == "-" else Path(back).read_text()
     except (OSError, UnicodeDecodeError) as error:
         raise BadInput(
-            f"cannot be read: {getattr(error, 'strerror', error)}", place=place
+            f"cannot be read: {getattr(error, 'strerror', error)}", position=place
         ) from None
     only_one_plan(text, place)
     try:
         plan = exported.joint_plan(plan_names(text))
     except BadInput as error:
-        raise BadInput(error.what, place=place, remedy=error.remedy) from None
+        raise BadInput(error.what, position=place, remedy=error.remedy) from None
     plans = Plans.of(fitting(spoken, words))
     if plans.rank(plan) is None:
         raise Refuted(
             "this is no optimal plan of the exported problem",
-            place=place,
+            position=place,
             remedy="Ask the planner for an optimal plan: the one of least total-cost.",
         )
     write(json.dumps(to_json(plans, [plan])) + "\n" if as_json else to_ipc(plans, plan), output)

@@ -13,7 +13,7 @@ from coordlang.cli.app import counted, limits, model_options, note_single_robot,
 
 if TYPE_CHECKING:
     from planners.inspection import Inspection
-    from planners.loading import Loaded
+    from planners.loading import PlanningInstance
 
 
 @click.command(name="inspect")
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 @model_options
 @task_files
 @limits
-def command(count_states: bool, as_json: bool, load: Callable[[], Loaded]) -> None:
+def command(count_states: bool, as_json: bool, load: Callable[[], PlanningInstance]) -> None:
     """Show what was understood of DOMAIN and PROBLEM: a domain that was misread shows it here."""
     from planners.inspection import inspect
 

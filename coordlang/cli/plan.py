@@ -18,9 +18,9 @@ from coordlang.cli.app import (
 )
 
 if TYPE_CHECKING:
-    from coordlang.use.sentence.best_sentence import Wished
-    from coordlang.use.sentence.guided import Search
-    from coordlang.use.sentence.wishes import Wish
+    from coordlang.use.sentence.astar import Search
+    from coordlang.use.sentence.best_sentence import BestSentence
+    from coordlang.use.sentence.preferences import Preference
 
 
 @click.command(name="plan")
@@ -60,22 +60,22 @@ def command(
     With --wish the best sentence of the task is found first.  The nodes expanded with and without
     the sentence go to stderr.
     """
-    from coordlang.cli.speaking import covered, read_spoken
+    from coordlang.cli.speaking import covered, read_task_language
+    from coordlang.use.sentence.astar import ExpandedStates, plan_under_sentence
     from coordlang.use.sentence.best_sentence import best_sentence
-    from coordlang.use.sentence.guided import Terrain, guided
+    from coordlang.use.sentence.preferences import read_preference
     from coordlang.use.sentence.understanding import understand, understood_data
-    from coordlang.use.sentence.wishes import read_wish
     from planners.search.plan_file import to_ipc
 
     if (sentence is None) == (not wishes):
         raise click.UsageError("expected a SENTENCE or --wish, one of the two")
-    spoken = read_spoken(language, domain, problem, given)
-    read = [read_wish(spoken, wish) for wish in wishes]
+    spoken = read_task_language(language, domain, problem, given)
+    read = [read_preference(spoken, wish) for wish in wishes]
     best = best_sentence(spoken, read) if read else None
     words = best.words if best else spoken.words_of(sentence or "")
-    terrain = Terrain(spoken.model, spoken.table)
-    found = guided(spoken, words, heuristic, terrain)
-    without = guided(spoken, None, heuristic, terrain)
+    terrain = ExpandedStates(spoken.model, spoken.table)
+    found = plan_under_sentence(spoken, words, heuristic, terrain)
+    without = plan_under_sentence(spoken, None, heuristic, terrain)
     understood = understand(spoken, words)
     if as_json:
         data = understood_data(understood, [found.plan], None)
@@ -102,7 +102,7 @@ def _work(search: Search) -> dict[str, int]:
     return {"expanded": search.expanded, "generated": search.generated, "states": search.states}
 
 
-def _fulfilled(wishes: list[Wish], best: Wished) -> list[dict[str, Any]]:
+def _fulfilled(wishes: list[Preference], best: BestSentence) -> list[dict[str, Any]]:
     from planners.search.plan_file import json_count
 
     result: list[dict[str, Any]] = []
@@ -124,7 +124,7 @@ def _fulfilled(wishes: list[Wish], best: Wished) -> list[dict[str, Any]]:
     return result
 
 
-def _comment(wishes: list[Wish], best: Wished) -> None:
+def _comment(wishes: list[Preference], best: BestSentence) -> None:
     """What became of each wish, on stderr."""
     for wish, value in zip(wishes, best.values, strict=True):
         if isinstance(value, int):

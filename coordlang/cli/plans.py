@@ -19,7 +19,7 @@ from coordlang.cli.app import (
 )
 
 if TYPE_CHECKING:
-    from planners.loading import Loaded
+    from planners.loading import PlanningInstance
 
 _DEFAULT_MAX = 10
 
@@ -55,7 +55,7 @@ def command(
     seed: int,
     form: str,
     as_json: bool,
-    load: Callable[[], Loaded],
+    load: Callable[[], PlanningInstance],
 ) -> None:
     """Count, list or sample all optimal plans of a task.
 

@@ -60,13 +60,13 @@ def command(
     """
     from coordlang.language.file import check_source, read_language, write_atomically
     from coordlang.report.page import make_report
-    from planners.errors import Place
+    from planners.errors import Position
 
     places = coordinates if coordinates is not None else str(_beside(problems[0]))
     check_outputs([("-o", output)], [language, domain, *problems, places])
     spoken = read_language(language)
     lifted, read = read_files(domain, problems)
-    place = Place(language)
+    place = Position(language)
     check_source(spoken, lifted, read, place)
     report = make_report(
         spoken,
@@ -76,7 +76,7 @@ def command(
         seed=seed,
         options=given.for_language(spoken),
         coordinates=_coordinates(coordinates, problems[0]),
-        place=place,
+        position=place,
     )
     if output == "-":
         click.echo(report.html.decode(), nl=False)

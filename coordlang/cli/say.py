@@ -32,11 +32,11 @@ def command(
     PLAN is a plan file, IPC text or JSON, or - for stdin; a JSON file with several plans gives one
     sentence a line.
     """
-    from coordlang.cli.speaking import covered, read_spoken
+    from coordlang.cli.speaking import covered, read_task_language
     from coordlang.use.sentence.saying import read_plan_file, say
     from planners.errors import CoordlangError
 
-    spoken = read_spoken(language, domain, problem, given)
+    spoken = read_task_language(language, domain, problem, given)
     plans = read_plan_file(plan, spoken.model)
     sentences = []
     for number, steps in enumerate(plans, 1):

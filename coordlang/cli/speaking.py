@@ -11,21 +11,23 @@ import click
 from coordlang.cli.app import GivenOptions, read_files
 
 if TYPE_CHECKING:
-    from coordlang.use.sentence.spoken import Spoken
+    from coordlang.use.sentence.task_language import TaskLanguage
 
 
-def read_spoken(language: str, domain: str, problem: str, given: GivenOptions) -> Spoken:
+def read_task_language(
+    language: str, domain: str, problem: str, given: GivenOptions
+) -> TaskLanguage:
     """The language of a file in the task of a problem file."""
     from coordlang.language.file import read_language
-    from coordlang.use.sentence.spoken import speak
-    from planners.errors import Place
+    from coordlang.use.sentence.task_language import language_in_task
+    from planners.errors import Position
 
     read = read_language(language)
     lifted, (task,) = read_files(domain, (problem,))
-    return speak(read, lifted, task, given.for_language(read), Place(language))
+    return language_in_task(read, lifted, task, given.for_language(read), Position(language))
 
 
-def covered(spoken: Spoken) -> int:
+def covered(spoken: TaskLanguage) -> int:
     """The exit code of an answer: 1, and a warning on stderr, for a task that the language does not
     cover.
     """

@@ -85,7 +85,7 @@ def command(
     --format dot and svg draw them as one DAG, whose paths they are; json has both the listed plans
     and the DAG.
     """
-    from coordlang.cli.speaking import covered, read_spoken, write
+    from coordlang.cli.speaking import covered, read_task_language, write
     from coordlang.use.sentence.understanding import understand
 
     form = form_of(form, as_json)
@@ -99,7 +99,7 @@ def command(
             "--nodes cuts the DAG: it belongs to --format dot, svg or json, without --count"
         )
     check_outputs([("-o", output)], [language, domain, problem])
-    spoken = read_spoken(language, domain, problem, given)
+    spoken = read_task_language(language, domain, problem, given)
     understood = understand(spoken, spoken.words_of(sentence))
     if form in ("dot", "svg"):
         write(_drawn(understood, form, nodes or _DEFAULT_NODES), output)

@@ -69,7 +69,7 @@ def command(
     from coordlang.language.words import WordTable, words_of_states
     from coordlang.verification.by_definition import verify
     from coordlang.verification.overlapping import verify_overlapping
-    from planners.errors import Place, Refuted
+    from planners.errors import Position, Refuted
 
     if dimacs and not certificate:
         raise click.UsageError("--dimacs belongs to --lower-bound")
@@ -79,10 +79,10 @@ def command(
     spoken = read_language(language)
     proof = read_certificate(certificate) if certificate else None
     lifted, read = pddl.read()
-    check_source(spoken, lifted, read, Place(language))
+    check_source(spoken, lifted, read, Position(language))
     options = given.for_language(spoken)
     if tasks is None:
-        candidates = recorded_candidates(spoken, lifted, read, options, Place(language))
+        candidates = recorded_candidates(spoken, lifted, read, options, Position(language))
     else:
         candidates = make_candidates(lifted, read, tasks, options)
     verdict = verify(WordTable.of(spoken, candidates.model), candidates.spaces)

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import Any
 
-from coordlang.explanation.asks import Asked, RobotPart, WordChange
 from coordlang.explanation.cover import Cover, Literal, Term
-from coordlang.explanation.telling import Telling
+from coordlang.explanation.demands import RobotPart, SentenceDemands, WordChange
+from coordlang.explanation.descriptions import WordDescriptions
 from coordlang.explanation.words import Mapped
 
 #: Terms of one formula, and alternatives of one choice, that are written out.
@@ -82,7 +82,7 @@ def cover_data(cover: Cover) -> dict[str, Any]:
     }
 
 
-def telling_text(told: Telling, mapped: Mapped) -> str:
+def telling_text(told: WordDescriptions, mapped: Mapped) -> str:
     """The words and their formulas, a term a line where there are several."""
     lines = []
     states = dict(zip(mapped.words, mapped.states, strict=True))
@@ -107,7 +107,7 @@ def telling_text(told: Telling, mapped: Mapped) -> str:
     return "\n".join(lines)
 
 
-def asked_text(asked: Asked) -> str:
+def demands_text(asked: SentenceDemands) -> str:
     """What a sentence asks, in plain sentences."""
     lines = [f'"{" ".join(asked.sentence)}" leaves {counted(asked.plans, "plan")} open.']
     lines += [line for part in asked.parts for line in _part_lines(part, asked.steps)]
@@ -193,7 +193,7 @@ def counted(number: int, noun: str) -> str:
     return f"{number:,} {noun}{'s' * (number != 1)}"
 
 
-def asked_data(asked: Asked) -> dict[str, Any]:
+def demands_data(asked: SentenceDemands) -> dict[str, Any]:
     """What a sentence asks, for JSON; steps count from 1, null is idling."""
     return {
         "steps": asked.steps,

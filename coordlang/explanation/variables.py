@@ -97,7 +97,7 @@ def truth(model: JointModel, rows: Rows) -> tuple[tuple[str, ...], NDArray[np.bo
     holds = [codec.truth(rows)]
     if codec.memory is not None:
         for robot, labels, last in zip(
-            codec.robots, codec.memory, rows[:, codec.fact_words :].T, strict=True
+            codec.robots, codec.memory, rows[:, codec.fact_blocks :].T, strict=True
         ):
             atoms += [f"(last {robot} {label})" for label in ("none", *labels)]
             holds.append(last[:, None] == np.arange(len(labels) + 1, dtype=np.uint64)[None, :])

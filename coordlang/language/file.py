@@ -29,14 +29,16 @@ from coordlang.tasks.candidates import (
     from_recorded,
 )
 from coordlang.tasks.task_file import ListedTask, task_data
-from planners.errors import BadInput, Place, UsageError
+from planners.errors import BadInput, Position, UsageError
 from planners.joint.model import show
 from planners.loading import ModelOptions
 from planners.pddl.lifted import Domain, Problem
-from planners.pddl.robots import ENVIRONMENT, RobotChoice, static_atoms
+from planners.pddl.robots import ENVIRONMENT, RobotSelection, static_atoms
 
 
-def signed(language: Language, candidates: Candidates, producer: Mapping[str, Any]) -> Language:
+def with_provenance(
+    language: Language, candidates: Candidates, producer: Mapping[str, Any]
+) -> Language:
     """The language with what its file records of domain, model, tasks and making."""
     loaded = candidates.loaded
     problem = loaded.problems[0]
@@ -107,7 +109,7 @@ def write_language(language: Language, path: str | Path) -> None:
 
 
 def write_atomically(path: str | Path, data: bytes) -> None:
-    """Write beside, then rename.  Raises `UsageError` when the place cannot be written."""
+    """Write beside, then rename.  Raises `UsageError` when the position cannot be written."""
     target = Path(os.path.realpath(path))
     try:
         if (
@@ -147,48 +149,48 @@ def read_language(path: str | Path) -> Language:
     Raises `BadInput` for a file that is missing, cut off, no language, of another version, or that
     contradicts itself.
     """
-    place = Place(str(path))
+    position = Position(str(path))
     try:
         data = sys.stdin.buffer.read() if str(path) == "-" else Path(path).read_bytes()
         if data[:2] == b"\x1f\x8b":
             data = gzip.decompress(data)
     except FileNotFoundError:
-        raise BadInput("there is no such file", place=place) from None
+        raise BadInput("there is no such file", position=position) from None
     except (OSError, EOFError, zlib.error) as error:
-        raise BadInput(f"cannot be read: {error}", place=place) from None
-    return language_from_bytes(data, place)
+        raise BadInput(f"cannot be read: {error}", position=position) from None
+    return language_from_bytes(data, position)
 
 
-def language_from_bytes(data: bytes, place: Place) -> Language:
+def language_from_bytes(data: bytes, position: Position) -> Language:
     """The language in the text of a language file; see `read_language`."""
-    head = _head(data, place)
+    head = _head(data, position)
     try:
         record = msgspec.json.decode(data, type=LanguageRecord)
         twice = duplicate_key(data, memoryview(head.states), len(record.states))
     except msgspec.ValidationError as error:
         raise BadInput(
             f"this is no language file: {error}",
-            place=place,
+            position=position,
             remedy="`coordlang schema` prints what a language file holds.",
         ) from None
     except RecursionError as error:
-        raise BadInput(f"this is no JSON that can be read: {error}", place=place) from None
+        raise BadInput(f"this is no JSON that can be read: {error}", position=position) from None
     if twice is not None:
         raise BadInput(
             f"the key {twice!r} occurs twice",
-            place=place,
+            position=position,
             remedy="Of two entries one would be lost.",
         )
-    _check_words(record, place)
+    _check_words(record, position)
     robots = [] if record.robots is UNSET else record.robots
     if len(set(robots)) < len(robots) or (not robots and record.robots is not UNSET):
-        raise BadInput("the robots must be different, and at least one", place=place)
+        raise BadInput("the robots must be different, and at least one", position=position)
     return Language(
         words=tuple(record.words),
         states=record.states,
         default=record.default,
         robots=tuple(robots),
-        guarantee=_guarantee(record, place),
+        guarantee=_guarantee(record, position),
         domain={} if record.domain is UNSET else _present(record.domain),
         model=_present(record.model),
         tasks=_present(TasksRecord("problems", 0) if record.tasks is UNSET else record.tasks),
@@ -202,15 +204,15 @@ def _present(record: msgspec.Struct) -> dict[str, Any]:
     return {key: value for key, value in msgspec.to_builtins(record).items() if value is not None}
 
 
-def _check_words(record: LanguageRecord, place: Place) -> None:
+def _check_words(record: LanguageRecord, position: Position) -> None:
     words = set(record.words)
     if len(words) < len(record.words) or not words:
-        raise BadInput("the words must be different, and at least one", place=place)
+        raise BadInput("the words must be different, and at least one", position=position)
     for word in record.words:
         if word.split() != [word]:
             raise BadInput(
                 f"{word!r} is no word",
-                place=place,
+                position=position,
                 remedy="Words are not empty and have no blanks in them.",
             )
     if not {*record.states.values(), record.default} <= words:
@@ -219,17 +221,17 @@ def _check_words(record: LanguageRecord, place: Place) -> None:
             for k, w in [*record.states.items(), ("default", record.default)]
             if w not in words
         )
-        raise BadInput(f"{word!r} (of {key!r}) is not among the words", place=place)
+        raise BadInput(f"{word!r} (of {key!r}) is not among the words", position=position)
     for key, further in record.also.items():
         good = bool(further) and len(set(further)) == len(further)
         if not good or key not in record.states or not set(further) <= words - {record.states[key]}:
             raise BadInput(
                 f"'also' of {key!r} must hold further words of a state that 'states' has",
-                place=place,
+                position=position,
             )
 
 
-def _guarantee(record: LanguageRecord, place: Place) -> Guarantee:
+def _guarantee(record: LanguageRecord, position: Position) -> Guarantee:
     """What the file says of the language's size; a file that says nothing claims nothing."""
     size = len(record.words)
     if record.guarantee is UNSET:
@@ -238,10 +240,10 @@ def _guarantee(record: LanguageRecord, place: Place) -> Guarantee:
     if g.size != size or not 1 <= g.lower_bound <= g.size:
         raise BadInput(
             f"the guarantee (size {g.size}, lower bound {g.lower_bound}) contradicts the {size} words",
-            place=place,
+            position=position,
         )
     if g.proved_minimal != (g.lower_bound == g.size):
-        raise BadInput("'proved_minimal' contradicts the lower bound", place=place)
+        raise BadInput("'proved_minimal' contradicts the lower bound", position=position)
     return Guarantee(g.method, g.size, g.lower_bound, g.proved_minimal)
 
 
@@ -251,20 +253,20 @@ class _Head(msgspec.Struct):
     states: msgspec.Raw = msgspec.Raw()
 
 
-def _head(data: bytes, place: Place) -> _Head:
+def _head(data: bytes, position: Position) -> _Head:
     """Format and version first: a file of another version need not look like ours."""
     try:
         head = msgspec.json.decode(data, type=_Head)
     except msgspec.ValidationError as error:
-        raise BadInput(f"this is no language file: {error}", place=place) from None
+        raise BadInput(f"this is no language file: {error}", position=position) from None
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise BadInput(f"this is no JSON, or it is cut off: {error}", place=place) from None
+        raise BadInput(f"this is no JSON, or it is cut off: {error}", position=position) from None
     if head.format != FORMAT:
-        raise BadInput(f"format {head.format!r}, expected {FORMAT!r}", place=place)
+        raise BadInput(f"format {head.format!r}, expected {FORMAT!r}", position=position)
     if head.version != VERSION:
         raise BadInput(
             f"language file version {head.version!r}; this program reads version {VERSION}",
-            place=place,
+            position=position,
         )
     return head
 
@@ -305,21 +307,23 @@ def options_of(
         )
     idle = model.get("idle")
     return ModelOptions(
-        RobotChoice(own, None, recorded["--unowned"]),
+        RobotSelection(own, None, recorded["--unowned"]),
         recorded["--cost"],
         recorded["--remember-actions"],
         tuple(idle) if idle is not None else None,
     )
 
 
-def check_source(language: Language, domain: Domain, problems: list[Problem], place: Place) -> None:
+def check_source(
+    language: Language, domain: Domain, problems: list[Problem], position: Position
+) -> None:
     """Raise `BadInput` when domain or problem are not those that the language was built for."""
     wanted = language.domain.get("sha256")
     if wanted is not None and wanted != domain.source.sha256:
         raise BadInput(
             f"this language belongs to another domain ({language.domain.get('name')!r}): the text of "
             f"{domain.source.name} has another hash",
-            place=place,
+            position=position,
             remedy="Give the domain file that the language was built from.",
         )
     world = language.model.get("world_sha256")
@@ -327,7 +331,7 @@ def check_source(language: Language, domain: Domain, problems: list[Problem], pl
         if world is not None and world != world_sha256(domain, problem):
             raise BadInput(
                 f"{problem.source.name} has other objects or static facts than the language's problem",
-                place=place,
+                position=position,
                 remedy="A language serves the problems of one world: same objects, same static facts.",
             )
 
@@ -338,7 +342,11 @@ def recorded_list(language: Language) -> list[ListedTask]:
 
 
 def recorded_candidates(
-    language: Language, domain: Domain, problems: list[Problem], options: ModelOptions, place: Place
+    language: Language,
+    domain: Domain,
+    problems: list[Problem],
+    options: ModelOptions,
+    position: Position,
 ) -> Candidates:
     """The candidate tasks that a language file records; the problems' own ones if it records none."""
     kind = language.tasks["kind"]
@@ -366,8 +374,8 @@ def recorded_candidates(
                 remedy="Say --tasks all or --tasks FILE.",
             )
         make = from_listed if kind == "file" else from_recorded
-        return make(domain, problems, listed, options, place)
+        return make(domain, problems, listed, options, position)
     except BadInput as error:
-        if error.place is not None:
+        if error.position is not None:
             raise
-        raise BadInput(error.what, place=place, remedy=error.remedy) from None
+        raise BadInput(error.what, position=position, remedy=error.remedy) from None

@@ -56,7 +56,7 @@ def _read(
     if codec.memory is not None:
         seen = np.zeros((len(keys), codec.width), np.int64)
         np.add.at(seen, (source, place[found]), 1)
-        bad |= (seen[:, codec.fact_words :] != 1).any(axis=1)
+        bad |= (seen[:, codec.fact_blocks :] != 1).any(axis=1)
     return rows, bad
 
 
@@ -68,12 +68,12 @@ def keys_of(codec: StateCodec, rows: Rows) -> list[str]:
     keys: list[str] = []
     for start in range(0, len(rows), _BLOCK):
         block = rows[start : start + _BLOCK]
-        words = np.ascontiguousarray(block[:, : codec.fact_words].astype("<u8"))
+        words = np.ascontiguousarray(block[:, : codec.fact_blocks].astype("<u8"))
         state, bit = np.nonzero(np.unpackbits(words.view(np.uint8), axis=1, bitorder="little"))
         atom = fact_number[bit]
         if codec.memory is not None:
             last = [
-                np.flatnonzero(place == codec.fact_words + robot)
+                np.flatnonzero(place == codec.fact_blocks + robot)
                 for robot in range(len(codec.robots))
             ]
             said = [
@@ -99,7 +99,7 @@ def _atoms(codec: StateCodec) -> tuple[tuple[str, ...], Ints, Rows]:
         zip(codec.robots, codec.memory or (), strict=codec.memory is not None)
     ):
         listed += [
-            (f"(last {name} {label})", codec.fact_words + robot, n)
+            (f"(last {name} {label})", codec.fact_blocks + robot, n)
             for n, label in enumerate(("none", *labels))
         ]
     listed.sort()

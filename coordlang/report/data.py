@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from coordlang.explanation.telling import Telling, telling
+from coordlang.explanation.descriptions import WordDescriptions, describe_words
 from coordlang.explanation.text import term_text
 from coordlang.explanation.words import all_covers, mapped_states
 from coordlang.language.words import Language
@@ -20,7 +20,7 @@ from coordlang.report.layout import Point, graph_layout, place_layout, spread
 from coordlang.report.shown import Selection
 from coordlang.report.task import Tables, TaskPart, task_data, told
 from coordlang.report.world import World, find_world
-from coordlang.use.sentence.spoken import Spoken
+from coordlang.use.sentence.task_language import TaskLanguage
 from planners.joint.model import JointModel, own_text
 from planners.joint.states import find_rows, split_atoms
 
@@ -109,9 +109,9 @@ def _words(language: Language, model: JointModel) -> dict[str, Any]:
     explained = 0 < len(language.states) <= _STATES_EXPLAINED
     mapped = mapped_states(language, model) if explained else None
     told = (
-        telling(mapped, all_covers(mapped))
+        describe_words(mapped, all_covers(mapped))
         if mapped
-        else Telling(tuple((w, None) for w in language.words), False)
+        else WordDescriptions(tuple((w, None) for w in language.words), False)
     )
     words = {}
     for word, cover in told.rules:
@@ -182,7 +182,7 @@ def _label(model: JointModel, world: World, robot: int, text: str | None) -> dic
     }
 
 
-def _state_graph(spoken: Spoken) -> dict[str, Any] | None:
+def _state_graph(spoken: TaskLanguage) -> dict[str, Any] | None:
     """The language's states, in the order of their keys, and the joint steps between them (either
     way).
     """

@@ -13,8 +13,8 @@ from coordlang.language.sentences import sentence_counts
 from coordlang.language.words import sentence
 from coordlang.report.layout import layer_orders
 from coordlang.use.choices.automaton import determinise
-from coordlang.use.sentence.fitting import fitting
-from coordlang.use.sentence.spoken import Spoken
+from coordlang.use.sentence.fitting_plans import fitting
+from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import OutOfMemory
 from planners.joint.matching import Ints, ranges
 from planners.search.plan_space import PlanSpace
@@ -65,7 +65,7 @@ class ShownSentences:
     total: int | None
 
 
-def plan_graph(spoken: Spoken, seed: int) -> Graph:
+def plan_graph(spoken: TaskLanguage, seed: int) -> Graph:
     """The plans of a task as a graph of at most `EDGES` edges."""
     space = spoken.space
     complete = len(space.target) <= EDGES
@@ -114,7 +114,7 @@ def _edges_of(space: PlanSpace, start: int, plan: Sequence[Sequence[int]]) -> li
     return path
 
 
-def shown_sentences(spoken: Spoken, graph: Graph, seed: int) -> ShownSentences:
+def shown_sentences(spoken: TaskLanguage, graph: Graph, seed: int) -> ShownSentences:
     """The task's sentences that leave most plans open; of too many, those that drawn plans have."""
     all_of_them = _count_sentences(spoken) if len(spoken.space.target) <= EDGES else None
     if all_of_them is None:
@@ -133,7 +133,7 @@ def shown_sentences(spoken: Spoken, graph: Graph, seed: int) -> ShownSentences:
     return ShownSentences(listed, None if all_of_them is None else len(all_of_them))
 
 
-def _count_sentences(spoken: Spoken) -> dict[tuple[int, ...], int] | None:
+def _count_sentences(spoken: TaskLanguage) -> dict[tuple[int, ...], int] | None:
     """Sentence -> number of plans; None if a node has too many."""
     try:
         return sentence_counts(spoken.space, spoken.start, spoken.word.tolist(), _ALL_SENTENCES)[
@@ -143,7 +143,7 @@ def _count_sentences(spoken: Spoken) -> dict[tuple[int, ...], int] | None:
         return None
 
 
-def _drawn_sentences(spoken: Spoken, graph: Graph, seed: int) -> list[tuple[int, ...]]:
+def _drawn_sentences(spoken: TaskLanguage, graph: Graph, seed: int) -> list[tuple[int, ...]]:
     """Sentences of plans within the drawn part."""
     space, inside = spoken.space, set(graph.edges.tolist())
     plans = Plans.of(space)
@@ -157,7 +157,7 @@ def _drawn_sentences(spoken: Spoken, graph: Graph, seed: int) -> list[tuple[int,
     return list(found)
 
 
-def _own_counts(spoken: Spoken, words: tuple[int, ...]) -> tuple[int | None, ...]:
+def _own_counts(spoken: TaskLanguage, words: tuple[int, ...]) -> tuple[int | None, ...]:
     fits = fitting(spoken, words)
     return tuple(_own_count(fits, robot) for robot in range(len(spoken.model.robots)))
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.errors import BadInput, Place
+from planners.errors import BadInput, Position
 
 Floats = NDArray[np.float64]
 Point = tuple[float, float]
@@ -67,16 +67,16 @@ def read_coordinates(path: str | Path) -> dict[str, Point]:
 
     Raises `BadInput` for anything else.
     """
-    place = Place(str(path))
+    place = Position(str(path))
     try:
         data = json.loads(Path(path).read_text("utf-8-sig"))
     except OSError as error:
-        raise BadInput(f"cannot be read: {error.strerror}", place=place) from None
+        raise BadInput(f"cannot be read: {error.strerror}", position=place) from None
     except (ValueError, RecursionError) as error:
-        raise BadInput(f"this is no JSON: {error}", place=place) from None
+        raise BadInput(f"this is no JSON: {error}", position=place) from None
     entries = data.get("coordinates") if isinstance(data, dict) else None
     if not isinstance(entries, dict):
-        raise BadInput('expected {"coordinates": {"PLACE": [X, Y], ..}}', place=place)
+        raise BadInput('expected {"coordinates": {"PLACE": [X, Y], ..}}', position=place)
     points: dict[str, Point] = {}
     for name, pair in entries.items():
         if not (
@@ -89,11 +89,11 @@ def read_coordinates(path: str | Path) -> dict[str, Point]:
             and all(abs(v) < 1e6 for v in pair)
         ):
             raise BadInput(
-                f"{name!r}: expected two numbers [X, Y], not {json.dumps(pair)}", place=place
+                f"{name!r}: expected two numbers [X, Y], not {json.dumps(pair)}", position=place
             )
         points[name.lower()] = (float(pair[0]), float(pair[1]))
     if len(set(points.values())) < len(points):
-        raise BadInput("two places have the same coordinates", place=place)
+        raise BadInput("two places have the same coordinates", position=place)
     return points
 
 

@@ -15,7 +15,7 @@ from coordlang.report.data import page_data
 from coordlang.report.layout import Point
 from coordlang.report.shown import select_tasks
 from coordlang.report.task import task_part
-from planners.errors import OutOfMemory, Place
+from planners.errors import OutOfMemory, Position
 from planners.loading import ModelOptions
 from planners.pddl.lifted import Domain, Problem
 
@@ -45,7 +45,7 @@ def make_report(
     seed: int = 0,
     options: ModelOptions | None = None,
     coordinates: Mapping[str, Point] | None = None,
-    place: Place | None = None,
+    position: Position | None = None,
 ) -> Report:
     """The report of a language: the same arguments give the same bytes.
 
@@ -53,7 +53,7 @@ def make_report(
     fewer if the page would become larger than 5 MB.  Raises what
     `coordlang.report.shown.select_tasks` raises.
     """
-    selection = select_tasks(language, domain, problems, tasks_shown, seed, options, place)
+    selection = select_tasks(language, domain, problems, tasks_shown, seed, options, position)
     parts = [task_part(shown, seed) for shown in selection.tasks]
     while True:
         data = page_data(language, selection, parts, coordinates)

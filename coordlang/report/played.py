@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coordlang.required.miscoordination import Miscoordination
-from coordlang.use.sentence.spoken import Spoken
+from coordlang.use.sentence.task_language import TaskLanguage
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class Played:
     reaches: bool
 
 
-def play(spoken: Spoken, witness: Miscoordination) -> Played:
+def play(spoken: TaskLanguage, witness: Miscoordination) -> Played:
     """Robot i does its part of ``witness.plans[i]``, step by step, from the start."""
     space, model = spoken.space, spoken.model
     row = space.rows[space.state[spoken.start]]

@@ -12,8 +12,8 @@ from coordlang.language.file import recorded_list
 from coordlang.language.words import Language
 from coordlang.required.miscoordination import Miscoordination, miscoordination
 from coordlang.tasks.task_file import goal_text, ground_tasks
-from coordlang.use.sentence.spoken import Spoken, speak
-from planners.errors import OutOfMemory, Place, ProvedImpossible, UsageError
+from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
+from planners.errors import OutOfMemory, Position, ProvedImpossible, UsageError
 from planners.joint.model import FullState, Goal
 from planners.joint.states import Rows
 from planners.loading import ModelOptions, PlanningTask
@@ -36,7 +36,7 @@ class ShownTask:
     """
 
     name: str | None
-    spoken: Spoken
+    spoken: TaskLanguage
     witness: Miscoordination | None
     decided: bool
 
@@ -60,7 +60,7 @@ def select_tasks(
     number: int,
     seed: int,
     options: ModelOptions | None = None,
-    place: Place | None = None,
+    position: Position | None = None,
 ) -> Selection:
     """At most ``number`` tasks: the problems' own first, then candidate tasks drawn without
     repetition.
@@ -73,14 +73,17 @@ def select_tasks(
             f"{len(problems)} problems are given and {number} tasks are to be shown",
             remedy="Give fewer problems, or a larger --tasks-shown.",
         )
-    given = [_looked_at(p.name, speak(language, domain, p, options, place)) for p in problems]
+    given = [
+        _looked_at(p.name, language_in_task(language, domain, p, options, position))
+        for p in problems
+    ]
     known = {_identity(task.spoken) for task in given}
     room = number - len(given)
     first = given[0].spoken
     drawn: tuple[list[ShownTask], list[ShownTask]] = ([], [])
     wanted = round(room * _REQUIRING)
     looked, complete = 0, True
-    for spoken in _candidates(first, domain, problems[0], Random(seed), place):
+    for spoken in _candidates(first, domain, problems[0], Random(seed), position):
         if (
             len(drawn[1]) >= wanted and len(drawn[0]) + len(drawn[1]) >= room
         ) or looked >= _TRIES * room:
@@ -98,22 +101,22 @@ def select_tasks(
     return Selection((*given, *kept), looked, requiring, complete)
 
 
-def _looked_at(name: str | None, spoken: Spoken) -> ShownTask:
+def _looked_at(name: str | None, spoken: TaskLanguage) -> ShownTask:
     try:
         return ShownTask(name, spoken, miscoordination(spoken.space, spoken.task), True)
     except OutOfMemory:
         return ShownTask(name, spoken, None, False)
 
 
-def _identity(spoken: Spoken) -> tuple[str, str]:
+def _identity(spoken: TaskLanguage) -> tuple[str, str]:
     space = spoken.space
     init = space.model.codec.key(space.rows[space.state[spoken.start]])
     return init, goal_text(space.model, space.goals[0])
 
 
 def _candidates(
-    first: Spoken, domain: Domain, problem: Problem, random: Random, place: Place | None
-) -> Iterator[Spoken]:
+    first: TaskLanguage, domain: Domain, problem: Problem, random: Random, position: Position | None
+) -> Iterator[TaskLanguage]:
     """The language's candidate tasks in random order.  Under ``--tasks all`` endless repetition is
     cut off.
     """
@@ -121,7 +124,7 @@ def _candidates(
     tasks = (
         _pairs(first, random)
         if language.tasks.get("kind") == "all"
-        else _recorded(first, domain, problem, random, place)
+        else _recorded(first, domain, problem, random, position)
     )
     for number, (init, goal) in enumerate(tasks):
         try:
@@ -133,26 +136,26 @@ def _candidates(
 
 
 def _recorded(
-    first: Spoken, domain: Domain, problem: Problem, random: Random, place: Place | None
+    first: TaskLanguage, domain: Domain, problem: Problem, random: Random, position: Position | None
 ) -> Iterator[tuple[Rows, Goal]]:
     listed = recorded_list(first.language)
     random.shuffle(listed)
     for one in listed:
-        ((init, goal),) = ground_tasks(domain, problem, [one], place)
+        ((init, goal),) = ground_tasks(domain, problem, [one], position)
         yield first.model.state(init), goal
 
 
-def _pairs(first: Spoken, random: Random) -> Iterator[tuple[Rows, Goal]]:
+def _pairs(first: TaskLanguage, random: Random) -> Iterator[tuple[Rows, Goal]]:
     """Ordered pairs of different mapped states: under ``--tasks all`` every state of a candidate
     task is mapped.
     """
     codec = first.model.codec
     rows = first.table.rows
-    rows = rows[(rows[:, codec.fact_words :] == 0).all(axis=1)]
+    rows = rows[(rows[:, codec.fact_blocks :] == 0).all(axis=1)]
     number = len(rows)
     total = number * (number - 1)
     order = random.sample(range(total), min(total, 100_000))
     for code in order:
         a, b = divmod(code, number - 1)
         b += b >= a
-        yield rows[a], FullState(tuple(int(w) for w in rows[b][: codec.fact_words]))
+        yield rows[a], FullState(tuple(int(w) for w in rows[b][: codec.fact_blocks]))

@@ -15,7 +15,7 @@ from coordlang.report.shown import ShownTask
 from coordlang.report.world import World
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.tasks.task_file import goal_text
-from coordlang.use.sentence.spoken import Spoken
+from coordlang.use.sentence.task_language import TaskLanguage
 from coordlang.verification.by_definition import verify
 from planners.errors import OutOfMemory
 from planners.joint.model import JointModel
@@ -60,7 +60,7 @@ def task_part(shown: ShownTask, seed: int) -> TaskPart:
     )
 
 
-def _verified(spoken: Spoken) -> tuple[bool | None, Miscoordination | None]:
+def _verified(spoken: TaskLanguage) -> tuple[bool | None, Miscoordination | None]:
     if len(spoken.space.target) > _VERIFIED:
         return None, None
     try:

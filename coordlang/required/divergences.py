@@ -16,7 +16,7 @@ from planners.search.plan_space import PlanSpace
 
 
 @dataclass(frozen=True, slots=True)
-class Alphas:
+class FirstDifferences:
     """The first differences of all candidate tasks (the paper's ``alpha*``, each once).
 
     ``requiring`` counts the tasks that require coordination; ``nodes`` and ``edges`` are the
@@ -29,7 +29,7 @@ class Alphas:
     edges: int
 
 
-def alphas(spaces: Sequence[PlanSpace]) -> Alphas:
+def first_differences(spaces: Sequence[PlanSpace]) -> FirstDifferences:
     """Walk every plan space; see `coordlang.required.composition_walk.walk` for cost and errors."""
     walks: list[Walk] = []
     requiring = 0
@@ -41,7 +41,7 @@ def alphas(spaces: Sequence[PlanSpace]) -> Alphas:
         np.concatenate([w.divergences.last for w in walks]),
         np.concatenate([w.divergences.following for w in walks]),
     )
-    return Alphas(
+    return FirstDifferences(
         unique_divergences(joined),
         requiring,
         sum(w.nodes for w in walks),

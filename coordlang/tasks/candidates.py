@@ -9,10 +9,10 @@ from typing import Literal
 import numpy as np
 
 from coordlang.tasks.task_file import ListedTask, goal_atoms, goal_text, ground_tasks
-from planners.errors import BadInput, Place, ProvedImpossible
+from planners.errors import BadInput, Position, ProvedImpossible
 from planners.joint.model import NO_FACT, FullState, Goal, JointModel, show
 from planners.joint.states import Rows, find_rows, unique_rows
-from planners.loading import Loaded, ModelOptions, PlanningTask, build
+from planners.loading import ModelOptions, PlanningInstance, PlanningTask, build
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.robots import fluent_predicates
 from planners.search.plan_space import (
@@ -41,7 +41,7 @@ class Candidates:
     """
 
     kind: Kind
-    loaded: Loaded
+    loaded: PlanningInstance
     listed: tuple[ListedTask, ...]
     spaces: tuple[PlanSpace, ...]
     states: int | None
@@ -107,13 +107,13 @@ def all_pairs(
     return Candidates("all", loaded, (), spaces, len(space))
 
 
-def _all_pairs_remembering(loaded: Loaded, inits: Rows) -> Candidates:
+def _all_pairs_remembering(loaded: PlanningInstance, inits: Rows) -> Candidates:
     """The same pairs of states as without ``--remember-actions``; every task starts with no action
     to remember.
     """
     model = loaded.model
     forgetting = replace(model, codec=replace(model.codec, memory=None))
-    base = explore(forgetting, inits[:, : model.codec.fact_words])
+    base = explore(forgetting, inits[:, : model.codec.fact_blocks])
     zeros = np.zeros((len(base), len(model.robots)), np.uint64)
     starts = np.hstack((base.rows, zeros))
     groups = []
@@ -130,7 +130,7 @@ def _all_pairs_remembering(loaded: Loaded, inits: Rows) -> Candidates:
 
 
 def _full_states(model: JointModel, rows: Rows) -> list[Goal]:
-    return [FullState(tuple(int(w) for w in row[: model.codec.fact_words])) for row in rows]
+    return [FullState(tuple(int(w) for w in row[: model.codec.fact_blocks])) for row in rows]
 
 
 def from_listed(
@@ -138,7 +138,7 @@ def from_listed(
     problems: Sequence[Problem],
     listed: Sequence[ListedTask],
     options: ModelOptions | None = None,
-    place: Place | None = None,
+    position: Position | None = None,
     *,
     skip_unsolvable: bool = False,
 ) -> Candidates:
@@ -153,20 +153,22 @@ def from_listed(
         problem's initial state does not reach (such a state is taken for a mistake).
     """
     if not listed:
-        raise BadInput("the list of tasks is empty", place=place, remedy="Give at least one task.")
-    ground = ground_tasks(domain, problems[0], listed, place)
+        raise BadInput(
+            "the list of tasks is empty", position=position, remedy="Give at least one task."
+        )
+    ground = ground_tasks(domain, problems[0], listed, position)
     loaded = build(domain, problems, options, inits=[init for init, _ in ground])
     model = loaded.model
     space = explore(model, np.stack([task.init for task in loaded.tasks]))
-    reached, _ = unique_rows(space.rows[:, : model.codec.fact_words])
+    reached, _ = unique_rows(space.rows[:, : model.codec.fact_blocks])
     groups: dict[Goal, list[Rows]] = {}
     for number, (init, goal) in enumerate(ground, 1):
         row = model.state(init)
-        if find_rows(reached, row[None, : model.codec.fact_words])[0] < 0:
+        if find_rows(reached, row[None, : model.codec.fact_blocks])[0] < 0:
             raise BadInput(
                 f"task {number}: the state {model.state_text(row)} cannot be reached from the initial "
                 f"state of {problems[0].source.name}",
-                place=place,
+                position=position,
                 remedy="Is a fluent missing or one too many?  List all fluents that are true.",
             )
         groups.setdefault(goal, []).append(row)
@@ -199,7 +201,7 @@ def from_listed(
         number = solved(solvable(space, grouped)).index(False)
         raise ProvedImpossible(
             f"task {number + 1}: the goal {_goal_text(listed[number])} cannot be reached from {_init_text(listed[number])}",
-            place=place,
+            position=position,
             remedy=error.remedy,
         ) from None
     return Candidates("file", loaded, tuple(listed), spaces, states, tuple(skipped))
@@ -218,12 +220,12 @@ def from_recorded(
     problems: Sequence[Problem],
     listed: Sequence[ListedTask],
     options: ModelOptions | None = None,
-    place: Place | None = None,
+    position: Position | None = None,
 ) -> Candidates:
     """Problems' tasks as a language file records them: searched one by one, without the rest of the
     space.
     """
-    ground = ground_tasks(domain, problems[0], listed, place)
+    ground = ground_tasks(domain, problems[0], listed, position)
     loaded = build(domain, problems, options, inits=[init for init, _ in ground])
     tasks = [
         PlanningTask(f"{n}", loaded.model.state(init), goal)

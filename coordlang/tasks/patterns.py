@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from coordlang.tasks.task_file import ListedTask, goal_atoms
 from planners.errors import ProvedImpossible, UsageError
 from planners.joint.matching import Ints
-from planners.loading import Loaded
+from planners.loading import PlanningInstance
 from planners.search.plan_space import distances
 from planners.search.reachable import Space, explore
 
@@ -28,7 +28,7 @@ _BATCH = 2_000_000
 
 
 def varied_tasks(
-    loaded: Loaded, starts: Sequence[str], goals: Sequence[str]
+    loaded: PlanningInstance, starts: Sequence[str], goals: Sequence[str]
 ) -> tuple[ListedTask, ...]:
     """The tasks that the patterns describe, sorted.  Without ``goals`` the problem's own goal is
     the only one.

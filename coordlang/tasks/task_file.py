@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from planners.errors import BadInput, Place
+from planners.errors import BadInput, Position
 from planners.grounding import ground_goal
 from planners.joint.model import FullState, Goal, JointModel, show
 from planners.joint.states import split_atoms
@@ -37,30 +37,30 @@ class ListedTask:
 
 def read_task_file(path: str | Path) -> tuple[ListedTask, ...]:
     """Read a task file (docs/formats.md).  Raises `BadInput` for anything else."""
-    place = Place(str(path))
+    position = Position(str(path))
     try:
         data = json.loads(
             sys.stdin.read() if str(path) == "-" else Path(path).read_text("utf-8-sig")
         )
     except OSError as error:
-        raise BadInput(f"cannot be read: {error.strerror}", place=place) from None
+        raise BadInput(f"cannot be read: {error.strerror}", position=position) from None
     except (ValueError, RecursionError) as error:
-        raise BadInput(f"this is no JSON: {error}", place=place) from None
-    return tasks_from_data(data, place)
+        raise BadInput(f"this is no JSON: {error}", position=position) from None
+    return tasks_from_data(data, position)
 
 
-def tasks_from_data(data: Any, place: Place) -> tuple[ListedTask, ...]:
+def tasks_from_data(data: Any, position: Position) -> tuple[ListedTask, ...]:
     """The tasks in the data of a task file."""
     if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise BadInput(f'expected a task file: {{"format": "{FORMAT}", ..}}', place=place)
+        raise BadInput(f'expected a task file: {{"format": "{FORMAT}", ..}}', position=position)
     if data.get("version") != VERSION or data.get("version") is True:
         raise BadInput(
-            f"task file version {data.get('version')!r}, expected {VERSION}", place=place
+            f"task file version {data.get('version')!r}, expected {VERSION}", position=position
         )
     tasks = data.get("tasks")
     if not isinstance(tasks, list):
-        raise BadInput("expected a list 'tasks'", place=place)
-    return tuple(_listed(entry, number, place) for number, entry in enumerate(tasks, 1))
+        raise BadInput("expected a list 'tasks'", position=position)
+    return tuple(_listed(entry, number, position) for number, entry in enumerate(tasks, 1))
 
 
 def task_data(tasks: Sequence[ListedTask]) -> dict[str, Any]:
@@ -79,16 +79,16 @@ def tasks_text(tasks: Sequence[ListedTask]) -> str:
 
 
 def ground_tasks(
-    domain: Domain, problem: Problem, listed: Sequence[ListedTask], place: Place | None = None
+    domain: Domain, problem: Problem, listed: Sequence[ListedTask], position: Position | None = None
 ) -> list[tuple[frozenset[Atom], Formula]]:
     """Listed tasks as (true fluents, ground goal); everything static comes from the problem."""
     return [
         (
-            _read_init(domain, problem, task, place),
+            _read_init(domain, problem, task, position),
             ground_goal(
                 domain,
                 problem,
-                And(tuple(_read_text(domain, problem, text, place) for text in task.goal)),
+                And(tuple(_read_text(domain, problem, text, position) for text in task.goal)),
             ),
         )
         for task in listed
@@ -99,7 +99,7 @@ def goal_text(model: JointModel, goal: Goal) -> str:
     """A goal as PDDL text."""
     if isinstance(goal, FullState):
         row = np.zeros(model.codec.width, np.uint64)
-        row[: model.codec.fact_words] = goal.words
+        row[: model.codec.fact_blocks] = goal.words
         atoms = model.codec.decode(row)
         return " ".join(a for a in atoms if not (model.remembers and a.startswith("(last ")))
     return " ".join(
@@ -129,44 +129,46 @@ def formula_text(formula: Formula) -> str:
     raise AssertionError(formula)
 
 
-def _listed(entry: Any, number: int, place: Place) -> ListedTask:
+def _listed(entry: Any, number: int, position: Position) -> ListedTask:
     fields = []
     for key in ("init", "goal"):
         value = entry.get(key) if isinstance(entry, dict) else None
         if not isinstance(value, list) or not all(isinstance(v, str) for v in value):
-            raise BadInput(f"task {number}: expected a list of texts {key!r}", place=place)
+            raise BadInput(f"task {number}: expected a list of texts {key!r}", position=position)
         fields.append(tuple(" ".join(v.lower().split()) for v in value))
     return ListedTask(*fields)
 
 
-def _names(domain: Domain, problem: Problem, text: str, place: Place | None) -> Names:
-    document = parse(Source(place.file if place else "task", text))
+def _names(domain: Domain, problem: Problem, text: str, position: Position | None) -> Names:
+    document = parse(Source(position.file if position else "task", text))
     return Names(
         document, frozenset(domain.types), domain.predicates, {}, {}, frozenset(problem.objects)
     )
 
 
 def _read_init(
-    domain: Domain, problem: Problem, task: ListedTask, place: Place | None
+    domain: Domain, problem: Problem, task: ListedTask, position: Position | None
 ) -> frozenset[Atom]:
     fluents = fluent_predicates(domain)
     atoms = set()
     for text in task.init:
-        formula = _read_text(domain, problem, text, place)
+        formula = _read_text(domain, problem, text, position)
         if not isinstance(formula, Atom):
-            raise BadInput(f"{text} is no atom: 'init' lists what is true", place=place)
+            raise BadInput(f"{text} is no atom: 'init' lists what is true", position=position)
         if formula.predicate not in fluents and formula not in problem.init:
-            raise BadInput(f"{text} is static and false in {problem.source.name}", place=place)
+            raise BadInput(
+                f"{text} is static and false in {problem.source.name}", position=position
+            )
         atoms.add(formula)
     return frozenset(atom for atom in atoms if atom.predicate in fluents)
 
 
-def _read_text(domain: Domain, problem: Problem, text: str, place: Place | None) -> Formula:
+def _read_text(domain: Domain, problem: Problem, text: str, position: Position | None) -> Formula:
     try:
         parts = split_atoms(text)
         if len(parts) != 1:
             raise BadInput("expected one PDDL literal")
-        names = _names(domain, problem, parts[0], place)
+        names = _names(domain, problem, parts[0], position)
         return read_formula(names, names.document.root)
     except BadInput as error:
-        raise BadInput(f"{text}: {error.what}", place=place, remedy=error.remedy) from None
+        raise BadInput(f"{text}: {error.what}", position=position, remedy=error.remedy) from None

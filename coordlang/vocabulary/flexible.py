@@ -176,7 +176,7 @@ class _Clauses:
             self.pairs.append(tuple(sorted(image)))
 
     def violated(self, number: int, word: Sequence[int]) -> bool:
-        for a, b in self.pairs[number]:  # noqa: SIM110 (the inner loop)
+        for a, b in self.pairs[number]:
             if word[a] != word[b]:
                 return False
         return True

@@ -10,7 +10,9 @@ from coordlang.vocabulary.job import Job, Outcome
 
 def greedy(job: Job) -> Outcome:
     """The greedy partition of a job's states in their own order."""
-    return Outcome(fill(job.states, separations(job.alphas.divergences)), job.lower_bound)
+    return Outcome(
+        fill(job.states, separations(job.first_differences.divergences)), job.lower_bound
+    )
 
 
 def fill(states: Sequence[int], constraints: Sequence[tuple[Separation, ...]]) -> dict[int, int]:

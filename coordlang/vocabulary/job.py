@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from coordlang.language.warping import Clause
-from coordlang.required.divergences import Alphas
+from coordlang.required.divergences import FirstDifferences
 from coordlang.tasks.candidates import Candidates
 from coordlang.vocabulary.counterexamples import Counterexample
 from coordlang.vocabulary.symmetry import Symmetry
@@ -29,7 +29,7 @@ class Job:
 
     candidates: Candidates
     states: tuple[int, ...]
-    alphas: Alphas
+    first_differences: FirstDifferences
     incumbent: Partition | None = None
     seed: int = 0
     alpha_only: bool = False
@@ -39,7 +39,7 @@ class Job:
     @property
     def lower_bound(self) -> int:
         """A bound that needs no search: plans that introduce RC need two words at least."""
-        return 2 if self.alphas.requiring else 1
+        return 2 if self.first_differences.requiring else 1
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,13 +21,13 @@ from coordlang.language.warping import Clause, pair, separation_clause
 from coordlang.vocabulary.counterexamples import counterexamples
 from coordlang.vocabulary.job import Evidence, Job, Outcome, Partition
 from coordlang.vocabulary.sat import (
-    Colouring,
-    Effort,
-    Problems,
+    PartitionProblem,
+    PartitionProblems,
+    SolverBudget,
     Undecided,
-    by_demand,
-    close_in,
+    close_bounds,
     most_asked,
+    most_constrained_first,
     reduce,
 )
 from coordlang.vocabulary.separating import quickly as separated
@@ -104,10 +104,10 @@ class _Search:
         self._rounds = 0
         self._found = 0
         self._clauses: list[Clause] = []
-        self._problems = Problems(self._start, Colouring.add)
+        self._problems = PartitionProblems(self._start, PartitionProblem.add)
         #: Of symmetric partitions these allow one: proofs are ten times shorter, but partitions
         #: harder to find.
-        self._led = Problems(self._start_led, Colouring.add)
+        self._led = PartitionProblems(self._start_led, PartitionProblem.add)
         self.evidence: dict[Clause, Evidence] = {}
         self._symmetries: list[tuple[Symmetry, list[int]]] = []
         self._group: list[list[int]] = []
@@ -118,24 +118,24 @@ class _Search:
 
     def run(self) -> None:
         job = self._job
-        if not job.alphas.requiring:
+        if not job.first_differences.requiring:
             self.best = dict.fromkeys(job.states, 0)
             return
         parts = self._prepare()
         self._fill()
         filled = self.best
-        close_in(
+        close_bounds(
             lambda: (self.lower, self._upper),
             lambda size, effort: self._decide(size, parts, effort),
         )
         if (
             self.best is filled
         ):  # it separates more than a language must: one that does not leaves more open
-            self._decide(self.lower, parts, Effort())
+            self._decide(self.lower, parts, SolverBudget())
 
     def _fill(self) -> None:
         """A separating partition, if one with fewer words is found quickly."""
-        if self._job.alphas.edges > _WALKED:
+        if self._job.first_differences.edges > _WALKED:
             return
         found = separated(replace(self._job, incumbent=self.best))
         self.best = found.partition
@@ -145,7 +145,7 @@ class _Search:
     def exceeds(self, size: int) -> bool:
         """Whether every partition that is a language has more words than ``size``."""
         return (
-            self._decide(size, self._prepare(), Effort(sys.maxsize, sys.maxsize))
+            self._decide(size, self._prepare(), SolverBudget(sys.maxsize, sys.maxsize))
             and self.lower > size
         )
 
@@ -162,7 +162,7 @@ class _Search:
             self._group = [states for _, states in self._symmetries]
         return _parts(self._job.candidates.spaces, Random(self._job.seed))
 
-    def _decide(self, size: int, parts: Sequence[_Part], effort: Effort) -> bool:
+    def _decide(self, size: int, parts: Sequence[_Part], effort: SolverBudget) -> bool:
         """Find a language with ``size`` words or prove that there is none; False if the effort was
         not enough.
         """
@@ -178,16 +178,20 @@ class _Search:
             self.best = partition
         return True
 
-    def _start(self, size: int, known: Sequence[Clause], solver: str = "cadical153") -> Colouring:
+    def _start(
+        self, size: int, known: Sequence[Clause], solver: str = "cadical153"
+    ) -> PartitionProblem:
         clauses = reduce(known, _COMPARED)
-        colouring = Colouring(by_demand(self._job.states, clauses), size, solver)
+        colouring = PartitionProblem(
+            most_constrained_first(self._job.states, clauses), size, solver
+        )
         for clause in clauses:
             colouring.add(clause)
         return colouring
 
-    def _start_led(self, size: int, known: Sequence[Clause]) -> Colouring:
+    def _start_led(self, size: int, known: Sequence[Clause]) -> PartitionProblem:
         colouring = self._start(size, known, "glucose4")
-        colouring.prefer_one_of_each(self._group, most_asked(known, _LEADING))
+        colouring.add_lex_leaders(self._group, most_asked(known, _LEADING))
         return colouring
 
     def _partition(self, size: int, conflicts: int) -> dict[int, int] | None:
@@ -200,7 +204,7 @@ class _Search:
         for problems in (self._problems, self._led):
             problems.drop(size)
 
-    def _refine(self, size: int, parts: Sequence[_Part], effort: Effort) -> Partition | None:
+    def _refine(self, size: int, parts: Sequence[_Part], effort: SolverBudget) -> Partition | None:
         """The loop for one number of words: a language, or None if there is none."""
         partition = self._partition(size, effort.conflicts)
         clean = position = rounds = 0

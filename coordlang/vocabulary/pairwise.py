@@ -22,7 +22,7 @@ from coordlang.language.warping import Clause, separation_clause
 from coordlang.required.composition_walk import walk
 from coordlang.required.miscoordination import Inseparable, inseparable, separable
 from coordlang.vocabulary.counterexamples import counterexamples
-from coordlang.vocabulary.sat import Colouring, by_demand, reduce
+from coordlang.vocabulary.sat import PartitionProblem, most_constrained_first, reduce
 from planners.search.plan_space import PlanSpace
 from planners.search.tuples import EdgeIndex
 
@@ -125,7 +125,7 @@ def _words(
     """A partition into ``size`` words without counterexample, or None if there is none; new clauses
     are added to the list.
     """
-    colouring = Colouring(by_demand(states, clauses), size)
+    colouring = PartitionProblem(most_constrained_first(states, clauses), size)
     try:
         for clause in clauses:
             colouring.add(clause)

@@ -18,7 +18,7 @@ _SLICE = 2_000
 _GROWN = 2
 
 
-class Colouring:
+class PartitionProblem:
     """An incremental SAT problem: give each of ``states`` one of ``size`` words so that every
     clause holds.
 
@@ -53,9 +53,7 @@ class Colouring:
             return
         self._solver.add_clause([self._all_separate(pairs) for pairs in alternatives])
 
-    def prefer_one_of_each(
-        self, symmetries: Sequence[Sequence[int]], pairs: Sequence[Pair]
-    ) -> None:
+    def add_lex_leaders(self, symmetries: Sequence[Sequence[int]], pairs: Sequence[Pair]) -> None:
         """Of partitions that are images of each other, allow the one that separates the first of
         ``pairs`` (and of such the one that separates the second, ..): a lex-leader constraint over
         so many pairs.
@@ -146,7 +144,7 @@ class Colouring:
             used = after
 
 
-class Problems(Generic[Requirement]):
+class PartitionProblems(Generic[Requirement]):
     """The colouring problem of each number of words, kept as long as it is undecided: a solver goes
     on where it stopped.
 
@@ -155,13 +153,13 @@ class Problems(Generic[Requirement]):
 
     def __init__(
         self,
-        start: Callable[[int, Sequence[Requirement]], Colouring],
-        require: Callable[[Colouring, Requirement], None],
+        start: Callable[[int, Sequence[Requirement]], PartitionProblem],
+        require: Callable[[PartitionProblem, Requirement], None],
     ) -> None:
         self._start, self._require = start, require
         self._kept: dict[int, _Kept] = {}
 
-    def of(self, size: int, known: Sequence[Requirement]) -> Colouring:
+    def of(self, size: int, known: Sequence[Requirement]) -> PartitionProblem:
         """The problem with ``size`` words under all ``known`` requirements, a list that only grows.
 
         When it has grown much, the problem starts afresh: the order of its states was that of few
@@ -187,7 +185,7 @@ class Problems(Generic[Requirement]):
 
 @dataclass(slots=True)
 class _Kept:
-    colouring: Colouring
+    colouring: PartitionProblem
     first: int
     given: int
 
@@ -221,25 +219,27 @@ def solved(solver: Any, assumptions: Sequence[int] = (), conflicts: int | None =
     raise Undecided
 
 
-def close_in(bounds: Callable[[], tuple[int, int]], decide: Callable[[int, Effort], bool]) -> None:
+def close_bounds(
+    bounds: Callable[[], tuple[int, int]], decide: Callable[[int, SolverBudget], bool]
+) -> None:
     """Decide numbers of words until the bounds (proved to be needed, known to suffice) meet.
 
     From below as long as that is quick; what is slow is first closed in from above, to have a good
     language early. ``decide`` moves a bound, or returns False when the effort was not enough, which
     then is doubled.
     """
-    effort = Effort()
+    effort = SolverBudget()
     while (span := bounds())[0] < span[1]:
         lower, upper = span
         if decide(lower, effort):
             continue
         middle = (lower + upper) // 2
         if middle == lower or not decide(middle, effort):
-            effort = Effort(2 * effort.rounds, 2 * effort.conflicts)
+            effort = SolverBudget(2 * effort.rounds, 2 * effort.conflicts)
 
 
 @dataclass(frozen=True, slots=True)
-class Effort:
+class SolverBudget:
     """What may be spent on one number of words: partitions refuted, and conflicts for each of them."""
 
     rounds: int = 60
@@ -273,7 +273,7 @@ def most_asked(clauses: Iterable[Clause], most: int) -> list[Pair]:
     return sorted(asked, key=lambda p: (-asked[p], p))[:most]
 
 
-def by_demand(states: Iterable[int], clauses: Iterable[Clause]) -> list[int]:
+def most_constrained_first(states: Iterable[int], clauses: Iterable[Clause]) -> list[int]:
     """States in the order of how much the clauses ask of them: a good order to break the symmetry
     of words.
     """

@@ -17,7 +17,14 @@ from coordlang.required.divergences import Separation, separations
 from coordlang.required.last_differences import Constraint, SeparationWalk, ordered
 from coordlang.vocabulary.greedy import fill
 from coordlang.vocabulary.job import Job, Outcome, Partition
-from coordlang.vocabulary.sat import Colouring, Effort, Problems, Undecided, by_demand, close_in
+from coordlang.vocabulary.sat import (
+    PartitionProblem,
+    PartitionProblems,
+    SolverBudget,
+    Undecided,
+    close_bounds,
+    most_constrained_first,
+)
 from coordlang.vocabulary.symmetry import state_symmetries
 from planners.errors import OutOfMemory
 from planners.limits import STOPPING, stop_clock
@@ -27,7 +34,7 @@ _FILLED = 20
 #: Constraints of one walk up to which all are written down.
 _WRITTEN = 200_000
 #: What a short search may spend on one number of words.
-_SHORT = Effort(20, 2_000)
+_SHORT = SolverBudget(20, 2_000)
 
 
 def separating(job: Job) -> Outcome:
@@ -80,7 +87,7 @@ class _Search:
         self.lower = job.lower_bound
         self.best: Partition | None = job.incumbent
         self._constraints: list[Constraint] = []
-        self._problems = Problems(self._start, _require)
+        self._problems = PartitionProblems(self._start, _require)
         self._rounds = 0
         #: States that need words of their own; naming these first leaves fewest symmetries to
         #: search.
@@ -91,11 +98,11 @@ class _Search:
         return len(set(self.best.values())) if self.best is not None else len(self._job.states) + 1
 
     def run(self) -> None:
-        if not self._job.alphas.requiring:
+        if not self._job.first_differences.requiring:
             self.best = dict.fromkeys(self._job.states, 0)
             return
         self.prepare()
-        close_in(lambda: (self.lower, self.upper), self.decide)
+        close_bounds(lambda: (self.lower, self.upper), self.decide)
 
     def prepare(self) -> None:
         raise NotImplementedError
@@ -104,7 +111,7 @@ class _Search:
         """Constraints that a partition breaks, none of them known yet; empty: it is separating."""
         raise NotImplementedError
 
-    def decide(self, size: int, effort: Effort) -> bool:
+    def decide(self, size: int, effort: SolverBudget) -> bool:
         """Find a separating partition with ``size`` words, or prove that there is none; False: not
         with this effort.
         """
@@ -131,10 +138,10 @@ class _Search:
             self._constraints += fresh
         return False
 
-    def _start(self, size: int, known: Sequence[Constraint]) -> Colouring:
-        order = by_demand(self._job.states, (s.pairs for c in known for s in c))
+    def _start(self, size: int, known: Sequence[Constraint]) -> PartitionProblem:
+        order = most_constrained_first(self._job.states, (s.pairs for c in known for s in c))
         # On these problems quicker than the other solver, by a third and more.
-        colouring = Colouring(
+        colouring = PartitionProblem(
             [*self._first, *(s for s in order if s not in set(self._first))], size, "glucose4"
         )
         for constraint in known:
@@ -157,14 +164,16 @@ class _AlphaOnly(_Search):
     """All constraints are known; with two robots they are the edges of a graph to colour."""
 
     def prepare(self) -> None:
-        self._constraints = separations(self._job.alphas.divergences)
+        self._constraints = separations(self._job.first_differences.divergences)
         edges = {p for c in self._constraints if len(c) == 1 for p in c[0].pairs}
         self._first = _clique(edges)
         self.lower = max(self.lower, len(self._first))
         if all(len(c) == 1 for c in self._constraints):
             coloured = _dsatur(self._job.states, edges)
         else:
-            coloured = fill(by_demand(self._job.states, [frozenset(edges)]), self._constraints)
+            coloured = fill(
+                most_constrained_first(self._job.states, [frozenset(edges)]), self._constraints
+            )
         if len(set(coloured.values())) < self.upper:
             self._job.check(coloured)
             self.best = coloured
@@ -194,7 +203,7 @@ class _AlphaOrBeta(_Search):
         job = self._job
         for _ in range(_FILLED):
             filled = fill(
-                by_demand(job.states, (s.pairs for c in self._constraints for s in c)),
+                most_constrained_first(job.states, (s.pairs for c in self._constraints for s in c)),
                 self._constraints,
             )
             fresh = list(self._broken(filled))
@@ -223,7 +232,7 @@ class _AlphaOrBeta(_Search):
         }
 
 
-def _require(colouring: Colouring, constraint: Constraint) -> None:
+def _require(colouring: PartitionProblem, constraint: Constraint) -> None:
     colouring.choose([s.pairs for s in constraint])
 
 

@@ -22,7 +22,7 @@ from unified_planning.shortcuts import (
 from coordlang.building import build_language
 from coordlang.language.sentences import task_sentences
 from coordlang.tasks.candidates import from_problems
-from coordlang.use.sentence.spoken import speak_candidates
+from coordlang.use.sentence.task_language import languages_in_tasks
 from coordlang.use.unified import register
 from coordlang.use.unified.translation import translate
 
@@ -80,7 +80,7 @@ language = build_language(candidates, "minimal").language
 print(language.words, dict(language.sizes()))
 
 # %% What can be said, and the plan under a sentence.
-spoken = next(speak_candidates(language, candidates))
+spoken = next(languages_in_tasks(language, candidates))
 for sentence in task_sentences(spoken.space, 0, spoken.table):
     text = " ".join(sentence.words)
     with OneshotPlanner(

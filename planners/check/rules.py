@@ -328,7 +328,7 @@ class Rules:
             first, second = sorted(results.values())[:2]
             raise BadInput(
                 f"{first} and {second} have the same subactions but different results",
-                place=self.domain.source.place(self.domain.schemas[0].offset),
+                position=self.domain.source.position(self.domain.schemas[0].offset),
                 remedy="The subactions of a joint action must determine what it does: rename one of them.",
             )
         for result in results:
@@ -460,7 +460,7 @@ class Rules:
         if self.is_joint_action:
             raise BadInput(
                 f"action {schema.name!r} is used as a formula in a joint-action domain",
-                place=self.domain.source.place(schema.offset),
+                position=self.domain.source.position(schema.offset),
                 remedy="A joint action already says what every robot does: use predicates only.",
             )
         args = _ground(formula, binding).args

@@ -22,26 +22,26 @@ from planners.classical.choosers import Choosers, choosers_of
 from planners.classical.explicit import TooManyError, explicit
 from planners.classical.pddl import action_names, to_pddl
 from planners.classical.selection import select_then_apply
-from planners.classical.task import LONGEST, Condition, Form, PlainAction, PlainTask
+from planners.classical.task import LONGEST, ClassicalAction, ClassicalTask, Condition, Form
 from planners.classical.writer import Writer, state_literals
 from planners.joint.model import Goal, JointModel, show
 from planners.loading import PlanningTask
 
 __all__ = [
     "LONGEST",
+    "ClassicalAction",
+    "ClassicalTask",
     "Condition",
     "Form",
-    "PlainAction",
-    "PlainTask",
     "action_names",
-    "compile_plain",
+    "compile_classical",
     "to_pddl",
 ]
 
 
-def compile_plain(
+def compile_classical(
     model: JointModel, task: PlanningTask, limit: int = 2000, longest: int = LONGEST
-) -> PlainTask:
+) -> ClassicalTask:
     """The plain form of a task: explicit with at most ``limit`` plain actions, else
     select-then-apply.
 
@@ -51,15 +51,15 @@ def compile_plain(
         0 asks for select-then-apply.  Joint-action PDDL, whose ground actions are plain actions
         already, may exceed it.
     longest
-        The makespan, in joint steps, up to which `PlainTask.cost` has to be sure.
+        The makespan, in joint steps, up to which `ClassicalTask.cost` has to be sure.
     """
     team = choosers_of(model)
-    step_cost = team.dearest * longest + 1
+    step_cost = team.highest_cost * longest + 1
     out, form = _written(team, model, task.goal, step_cost, limit)
     true = {
         out.fact(atom) for atom, holds in state_literals(model, task.init.tolist()).items() if holds
     }
-    return PlainTask(
+    return ClassicalTask(
         name=task.name,
         form=form,
         facts=tuple(show(atom) for atom in out.facts),
@@ -67,7 +67,7 @@ def compile_plain(
         actions=tuple(out.actions),
         goal=out.goal,
         step_cost=step_cost,
-        dearest=team.dearest,
+        highest_cost=team.highest_cost,
     )
 
 

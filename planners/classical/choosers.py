@@ -32,7 +32,7 @@ class Choosers:
     covered_by: tuple[tuple[int, ...], ...]
 
     @property
-    def dearest(self) -> int:
+    def highest_cost(self) -> int:
         """The most that one joint step can add to the second cost."""
         most = [0] * len(self.choosers)
         for owners, second in zip(self.owners, self.seconds, strict=True):

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from planners.classical import LONGEST, Form, PlainTask, compile_plain
+from planners.classical import LONGEST, ClassicalTask, Form, compile_classical
 from planners.errors import CoordlangError, OutOfMemory, OutOfTime
 from planners.joint.model import JointModel
 from planners.loading import PlanningTask
@@ -78,7 +78,7 @@ def optimal_cost(
         Seconds of wall time for all of it; bytes of address space for Fast Downward's translator
         and its search.
     limit
-        See `planners.classical.compile_plain`.
+        See `planners.classical.compile_classical`.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def optimal_cost(
     start = time.monotonic()
     longest = LONGEST
     while True:
-        plain = compile_plain(model, task, limit, longest)
+        plain = compile_classical(model, task, limit, longest)
         left = None if time_limit is None else time_limit - (time.monotonic() - start)
         total = _solve(plain, left, time_limit, memory_limit)
         cost = None if total is None else plain.cost(total)
@@ -104,7 +104,7 @@ def optimal_cost(
 
 
 def total_cost(
-    plain: PlainTask, *, time_limit: float | None = None, memory_limit: int | None = None
+    plain: ClassicalTask, *, time_limit: float | None = None, memory_limit: int | None = None
 ) -> int | None:
     """The total cost of an optimal plan of a plain task by Fast Downward, None if there is none;
     see `optimal_cost`.
@@ -112,7 +112,7 @@ def total_cost(
     return _solve(plain, time_limit, time_limit, memory_limit)
 
 
-def as_json(plain: PlainTask, memory_limit: int | None) -> str:
+def as_json(plain: ClassicalTask, memory_limit: int | None) -> str:
     """The task as `planners.classical.fast_downward_worker` reads it; names stay here."""
     return json.dumps(
         {
@@ -126,7 +126,7 @@ def as_json(plain: PlainTask, memory_limit: int | None) -> str:
 
 
 def _solve(
-    plain: PlainTask, left: float | None, time_limit: float | None, memory_limit: int | None
+    plain: ClassicalTask, left: float | None, time_limit: float | None, memory_limit: int | None
 ) -> int | None:
     """The cost of an optimal plan of a plain task, None if there is no plan."""
     with tempfile.TemporaryDirectory(prefix="coordlang-") as name:

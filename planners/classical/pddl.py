@@ -6,10 +6,10 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
-from planners.classical.task import Condition, PlainTask
+from planners.classical.task import ClassicalTask, Condition
 
 
-def to_pddl(plain: PlainTask) -> tuple[str, str]:
+def to_pddl(plain: ClassicalTask) -> tuple[str, str]:
     """Domain and problem text of a plain task: STRIPS with negative preconditions and action costs.
 
     Facts become predicates without arguments; a comment keeps what each predicate and action stands
@@ -50,7 +50,7 @@ def to_pddl(plain: PlainTask) -> tuple[str, str]:
     return "\n".join((*domain, ")", "")), "\n".join((*problem, ""))
 
 
-def action_names(plain: PlainTask) -> list[str]:
+def action_names(plain: ClassicalTask) -> list[str]:
     """The names of the actions in `to_pddl`, in the order of ``plain.actions``."""
     return _safe_names(action.name for action in plain.actions)
 

@@ -13,12 +13,12 @@ Form = Literal["explicit", "select-then-apply"]
 Condition = tuple[int, bool]
 Known = Mapping[Atom, bool]
 
-#: The makespan up to which `PlainTask.cost` is sure to be lexicographic by default.
+#: The makespan up to which `ClassicalTask.cost` is sure to be lexicographic by default.
 LONGEST = 100
 
 
 @dataclass(frozen=True, slots=True)
-class PlainAction:
+class ClassicalAction:
     """A ground STRIPS action with negative preconditions; facts by number, ``adds`` and ``deletes``
     are disjoint.
     """
@@ -31,30 +31,30 @@ class PlainAction:
 
 
 @dataclass(frozen=True, slots=True)
-class PlainTask:
+class ClassicalTask:
     """A ground planning task.
 
     ``facts`` are texts; facts of the model are its PDDL atoms.  A plan of total cost ``step_cost *
-    m + s`` stands for a joint plan of makespan ``m`` and second cost ``s``; ``dearest`` is the most
-    that one joint step adds to ``s``.
+    m + s`` stands for a joint plan of makespan ``m`` and second cost ``s``; ``highest_cost`` is the
+    most that one joint step adds to ``s``.
     """
 
     name: str
     form: Form
     facts: tuple[str, ...]
     init: frozenset[int]
-    actions: tuple[PlainAction, ...]
+    actions: tuple[ClassicalAction, ...]
     goal: tuple[Condition, ...]
     step_cost: int
-    dearest: int
+    highest_cost: int
 
     def cost(self, total: int) -> tuple[int, int] | None:
         """An optimal total cost as (makespan, second cost); None if ``step_cost`` is too small to
         be sure.
 
-        A plan of ``k`` steps costs from ``step_cost * k`` to ``(step_cost + dearest) * k``, which
-        is less than ``step_cost * m`` for every ``k < m`` when ``step_cost > dearest * m``: then no
-        plan has fewer than ``m`` steps.
+        A plan of ``k`` steps costs from ``step_cost * k`` to ``(step_cost + highest_cost) * k``,
+        which is less than ``step_cost * m`` for every ``k < m`` when ``step_cost > highest_cost *
+        m``: then no plan has fewer than ``m`` steps.
         """
         makespan, second = divmod(total, self.step_cost)
-        return (makespan, second) if self.step_cost > self.dearest * makespan else None
+        return (makespan, second) if self.step_cost > self.highest_cost * makespan else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 
 from planners.classical.formulas import Leaf, literals_of, negated, put
-from planners.classical.task import Condition, Known, PlainAction
+from planners.classical.task import ClassicalAction, Condition, Known
 from planners.joint.model import FullState, Goal, JointModel
 from planners.pddl.lifted import FALSE, And, Atom, Formula, Not, Or
 
@@ -15,10 +15,10 @@ class Writer:
 
     def __init__(self, facts: Iterable[Atom]) -> None:
         self.facts: dict[Atom, int] = {atom: n for n, atom in enumerate(facts)}
-        self.actions: list[PlainAction] = []
+        self.actions: list[ClassicalAction] = []
         self.init: set[int] = set()
         self.goal: tuple[Condition, ...] = ()
-        self._seen: set[PlainAction] = set()
+        self._seen: set[ClassicalAction] = set()
         self._places = 0
 
     def fact(self, atom: Atom) -> int:
@@ -33,7 +33,7 @@ class Writer:
         """An action; an atom that it both adds and deletes is added."""
         plus = {self.fact(atom) for atom in adds}
         minus = {self.fact(atom) for atom in deletes} - plus
-        new = PlainAction(
+        new = ClassicalAction(
             name, self.conditions(known), tuple(sorted(plus)), tuple(sorted(minus)), cost
         )
         if new not in self._seen:

@@ -151,7 +151,7 @@ class _Grounder:
         if not owners:
             raise BadInput(
                 f"action {label(schema.name, args)} names no robot (robots: {', '.join(self._team.robots)})",
-                place=self._domain.source.place(schema.offset),
+                position=self._domain.source.position(schema.offset),
                 remedy="Say --unowned environment (one extra chooser owns such actions) "
                 "or --unowned shared (all robots choose them together).",
             )
@@ -212,7 +212,7 @@ class _Grounder:
         if self._domain.is_joint_action:
             raise BadInput(
                 f"action {action!r} is used as a formula in a joint-action domain",
-                place=self._domain.source.place(schema.offset),
+                position=self._domain.source.position(schema.offset),
                 remedy="A joint action already says what every robot does: use predicates only.",
             )
         for parameter, arg in zip(schema.parameters, args, strict=True):
@@ -344,7 +344,7 @@ class _Grounder:
             if (schema.cost or 0) > MAX_COST:
                 raise Unsupported(
                     f"an action cost above {MAX_COST} (of {schema.name}) is not supported",
-                    place=self._domain.source.place(schema.offset),
+                    position=self._domain.source.position(schema.offset),
                     remedy="Write costs in a larger unit, or leave out --cost makespan+cost.",
                 )
             return schema.cost or 0
@@ -354,7 +354,7 @@ class _Grounder:
             raise BadInput(
                 f"the cost {label(atom.predicate, atom.args)} has no whole value from 0 to {MAX_COST} in the initial state "
                 f"of {self._problem.source.name}",
-                place=self._domain.source.place(schema.offset),
+                position=self._domain.source.position(schema.offset),
                 remedy="Give it a value in (:init ..), or leave out --cost makespan+cost.",
             )
         return int(value)

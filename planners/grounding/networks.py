@@ -64,7 +64,7 @@ def _check_types(domain: Domain, problem: Problem, constraint: Constraint) -> No
             raise BadInput(
                 f"argument {position} of {name} is {argument.name} - {' or '.join(argument.types)}, which is never "
                 f"{parameter.name} - {' or '.join(parameter.types)}: the constraint {constraint.name!r} would never match",
-                place=domain.source.place(offset),
+                position=domain.source.position(offset),
                 remedy="Positions count from 0; if the action has an :agent, it is argument 0.",
             )
 

@@ -21,7 +21,7 @@ from planners.pddl.lifted import TRUE, Atom, Formula, Not, StepAtom
 _CHUNK = 1_000_000
 
 
-class Composition:
+class ComposingStepper:
     """The `Stepper` of PDDL with one action per robot: every robot picks one subaction or idles.
 
     Parameters
@@ -152,7 +152,7 @@ class Composition:
             )
 
     def _apply(self, rows: Rows, source: Ints, labels: Labels) -> tuple[Rows, Ints]:
-        shape = (len(source), self._codec.fact_words)
+        shape = (len(source), self._codec.fact_blocks)
         adds, deletes = np.zeros(shape, np.uint64), np.zeros(shape, np.uint64)
         cost = np.zeros(len(source), np.int64)
         for i, robot in enumerate(self._robot):
@@ -185,11 +185,11 @@ class _Subactions:
         cost: Cost,
     ) -> None:
         self._evaluator = evaluator
-        required, forbidden = [], np.zeros((len(actions), codec.fact_words), np.uint64)
+        required, forbidden = [], np.zeros((len(actions), codec.fact_blocks), np.uint64)
         self._state_formulas: dict[int, list[Formula]] = {}
         self._step_formulas: dict[int, list[Formula]] = {}
         self.conditional: dict[int, list[GroundEffect]] = {}
-        self.adds = np.zeros((len(actions) + 1, codec.fact_words), np.uint64)
+        self.adds = np.zeros((len(actions) + 1, codec.fact_blocks), np.uint64)
         self.deletes = np.zeros_like(self.adds)
         self.cost = np.zeros(len(actions) + 1, np.int64)
         for number, action in enumerate(actions):

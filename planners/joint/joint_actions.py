@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from planners.errors import BadInput, Place
+from planners.errors import BadInput, Position
 from planners.grounding import GroundAction, GroundEffect
 from planners.joint.composition import cost_of, split
 from planners.joint.conditions import Evaluator
@@ -16,12 +16,12 @@ from planners.joint.states import Rows, StateCodec
 from planners.pddl.lifted import TRUE, Formula
 
 
-class WholeActions:
+class JointActionStepper:
     """The `Stepper` of joint-action PDDL.
 
     Actions with the same parts are one joint action if they do the same; different results for the
-    same parts are an error (`BadInput`), because no robot could tell them apart.  ``places`` are
-    the schemas' places, for that message.
+    same parts are an error (`BadInput`), because no robot could tell them apart.  ``positions`` are
+    the schemas' positions, for that message.
     """
 
     def __init__(
@@ -32,13 +32,13 @@ class WholeActions:
         labels: Sequence[Sequence[str]],
         actions: Sequence[GroundAction],
         cost: Cost,
-        places: Mapping[str, Place],
+        positions: Mapping[str, Position],
     ) -> None:
-        self._places = places
+        self._positions = positions
         self._codec, self._evaluator, self._robots = codec, evaluator, tuple(robots)
         self._names, self._actions = [tuple(own) for own in labels], tuple(actions)
         numbers = [{text: n for n, text in enumerate(own)} for own in labels]
-        required, forbidden = [], np.zeros((len(actions), codec.fact_words), np.uint64)
+        required, forbidden = [], np.zeros((len(actions), codec.fact_blocks), np.uint64)
         self._formulas: dict[int, list[Formula]] = {}
         self._conditional: dict[int, list[GroundEffect]] = {}
         self._labels = np.zeros((len(actions), len(robots)), np.int32)
@@ -84,7 +84,7 @@ class WholeActions:
             first, second = (self._actions[operator[differs[0] + k]] for k in (0, 1))
             raise BadInput(
                 f"{first.label} and {second.label} have the same subactions but different results",
-                place=self._places.get(second.schema),
+                position=self._positions.get(second.schema),
                 remedy="The subactions of a joint action must determine what it does: rename one of them.",
             )
         keep = ~same

@@ -110,8 +110,8 @@ class Matcher:
         rows_out = np.concatenate(found_rows)
         operators_out = np.concatenate(found_operators)
         if self._has_forbidden:
-            fact_words = self._forbidden.shape[1]
-            clash = (rows[rows_out, :fact_words] & self._forbidden[operators_out]).any(axis=1)
+            fact_blocks = self._forbidden.shape[1]
+            clash = (rows[rows_out, :fact_blocks] & self._forbidden[operators_out]).any(axis=1)
             rows_out, operators_out = rows_out[~clash], operators_out[~clash]
         order = np.lexsort((operators_out, rows_out))
         return rows_out[order], operators_out[order]

@@ -97,7 +97,7 @@ class JointModel:
         """All joint steps from a table of states (see `Steps`)."""
         if not self.remembers:
             return self.stepper.steps(rows)
-        base = self.stepper.steps(np.ascontiguousarray(rows[:, : self.codec.fact_words]))
+        base = self.stepper.steps(np.ascontiguousarray(rows[:, : self.codec.fact_blocks]))
         last = (base.labels + 1).astype(np.uint64)
         return Steps(base.source, base.labels, np.hstack((base.result, last)), base.cost)
 
@@ -105,7 +105,7 @@ class JointModel:
         """Which states of a table satisfy a goal.  Remembered actions never count."""
         if isinstance(goal, FullState):
             wanted = np.array(goal.words, np.uint64)
-            same: NDArray[np.bool_] = (rows[:, : self.codec.fact_words] == wanted).all(axis=1)
+            same: NDArray[np.bool_] = (rows[:, : self.codec.fact_blocks] == wanted).all(axis=1)
             return same
         return self.evaluator.holds(goal, rows, np.arange(len(rows)))
 
@@ -116,7 +116,7 @@ class JointModel:
 
     def why_not(self, row: Rows, labels: Sequence[int]) -> str:
         """Why these labels are no joint step in a state, in words."""
-        return self.stepper.why_not(row[: self.codec.fact_words], labels)
+        return self.stepper.why_not(row[: self.codec.fact_blocks], labels)
 
     def state_text(self, row: Rows) -> str:
         """A state for people: its key, if it is not empty."""

@@ -36,16 +36,16 @@ class StateCodec:
         object.__setattr__(self, "index", {fact: number for number, fact in enumerate(self.facts)})
 
     @property
-    def fact_words(self) -> int:
+    def fact_blocks(self) -> int:
         return max(1, -(-len(self.facts) // _WORD_BITS))
 
     @property
     def width(self) -> int:
-        return self.fact_words + (len(self.robots) if self.memory is not None else 0)
+        return self.fact_blocks + (len(self.robots) if self.memory is not None else 0)
 
     def mask(self, facts: Iterable[int]) -> Rows:
         """A row of the fact words with the bits of these facts set."""
-        row = np.zeros(self.fact_words, np.uint64)
+        row = np.zeros(self.fact_blocks, np.uint64)
         for number in facts:
             row[number // _WORD_BITS] |= np.uint64(1 << number % _WORD_BITS)
         return row
@@ -73,12 +73,12 @@ class StateCodec:
         """The true atoms of a state, sorted."""
         atoms = [
             self.facts[word * _WORD_BITS + bit]
-            for word in range(self.fact_words)
+            for word in range(self.fact_blocks)
             for bit in bits(int(row[word]))
         ]
         if self.memory is not None:
             for robot, labels, last in zip(
-                self.robots, self.memory, row[self.fact_words :], strict=True
+                self.robots, self.memory, row[self.fact_blocks :], strict=True
             ):
                 name = "none" if last == 0 else labels[int(last) - 1]
                 atoms.append(f"(last {robot} {name})")
@@ -87,7 +87,7 @@ class StateCodec:
 
     def truth(self, rows: Rows) -> NDArray[np.bool_]:
         """A table of states as truth values, (states, facts); remembered actions are left out."""
-        words = np.ascontiguousarray(rows[:, : self.fact_words], "<u8")
+        words = np.ascontiguousarray(rows[:, : self.fact_blocks], "<u8")
         true = np.unpackbits(words.view(np.uint8), axis=1, bitorder="little")
         return true[:, : len(self.facts)].astype(np.bool_)
 
@@ -108,7 +108,7 @@ class StateCodec:
                 return
             if name in self.memory[position]:
                 number = self.memory[position].index(name) + 1
-                row[self.fact_words + position] = np.uint64(number)
+                row[self.fact_blocks + position] = np.uint64(number)
                 return
         raise BadInput(f"{atom} names no robot's subaction of this model")
 

@@ -1,4 +1,4 @@
-"""PDDL text -> lifted domain and problem, with places in every error message."""
+"""PDDL text -> lifted domain and problem, with positions in every error message."""
 
 from planners.pddl.domain import parse_domain, read_domain
 from planners.pddl.problem import parse_problem, read_problem

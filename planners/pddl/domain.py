@@ -108,7 +108,7 @@ def read_header(document: Document, kind: str) -> tuple[str, dict[str, list[Grou
         if head in _UNSUPPORTED:
             raise Unsupported(
                 f"{_UNSUPPORTED[head]} ({head}) are not supported",
-                place=document.source.place(section.offset),
+                position=document.source.position(section.offset),
                 remedy="coordlang reads classical PDDL with instantaneous actions.",
             )
         if head not in _SECTIONS[kind]:
@@ -226,7 +226,7 @@ def _read_predicates(
     def declare(items: Sequence[Expression]) -> None:
         for item in items:
             if isinstance(item, Group) and item.head == ":private":
-                # "(:private ?agent - place (p ..) ..)" or, factored, "(:private (p ..) ..)".
+                # "(:private ?agent - position (p ..) ..)" or, factored, "(:private (p ..) ..)".
                 declare([part for part in item.items[1:] if isinstance(part, Group)])
                 continue
             entry = group(document, item, "a predicate in parentheses")
@@ -313,9 +313,9 @@ def _parameter_items(
     if fields.get(":parameters"):
         listed = group(document, fields[":parameters"][0], "a list of parameters").items
     agent_items = fields.get(":agent", ())
-    for position, item in enumerate(listed):
+    for number, item in enumerate(listed):
         if isinstance(item, Word) and item.text == ":agent":
-            before, behind = listed[:position], listed[position + 1 :]
+            before, behind = listed[:number], listed[number + 1 :]
             if not behind or not isinstance(behind[0], Word):
                 raise document.fail("expected a variable after ':agent'", item)
             return before + behind, behind[0].text

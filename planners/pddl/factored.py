@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from planners.errors import BadInput, Place
+from planners.errors import BadInput, Position
 from planners.pddl.domain import read_domain
 from planners.pddl.lifted import And, Atom, Domain, Formula, Problem, Schema
 from planners.pddl.problem import read_problem
@@ -27,7 +27,7 @@ def read_factored(directory: str | Path) -> tuple[Domain, Problem]:
     if not folder.is_dir():
         what = "this is a file, not a folder" if folder.exists() else "there is no such folder"
         raise BadInput(
-            what, place=Place(str(directory)), remedy="Name the folder of the robots' files."
+            what, position=Position(str(directory)), remedy="Name the folder of the robots' files."
         )
     domains = {
         path.stem.partition("-")[2].lower(): path for path in sorted(folder.glob("domain-*.pddl"))
@@ -39,7 +39,7 @@ def read_factored(directory: str | Path) -> tuple[Domain, Problem]:
         odd = ", ".join(sorted(set(domains) ^ set(problems))) or "no such files"
         raise BadInput(
             f"expected domain-ROBOT.pddl and problem-ROBOT.pddl for every robot; without a partner: {odd}",
-            place=Place(str(directory)),
+            position=Position(str(directory)),
             remedy="Unfactored files are given as DOMAIN PROBLEM, without --factored.",
         )
     views: list[tuple[Domain, Problem]] = []
@@ -55,7 +55,7 @@ def _of_robot(robot: str, domain: Domain, problem: Problem) -> tuple[Domain, Pro
     if robot not in problem.objects:
         raise BadInput(
             f"robot {robot!r} of the file name is no object of its problem",
-            place=problem.source.section(":objects"),
+            position=problem.source.section(":objects"),
         )
     schemas = tuple(replace(s, agent=_agent(robot, s, domain, problem)) for s in domain.schemas)
     return replace(domain, schemas=schemas), problem
@@ -73,7 +73,7 @@ def _agent(robot: str, schema: Schema, domain: Domain, problem: Problem) -> int:
             return number
     raise BadInput(
         f"action {schema.name!r} has no parameter that can only be {robot!r}",
-        place=domain.source.place(schema.offset),
+        position=domain.source.position(schema.offset),
         remedy="Give the robot a type of its own and a parameter of this type.",
     )
 
@@ -86,7 +86,7 @@ def _join_domains(domains: list[Domain], name: str) -> Domain:
         if domain.name != first.name:
             raise BadInput(
                 f"domain {domain.name!r}, expected {first.name!r}",
-                place=domain.source.section("domain"),
+                position=domain.source.section("domain"),
             )
         for schema in domain.schemas:
             known = schemas.setdefault(
@@ -95,7 +95,7 @@ def _join_domains(domains: list[Domain], name: str) -> Domain:
             if replace(known, offset=0) != replace(schema, offset=0):
                 raise BadInput(
                     f"action {schema.name!r} differs between the robots' files",
-                    place=domain.source.place(schema.offset),
+                    position=domain.source.position(schema.offset),
                 )
     return replace(
         first,
@@ -145,13 +145,13 @@ def _join_problems(problems: list[Problem], domain: Domain, name: str) -> Proble
             if values.setdefault(function, value) != value:
                 raise BadInput(
                     f"{function.predicate} {' '.join(function.args)} has another value elsewhere",
-                    place=problem.source.section(":init"),
+                    position=problem.source.section(":init"),
                 )
         for obj, types in problem.objects.items():
             if objects.setdefault(obj, types) != types:
                 raise BadInput(
                     f"object {obj!r} has other types elsewhere",
-                    place=problem.source.section(":objects"),
+                    position=problem.source.section(":objects"),
                 )
         init |= problem.init
         goals[problem.goal] = None

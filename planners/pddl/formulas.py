@@ -208,7 +208,7 @@ def _expect(names: Names, item: Group, count: int) -> None:
 def _unsupported(names: Names, feature: str, item: Group) -> Unsupported:
     return Unsupported(
         f"{feature} is not supported",
-        place=names.document.source.place(item.offset),
+        position=names.document.source.position(item.offset),
         remedy="coordlang reads classical PDDL: states of true and false facts.",
     )
 

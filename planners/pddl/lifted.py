@@ -128,7 +128,7 @@ class Constraint:
     For each binding of ``parameters``, the subactions of a joint step that match it are none, or at
     least ``low`` and at most ``high`` (None: no bound).  ``actions`` lists each action with the
     positions of its arguments (the agent is argument 0) that the parameters bind; ``offsets`` are
-    the places of its entries in the text.
+    the positions of its entries in the text.
     """
 
     name: str

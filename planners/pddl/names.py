@@ -52,21 +52,21 @@ def typed_list(document: Document, items: Sequence[Expression], what: str) -> li
     """
     entries: list[Typed] = []
     waiting: list[Word] = []
-    position = 0
-    while position < len(items):
-        item = word(document, items[position], what)
+    at = 0
+    while at < len(items):
+        item = word(document, items[at], what)
         if item.text != "-":
             waiting.append(item)
-            position += 1
+            at += 1
             continue
-        if position + 1 == len(items):
+        if at + 1 == len(items):
             raise document.fail("expected a type after '-'", item)
         if not waiting:
             raise document.fail(f"expected {what} before '-'", item)
-        types = _types(document, items[position + 1])
+        types = _types(document, items[at + 1])
         entries += [Typed(name, types) for name in waiting]
         waiting = []
-        position += 2
+        at += 2
     return entries + [Typed(name, ("object",)) for name in waiting]
 
 
@@ -138,7 +138,7 @@ class Names:
             if item.head in self.functions:
                 raise Unsupported(
                     f"numeric or object fluent ({item.head} ..) inside a formula",
-                    place=self.document.source.place(item.offset),
+                    position=self.document.source.position(item.offset),
                     remedy="coordlang reads functions only in '(increase (total-cost) ..)'.",
                 )
             raise self.document.fail("expected a variable or an object, found a list", item)

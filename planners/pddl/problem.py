@@ -22,7 +22,7 @@ def read_problem(path: str | Path, domain: Domain) -> Problem:
 def parse_problem(source: Source, domain: Domain) -> Problem:
     """Read a problem.
 
-    Raises `BadInput` (with place and remedy) for anything that ``domain`` does not declare, a
+    Raises `BadInput` (with position and remedy) for anything that ``domain`` does not declare, a
     problem of another domain, or a missing goal; `Unsupported` for timed literals and the like.
     """
     document = parse(source)
@@ -85,13 +85,13 @@ def _read_init(names: Names, item: Group, init: set[Atom], values: dict[Atom, fl
     if head == "at" and len(item) == 3 and isinstance(item.items[2], Group):
         raise Unsupported(
             "timed initial literals are not supported",
-            place=document.source.place(item.offset),
+            position=document.source.position(item.offset),
             remedy="coordlang reads classical PDDL: list what is true at the start.",
         )
     if head in ("oneof", "unknown", "or") and isinstance(second, Group):
         raise Unsupported(
             f"an uncertain initial state '({head} ..)' is not supported",
-            place=document.source.place(item.offset),
+            position=document.source.position(item.offset),
         )
     atom = read_formula(names, item)
     if not isinstance(atom, Atom):
@@ -108,7 +108,7 @@ def _read_value(names: Names, item: Group, values: dict[Atom, float]) -> None:
     if not isinstance(number, Word) or not NUMBER.match(number.text):
         raise Unsupported(
             "a function value that is no number is not supported",
-            place=document.source.place(item.offset),
+            position=document.source.position(item.offset),
         )
     if function.head in names.functions:
         error = names.arity(function, function.head, names.functions[function.head], "function")

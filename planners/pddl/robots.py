@@ -30,7 +30,7 @@ def natural(name: str) -> tuple[tuple[int, int, str], ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class RobotChoice:
+class RobotSelection:
     """What the user said about robots (``--robots``, ``--robot-type``, ``--unowned``)."""
 
     names: tuple[str, ...] = ()
@@ -78,7 +78,7 @@ def objects_of(domain: Domain, problem: Problem, types: Sequence[str]) -> tuple[
     return tuple(sorted(found, key=natural))
 
 
-def find_team(domain: Domain, problem: Problem, choice: RobotChoice) -> Team:
+def find_team(domain: Domain, problem: Problem, choice: RobotSelection) -> Team:
     """The robots: from subaction comments, ``:agent``, the user's choice, or by detection.
 
     Raises
@@ -121,7 +121,7 @@ def find_team(domain: Domain, problem: Problem, choice: RobotChoice) -> Team:
     if not robots:
         raise BadInput(
             "there is no robot in this problem",
-            place=problem.source.section(":objects"),
+            position=problem.source.section(":objects"),
             remedy=f"Robots are found by {by}; declare at least one such object.",
         )
     if choice.unowned == "environment" and any(
@@ -198,7 +198,7 @@ def _detect(domain: Domain, problem: Problem) -> tuple[tuple[str, ...], str]:
     raise BadInput(
         "which objects are the robots? "
         + ("Several types could be" if candidates else "No type could be"),
-        place=domain.source.section(":types"),
+        position=domain.source.section(":types"),
         remedy="Say --robot-type TYPE or --robots NAME,NAME."
         + (f" Candidates: {', '.join(candidates)}." if candidates else ""),
     )

@@ -14,7 +14,7 @@ from hashlib import sha256
 from itertools import accumulate
 from pathlib import Path
 
-from planners.errors import BadInput, Place
+from planners.errors import BadInput, Position
 
 #: Deeper nesting than this is refused: no domain needs it, and the passes behind recurse.
 MAX_DEPTH = 200
@@ -23,7 +23,7 @@ _TOKEN = re.compile(r";[^\n\r]*|[()]|[^\s();]+")
 
 
 class Source:
-    """A text with a name: turns offsets into places for messages."""
+    """A text with a name: turns offsets into positions for messages."""
 
     __slots__ = ("_line_starts", "name", "text")
 
@@ -32,18 +32,18 @@ class Source:
         self.text = text
         self._line_starts: list[int] | None = None
 
-    def place(self, offset: int) -> Place:
+    def position(self, offset: int) -> Position:
         """The line and column (from 1) of a character offset."""
         if self._line_starts is None:
             self._line_starts = [0, *(m.end() for m in re.finditer(r"\n", self.text))]
         line = bisect_right(self._line_starts, offset)
-        return Place(self.name, line, offset - self._line_starts[line - 1] + 1)
+        return Position(self.name, line, offset - self._line_starts[line - 1] + 1)
 
-    def section(self, name: str) -> Place:
+    def section(self, name: str) -> Position:
         """Where a section such as ``:objects`` begins; the first parenthesis if there is none."""
-        places = [m.start() for m in _TOKEN.finditer(self.text) if m.group().lower() == name]
-        places += [m.start() for m in _TOKEN.finditer(self.text) if m.group() == "("][:1]
-        return self.place(places[0] if places else 0)
+        positions = [m.start() for m in _TOKEN.finditer(self.text) if m.group().lower() == name]
+        positions += [m.start() for m in _TOKEN.finditer(self.text) if m.group() == "("][:1]
+        return self.position(positions[0] if positions else 0)
 
     @property
     def sha256(self) -> str:
@@ -51,7 +51,7 @@ class Source:
 
 
 class JoinedSource(Source):
-    """Several texts as one, one below the other; its places are those in the texts themselves."""
+    """Several texts as one, one below the other; its positions are those in the texts themselves."""
 
     __slots__ = ("_parts", "_starts")
 
@@ -60,9 +60,9 @@ class JoinedSource(Source):
         self._parts = tuple(parts)
         self._starts = [0, *accumulate(len(part.text) + 1 for part in parts)][:-1]
 
-    def place(self, offset: int) -> Place:
+    def position(self, offset: int) -> Position:
         number = bisect_right(self._starts, offset) - 1
-        return self._parts[number].place(offset - self._starts[number])
+        return self._parts[number].position(offset - self._starts[number])
 
     def offset(self, part: Source, offset: int) -> int:
         """An offset in one of the texts as an offset in the whole."""
@@ -119,7 +119,7 @@ class Document:
 
     def fail(self, what: str, at: Expression | Comment, remedy: str | None = None) -> BadInput:
         """An error that points at an expression (the caller raises it)."""
-        return BadInput(what, place=self.source.place(at.offset), remedy=remedy)
+        return BadInput(what, position=self.source.position(at.offset), remedy=remedy)
 
 
 def read_source(path: str | Path) -> Source:
@@ -131,16 +131,18 @@ def read_source(path: str | Path) -> Source:
     try:
         data = sys.stdin.buffer.read() if name == "-" else Path(path).read_bytes()
     except FileNotFoundError:
-        raise BadInput("there is no such file", place=Place(name)) from None
+        raise BadInput("there is no such file", position=Position(name)) from None
     except OSError as error:
-        raise BadInput(f"cannot be read: {error.strerror}", place=Place(name)) from None
+        raise BadInput(f"cannot be read: {error.strerror}", position=Position(name)) from None
     try:
         return Source(name, data.decode("utf-8-sig"))
     except UnicodeDecodeError:
         # Old benchmark files hold Latin-1 in their comments; a zero byte is no text in any
         # encoding.
         if b"\0" in data:
-            raise BadInput("this is a binary file, not PDDL text", place=Place(name)) from None
+            raise BadInput(
+                "this is a binary file, not PDDL text", position=Position(name)
+            ) from None
         return Source(name, data.decode("latin-1"))
 
 
@@ -160,16 +162,18 @@ def parse(source: Source) -> Document:
         elif root is not None:
             raise BadInput(
                 f"unexpected {token[:40]!r} after the end of the definition",
-                place=source.place(offset),
-                remedy="Expected the end of the file: a parenthesis too many before this place?",
+                position=source.position(offset),
+                remedy="Expected the end of the file: a parenthesis too many before this position?",
             )
         elif token == "(":
             if len(open_groups) >= MAX_DEPTH:
-                raise BadInput(f"nested more than {MAX_DEPTH} deep", place=source.place(offset))
+                raise BadInput(
+                    f"nested more than {MAX_DEPTH} deep", position=source.position(offset)
+                )
             open_groups.append((offset, []))
         elif token == ")":
             if not open_groups:
-                raise BadInput("')' without a '('", place=source.place(offset))
+                raise BadInput("')' without a '('", position=source.position(offset))
             start, items = open_groups.pop()
             group = Group(tuple(items), start, offset)
             if open_groups:
@@ -178,7 +182,7 @@ def parse(source: Source) -> Document:
                 root = group
         elif not open_groups:
             raise BadInput(
-                f"expected '(define ...', found {token[:40]!r}", place=source.place(offset)
+                f"expected '(define ...', found {token[:40]!r}", position=source.position(offset)
             )
         else:
             open_groups[-1][1].append(Word(token.lower(), offset))
@@ -187,13 +191,13 @@ def parse(source: Source) -> Document:
         first = items[0].text if items and isinstance(items[0], Word) else ""
         raise BadInput(
             f"the '({first}' that opens here is never closed",
-            place=source.place(start),
+            position=source.position(start),
             remedy=f"Expected {len(open_groups)} more ')' before the end of the file.",
         )
     if root is None:
         raise BadInput(
             "expected '(define ...', found an empty file",
-            place=Place(source.name),
+            position=Position(source.name),
             remedy="Give a PDDL file: DOMAIN first, then PROBLEM.",
         )
     return Document(source, root, tuple(comments))

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from planners.errors import BadInput, Place
-from planners.joint.joint_actions import WholeActions
+from planners.errors import BadInput, Position
+from planners.joint.joint_actions import JointActionStepper
 from planners.joint.model import JointModel
 from planners.search.plans import Plan, Plans
 
@@ -32,8 +32,8 @@ def json_count(number: int) -> int | str:
 class NoSuchAction(BadInput):
     """A plan names an action that the problem does not have; ``step`` is where, from 0."""
 
-    def __init__(self, action: str, step: int, place: Place) -> None:
-        super().__init__(f"{action} is no action of this problem", place=place)
+    def __init__(self, action: str, step: int, position: Position) -> None:
+        super().__init__(f"{action} is no action of this problem", position=position)
         self.step = step
 
 
@@ -56,10 +56,10 @@ def to_ipc(plans: Plans, plan: Plan) -> str:
     """
     model = plans.space.model
     lines: list[str] = []
-    if isinstance(model.stepper, WholeActions):
+    if isinstance(model.stepper, JointActionStepper):
         states = plans.states(plan)
         lines += [
-            model.stepper.name(plans.space.rows[state][: model.codec.fact_words], labels)
+            model.stepper.name(plans.space.rows[state][: model.codec.fact_blocks], labels)
             for state, labels in zip(states, plan, strict=False)
         ]
     else:
@@ -89,19 +89,19 @@ def to_json(plans: Plans, listed: Sequence[Plan], task: int = 0) -> dict[str, An
 
 def read_plans(path: str | Path, model: JointModel) -> list[tuple[Texts, ...]]:
     """The plans of a plan file, JSON or IPC text.  Raises `BadInput` with the line."""
-    place = Place(str(path))
+    position = Position(str(path))
     try:
         text = sys.stdin.read() if str(path) == "-" else Path(path).read_text()
     except OSError as error:
-        raise BadInput(f"cannot be read: {error.strerror}", place=place) from None
+        raise BadInput(f"cannot be read: {error.strerror}", position=position) from None
     except UnicodeDecodeError as error:
-        raise BadInput(f"this is no text: {error}", place=place) from None
+        raise BadInput(f"this is no text: {error}", position=position) from None
     if text.lstrip().startswith("{"):
-        return _from_json(text, model, place)
+        return _from_json(text, model, position)
     return [_from_ipc(text, model, str(path))]
 
 
-def only_one_plan(text: str, place: Place) -> None:
+def only_one_plan(text: str, position: Position) -> None:
     """Raise `BadInput`, with the line, where a second plan begins in IPC text.
 
     It begins with its comment, after the closing comment of the plan before it, or with step
@@ -118,7 +118,7 @@ def only_one_plan(text: str, place: Place) -> None:
         if again or (title and (begun or actions)):
             raise BadInput(
                 "this file holds several plans: a second one begins here",
-                place=Place(place.file, number, 1),
+                position=Position(position.file, number, 1),
                 remedy="Write one plan a file (`coordlang plans --max 1`), or use the JSON form.",
             )
         begun, ended = begun or title, ended or (actions and bool(_END.match(raw)))
@@ -127,12 +127,12 @@ def only_one_plan(text: str, place: Place) -> None:
             first = now if first < 0 else first
 
 
-def _from_json(text: str, model: JointModel, place: Place) -> list[tuple[Texts, ...]]:
+def _from_json(text: str, model: JointModel, position: Position) -> list[tuple[Texts, ...]]:
     try:
         entries = json.loads(text)["plans"]
         found = [tuple(tuple(step) for step in entry["actions"]) for entry in entries]
     except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise BadInput(f"this is no JSON plan file: {error}", place=place) from None
+        raise BadInput(f"this is no JSON plan file: {error}", position=position) from None
     for plan in found:
         for number, step in enumerate(plan):
             if len(step) != len(model.robots) or not all(
@@ -140,13 +140,13 @@ def _from_json(text: str, model: JointModel, place: Place) -> list[tuple[Texts, 
             ):
                 raise BadInput(
                     f"step {number} must have one text or null for each of {', '.join(model.robots)}",
-                    place=place,
+                    position=position,
                 )
     return found
 
 
 def _from_ipc(text: str, model: JointModel, name: str) -> tuple[Texts, ...]:
-    only_one_plan(text, Place(name))
+    only_one_plan(text, Position(name))
     steps: dict[int, list[str | None]] = {}
     for number, raw in enumerate(text.splitlines(), 1):
         line = raw.split(";")[0].strip().lower()
@@ -155,37 +155,42 @@ def _from_ipc(text: str, model: JointModel, name: str) -> tuple[Texts, ...]:
         match = _LINE.match(line)
         if match is None:
             raise BadInput(
-                f"expected '0: (action args)', found {raw.strip()!r}", place=Place(name, number, 1)
+                f"expected '0: (action args)', found {raw.strip()!r}",
+                position=Position(name, number, 1),
             )
         action = "(" + " ".join(match["action"][1:-1].split()) + ")"
         step = int(match["step"][-8:]) if match["step"] else len(steps)
         if match["step"] and (len(match["step"]) > 8 or step > _MOST_STEPS):
             raise BadInput(
-                f"step {match['step'][:20]} is too many steps", place=Place(name, number, 1)
+                f"step {match['step'][:20]} is too many steps", position=Position(name, number, 1)
             )
         own = steps.setdefault(step, [None] * len(model.robots))
-        _put(own, step, action, model, Place(name, number, 1))
+        _put(own, step, action, model, Position(name, number, 1))
     last = max(steps, default=-1)
     return tuple(tuple(steps.get(k, [None] * len(model.robots))) for k in range(last + 1))
 
 
-def _put(own: list[str | None], step: int, action: str, model: JointModel, place: Place) -> None:
+def _put(
+    own: list[str | None], step: int, action: str, model: JointModel, position: Position
+) -> None:
     """Enter an action for the robots that it belongs to."""
     if model.is_joint_action:
         parts = next((a.parts for a in model.actions if a.label == action), None)
         if parts is None:
-            raise NoSuchAction(action, step, place)
+            raise NoSuchAction(action, step, position)
         if any(own):
-            raise BadInput(f"two joint actions in one step: {action} is the second", place=place)
+            raise BadInput(
+                f"two joint actions in one step: {action} is the second", position=position
+            )
         own[:] = parts
         return
     owners = next((a.owners for a in model.actions if a.label == action), None)
     if owners is None:
-        raise NoSuchAction(action, step, place)
+        raise NoSuchAction(action, step, position)
     for robot in owners:
         if own[robot] is not None:
             raise BadInput(
                 f"{model.robots[robot]} does two things in one step: {own[robot]} and {action}",
-                place=place,
+                position=position,
             )
         own[robot] = action

@@ -126,7 +126,7 @@ def _forward(
         if not len(layer):
             raise ProvedImpossible(
                 f"task {task.name}: the goal cannot be reached",
-                place=task.place,
+                position=task.position,
                 remedy=_searched(len(seen)),
             )
         seen, _ = unique_rows(np.concatenate((seen, layer)))

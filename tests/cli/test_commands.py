@@ -14,7 +14,7 @@ import pytest
 
 from planners.check.validate import validate
 from planners.loading import load
-from planners.pddl.robots import RobotChoice, find_team
+from planners.pddl.robots import RobotSelection, find_team
 from planners.search.plan_file import read_plans
 from tests.conftest import DOMAINS, ROOT, Command
 
@@ -44,7 +44,7 @@ def test_every_printed_plan_is_valid(
         path.write_text(text)
         plans += read_plans(path, loaded.model)
     assert len(plans) == len(set(plans)) == 18
-    team = find_team(loaded.domain, loaded.problems[0], RobotChoice())
+    team = find_team(loaded.domain, loaded.problems[0], RobotSelection())
     for plan in plans:
         verdict = validate(loaded.domain, loaded.problems[0], team, plan)
         assert verdict.valid, verdict.reason

@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from coordlang.language.words import WordTable
-from coordlang.required.divergences import alphas, separations
+from coordlang.required.divergences import first_differences, separations
 from coordlang.required.miscoordination import inseparable, miscoordination
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.verification.by_definition import verify
@@ -90,7 +90,7 @@ def test_walk_equals_listing(robots: int, most: int) -> None:
         seen["required"] += any(requires)
         seen["inseparable"] += same_states
         if not same_states:
-            found = alphas(candidates.spaces)
+            found = first_differences(candidates.spaces)
             assert found.requiring == sum(requires)
             table = {
                 (last, frozenset(s for s in after if s >= 0))
@@ -167,7 +167,7 @@ def test_greedy_is_a_language_and_merging_is_judged_right(robots: int, most: int
         candidates = candidates_of(seed, robots)
         listable(candidates, most)
         assume(all(inseparable(space) is None for space in candidates.spaces))
-        found = alphas(candidates.spaces)
+        found = first_differences(candidates.spaces)
         partition = fill(range(len(candidates.rows)), separations(found.divergences))
         word = np.array([partition[s] for s in range(len(candidates.rows))])
         names = tuple(f"w{n}" for n in range(int(word.max()) + 1))

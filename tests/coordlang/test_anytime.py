@@ -15,7 +15,7 @@ import pytest
 import coordlang.building
 from coordlang.building import build_language
 from coordlang.language.file import read_language
-from coordlang.vocabulary.sat import Colouring
+from coordlang.vocabulary.sat import PartitionProblem
 from planners.errors import OutOfMemory, OutOfTime
 from planners.limits import time_limit
 from tests.conftest import DOMAINS, Command
@@ -139,7 +139,7 @@ def test_the_language_is_written_without_its_certificate(
 
 def test_the_solver_hears_the_clock() -> None:
     """Eleven pigeons in ten holes take the solver very long."""
-    colouring = Colouring([0], 1)
+    colouring = PartitionProblem([0], 1)
     hole = [[100 + 10 * pigeon + h for h in range(10)] for pigeon in range(11)]
     for pigeon in range(11):
         colouring._solver.add_clause(hole[pigeon])

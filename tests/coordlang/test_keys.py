@@ -30,11 +30,11 @@ def random_codec(random: Random) -> StateCodec:
 def random_rows(random: Random, codec: StateCodec) -> Rows:
     rows = np.zeros((random.randint(1, 30), codec.width), np.uint64)
     for row in rows:
-        row[: codec.fact_words] = codec.mask(
+        row[: codec.fact_blocks] = codec.mask(
             n for n in range(len(codec.facts)) if random.random() < random.choice([0, 0.1, 0.9])
         )
         if codec.memory is not None:
-            row[codec.fact_words :] = [random.randint(0, len(own)) for own in codec.memory]
+            row[codec.fact_blocks :] = [random.randint(0, len(own)) for own in codec.memory]
     return rows
 
 

@@ -18,11 +18,11 @@ import coordlang
 from coordlang.building import build_language
 from coordlang.language.file import language_from_bytes, read_language, to_bytes, write_language
 from coordlang.language.record import json_schema
-from planners.errors import BadInput, Place
+from planners.errors import BadInput, Position
 from tests.conftest import DOMAINS, Command
 from tests.coordlang.test_minimal import shipped
 
-HERE = Place("here")
+HERE = Position("here")
 RUNNING = [DOMAINS / "three-cells" / name for name in ("domain.pddl", "problem.pddl")]
 
 

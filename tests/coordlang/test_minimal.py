@@ -14,7 +14,7 @@ from coordlang.language.warping import Clause, pair, separation_clause, warping_
 from coordlang.language.words import sentence
 from coordlang.required.miscoordination import inseparable
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
-from coordlang.vocabulary.sat import Colouring, Problems, reduce
+from coordlang.vocabulary.sat import PartitionProblem, PartitionProblems, reduce
 from planners.errors import ProvedImpossible
 from planners.pddl import read_domain, read_problem
 from planners.search.plan_space import PlanSpace
@@ -92,7 +92,7 @@ def test_separation_clause_of_three_plans() -> None:
 )
 def test_colouring_against_trying_all(size: int, drawn: list[set[tuple[int, int]]]) -> None:
     clauses = [frozenset(pair(a, b) for a, b in clause if a != b) for clause in drawn]
-    colouring = Colouring([2, 0, 1, 4, 3], size)
+    colouring = PartitionProblem([2, 0, 1, 4, 3], size)
     for clause in clauses:
         colouring.add(clause)
     found = colouring.solve()
@@ -134,11 +134,11 @@ def test_one_of_symmetric_partitions(
         for clause in drawn
         for s in [range(5), *group]
     }
-    plain, led = Colouring(range(5), size), Colouring(range(5), size)
+    plain, led = PartitionProblem(range(5), size), PartitionProblem(range(5), size)
     for colouring in (plain, led):
         for clause in sorted(clauses, key=sorted):
             colouring.add(clause)
-    led.prefer_one_of_each(group, pairs)
+    led.add_lex_leaders(group, pairs)
     found = led.solve()
     assert (found is None) == (plain.solve() is None)
     for colouring in (plain, led):
@@ -151,14 +151,14 @@ def test_one_of_symmetric_partitions(
 def test_problems_are_kept_and_learn_what_is_new() -> None:
     started: list[int] = []
 
-    def start(size: int, known: Sequence[Clause]) -> Colouring:
+    def start(size: int, known: Sequence[Clause]) -> PartitionProblem:
         started.append(len(known))
-        colouring = Colouring([0, 1, 2], size)
+        colouring = PartitionProblem([0, 1, 2], size)
         for clause in known:
             colouring.add(clause)
         return colouring
 
-    problems = Problems(start, Colouring.add)
+    problems = PartitionProblems(start, PartitionProblem.add)
     known: list[Clause] = [frozenset({(0, 1)}), frozenset({(0, 1), (1, 2)})]
     first = problems.of(2, known)
     assert first.solve() is not None

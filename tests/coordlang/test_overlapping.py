@@ -22,7 +22,7 @@ from coordlang.tasks.candidates import Candidates
 from coordlang.verification.overlapping import verify_overlapping
 from coordlang.vocabulary.enlarging import enlarge
 from coordlang.vocabulary.flexibility_bound import flexibility_bounds
-from planners.errors import BadInput, Place
+from planners.errors import BadInput, Position
 from planners.search.plans import Plan
 from tests.coordlang import naive
 from tests.coordlang.test_flexible import listed, on_graph, shipped, some_tasks
@@ -217,7 +217,7 @@ def test_a_bad_also_is_refused() -> None:
     key, word = next(iter(language.states.items()))
     other = next(w for w in language.words if w != word)
     assert language_from_bytes(
-        to_bytes(replace(language, also={key: (other,)})), Place("l")
+        to_bytes(replace(language, also={key: (other,)})), Position("l")
     ).also == {key: (other,)}
     for also in (
         {key: ()},
@@ -227,7 +227,7 @@ def test_a_bad_also_is_refused() -> None:
         {"(at r1 nowhere)": (other,)},
     ):
         with pytest.raises(BadInput, match="'also' of"):
-            language_from_bytes(to_bytes(replace(language, also=also)), Place("l"))
+            language_from_bytes(to_bytes(replace(language, also=also)), Position("l"))
 
 
 def test_old_files_have_no_also() -> None:

@@ -183,4 +183,4 @@ def test_what_pairs_cost() -> None:
     languages = pair_languages(candidates.spaces)
     assert [language.size for language in languages] == [2, 2, 2]
     assert joint.language.guarantee.size == 2
-    assert sum(language.nodes for language in languages) < joint.alphas.nodes / 3
+    assert sum(language.nodes for language in languages) < joint.first_differences.nodes / 3

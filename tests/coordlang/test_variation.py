@@ -15,7 +15,7 @@ from coordlang.tasks.candidates import from_listed
 from coordlang.tasks.patterns import varied_tasks
 from coordlang.tasks.task_file import ListedTask, read_task_file
 from planners.errors import ProvedImpossible, UsageError
-from planners.loading import Loaded, load
+from planners.loading import PlanningInstance, load
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "planners"))
 
@@ -33,7 +33,7 @@ def matches(atom: str, pattern: str) -> bool:
 
 
 def naive(
-    loaded: Loaded, starts: list[str], goals: list[str]
+    loaded: PlanningInstance, starts: list[str], goals: list[str]
 ) -> set[tuple[frozenset[str], frozenset[str]]]:
     """The definition, with sets of atoms."""
     twin = Twin(loaded.domain, loaded.problems[0], loaded.team)

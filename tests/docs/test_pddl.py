@@ -59,7 +59,7 @@ def test_what_is_not_supported(cells: list[str]) -> None:
         load(*texts(cells[2], code(cells[1])[0]))
     assert error.value.what == cells[3]
     assert error.value.exit_code == 34
-    place = error.value.place
+    place = error.value.position
     assert place is not None
     assert place.file == ("problem" if cells[2] == "init" else "domain")
     assert place.line > 0

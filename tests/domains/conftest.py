@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from planners.loading import Loaded, load
+from planners.loading import PlanningInstance, load
 from planners.search.plan_space import PlanSpace, search
 from planners.search.reachable import Space, explore
 
@@ -22,7 +22,7 @@ sys.path.insert(0, str(DOMAINS))
 
 @dataclass(frozen=True, slots=True)
 class World:
-    loaded: Loaded
+    loaded: PlanningInstance
     space: Space
     plans: PlanSpace
 

@@ -21,7 +21,7 @@ from coordlang.tasks.task_file import read_task_file
 from coordlang.verification.by_definition import verify
 from planners.classical.fast_downward import optimal_cost
 from planners.joint.model import Cost
-from planners.loading import Loaded, ModelOptions, load
+from planners.loading import ModelOptions, PlanningInstance, load
 from planners.pddl import read_domain, read_problem
 from planners.pddl.robots import static_atoms
 from planners.search.plan_space import search
@@ -32,8 +32,8 @@ ROOT = Path(__file__).resolve().parents[2]
 DOMAINS = ROOT / "domains"
 sys.path.insert(0, str(ROOT))  # this folder is no package, so pytest does not do it
 
-from tests.docs.pages import blocks, commands, links  # noqa: E402
-from tests.docs.test_run import run_command  # noqa: E402
+from tests.docs.pages import blocks, commands, links
+from tests.docs.test_run import run_command
 
 #: The folders, and how the robots are found in each.
 WORLDS = {
@@ -126,7 +126,7 @@ def test_the_table_of_languages(folder: str, row: Row) -> None:
     for method in ("greedy", "minimal"):
         built = build_language(tasks, method)
         guarantee = built.language.guarantee
-        assert built.alphas.requiring == int(row["requiring coordination"])
+        assert built.first_differences.requiring == int(row["requiring coordination"])
         assert guarantee.size == int(row[f"{method} words"])
         assert guarantee.proved_minimal or method == "greedy"
         assert verify(WordTable.of(built.language, tasks.model), tasks.spaces).holds
@@ -222,7 +222,7 @@ def atoms(key: str) -> State:
     return frozenset(tuple(atom.split()) for atom in re.findall(r"\(([^()]*)\)", key))
 
 
-def steps(loaded: Loaded, space: Space) -> Iterator[Step]:
+def steps(loaded: PlanningInstance, space: Space) -> Iterator[Step]:
     model = space.model
     fixed = frozenset(
         (atom.predicate, *atom.args) for atom in static_atoms(loaded.domain, loaded.problems[0])

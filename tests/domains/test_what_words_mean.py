@@ -247,7 +247,7 @@ def test_the_languages_of_the_maps(folder: str, row: Row) -> None:
     assert tasks.count == int(row["tasks"])
     for method in ("greedy", "minimal"):
         built = build_language(tasks, method)
-        assert built.alphas.requiring == int(row["requiring coordination"])
+        assert built.first_differences.requiring == int(row["requiring coordination"])
         assert built.language.guarantee.size == int(row[f"{method} words"])
         assert built.verdict.holds
         assert built.language.guarantee.proved_minimal or method == "greedy"

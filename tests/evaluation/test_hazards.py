@@ -19,14 +19,14 @@ from coordlang.evaluation.material.warehouse import (
     human_in,
     listed_tasks,
 )
-from coordlang.use.sentence.spoken import Spoken
+from coordlang.use.sentence.task_language import TaskLanguage
 from planners.search.plans import Plan
 from tests.conftest import DOMAINS
 from tests.coordlang import naive
 from tests.evaluation.worlds import shipped, spoken, three_cells
 
 
-def groups(one: Spoken) -> dict[tuple[int, ...], list[Plan]]:
+def groups(one: TaskLanguage) -> dict[tuple[int, ...], list[Plan]]:
     """The plans of each sentence."""
     of_state = dict(zip(one.space.state.tolist(), one.word.tolist(), strict=True))
     found: dict[tuple[int, ...], list[Plan]] = {}
@@ -45,7 +45,7 @@ def survive(plans: list[Plan], hazard: Hazard) -> bool:
     )
 
 
-def random_hazard(one: Spoken, random: Random) -> Hazard:
+def random_hazard(one: TaskLanguage, random: Random) -> Hazard:
     labels = [range(1, len(own)) for own in one.model.labels]
     return Hazard(
         str(random.random()),
@@ -150,7 +150,9 @@ def test_a_warehouse_by_enumeration(tmp_path) -> None:
         hazard, by_plan, by_sentence = trials.hazards[trial.hazard], 1.0, 1.0
         for task in trial.tasks:
             if task not in said:
-                said[task] = groups(Spoken(language, base.table, base.space, task, base.word, True))
+                said[task] = groups(
+                    TaskLanguage(language, base.table, base.space, task, base.word, True)
+                )
             found = said[task]
             total = sum(map(len, found.values()))
             by_plan *= sum(not hazard.breaks(p) for plans in found.values() for p in plans) / total

@@ -13,7 +13,7 @@ from coordlang.evaluation.experiments import communication, flexibility
 from coordlang.evaluation.experiments.table1 import brute_force, pairs_of_plans
 from coordlang.evaluation.lab.interval import mean_interval, wilson
 from coordlang.evaluation.material.orders import NATURAL, greedy_in_orders, natural_orders
-from coordlang.evaluation.material.said import Said, said, sentence_counts
+from coordlang.evaluation.material.sentence_counts import SentenceCounts, said, sentence_counts
 from coordlang.language.flexibility import flexibility as measured
 from coordlang.language.words import WordTable
 from coordlang.required.divergences import states_on_plans
@@ -59,7 +59,10 @@ def test_means_are_over_the_right_tasks() -> None:
     """Two tasks of two steps: one sentence of three words with one plan, one of a single word with
     five.
     """
-    tasks = [Said(2, {(0, 1, 2): 1}, (0, 1, 2), (0, 1, 2)), Said(2, {(0,): 5}, (0,), (0,))]
+    tasks = [
+        SentenceCounts(2, {(0, 1, 2): 1}, (0, 1, 2), (0, 1, 2)),
+        SentenceCounts(2, {(0,): 5}, (0,), (0,)),
+    ]
     savings = communication.measures(tasks)
     assert (savings["differing"], savings["tasks"]) == (1, 2)
     assert savings["saving_differing"] == round(2 / 3, 6)

@@ -24,9 +24,9 @@ from coordlang.evaluation.material.paper import (
 )
 from coordlang.evaluation.material.suite import OTHERS, ROWS, WORLDS, find_domains
 from coordlang.language.words import WordTable
-from coordlang.use.sentence.guided import Terrain
-from coordlang.use.sentence.spoken import speak_candidates
-from coordlang.vocabulary.sat import Colouring
+from coordlang.use.sentence.astar import ExpandedStates
+from coordlang.use.sentence.task_language import languages_in_tasks
+from coordlang.vocabulary.sat import PartitionProblem
 from planners.errors import OutOfTime, UsageError
 from planners.search.plans import Plans
 from tests.conftest import DOMAINS
@@ -76,14 +76,14 @@ def test_expansions_on_three_cells() -> None:
     away, and comes up next.
     """
     one = three_cells()
-    terrain = Terrain(one.model, one.table)
+    terrain = ExpandedStates(one.model, one.table)
     assert planning_cost.expansions(one, "blind", terrain) == (2, 2, 2)
     assert planning_cost.expansions(one, "relaxed", terrain) == (2, 2, 2)
 
 
 def test_a_sentence_saves_work() -> None:
     tasks = spoken("tray", "serve", "greedy")
-    terrain = Terrain(tasks[0].model, tasks[0].table)
+    terrain = ExpandedStates(tasks[0].model, tasks[0].table)
     counted = [
         planning_cost.expansions(one, "relaxed", terrain) for one in Random(1).sample(tasks, 40)
     ]
@@ -99,7 +99,7 @@ def test_the_detour_is_optimal_and_nobody_else_moves_otherwise(tmp_path: Path) -
     assert candidates.count == 36 * 36
     one = next(
         s
-        for s in speak_candidates(language, candidates)
+        for s in languages_in_tasks(language, candidates)
         if scenario._ends(s) == (scenario.START, scenario.GOAL)
     )
     found = scenario.detour(one)
@@ -164,7 +164,7 @@ def test_languages_are_kept_and_unfinished_ones_are_not(
     def late(*_: object) -> bool:
         raise OutOfTime("the time limit is over")
 
-    monkeypatch.setattr(Colouring, "solve", late)
+    monkeypatch.setattr(PartitionProblem, "solve", late)
     with pytest.raises(OutOfTime):
         language_for(WORLDS["GW2"], "minimal", settings)
     assert list((tmp_path / "cache").glob("*.json.gz")) == kept

@@ -9,7 +9,7 @@ from functools import cache
 from coordlang.building import build_language
 from coordlang.language.words import Guarantee, Language
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
-from coordlang.use.sentence.spoken import Spoken, speak_candidates
+from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 from planners.pddl import read_domain, read_problem
 from tests.conftest import DOMAINS
 
@@ -31,18 +31,18 @@ def where_r2_is(candidates: Candidates) -> Language:
 
 
 @cache
-def three_cells() -> Spoken:
+def three_cells() -> TaskLanguage:
     """r1 and r2 trade a and b on three adjacent cells, a joint step being three states: four
     optimal plans.
     """
     candidates = shipped("three-cells", everything=False)
-    return next(iter(speak_candidates(where_r2_is(candidates), candidates)))
+    return next(iter(languages_in_tasks(where_r2_is(candidates), candidates)))
 
 
 @cache
 def spoken(
     folder: str, stem: str, method: str = "minimal", everything: bool = True
-) -> tuple[Spoken, ...]:
+) -> tuple[TaskLanguage, ...]:
     """Every candidate task with a language that a method makes."""
     candidates = shipped(folder, stem, everything)
-    return tuple(speak_candidates(build_language(candidates, method).language, candidates))
+    return tuple(languages_in_tasks(build_language(candidates, method).language, candidates))

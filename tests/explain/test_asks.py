@@ -11,11 +11,11 @@ import pytest
 
 from coordlang.building import build_language
 from coordlang.explanation import word_formulas
-from coordlang.explanation.asks import Asked, asked
-from coordlang.explanation.text import asked_text
+from coordlang.explanation.demands import SentenceDemands, sentence_demands
+from coordlang.explanation.text import demands_text
 from coordlang.tasks.candidates import all_pairs, from_problems
-from coordlang.use.sentence.fitting import fitting
-from coordlang.use.sentence.spoken import Spoken, speak_candidates
+from coordlang.use.sentence.fitting_plans import fitting
+from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 from planners.errors import ProvedImpossible
 from planners.pddl import read_domain, read_problem
 from planners.search.plans import Plan, Plans
@@ -26,7 +26,7 @@ from tests.coordlang.test_minimal import shipped
 from tests.explain.test_formulas import language_of, random_language
 
 
-def by_sentence(spoken: Spoken, most: int) -> dict[tuple[int, ...], list[Plan]]:
+def by_sentence(spoken: TaskLanguage, most: int) -> dict[tuple[int, ...], list[Plan]]:
     word = spoken.table.of_rows(spoken.space.rows)
     groups: dict[tuple[int, ...], list[Plan]] = {}
     for plan in naive.listed(spoken.space, spoken.task, most):
@@ -36,7 +36,11 @@ def by_sentence(spoken: Spoken, most: int) -> dict[tuple[int, ...], list[Plan]]:
 
 
 def check(
-    spoken: Spoken, words: tuple[int, ...], plans: list[Plan], found: Asked, few: int
+    spoken: TaskLanguage,
+    words: tuple[int, ...],
+    plans: list[Plan],
+    found: SentenceDemands,
+    few: int,
 ) -> None:
     model = spoken.model
     assert found.sentence == tuple(spoken.table.words[w] for w in words)
@@ -85,16 +89,16 @@ def test_against_listed_plans(robots: int) -> None:
             Random(seed), candidates
         )  # RC or not: what is asked is about listed plans
         formulas = word_formulas(language, candidates.model)
-        for spoken in list(speak_candidates(language, candidates))[:8]:
+        for spoken in list(languages_in_tasks(language, candidates))[:8]:
             try:
                 groups = by_sentence(spoken, 60)
             except naive.TooLarge:
                 continue
             for words, plans in groups.items():
                 few = 2
-                found = asked(fitting(spoken, words), spoken.table, formulas, few)
+                found = sentence_demands(fitting(spoken, words), spoken.table, formulas, few)
                 check(spoken, words, plans, found, few)
-                assert asked_text(found)
+                assert demands_text(found)
                 seen["changes"] += len(found.changes) > 0
                 seen["many subplans"] += any((p.subplans or 0) > few for p in found.parts)
                 for change in found.changes:
@@ -114,10 +118,10 @@ def test_changes_that_may_come_sooner_or_later() -> None:
     words = {key: f"w{min(2, int(key.split('(at r1 c')[1][0]))}" for key in keys}
     language = language_of(words, ("w0", "w1", "w2"))
     formulas = word_formulas(language, candidates.model)
-    (spoken,) = speak_candidates(language, candidates)
+    (spoken,) = languages_in_tasks(language, candidates)
     several = 0
     for said, plans in by_sentence(spoken, 10_000).items():
-        found = asked(fitting(spoken, said), spoken.table, formulas, 3)
+        found = sentence_demands(fitting(spoken, said), spoken.table, formulas, 3)
         check(spoken, said, plans, found, 3)
         assert all(change.robots == ("r1",) for change in found.changes)
         several += sum(change.earliest < change.latest for change in found.changes)
@@ -135,10 +139,10 @@ def test_who_decides_a_change(folder: str, stem: str, every: int) -> None:
     language = build_language(candidates, "greedy").language
     formulas = word_formulas(language, candidates.model)
     sizes: Counter[int] = Counter()
-    for spoken in list(speak_candidates(language, candidates))[::every]:
+    for spoken in list(languages_in_tasks(language, candidates))[::every]:
         for words in by_sentence(spoken, 1000):
             fits = fitting(spoken, words)
-            found = asked(fits, spoken.table, formulas)
+            found = sentence_demands(fits, spoken.table, formulas)
             for number, change in enumerate(found.changes):
                 before = states_before(fits, spoken, number)
                 robots = [spoken.model.robots.index(r) for r in change.robots]
@@ -152,7 +156,7 @@ def test_who_decides_a_change(folder: str, stem: str, every: int) -> None:
     assert sizes[2], sizes
 
 
-def states_before(fits: object, spoken: Spoken, number: int) -> set[int]:
+def states_before(fits: object, spoken: TaskLanguage, number: int) -> set[int]:
     """The states in which a plan is just before its change of word ``number``, by following all
     plans.
     """
@@ -166,7 +170,7 @@ def states_before(fits: object, spoken: Spoken, number: int) -> set[int]:
     return found
 
 
-def settled(spoken: Spoken, states: set[int], after: int, robots: list[int]) -> bool:
+def settled(spoken: TaskLanguage, states: set[int], after: int, robots: list[int]) -> bool:
     mapped = set(spoken.language.states)
     for state in states:
         answer: dict[tuple[int, ...], bool] = {}
@@ -188,9 +192,9 @@ def test_the_running_example_in_plain_sentences() -> None:
     )
     language = build_language(candidates, "greedy").language
     formulas = word_formulas(language, candidates.model)
-    (spoken,) = speak_candidates(language, candidates)
-    found = asked(fitting(spoken, spoken.words_of("w1 w0")), spoken.table, formulas)
-    assert asked_text(found).splitlines() == [
+    (spoken,) = languages_in_tasks(language, candidates)
+    found = sentence_demands(fitting(spoken, spoken.words_of("w1 w0")), spoken.table, formulas)
+    assert demands_text(found).splitlines() == [
         '"w1 w0" leaves 2 plans open.',
         "  r1: move a c, move c b.",
         "  r2 may choose:",

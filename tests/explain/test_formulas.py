@@ -12,8 +12,8 @@ import pytest
 from coordlang.building import build_language
 from coordlang.explanation import Cover, Literal, Variable, word_formulas
 from coordlang.explanation.boxes import Points, expand
+from coordlang.explanation.descriptions import describe_words
 from coordlang.explanation.minimise import minimise
-from coordlang.explanation.telling import telling
 from coordlang.explanation.text import literal_text, pddl_condition, shown
 from coordlang.explanation.variables import truth, valuation
 from coordlang.explanation.words import all_covers, mapped_states
@@ -89,7 +89,7 @@ def test_exactly_one_formula_is_true_in_every_mapped_state(robots: int) -> None:
         mapped = mapped_states(language, candidates.model)
         formulas = all_covers(mapped)
         check_exact(language, candidates, formulas)
-        told = telling(mapped, formulas)
+        told = describe_words(mapped, formulas)
         for key, word in language.states.items():
             atoms = candidates.model.codec.decode(candidates.model.codec.parse_key(key))
             true = [w for w, formula in told.rules if formula is None or formula.holds(atoms)]

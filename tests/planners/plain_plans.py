@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 
-from planners.classical import PlainTask
+from planners.classical import ClassicalTask
 
 PlainState = frozenset[int]
 
@@ -21,7 +21,7 @@ class OptimalPlans:
     plans: `RecursionError`.
     """
 
-    plain: PlainTask
+    plain: ClassicalTask
     edges: dict[PlainState, list[tuple[int, int, PlainState]]]
     distance: dict[PlainState, int]
 
@@ -62,7 +62,7 @@ def holds(conditions: Sequence[tuple[int, bool]], state: PlainState) -> bool:
     return all((fact in state) == positive for fact, positive in conditions)
 
 
-def optimal_plans(plain: PlainTask) -> OptimalPlans:
+def optimal_plans(plain: ClassicalTask) -> OptimalPlans:
     """Everything that can be reached, and Dijkstra's algorithm from the goals back."""
     edges: dict[PlainState, list[tuple[int, int, PlainState]]] = {}
     into = defaultdict(list)

@@ -17,10 +17,10 @@ from random_pddl import Kind, random_model
 from planners.check.validate import Moment, State
 from planners.errors import BadInput
 from planners.joint.model import show
-from planners.loading import Loaded, ModelOptions, build, task_of
+from planners.loading import ModelOptions, PlanningInstance, build, task_of
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import And, Formula, Not
-from planners.pddl.robots import RobotChoice
+from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
 from planners.search.plan_space import TaskGroup, plan_spaces, search
 from planners.search.plans import Plans
@@ -29,7 +29,7 @@ from planners.search.reachable import explore
 Price = Callable[[str], int]
 
 
-def priced(seed: int, kind: Kind) -> tuple[Loaded, Price]:
+def priced(seed: int, kind: Kind) -> tuple[PlanningInstance, Price]:
     """A random model in which every action costs a constant, or what its first argument costs, or
     nothing.
     """
@@ -60,7 +60,7 @@ def priced(seed: int, kind: Kind) -> tuple[Loaded, Price]:
         Source("p", text.problem.replace("(:init", f"(:init {known}", 1)), domain
     )
     loaded = build(
-        domain, [problem], ModelOptions(RobotChoice(unowned=text.unowned), "makespan+cost")
+        domain, [problem], ModelOptions(RobotSelection(unowned=text.unowned), "makespan+cost")
     )
 
     def price(label: str) -> int:
@@ -135,7 +135,7 @@ def test_a_price_that_is_missing() -> None:
     problem = """(define (problem p) (:domain d) (:objects r1 r2 - robot a b c - place)
       (:init (at r1 a) (at r2 a) (way a b) (= (far a b) 2)) (:goal (at r1 b)))"""
 
-    def loaded(more: str = "", cost: str = "makespan+cost") -> Loaded:
+    def loaded(more: str = "", cost: str = "makespan+cost") -> PlanningInstance:
         read = parse_domain(Source("d", domain))
         task = parse_problem(Source("p", problem.replace("(way a b)", f"(way a b) {more}")), read)
         return build(read, [task], ModelOptions(cost=cost))  # type: ignore[arg-type]

@@ -18,9 +18,9 @@ from planners.classical import fast_downward
 from planners.classical.fast_downward import FastDownwardFailed, optimal_cost
 from planners.errors import OutOfMemory, OutOfTime, ProvedImpossible
 from planners.joint.model import Cost
-from planners.loading import Loaded, ModelOptions, build, load
+from planners.loading import ModelOptions, PlanningInstance, build, load
 from planners.pddl import parse_domain, parse_problem
-from planners.pddl.robots import RobotChoice
+from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
 from planners.search.plan_space import search
 
@@ -97,17 +97,17 @@ BIG = """
 
 
 @cache
-def read(domain_text: str, problem_text: str, cost: Cost = "makespan") -> Loaded:
+def read(domain_text: str, problem_text: str, cost: Cost = "makespan") -> PlanningInstance:
     domain = parse_domain(Source("domain.pddl", domain_text))
     problem = parse_problem(Source("problem.pddl", problem_text), domain)
     return build(domain, [problem], ModelOptions(cost=cost))
 
 
-def workshop(goal: str, cost: Cost = "makespan") -> Loaded:
+def workshop(goal: str, cost: Cost = "makespan") -> PlanningInstance:
     return read(WORKSHOP, WORKSHOP_TASK.format(goal=goal), cost)
 
 
-def big() -> Loaded:
+def big() -> PlanningInstance:
     cells = [f"c{n}" for n in range(BIG_CELLS)]
     steps = " ".join(f"(next {a} {b}) (next {b} {a})" for a, b in pairwise(cells))
     lit = " ".join(f"(lit {c})" for c in cells)
@@ -284,20 +284,20 @@ def test_importing_is_cheap() -> None:
     )
 
 
-ROWS: list[tuple[str, str, str, RobotChoice, int]] = [
-    ("boxpushing", "domain", "p2_3_2_1_1_0", RobotChoice(), 6),
-    ("workshop", "workshop_dom_cal", "workshop2_1_2_2_2", RobotChoice(), 5),
-    ("grippers", "domain", "n2-r3-o3-s2", RobotChoice(), 7),
-    ("transport", "p11.DOMAIN", "p11", RobotChoice(type="vehicle"), 7),
-    ("driverlog", "domain", "pfile1", RobotChoice(), 6),
-    ("driverlog", "domain_constrained", "pfile1", RobotChoice(), 6),
-    ("taxi", "domain", "p01", RobotChoice(), 10),
-    ("depot", "domain", "pfile1", RobotChoice(), 5),
-    ("depot", "domain_constrained", "pfile1", RobotChoice(), 5),
-    ("mapf", "mapf-domain", "mapf-problem2", RobotChoice(), 2),
-    ("storage", "domain", "p05", RobotChoice(type="hoist"), 6),
-    ("blocks-arms", "original_domain", "original_problem_3", RobotChoice(), 5),
-    ("gripper", "domain", "prob01", RobotChoice(type="gripper", unowned="environment"), 7),
+ROWS: list[tuple[str, str, str, RobotSelection, int]] = [
+    ("boxpushing", "domain", "p2_3_2_1_1_0", RobotSelection(), 6),
+    ("workshop", "workshop_dom_cal", "workshop2_1_2_2_2", RobotSelection(), 5),
+    ("grippers", "domain", "n2-r3-o3-s2", RobotSelection(), 7),
+    ("transport", "p11.DOMAIN", "p11", RobotSelection(type="vehicle"), 7),
+    ("driverlog", "domain", "pfile1", RobotSelection(), 6),
+    ("driverlog", "domain_constrained", "pfile1", RobotSelection(), 6),
+    ("taxi", "domain", "p01", RobotSelection(), 10),
+    ("depot", "domain", "pfile1", RobotSelection(), 5),
+    ("depot", "domain_constrained", "pfile1", RobotSelection(), 5),
+    ("mapf", "mapf-domain", "mapf-problem2", RobotSelection(), 2),
+    ("storage", "domain", "p05", RobotSelection(type="hoist"), 6),
+    ("blocks-arms", "original_domain", "original_problem_3", RobotSelection(), 5),
+    ("gripper", "domain", "prob01", RobotSelection(type="gripper", unowned="environment"), 7),
 ]
 
 
@@ -309,7 +309,7 @@ def test_foreign_models(
     folder: str,
     domain: str,
     problem: str,
-    robots: RobotChoice,
+    robots: RobotSelection,
     makespan: int,
     limit: int,
     cost: Cost,

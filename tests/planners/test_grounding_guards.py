@@ -11,7 +11,7 @@ from planners.grounding import ground_actions
 from planners.grounding.instantiate import GroundAction, _Grounder
 from planners.loading import build
 from planners.pddl import parse_domain, parse_problem
-from planners.pddl.robots import RobotChoice, Unowned, find_team
+from planners.pddl.robots import RobotSelection, Unowned, find_team
 from planners.pddl.sexpr import Source
 
 DOMAIN = """(define (domain halls) (:types robot place - thing hall - place)
@@ -57,7 +57,7 @@ CONDITIONS = [
 def grounded(domain: str, problem: str, unowned: Unowned = "error") -> tuple[GroundAction, ...]:
     lifted = parse_domain(Source("d", domain))
     read = parse_problem(Source("p", problem), lifted)
-    return ground_actions(lifted, read, find_team(lifted, read, RobotChoice(unowned=unowned)))
+    return ground_actions(lifted, read, find_team(lifted, read, RobotSelection(unowned=unowned)))
 
 
 def both(

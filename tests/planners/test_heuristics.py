@@ -9,7 +9,7 @@ import pytest
 
 from planners.errors import UsageError
 from planners.joint.model import Goal, JointModel
-from planners.loading import Loaded, build, load
+from planners.loading import PlanningInstance, build, load
 from planners.search.bounds import FAR, HEURISTICS, heuristic
 from planners.search.reachable import Space, explore
 from tests.conftest import DOMAINS
@@ -46,7 +46,7 @@ def distances(space: Space, goals: list[bool]) -> np.ndarray:
     return np.array([found.get(state, -1) for state in range(len(space))])
 
 
-def of(loaded: Loaded) -> tuple[JointModel, Goal, Space]:
+def of(loaded: PlanningInstance) -> tuple[JointModel, Goal, Space]:
     return loaded.model, loaded.tasks[0].goal, explore(loaded.model, loaded.tasks[0].init[None, :])
 
 

@@ -9,12 +9,12 @@ import pytest
 from random_pddl import KINDS, Kind, random_model
 
 from planners.inspection import inspect, unparse
-from planners.joint.composition import Composition
-from planners.loading import Loaded, ModelOptions, build, load
+from planners.joint.composition import ComposingStepper
+from planners.loading import ModelOptions, PlanningInstance, build, load
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.formulas import read_formula
 from planners.pddl.names import Names
-from planners.pddl.robots import RobotChoice
+from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source, parse
 from planners.search.reachable import explore
 
@@ -39,7 +39,7 @@ TASK = """(define (problem p) (:domain pushing) (:objects r1 r2 - robot a b - pl
   ( :goal (forall (?x - heavy) (or (in ?x b) (not (seen a))))))"""
 
 
-def made(domain: str, problem: str, options: ModelOptions | None = None) -> Loaded:
+def made(domain: str, problem: str, options: ModelOptions | None = None) -> PlanningInstance:
     lifted = parse_domain(Source("d.pddl", domain))
     return build(lifted, [parse_problem(Source("p.pddl", problem), lifted)], options)
 
@@ -73,10 +73,10 @@ def test_the_goal_is_the_one_that_was_understood() -> None:
     )
 
 
-def both_possible(loaded: Loaded, first: str, second: str) -> bool:
+def both_possible(loaded: PlanningInstance, first: str, second: str) -> bool:
     """Whether different robots can choose these subactions in one reachable state, each for itself."""
     model = loaded.model
-    assert isinstance(model.stepper, Composition)
+    assert isinstance(model.stepper, ComposingStepper)
     space = explore(model, loaded.tasks[0].init[None, :])
     choices = model.stepper.choices(space.rows)
     for state in range(len(space)):
@@ -94,7 +94,7 @@ def both_possible(loaded: Loaded, first: str, second: str) -> bool:
     return False
 
 
-def named(loaded: Loaded, example: str) -> tuple[str, str]:
+def named(loaded: PlanningInstance, example: str) -> tuple[str, str]:
     labels = {text for own in loaded.model.labels for text in own}
     first, second = [text for text in re.findall(r"\([^()]*\)", example) if text in labels]
     return first, second
@@ -125,7 +125,7 @@ def test_the_example_can_happen_in_random_models() -> None:
     shown = hidden = 0
     for seed in range(60):
         text = random_model(seed, ("agent", "plain")[seed % 2])
-        loaded = made(text.domain, text.problem, ModelOptions(RobotChoice(unowned=text.unowned)))
+        loaded = made(text.domain, text.problem, ModelOptions(RobotSelection(unowned=text.unowned)))
         found = inspect(loaded)
         if found.example is None:
             hidden += found.interfering > 0

@@ -19,10 +19,10 @@ from planners.errors import BadInput, ProvedImpossible
 from planners.grounding import instantiate
 from planners.grounding.reachability import reachable_arguments
 from planners.joint.model import own_text
-from planners.loading import Loaded, ModelOptions, build, task_of
+from planners.loading import ModelOptions, PlanningInstance, build, task_of
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import And, Atom, Domain, Formula, Not, Problem
-from planners.pddl.robots import RobotChoice
+from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
 from planners.search.plan_space import TaskGroup, plan_spaces, search
 from planners.search.plans import Plans
@@ -54,14 +54,14 @@ def one_reachability_per_model() -> Iterator[None]:
         yield
 
 
-def _load(text: RandomModel, cost: str = "makespan") -> Loaded:
+def _load(text: RandomModel, cost: str = "makespan") -> PlanningInstance:
     domain = parse_domain(Source("domain", text.domain))
     problem = parse_problem(Source("problem", text.problem), domain)
-    options = ModelOptions(robots=RobotChoice(unowned=text.unowned), cost=cost)  # type: ignore[arg-type]
+    options = ModelOptions(robots=RobotSelection(unowned=text.unowned), cost=cost)  # type: ignore[arg-type]
     return build(domain, [problem], options)
 
 
-def _twin(loaded: Loaded, text: RandomModel) -> Twin:
+def _twin(loaded: PlanningInstance, text: RandomModel) -> Twin:
     domain, (problem,) = loaded.domain, loaded.problems
     return Twin(domain, problem, loaded.team, loaded.model.keeps_idle, _MOST_TRIES)
 
@@ -71,7 +71,7 @@ def _key(state: State) -> list[str]:
 
 
 def _fast_steps(
-    loaded: Loaded, state: State
+    loaded: PlanningInstance, state: State
 ) -> set[tuple[tuple[str | None, ...], tuple[str, ...]]]:
     model = loaded.model
     steps = model.successors(model.codec.encode(_key(state))[None, :])
@@ -132,7 +132,9 @@ def _far(twin: Twin, state: State) -> Problem:
     return replace(twin.rules.problem, goal=And(tuple(goals)))
 
 
-def _check_plans(loaded: Loaded, twin: Twin, problem: Problem, note: Callable[[str], None]) -> None:
+def _check_plans(
+    loaded: PlanningInstance, twin: Twin, problem: Problem, note: Callable[[str], None]
+) -> None:
     """The same optimal cost, the same number of plans, the same plans, and all of them valid."""
     model = loaded.model
     task = task_of(model, loaded.domain, problem)
@@ -222,7 +224,7 @@ _TASK = """(define (problem p) (:domain rooms) (:objects r1 r2 - robot a b - pla
   (:init (at r1 a) (at r2 b) (ok r1)) (:goal (and (at r1 b) (at r2 b))))"""
 
 
-def _rooms(*more: str) -> Loaded:
+def _rooms(*more: str) -> PlanningInstance:
     return _load(RandomModel(_ROOMS.format(more=" ".join(more)), _TASK))
 
 

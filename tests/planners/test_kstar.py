@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from planners.classical import compile_plain, to_pddl
+from planners.classical import compile_classical, to_pddl
 from planners.loading import load
 from planners.search.plan_space import search
 from planners.search.plans import Plans
@@ -37,7 +37,7 @@ def test_k_star_counts_the_same_plans(
         "kstar_planner.planners", reason="K* is not installed (extra oracles)"
     )
     loaded = load(DOMAINS / folder / "domain.pddl", [DOMAINS / folder / f"{stem}.pddl"])
-    plain = compile_plain(loaded.model, loaded.tasks[0], limit=100_000)
+    plain = compile_classical(loaded.model, loaded.tasks[0], limit=100_000)
     assert plain.form == "explicit"
     ours = Plans.of(search(loaded.model, loaded.tasks[0]))
     assert ours.count == count

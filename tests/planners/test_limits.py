@@ -23,7 +23,7 @@ from planners.grounding import instantiate
 from planners.joint.model import Stepper, Steps
 from planners.joint.states import Rows
 from planners.limits import reaching, time_left, time_limit
-from planners.loading import Loaded, load
+from planners.loading import PlanningInstance, load
 from planners.search.plan_space import PlanSpace, TaskGroup, plan_spaces, search
 from planners.search.reachable import count, explore
 
@@ -160,11 +160,11 @@ class Stopping:
         return self.stepper.why_not(row, labels)
 
 
-def corners(problem: str = "corners-3x3") -> Loaded:
+def corners(problem: str = "corners-3x3") -> PlanningInstance:
     return load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / f"{problem}.pddl"])
 
 
-def stopped(loaded: Loaded, after: int, error: BaseException) -> Loaded:
+def stopped(loaded: PlanningInstance, after: int, error: BaseException) -> PlanningInstance:
     return replace(
         loaded, model=replace(loaded.model, stepper=Stopping(loaded.model.stepper, error, [after]))
     )

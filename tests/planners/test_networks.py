@@ -14,7 +14,7 @@ from test_joint_against_naive import _check_model
 
 from planners.check.rules import Rules
 from planners.errors import BadInput
-from planners.loading import Loaded, build
+from planners.loading import PlanningInstance, build
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Atom, Domain
 from planners.pddl.sexpr import Source
@@ -30,7 +30,7 @@ CREW = """(define (problem crew) (:domain rowing)
   (:init (on r1 b) (on r2 b) (on r3 b)) (:goal (moored b shore)))"""
 
 
-def rowing(network: str) -> Loaded:
+def rowing(network: str) -> PlanningInstance:
     domain = parse_domain(Source("rowing", ROWING.replace("NETWORK", network)))
     return build(domain, [parse_problem(Source("crew", CREW), domain)])
 

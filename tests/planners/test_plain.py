@@ -14,14 +14,14 @@ from hypothesis import strategies as st
 from random_pddl import KINDS, Kind, random_model
 
 from planners import classical as plain_module
-from planners.classical import PlainTask, compile_plain, to_pddl
+from planners.classical import ClassicalTask, compile_classical, to_pddl
 from planners.errors import BadInput, ProvedImpossible
 from planners.joint.model import Cost, FullState, JointModel
 from planners.joint.states import Rows
-from planners.loading import Loaded, ModelOptions, PlanningTask, build
+from planners.loading import ModelOptions, PlanningInstance, PlanningTask, build
 from planners.pddl.domain import parse_domain
 from planners.pddl.problem import parse_problem
-from planners.pddl.robots import RobotChoice, Unowned
+from planners.pddl.robots import RobotSelection, Unowned
 from planners.pddl.sexpr import Source
 from planners.search.plan_space import search
 from planners.search.reachable import explore
@@ -179,10 +179,10 @@ MODELS = {
 @cache
 def read(
     domain_text: str, problem_text: str, cost: Cost = "makespan", unowned: Unowned = "error"
-) -> Loaded:
+) -> PlanningInstance:
     domain = parse_domain(Source("domain.pddl", domain_text))
     problem = parse_problem(Source("problem.pddl", problem_text), domain)
-    return build(domain, [problem], ModelOptions(RobotChoice(unowned=unowned), cost))
+    return build(domain, [problem], ModelOptions(RobotSelection(unowned=unowned), cost))
 
 
 def ours(model: JointModel, task: PlanningTask) -> tuple[int, int] | None:
@@ -192,7 +192,7 @@ def ours(model: JointModel, task: PlanningTask) -> tuple[int, int] | None:
         return None
 
 
-def solved(plain: PlainTask) -> tuple[int, int] | None:
+def solved(plain: ClassicalTask) -> tuple[int, int] | None:
     """The optimal cost of a plain task by Dijkstra's algorithm."""
     total = dijkstra(plain)
     if total is None:
@@ -202,13 +202,13 @@ def solved(plain: PlainTask) -> tuple[int, int] | None:
     return cost
 
 
-def dijkstra(plain: PlainTask) -> int | None:
+def dijkstra(plain: ClassicalTask) -> int | None:
     return min(
         (cost for state, cost in reached(plain).items() if holds(plain.goal, state)), default=None
     )
 
 
-def reached(plain: PlainTask) -> dict[frozenset[int], int]:
+def reached(plain: ClassicalTask) -> dict[frozenset[int], int]:
     """The least total cost of every plain state."""
     best = {plain.init: 0}
     queue: list[tuple[int, int, frozenset[int]]] = [(0, 0, plain.init)]
@@ -238,7 +238,7 @@ def test_both_forms_have_the_optimal_cost_of_the_joint_model(
     loaded = read(*MODELS[name], cost)
     expected = ours(loaded.model, loaded.tasks[0])
     assert expected is not None
-    plain = compile_plain(loaded.model, loaded.tasks[0], FORMS[form])
+    plain = compile_classical(loaded.model, loaded.tasks[0], FORMS[form])
     assert plain.form == form
     assert solved(plain) == expected
 
@@ -263,9 +263,9 @@ def test_a_goal_that_is_a_full_state(form: str) -> None:
     space = search(model, task)
     last = space.rows[space.state[0]]
     full = replace(task, goal=FullState(tuple(int(w) for w in last)))
-    assert solved(compile_plain(model, full, FORMS[form])) == ours(model, full)
+    assert solved(compile_classical(model, full, FORMS[form])) == ours(model, full)
     back = replace(task, init=last, goal=FullState(tuple(int(w) for w in task.init)))
-    assert solved(compile_plain(model, back, FORMS[form])) == ours(model, back)
+    assert solved(compile_classical(model, back, FORMS[form])) == ours(model, back)
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -273,7 +273,7 @@ def test_a_goal_that_holds_at_the_start_costs_nothing(form: str) -> None:
     loaded = read(
         CORRIDOR, CORRIDOR_TASK.replace("(and (at r1 c) (at r2 a))", "(or (at r1 a) (at r1 b))")
     )
-    assert solved(compile_plain(loaded.model, loaded.tasks[0], FORMS[form])) == (0, 0)
+    assert solved(compile_classical(loaded.model, loaded.tasks[0], FORMS[form])) == (0, 0)
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -284,7 +284,7 @@ def test_a_goal_that_holds_at_the_start_costs_nothing(form: str) -> None:
 def test_an_unsolvable_task_stays_unsolvable(goal: str, form: str) -> None:
     loaded = read(CORRIDOR, CORRIDOR_TASK.replace("(and (at r1 c) (at r2 a))", goal))
     assert ours(loaded.model, loaded.tasks[0]) is None
-    assert solved(compile_plain(loaded.model, loaded.tasks[0], FORMS[form])) is None
+    assert solved(compile_classical(loaded.model, loaded.tasks[0], FORMS[form])) is None
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -292,7 +292,7 @@ def test_remembered_actions_change_no_cost(form: str) -> None:
     domain = parse_domain(Source("domain.pddl", CORRIDOR))
     problem = parse_problem(Source("problem.pddl", CORRIDOR_TASK), domain)
     loaded = build(domain, [problem], ModelOptions(remember_actions=True))
-    assert solved(compile_plain(loaded.model, loaded.tasks[0], FORMS[form])) == (6, 0)
+    assert solved(compile_classical(loaded.model, loaded.tasks[0], FORMS[form])) == (6, 0)
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -303,12 +303,12 @@ def test_without_its_conflicts_a_model_is_cheaper(
     monkeypatch.setattr(
         plain_module.choosers, "clashes", lambda actions: (frozenset(),) * len(actions)
     )
-    assert solved(compile_plain(loaded.model, loaded.tasks[0], FORMS[form])) == (1, 0)
+    assert solved(compile_classical(loaded.model, loaded.tasks[0], FORMS[form])) == (1, 0)
 
 
 def test_few_joint_actions_are_written_explicitly_and_many_are_not() -> None:
     loaded = read(TOOL, TOOL_TASK)
-    plain = compile_plain(loaded.model, loaded.tasks[0], 5)
+    plain = compile_classical(loaded.model, loaded.tasks[0], 5)
     assert sorted(action.name for action in plain.actions) == [
         "(release r1) idle",
         "(work r1) idle",
@@ -316,12 +316,12 @@ def test_few_joint_actions_are_written_explicitly_and_many_are_not() -> None:
         "idle (work r2)",
         "idle idle",
     ]
-    assert compile_plain(loaded.model, loaded.tasks[0], 4).form == "select-then-apply"
+    assert compile_classical(loaded.model, loaded.tasks[0], 4).form == "select-then-apply"
 
 
 def test_actions_without_effects_survive() -> None:
     loaded = read(PARTNERS, PARTNERS_TASK)
-    names = {action.name for action in compile_plain(loaded.model, loaded.tasks[0], 0).actions}
+    names = {action.name for action in compile_classical(loaded.model, loaded.tasks[0], 0).actions}
     assert {"choose r1 (press r1)", "choose r2 (press r2)"} <= names
 
 
@@ -331,18 +331,18 @@ def test_joint_actions_with_one_label_tuple_and_one_meaning_are_written_once() -
     loaded = read(JOINT.rstrip().removesuffix(")") + again, JOINT_TASK)
     once = read(JOINT, JOINT_TASK)
     assert len(loaded.model.actions) > len(once.model.actions)
-    assert len(compile_plain(loaded.model, loaded.tasks[0]).actions) == len(
-        compile_plain(once.model, once.tasks[0]).actions
+    assert len(compile_classical(loaded.model, loaded.tasks[0]).actions) == len(
+        compile_classical(once.model, once.tasks[0]).actions
     )
 
 
 def test_a_second_cost_that_outgrows_the_step_cost_is_noticed() -> None:
     loaded = read(CORRIDOR, CORRIDOR_TASK, "makespan+actions")
-    plain = compile_plain(loaded.model, loaded.tasks[0], 0, longest=2)
+    plain = compile_classical(loaded.model, loaded.tasks[0], 0, longest=2)
     total = dijkstra(plain)
     assert total is not None
     assert plain.cost(total) is None
-    enough = compile_plain(loaded.model, loaded.tasks[0], 0, longest=total // plain.step_cost)
+    enough = compile_classical(loaded.model, loaded.tasks[0], 0, longest=total // plain.step_cost)
     assert solved(enough) == (6, 6)
 
 
@@ -350,7 +350,7 @@ def test_a_second_cost_that_outgrows_the_step_cost_is_noticed() -> None:
 @pytest.mark.parametrize("name", MODELS)
 def test_the_pddl_says_the_same(name: str, form: str) -> None:
     loaded = read(*MODELS[name])
-    plain = compile_plain(loaded.model, loaded.tasks[0], FORMS[form])
+    plain = compile_classical(loaded.model, loaded.tasks[0], FORMS[form])
     domain_text, problem_text = to_pddl(plain)
     domain = parse_domain(Source("plain.pddl", domain_text))
     problem = parse_problem(Source("plain-task.pddl", problem_text), domain)
@@ -394,7 +394,7 @@ def distances(model: JointModel, task: PlanningTask) -> dict[frozenset[str], tup
     return {keys[state]: cost for state, cost in costs.items()}
 
 
-def plain_distances(plain: PlainTask) -> dict[frozenset[str], tuple[int, int] | None]:
+def plain_distances(plain: ClassicalTask) -> dict[frozenset[str], tuple[int, int] | None]:
     """The same of a plain task; between two steps nothing but the state and the time is true."""
     between = {
         plain.facts[fact] for fact in plain.init if plain.facts[fact].startswith("(time to choose ")
@@ -419,12 +419,12 @@ def test_every_state_of_random_models_costs_the_same(seed: int, kind: Kind, cost
         reject()
     event(f"{kind}: farthest state {max(expected.values())[0]}")
     for form, limit in FORMS.items():
-        plain = compile_plain(loaded.model, task, limit)
+        plain = compile_classical(loaded.model, task, limit)
         assert plain.form == form
         assert plain_distances(plain) == expected
 
 
-def random_state(loaded: Loaded, seed: int) -> Rows:
+def random_state(loaded: PlanningInstance, seed: int) -> Rows:
     """The given initial state, or another one."""
     rng = random.Random(seed)
     if seed % 4 == 0:

@@ -11,10 +11,10 @@ from plain_plans import optimal_plans
 from random_pddl import KINDS, Kind, random_model
 from test_plain import COSTS, FORMS, MODELS, random_state, read
 
-from planners.classical import compile_plain
+from planners.classical import compile_classical
 from planners.errors import BadInput
 from planners.joint.model import Cost, FullState
-from planners.loading import Loaded
+from planners.loading import PlanningInstance
 from planners.search.plan_space import search
 from planners.search.plans import Plans
 from planners.search.reachable import explore
@@ -54,7 +54,7 @@ ANYWAY_TASK = """(define (problem p) (:domain anyway) (:objects r1 r2 - robot) (
   (:goal (or (and (done r1) (or (done r2) (warm))) (warm) (and (done r2) (warm)))))"""
 
 
-def ours(loaded: Loaded) -> int:
+def ours(loaded: PlanningInstance) -> int:
     return Plans.of(search(loaded.model, loaded.tasks[0])).count
 
 
@@ -64,7 +64,7 @@ def ours(loaded: Loaded) -> int:
 def test_every_plan_once(name: str, cost: Cost, form: str) -> None:
     texts = {**MODELS, "twice": (TWICE, TWICE_TASK), "anyway": (ANYWAY, ANYWAY_TASK)}[name]
     loaded = read(*texts, cost)
-    plain = compile_plain(loaded.model, loaded.tasks[0], FORMS[form])
+    plain = compile_classical(loaded.model, loaded.tasks[0], FORMS[form])
     assert plain.form == form
     assert optimal_plans(plain).count() == ours(loaded)
 
@@ -90,4 +90,4 @@ def test_every_plan_of_random_models_once(seed: int, kind: Kind, cost: Cost) -> 
     expected = Plans.of(search(loaded.model, task)).count
     event(f"plans: {expected if expected < 3 else 'many'}")
     for limit in FORMS.values():
-        assert optimal_plans(compile_plain(loaded.model, task, limit)).count() == expected
+        assert optimal_plans(compile_classical(loaded.model, task, limit)).count() == expected

@@ -16,7 +16,7 @@ from planners.check.validate import Labels, Verdict, validate
 from planners.errors import BadInput
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import And, Atom, Domain, Not, Problem
-from planners.pddl.robots import RobotChoice, Team, Unowned, find_team
+from planners.pddl.robots import RobotSelection, Team, Unowned, find_team
 from planners.pddl.sexpr import Source
 
 World = tuple[Domain, Problem, Team]
@@ -26,7 +26,7 @@ def world(domain: str, problem: str, unowned: Unowned = "error") -> World:
     """``domain`` and ``problem`` are the sections behind the names."""
     read = parse_domain(Source("domain", f"(define (domain d) {domain})"))
     task = parse_problem(Source("problem", f"(define (problem p) (:domain d) {problem})"), read)
-    return read, task, find_team(read, task, RobotChoice(unowned=unowned))
+    return read, task, find_team(read, task, RobotSelection(unowned=unowned))
 
 
 def one_step(setting: World, *labels: str | None) -> str | None:

@@ -8,8 +8,8 @@ from itertools import product
 import pytest
 
 from coordlang.report.page import LARGEST, make_report
-from coordlang.use.sentence.fitting import fitting
-from coordlang.use.sentence.spoken import speak
+from coordlang.use.sentence.fitting_plans import fitting
+from coordlang.use.sentence.task_language import language_in_task
 from planners.pddl.lifted import And
 from planners.search.plans import Plans
 from tests.report.conftest import Opened, Opener, World, make_language, make_world, refuted
@@ -61,7 +61,7 @@ def test_every_page_plays(open_page: Opener, domain: str, problem: str, tasks: s
 def test_plans_are_those_of_the_planner(open_page: Opener) -> None:
     """Each sentence, each of its plans, each step: every robot is where the planner says."""
     world = make_world("grid", "three-robots-3x3", None)
-    spoken = speak(world.language, world.domain, world.problem)
+    spoken = language_in_task(world.language, world.domain, world.problem)
     opened = open_page(world.report.html)
     checked = 0
     for number, entry in list(enumerate(world.data["tasks"][0]["sentences"]))[::6]:
@@ -114,7 +114,7 @@ def test_a_robots_options_are_its_own_subplans(open_page: Opener) -> None:
     sentence; no more, no less.
     """
     world = make_world("grid", "three-robots-3x3", None)
-    spoken = speak(world.language, world.domain, world.problem)
+    spoken = language_in_task(world.language, world.domain, world.problem)
     opened = open_page(world.report.html)
     ways = opened.page.evaluate(
         """() => { const task = DATA.tasks[0], wordOf = node => DATA.state_words[task.nodes.state[node]];

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from coordlang.building import build_language
-from coordlang.language.file import signed
+from coordlang.language.file import with_provenance
 from coordlang.language.words import sentence
 from coordlang.report import graph
 from coordlang.report.data import page_data
@@ -20,7 +20,7 @@ from coordlang.report.shown import select_tasks
 from coordlang.report.task import task_part
 from coordlang.required.miscoordination import Inseparable
 from coordlang.tasks.candidates import all_pairs, from_problems
-from coordlang.use.sentence.spoken import speak
+from coordlang.use.sentence.task_language import language_in_task
 from planners.errors import ProvedImpossible, UsageError
 from planners.search.plans import Plans
 from tests.coordlang.random_models import random_model
@@ -91,7 +91,7 @@ def test_ranks_are_those_of_the_planner() -> None:
     for domain, problem, tasks in WORLDS:
         world = make_world(domain, problem, tasks)
         data, task = world.data, world.data["tasks"][0]
-        spoken = speak(world.language, world.domain, world.problem)
+        spoken = language_in_task(world.language, world.domain, world.problem)
         plans = Plans.of(spoken.space)
 
         def by_labels(way: tuple[list[int], list[int]], task: dict[str, Any] = task) -> list[int]:
@@ -130,7 +130,7 @@ def test_random_models() -> None:
             if not candidates.count or candidates.count > 400:
                 continue
             built = build_language(candidates, "greedy")
-            language = signed(built.language, candidates, {})
+            language = with_provenance(built.language, candidates, {})
             selection = select_tasks(language, domain, [problem], 4, seed)
         except (Inseparable, ProvedImpossible):
             continue
@@ -156,7 +156,7 @@ def test_random_models() -> None:
 
 
 def test_large_tasks_are_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    spoken = speak(*make_language("grid", "three-robots-3x3", None))
+    spoken = language_in_task(*make_language("grid", "three-robots-3x3", None))
     whole = graph.plan_graph(spoken, 0)
     exact = {s.words: s.plans for s in graph.shown_sentences(spoken, whole, 0).listed}
     monkeypatch.setattr(graph, "EDGES", 60)

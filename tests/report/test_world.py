@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 
 from coordlang.report.world import World, find_world
-from planners.loading import Loaded, load
+from planners.loading import PlanningInstance, load
 from planners.search.reachable import explore
 from tests.conftest import DOMAINS
 
 
-def world_of(domain: str, problem: str) -> tuple[World, Loaded]:
+def world_of(domain: str, problem: str) -> tuple[World, PlanningInstance]:
     loaded = load(DOMAINS / domain / "domain.pddl", [DOMAINS / domain / f"{problem}.pddl"])
     space = explore(loaded.model, loaded.tasks[0].init[None, :])
     return find_world(loaded.model, [loaded.model.codec.decode(row) for row in space.rows]), loaded

@@ -12,7 +12,7 @@ from itertools import product
 from math import prod
 
 from coordlang.use.choices.monitor import Detour
-from coordlang.use.sentence.spoken import Spoken
+from coordlang.use.sentence.task_language import TaskLanguage
 from planners.search.plans import Plan, Plans
 from tests.coordlang import naive
 
@@ -22,7 +22,7 @@ Own = tuple[int, ...]
 Known = tuple[frozenset[str], frozenset[str]]
 
 
-def sentences(spoken: Spoken, most: int) -> dict[tuple[int, ...], list[Plan]]:
+def sentences(spoken: TaskLanguage, most: int) -> dict[tuple[int, ...], list[Plan]]:
     """All optimal plans of the task by their sentence; raises `naive.TooLarge`."""
     groups: dict[tuple[int, ...], list[Plan]] = {}
     word = spoken.table.of_rows(spoken.space.rows)
@@ -36,7 +36,7 @@ def sentences(spoken: Spoken, most: int) -> dict[tuple[int, ...], list[Plan]]:
 class Listed:
     """The plans of one sentence, and all plans of the task."""
 
-    spoken: Spoken
+    spoken: TaskLanguage
     plans: list[Plan]
     optimal: set[Plan]
 
@@ -141,7 +141,7 @@ def like(pattern: str, text: str) -> bool:
 
 
 def listed(
-    spoken: Spoken, most_plans: int, most_combinations: int
+    spoken: TaskLanguage, most_plans: int, most_combinations: int
 ) -> Iterator[tuple[tuple[int, ...], Listed]]:
     """Every sentence of a task with what it leaves open; raises `naive.TooLarge`."""
     groups = sentences(spoken, most_plans)

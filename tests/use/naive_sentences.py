@@ -14,7 +14,7 @@ from coordlang.language.words import Guarantee, Language, WordTable, name_words
 from coordlang.required.miscoordination import Inseparable
 from coordlang.tasks.candidates import Candidates, from_listed, from_problems
 from coordlang.tasks.task_file import ListedTask
-from coordlang.use.sentence.spoken import Spoken
+from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import ProvedImpossible
 from planners.loading import ModelOptions, build
 from planners.pddl import parse_domain, parse_problem, read_domain, read_problem
@@ -43,7 +43,7 @@ SHIPPED = [
 
 
 @cache
-def shipped(name: str) -> tuple[Candidates, Spoken]:
+def shipped(name: str) -> tuple[Candidates, TaskLanguage]:
     """The task of a shipped problem with the greedy language for it; actions remembered where plans
     are inseparable.
     """
@@ -60,7 +60,7 @@ def shipped(name: str) -> tuple[Candidates, Spoken]:
     raise AssertionError(name)
 
 
-def random_spoken(seed: int, robots: int) -> tuple[Candidates, Spoken]:
+def random_spoken(seed: int, robots: int) -> tuple[Candidates, TaskLanguage]:
     """A task of a random model, one of its longer ones, under a random partition; some states are
     left to the default.
 
@@ -123,12 +123,12 @@ def long_task(
     return ListedTask(tuple(codec.decode(space.rows[start])), tuple(literals))
 
 
-def spoken_in(candidates: Candidates, language: Language) -> Spoken:
+def spoken_in(candidates: Candidates, language: Language) -> TaskLanguage:
     space, table = candidates.spaces[0], WordTable.of(language, candidates.model)
-    return Spoken(language, table, space, 0, table.of_rows(space.rows)[space.state], True)
+    return TaskLanguage(language, table, space, 0, table.of_rows(space.rows)[space.state], True)
 
 
-def by_sentence(spoken: Spoken) -> dict[tuple[str, ...], set[Plan]]:
+def by_sentence(spoken: TaskLanguage) -> dict[tuple[str, ...], set[Plan]]:
     """All optimal plans of the task by their sentences.  Raises `TooLarge`."""
     space, language = spoken.space, spoken.language
     keys = [space.model.codec.key(row) for row in space.rows]

@@ -21,9 +21,9 @@ from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.use.choices.automaton import Automaton, determinise
 from coordlang.use.choices.choices import Choices, RobotChoices, choices
 from coordlang.use.choices.file import monitor
-from coordlang.use.choices.own import OwnAtoms
-from coordlang.use.sentence.fitting import fitting
-from coordlang.use.sentence.spoken import Spoken, speak_candidates
+from coordlang.use.choices.own_facts import OwnFacts
+from coordlang.use.sentence.fitting_plans import fitting
+from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 from coordlang.verification.by_definition import verify
 from planners.errors import OutOfMemory, ProvedImpossible
 from planners.pddl import parse_domain, parse_problem, read_domain, read_problem
@@ -80,7 +80,7 @@ def tasks_of(candidates: Candidates, seed: int) -> list[tuple[PlanSpace, int]]:
     return sorted(tasks, key=lambda t: -int(t[0].layer[t[0].starts[t[1]]]))[:_TASKS]
 
 
-def spoken_in(seed: int, robots: int) -> Iterator[Spoken]:
+def spoken_in(seed: int, robots: int) -> Iterator[TaskLanguage]:
     """A built and verified language in some of its candidate tasks; most of them with as few words
     as merging gives.
     """
@@ -97,7 +97,9 @@ def spoken_in(seed: int, robots: int) -> Iterator[Spoken]:
     if seed // 11 % 4:
         table = merged(table, candidates, seed)
     for space, task in tasks_of(candidates, seed):
-        yield Spoken(language, table, space, task, table.of_rows(space.rows)[space.state], True)
+        yield TaskLanguage(
+            language, table, space, task, table.of_rows(space.rows)[space.state], True
+        )
 
 
 def merged(table: WordTable, candidates: Candidates, seed: int) -> WordTable:
@@ -118,7 +120,7 @@ def merged(table: WordTable, candidates: Candidates, seed: int) -> WordTable:
     return table
 
 
-def at_random(seed: int, robots: int) -> Iterator[Spoken]:
+def at_random(seed: int, robots: int) -> Iterator[TaskLanguage]:
     """A partition at random, which may be no language, in some candidate tasks."""
     candidates = candidates_of(seed, robots)
     random = Random(seed)
@@ -126,12 +128,12 @@ def at_random(seed: int, robots: int) -> Iterator[Spoken]:
     word = np.array([random.randrange(size) for _ in candidates.rows])
     table = WordTable(tuple(f"w{n}" for n in range(size)), candidates.rows, word, 0)
     for space, task in tasks_of(candidates, seed):
-        yield Spoken(None, table, space, task, word[space.state], True)  # type: ignore[arg-type]
+        yield TaskLanguage(None, table, space, task, word[space.state], True)  # type: ignore[arg-type]
 
 
 def with_twins(
-    make: Callable[[int, int], Iterator[Spoken]], robots: int, models: int
-) -> Iterator[tuple[int, Spoken, tuple[int, ...], Listed]]:
+    make: Callable[[int, int], Iterator[TaskLanguage]], robots: int, models: int
+) -> Iterator[tuple[int, TaskLanguage, tuple[int, ...], Listed]]:
     """(seed, task, sentence, what is listed of it) over many random models."""
     for seed in range(models):
         with suppress(Unsuitable):
@@ -281,9 +283,11 @@ def test_own_atoms_are_known(robots: int, models: int) -> None:
     assert min(seen["true"], seen["false"], seen["unknown"]) >= 100, seen
 
 
-def check_own_atoms(spoken: Spoken, own: RobotChoices, twin: Listed, seen: Counter[str]) -> None:
+def check_own_atoms(
+    spoken: TaskLanguage, own: RobotChoices, twin: Listed, seen: Counter[str]
+) -> None:
     known = twin.knows(own.robot)
-    mask = OwnAtoms.of(spoken.model, own.robot).mask
+    mask = OwnFacts.of(spoken.model, own.robot).mask
     facts = spoken.model.codec.facts
     for part in twin.own[own.robot]:
         state = 0
@@ -329,7 +333,7 @@ SHIPPED = [
 ]
 
 
-def shipped(folder: str, name: str) -> Iterator[Spoken]:
+def shipped(folder: str, name: str) -> Iterator[TaskLanguage]:
     domain = read_domain(DOMAINS / folder / "domain.pddl")
     for path in sorted((DOMAINS / folder).glob(f"{name}.pddl")):
         if path.name == "domain.pddl":
@@ -343,7 +347,7 @@ def shipped(folder: str, name: str) -> Iterator[Spoken]:
 
             candidates = from_problems(domain, [problem], ModelOptions(remember_actions=True))
             language = build_language(candidates).language
-        yield from speak_candidates(language, candidates)
+        yield from languages_in_tasks(language, candidates)
 
 
 @pytest.mark.parametrize(("folder", "name"), SHIPPED)
@@ -397,7 +401,7 @@ def test_all_tasks_of_the_t_map() -> None:
     language = build_language(candidates, "minimal").language
     assert len(language.words) == 3
     tasks = 0
-    for spoken in speak_candidates(language, candidates):
+    for spoken in languages_in_tasks(language, candidates):
         for words, twin in listed(spoken, 1000, 1000):
             found = choices(spoken, words)
             check_automata(found, twin)
@@ -431,7 +435,7 @@ def test_choices_may_leave_the_sentence(robots: int) -> None:
     word = np.array([1 + len(begun[s]) % 2 if layer[s] == 1 else 0 for s in range(len(space.rows))])
     table = WordTable(("start", "even", "odd"), space.rows, word, 0)
     assert verify(table, candidates.spaces).holds
-    spoken = Spoken(None, table, space, 0, word[space.state], True)  # type: ignore[arg-type]
+    spoken = TaskLanguage(None, table, space, 0, word[space.state], True)  # type: ignore[arg-type]
     for words, twin in listed(spoken, 100, 100):
         found = choices(spoken, words)
         check_automata(found, twin)
@@ -459,7 +463,7 @@ def test_too_many_are_refused_with_an_estimate(monkeypatch: pytest.MonkeyPatch) 
     assert choices(spoken, words).guaranteed
 
 
-def sentence_of(spoken: Spoken) -> str:
+def sentence_of(spoken: TaskLanguage) -> str:
     plan = next(iter(Plans.of(spoken.space, spoken.task)))
     states = Plans(spoken.space, spoken.start, []).states(plan)
     return spoken.text(naive.sentence(spoken.table.of_rows(spoken.space.rows[states]).tolist()))
@@ -471,7 +475,7 @@ def test_a_task_that_starts_at_its_goal() -> None:
     from planners.pddl.lifted import TRUE
 
     candidates = from_problems(domain, [replace(problem, goal=TRUE)])
-    (spoken,) = speak_candidates(build_language(candidates).language, candidates)
+    (spoken,) = languages_in_tasks(build_language(candidates).language, candidates)
     found = choices(spoken, (int(spoken.word[spoken.start]),))
     for own, robot in zip(found.robots, spoken.model.robots, strict=True):
         assert len(own.automaton) == own.automaton.count == 1

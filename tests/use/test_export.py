@@ -27,8 +27,8 @@ from coordlang.use.export import membership as membership_module
 from coordlang.use.export.ltlf import export_ltlf, symbols_of
 from coordlang.use.export.membership import membership
 from coordlang.use.export.pddl import Exported, export_pddl, plan_names
-from coordlang.use.sentence.fitting import NoPlanFits
-from coordlang.use.sentence.spoken import Spoken, speak_candidates
+from coordlang.use.sentence.fitting_plans import NoPlanFits
+from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 from planners.classical import action_names
 from planners.errors import BadInput, ProvedImpossible
 from planners.pddl import read_domain, read_problem
@@ -45,7 +45,7 @@ SEEDS = {"few": range(80), "many": range(80, 600)}
 BOTH = pytest.mark.parametrize("lot", ["few", pytest.param("many", marks=pytest.mark.slow)])
 
 
-def random_spoken(seed: int) -> Spoken | None:
+def random_spoken(seed: int) -> TaskLanguage | None:
     """A random task with a random partition of its reachable states, some of them left to the
     default.
 
@@ -80,16 +80,16 @@ def random_spoken(seed: int) -> Spoken | None:
     language = Language(
         words, states, words[-1], model.robots, Guarantee("random", 1, 1, False), {}, {}, {}, {}
     )
-    return next(speak_candidates(language, candidates))
+    return next(languages_in_tasks(language, candidates))
 
 
 @cache
-def tasks(lot: str) -> tuple[Spoken, ...]:
+def tasks(lot: str) -> tuple[TaskLanguage, ...]:
     found = map(random_spoken, SEEDS[lot])
     return tuple(spoken for spoken in found if spoken is not None)
 
 
-def rich() -> Spoken:
+def rich() -> TaskLanguage:
     """A task with several sentences, one of which has several words and leaves several plans open."""
     for spoken in tasks("few"):
         sentences = by_sentence(spoken)
@@ -100,7 +100,7 @@ def rich() -> Spoken:
     raise AssertionError("no such task")
 
 
-def by_sentence(spoken: Spoken) -> dict[tuple[int, ...], set[Plan]]:
+def by_sentence(spoken: TaskLanguage) -> dict[tuple[int, ...], set[Plan]]:
     """The definition: every optimal plan with the words of its states, repeated ones collapsed."""
     plans, found = Plans.of(spoken.space, spoken.task), dict[tuple[int, ...], set[Plan]]()
     for plan in plans:
@@ -217,7 +217,7 @@ def true_at(formula: tuple[object, ...], states: Sequence[frozenset[str]], place
     raise AssertionError(formula)
 
 
-def symbols_in(spoken: Spoken, plan: Plan, symbols: dict[str, str]) -> list[frozenset[str]]:
+def symbols_in(spoken: TaskLanguage, plan: Plan, symbols: dict[str, str]) -> list[frozenset[str]]:
     """The states of a plan as the sets of symbols that hold."""
     plans = Plans.of(spoken.space, spoken.task)
     states = [set(spoken.model.codec.decode(spoken.space.rows[n])) for n in plans.states(plan)]
@@ -246,7 +246,7 @@ def test_no_word_may_be_skipped(t_map: tuple[Path, Path]) -> None:
     """A plan that stays in w0 does not say "w0 w2 w1 w0", though nothing else is wrong with it."""
     domain = read_domain(t_map[0])
     candidates = from_problems(domain, [read_problem(t_map[1], domain)])
-    spoken = next(speak_candidates(build_language(candidates, "minimal").language, candidates))
+    spoken = next(languages_in_tasks(build_language(candidates, "minimal").language, candidates))
     sentences = by_sentence(spoken)
     assert any(len(set(words)) == 1 for words in sentences)
     assert any(words[0] == words[-1] and len(words) > 2 for words in sentences)

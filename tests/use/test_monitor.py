@@ -22,17 +22,17 @@ from coordlang.use.choices import monitor as monitor_module
 from coordlang.use.choices.choices import Choices, choices
 from coordlang.use.choices.file import monitor, to_bytes, to_data
 from coordlang.use.choices.monitor import Detour, Monitor, MonitorError, NotAllowed, NotPossible
-from coordlang.use.sentence.spoken import Spoken, speak_candidates
+from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 from planners.pddl import read_domain, read_problem
 from tests.conftest import DOMAINS
 from tests.use.naive_choices import Known, Listed, Own
 from tests.use.test_choices import RUNS, sentence_of, spoken_in, with_twins
 
 
-def spoken_of(folder: str, name: str) -> Spoken:
+def spoken_of(folder: str, name: str) -> TaskLanguage:
     domain = read_domain(DOMAINS / folder / "domain.pddl")
     candidates = from_problems(domain, [read_problem(DOMAINS / folder / f"{name}.pddl", domain)])
-    return next(speak_candidates(build_language(candidates).language, candidates))
+    return next(languages_in_tasks(build_language(candidates).language, candidates))
 
 
 @pytest.fixture(scope="module")
@@ -47,12 +47,12 @@ def corridor() -> Choices:
     return choices(spoken, spoken.words_of(sentence_of(spoken)))
 
 
-def texts(spoken: Spoken, robot: int, own: Own) -> list[str | None]:
+def texts(spoken: TaskLanguage, robot: int, own: Own) -> list[str | None]:
     return [spoken.model.labels[robot][label] if label else None for label in own]
 
 
 def random_detour(
-    random: Random, spoken: Spoken, robot: int, left: set[Own], known: dict[Own, Known]
+    random: Random, spoken: TaskLanguage, robot: int, left: set[Own], known: dict[Own, Known]
 ) -> Detour:
     """What tells two of the subplans that are left apart, or anything else; each kind not at all,
     once or twice.
@@ -125,7 +125,7 @@ def test_detours_against_the_definition(robots: int, models: int) -> None:
 
 def check_detours(
     random: Random,
-    spoken: Spoken,
+    spoken: TaskLanguage,
     twin: Listed,
     at: Monitor,
     robot: int,

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from coordlang.tasks.candidates import Candidates
 from coordlang.tasks.task_file import ground_tasks
-from coordlang.use.sentence.fitting import NoPlanFits
-from coordlang.use.sentence.guided import Terrain, astar, guided
-from coordlang.use.sentence.spoken import Spoken
+from coordlang.use.sentence.astar import ExpandedStates, astar, plan_under_sentence
+from coordlang.use.sentence.fitting_plans import NoPlanFits
+from coordlang.use.sentence.task_language import TaskLanguage
 from planners.check.validate import validate
 from planners.errors import UsageError
 from planners.search.bounds import heuristic
@@ -23,19 +23,19 @@ from tests.conftest import DOMAINS, Command
 from tests.use.naive_sentences import SHIPPED, by_sentence, random_spoken, shipped
 
 
-def check(candidates: Candidates, spoken: Spoken, names: tuple[str, ...]) -> int:
+def check(candidates: Candidates, spoken: TaskLanguage, names: tuple[str, ...]) -> int:
     """The searches made; every sentence of the task with every heuristic."""
     loaded, groups = candidates.loaded, by_sentence(spoken)
     problem = loaded.problems[0]
     [(init, goal)] = ground_tasks(loaded.domain, problem, candidates.listed)
-    terrain, searches = Terrain(spoken.model, spoken.table), 0
+    terrain, searches = ExpandedStates(spoken.model, spoken.table), 0
     for name in names:
-        without = guided(spoken, None, name, terrain)
+        without = plan_under_sentence(spoken, None, name, terrain)
         assert without.cost == spoken.space.cost_of(0)
         assert any(without.plan in plans for plans in groups.values())
         for words, plans in list(groups.items())[:25]:
             for count_words in (True, False):
-                found = guided(
+                found = plan_under_sentence(
                     spoken, spoken.words_of(words), name, terrain, count_words=count_words
                 )
                 assert found.plan in plans
@@ -78,14 +78,16 @@ def test_a_state_is_looked_at_once(seed: int, robots: int) -> None:
     _, spoken = random_spoken(seed, robots)
     space, model = spoken.space, spoken.model
     assume(model.cost == "makespan")
-    terrain = Terrain(model, spoken.table)
+    terrain = ExpandedStates(model, spoken.table)
     most = _expandable(terrain, space.rows[space.state[spoken.start]], space.cost_of(0)[0])
     for words in list(by_sentence(spoken))[:10]:
-        found = guided(spoken, spoken.words_of(words), "blind", terrain, count_words=False)
+        found = plan_under_sentence(
+            spoken, spoken.words_of(words), "blind", terrain, count_words=False
+        )
         assert found.states == found.expanded <= most
 
 
-def _expandable(terrain: Terrain, init: object, makespan: int) -> int:
+def _expandable(terrain: ExpandedStates, init: object, makespan: int) -> int:
     """How many states are nearer to the start than the goal is."""
     layer = set(terrain.numbers(init[None, :]))  # type: ignore[index]
     seen = set(layer)
@@ -100,7 +102,7 @@ def test_a_sentence_of_longer_plans_only_is_no_sentence() -> None:
     spoken = shipped("t-map/problem")[1]
     space = spoken.space
     sentences = [spoken.words_of(words) for words in by_sentence(spoken)]
-    terrain = Terrain(spoken.model, spoken.table)
+    terrain = ExpandedStates(spoken.model, spoken.table)
     goal, init = space.goals[0], space.rows[space.state[spoken.start]]
     bound = heuristic("relaxed", spoken.model, goal)
     found = {}
@@ -114,7 +116,7 @@ def test_a_sentence_of_longer_plans_only_is_no_sentence() -> None:
         assert result.cost > space.cost_of(0)
         assert result.words == words
         with pytest.raises(NoPlanFits):
-            guided(spoken, words)
+            plan_under_sentence(spoken, words)
 
 
 # -- the command

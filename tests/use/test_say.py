@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 from coordlang.tasks.candidates import Candidates
 from coordlang.tasks.task_file import ground_tasks
 from coordlang.use.sentence.saying import NotAPlan, NotOptimal, say
-from coordlang.use.sentence.spoken import Spoken
+from coordlang.use.sentence.task_language import TaskLanguage
 from planners.check.validate import validate
-from planners.errors import BadInput, Place, ProvedImpossible
+from planners.errors import BadInput, Position, ProvedImpossible
 from planners.loading import PlanningTask
 from planners.search.plan_file import Texts, only_one_plan, texts
 from planners.search.plan_space import search
@@ -28,7 +28,7 @@ from tests.conftest import Command
 from tests.use.naive_sentences import SHIPPED, by_sentence, random_spoken, shipped
 
 
-def check_said(spoken: Spoken) -> None:
+def check_said(spoken: TaskLanguage) -> None:
     for words, plans in by_sentence(spoken).items():
         for plan in sorted(plans)[:40]:
             assert spoken.text(say(spoken, texts(spoken.model, plan))) == " ".join(words)
@@ -46,7 +46,7 @@ def test_every_plan_of_a_random_model(robots: int, seed: int) -> None:
     check_said(random_spoken(seed, robots)[1])
 
 
-def changed(spoken: Spoken, random: Random) -> Plan:
+def changed(spoken: TaskLanguage, random: Random) -> Plan:
     """A sequence of label tuples near an optimal plan, or a detour that ends in the goal."""
     model = spoken.model
     plan = list(Plans.of(spoken.space).unrank(random.randrange(Plans.of(spoken.space).count)))
@@ -74,7 +74,7 @@ def changed(spoken: Spoken, random: Random) -> Plan:
     return tuple(plan)
 
 
-def busy(spoken: Spoken, random: Random) -> Plan:
+def busy(spoken: TaskLanguage, random: Random) -> Plan:
     """A plan of least makespan, whatever its second cost is."""
     model, space = spoken.model, spoken.space
     row, plan = space.rows[space.state[spoken.start]], []
@@ -99,7 +99,7 @@ def busy(spoken: Spoken, random: Random) -> Plan:
     return tuple(plan)
 
 
-def detour(spoken: Spoken, random: Random) -> Plan:
+def detour(spoken: TaskLanguage, random: Random) -> Plan:
     """Some random joint steps, then an optimal plan from there."""
     model, space = spoken.model, spoken.space
     row = space.rows[space.state[spoken.start]]
@@ -117,7 +117,7 @@ def detour(spoken: Spoken, random: Random) -> Plan:
     return (*plan, *Plans.of(rest).unrank(random.randrange(Plans.of(rest).count)))
 
 
-def judged(candidates: Candidates, spoken: Spoken, plan: Plan, optimal: set[Plan]) -> str:
+def judged(candidates: Candidates, spoken: TaskLanguage, plan: Plan, optimal: set[Plan]) -> str:
     """What `say` does with a sequence of steps, compared with the plan checker and the list of
     optimal plans.
     """
@@ -309,9 +309,9 @@ def test_several_plans_in_one_text(
 
 def test_two_plans_of_one_step() -> None:
     text = "; plan {} of 2\n0: (go r{})\n; makespan = 1\n\n"
-    only_one_plan(text.format(1, 1), Place("p"))
+    only_one_plan(text.format(1, 1), Position("p"))
     with pytest.raises(BadInput, match="p:5:1: this file holds several plans"):
-        only_one_plan(text.format(1, 1) + text.format(2, 2), Place("p"))
+        only_one_plan(text.format(1, 1) + text.format(2, 2), Position("p"))
 
 
 @pytest.mark.parametrize(
@@ -325,7 +325,7 @@ def test_two_plans_of_one_step() -> None:
     ],
 )
 def test_one_plan_is_one(text: str) -> None:
-    only_one_plan(text, Place("p"))
+    only_one_plan(text, Position("p"))
 
 
 def test_spelling_is_free(
@@ -371,7 +371,7 @@ def test_the_plan_with_an_initial_goal_state() -> None:
     candidates, spoken = shipped("three-cells/problem")
     space = spoken.space
     goal_node = int(np.flatnonzero(space.layer == 0)[0])
-    there = Spoken(
+    there = TaskLanguage(
         spoken.language,
         spoken.table,
         replace(space, starts=np.array([goal_node])),

@@ -15,9 +15,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coordlang.use.sentence.drawing import COLOURS, cut_note, edge_lines, inks, node_lines, to_dot
-from coordlang.use.sentence.fitting import NoPlanFits
+from coordlang.use.sentence.fitting_plans import NoPlanFits
 from coordlang.use.sentence.picture import _items, _place, to_svg
-from coordlang.use.sentence.spoken import Spoken
+from coordlang.use.sentence.task_language import TaskLanguage
 from coordlang.use.sentence.understanding import Dag, dag, understand, understood_data
 from planners.search.plan_file import texts
 from planners.search.plans import Plan
@@ -25,7 +25,7 @@ from tests.conftest import DOMAINS, Command
 from tests.use.naive_sentences import SHIPPED, by_sentence, random_spoken, shipped
 
 
-def check(spoken: Spoken, seed: int) -> None:
+def check(spoken: TaskLanguage, seed: int) -> None:
     """Every sentence of the task, and sentences near them."""
     groups = by_sentence(spoken)
     for words, plans in list(groups.items())[:40]:
@@ -38,7 +38,7 @@ def check(spoken: Spoken, seed: int) -> None:
         check_broken(spoken, near(spoken, random, list(groups)), groups)
 
 
-def check_dag(spoken: Spoken, graph: Dag, plans: set[Plan]) -> None:
+def check_dag(spoken: TaskLanguage, graph: Dag, plans: set[Plan]) -> None:
     """Its paths are the plans, its nodes have the right words and counts."""
     assert graph.count == len(plans)
     assert not graph.cut
@@ -61,7 +61,7 @@ def check_dag(spoken: Spoken, graph: Dag, plans: set[Plan]) -> None:
         assert node.plans == through[number]
 
 
-def near(spoken: Spoken, random: Random, sentences: list[tuple[str, ...]]) -> tuple[str, ...]:
+def near(spoken: TaskLanguage, random: Random, sentences: list[tuple[str, ...]]) -> tuple[str, ...]:
     """A sentence with a word changed, left out or put in."""
     words = list(random.choice(sentences))
     at = random.randrange(len(words) + 1)
@@ -72,7 +72,7 @@ def near(spoken: Spoken, random: Random, sentences: list[tuple[str, ...]]) -> tu
 
 
 def check_broken(
-    spoken: Spoken, words: tuple[str, ...], groups: dict[tuple[str, ...], set[Plan]]
+    spoken: TaskLanguage, words: tuple[str, ...], groups: dict[tuple[str, ...], set[Plan]]
 ) -> None:
     if not words or words in groups:
         return

@@ -25,7 +25,7 @@ from unified_planning.plans import ActionInstance, PartialOrderPlan, PlanKind, S
 from coordlang.building import build_language
 from coordlang.language.sentences import task_sentences
 from coordlang.tasks.candidates import from_problems
-from coordlang.use.sentence.spoken import speak_candidates
+from coordlang.use.sentence.task_language import languages_in_tasks
 from coordlang.use.unified import engine as engine_module
 from coordlang.use.unified import register
 from coordlang.use.unified.names import Names
@@ -33,7 +33,7 @@ from coordlang.use.unified.plans import label
 from coordlang.use.unified.translation import translate
 from planners.loading import ModelOptions, load
 from planners.pddl import read_domain
-from planners.pddl.robots import RobotChoice
+from planners.pddl.robots import RobotSelection
 from planners.search.plan_space import search
 from planners.search.plans import Plans
 from tests.conftest import DOMAINS, Command
@@ -140,7 +140,7 @@ def test_the_plans_are_those_of_the_pddl_files(
     folder: str, name: str, robots: dict[str, Any]
 ) -> None:
     path = DOMAINS / folder
-    choice = RobotChoice(tuple(robots.get("robots", ())))
+    choice = RobotSelection(tuple(robots.get("robots", ())))
     loaded = load(path / "domain.pddl", [path / f"{name}.pddl"], ModelOptions(choice))
     space = search(loaded.model, loaded.tasks[0])
     problem = read(folder, name)
@@ -437,7 +437,7 @@ def test_a_sentence_leaves_exactly_its_plans() -> None:
     found = translate(problem)
     candidates = from_problems(found.domain, [found.problem])
     language = build_language(candidates).language
-    spoken = next(speak_candidates(language, candidates))
+    spoken = next(languages_in_tasks(language, candidates))
     everything = sorted(str(steps_of(found, plan)) for plan in all_plans(problem))
     listed = []
     sentences = task_sentences(spoken.space, 0, spoken.table)
@@ -540,7 +540,7 @@ def test_kinds() -> None:
     costs = crossing()
     costs.add_quality_metric(up.MinimizeActionCosts({costs.action("Move"): up.Int(1)}))
     assert not costs.kind <= kind
-    # Asked for by name, an engine is tried in spite of the warning.
+    # SentenceDemands for by name, an engine is tried in spite of the warning.
     with pytest.warns(UserWarning, match="cannot establish"):
         assert solve(costs).status == Status.SOLVED_SATISFICING
     with pytest.warns(UserWarning, match="cannot establish"):

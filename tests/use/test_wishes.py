@@ -14,8 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coordlang.use.sentence.best_sentence import best_sentence
-from coordlang.use.sentence.spoken import Spoken
-from coordlang.use.sentence.wishes import PlanWish, read_wish
+from coordlang.use.sentence.preferences import PlanPreference, read_preference
+from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import OutOfMemory, UsageError
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
@@ -27,7 +27,7 @@ from tests.use.naive_sentences import SHIPPED, by_sentence, random_spoken, shipp
 Value = Callable[[tuple[str, ...], set[Plan]], object]
 
 
-def naive_value(spoken: Spoken, text: str) -> Value:
+def naive_value(spoken: TaskLanguage, text: str) -> Value:
     kind, _, argument = text.partition(":")
     if kind == "shortest":
         return lambda words, _: len(words)
@@ -41,7 +41,7 @@ def naive_value(spoken: Spoken, text: str) -> Value:
     return lambda _, plans: (max(map(grade, plans)), min(map(grade, plans)))
 
 
-def goes_first(spoken: Spoken, plan: Plan, robot: str) -> int:
+def goes_first(spoken: TaskLanguage, plan: Plan, robot: str) -> int:
     """2 if somebody goes before the robot, 0 if the robot goes before everybody, else 1."""
     model = spoken.model
     me = model.robots.index(robot)
@@ -62,7 +62,7 @@ def goes_first(spoken: Spoken, plan: Plan, robot: str) -> int:
     return 2 if "other" in orders else 1 if "nobody" in orders else 0
 
 
-def passes(spoken: Spoken, plan: Plan, atoms: str) -> int:
+def passes(spoken: TaskLanguage, plan: Plan, atoms: str) -> int:
     space = spoken.space
     wanted = {f"({part}" for part in atoms.split("(")[1:]}
     wanted = {part.strip() for part in wanted}
@@ -73,7 +73,7 @@ def passes(spoken: Spoken, plan: Plan, atoms: str) -> int:
     return int(any(wanted <= key for key in keys))
 
 
-def wishes_for(spoken: Spoken, random: Random) -> list[str]:
+def wishes_for(spoken: TaskLanguage, random: Random) -> list[str]:
     space = spoken.space
     row = space.rows[int(random.choice(space.state.tolist()))]
     atoms = spoken.model.codec.decode(row)
@@ -87,7 +87,7 @@ def wishes_for(spoken: Spoken, random: Random) -> list[str]:
     return random.sample(some, random.randint(1, 3))
 
 
-def check(spoken: Spoken, texts: list[str]) -> Counter[str]:
+def check(spoken: TaskLanguage, texts: list[str]) -> Counter[str]:
     groups = by_sentence(spoken)
     number = {word: n for n, word in enumerate(spoken.language.words)}
     values = [naive_value(spoken, text) for text in texts]
@@ -97,7 +97,7 @@ def check(spoken: Spoken, texts: list[str]) -> Counter[str]:
         return (*(value(words, plans) for value in values), len(words), [number[w] for w in words])
 
     words, plans = min(groups.items(), key=key)
-    found = best_sentence(spoken, [read_wish(spoken, text) for text in texts])
+    found = best_sentence(spoken, [read_preference(spoken, text) for text in texts])
     assert found.words == spoken.words_of(words)
     assert found.plans == len(plans)
     expected = [abs(v) if isinstance(v := value(words, plans), int) else v for value in values]
@@ -147,7 +147,7 @@ def test_random_models() -> None:
     assert sum(seen[kind] for kind in ("first (2, 0)", "first (2, 1)", "first (1, 0)")) > 2, seen
 
 
-def random_graph(random: Random) -> Spoken:
+def random_graph(random: Random) -> TaskLanguage:
     """A layered graph of plans made up freely, with joint actions that lead to the same state; no
     model behind it.
     """
@@ -178,12 +178,12 @@ def random_graph(random: Random) -> Spoken:
         second=np.zeros(1, np.int64),
     )
     word = np.array([random.randrange(random.choice([2, 3])) for _ in range(number)])
-    return Spoken(None, None, space, 0, word, True)  # type: ignore[arg-type]
+    return TaskLanguage(None, None, space, 0, word, True)  # type: ignore[arg-type]
 
 
-def worst_state(grade_of: list[int]) -> PlanWish:
+def worst_state(grade_of: list[int]) -> PlanPreference:
     """A plan is as good as the worst state that it passes."""
-    return PlanWish(
+    return PlanPreference(
         "worst",
         lambda s: (grade_of[s],),
         lambda m, _, s: (max(m[0], grade_of[s]),),
@@ -222,7 +222,7 @@ def test_random_graphs() -> None:
         )
         value = {
             "shortest": lambda words: len(words),
-            "most-plans": lambda words: -len(groups[words]),  # noqa: B023
+            "most-plans": lambda words: -len(groups[words]),
         }
         best = min(
             groups,
@@ -247,7 +247,9 @@ def test_random_graphs() -> None:
 def test_wishes_of_one_robot_are_against_those_of_the_other() -> None:
     """On the T-map the two sentences say who goes first."""
     spoken = shipped("t-map/problem")[1]
-    one, other = (best_sentence(spoken, [read_wish(spoken, f"first:{r}")]) for r in ("r1", "r2"))
+    one, other = (
+        best_sentence(spoken, [read_preference(spoken, f"first:{r}")]) for r in ("r1", "r2")
+    )
     assert one.values == other.values == ((0, 0),)
     assert one.words != other.words
     assert (
@@ -261,7 +263,7 @@ def test_wishes_of_one_robot_are_against_those_of_the_other() -> None:
 def test_a_search_that_is_too_large_says_so() -> None:
     spoken = shipped("grid/corners-4x4")[1]
     with pytest.raises(OutOfMemory, match="not decided yet"):
-        best_sentence(spoken, [read_wish(spoken, "most-plans")], most=2)
+        best_sentence(spoken, [read_preference(spoken, "most-plans")], most=2)
 
 
 @pytest.mark.parametrize(
@@ -280,14 +282,14 @@ def test_a_search_that_is_too_large_says_so() -> None:
 )
 def test_wishes_that_are_none(text: str) -> None:
     with pytest.raises(UsageError):
-        read_wish(shipped("t-map/problem")[1], text)
+        read_preference(shipped("t-map/problem")[1], text)
 
 
 def test_spelling_of_wishes() -> None:
     spoken = shipped("t-map/problem")[1]
-    assert read_wish(spoken, " shortest ") == "shortest"
-    assert read_wish(spoken, "first: R2 ").text == "first:r2"  # type: ignore[union-attr]
-    assert read_wish(spoken, "avoid: ( AT r1  c1-1 )").text == "avoid:(at r1 c1-1)"  # type: ignore[union-attr]
+    assert read_preference(spoken, " shortest ") == "shortest"
+    assert read_preference(spoken, "first: R2 ").text == "first:r2"  # type: ignore[union-attr]
+    assert read_preference(spoken, "avoid: ( AT r1  c1-1 )").text == "avoid:(at r1 c1-1)"  # type: ignore[union-attr]
 
 
 # -- the command

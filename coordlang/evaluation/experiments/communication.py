@@ -22,7 +22,12 @@ from coordlang.evaluation.material.compared import Compared, compared_units
 from coordlang.evaluation.material.languages import TITLES, language_for
 from coordlang.evaluation.material.orders import NATURAL, greedy_in_orders
 from coordlang.evaluation.material.paper import DIFFERING, SAVING_ALL, SAVING_DIFFERING
-from coordlang.evaluation.material.said import MOST_LISTED, Said, mean, said_in
+from coordlang.evaluation.material.sentence_counts import (
+    MOST_LISTED,
+    SentenceCounts,
+    mean,
+    sentence_counts_in,
+)
 from coordlang.evaluation.material.suite import ROW, WORLDS
 from coordlang.language.flexibility import flexibility
 
@@ -51,10 +56,13 @@ def run(unit: Unit, settings: Settings) -> Result:
             found[name] = [int(shorter.sum()), round(float(measured.first_saving.mean()), 6)]
         return {"differing_and_saving": found}
     candidates, language = language_for(world, unit.parameters["method"], settings)
-    return {"words": len(language.words), **measures(list(said_in(candidates, language)))}
+    return {
+        "words": len(language.words),
+        **measures(list(sentence_counts_in(candidates, language))),
+    }
 
 
-def measures(tasks: Sequence[Said]) -> Result:
+def measures(tasks: Sequence[SentenceCounts]) -> Result:
     """Savings of the first plan of each task, and what they would be for other plans.
 
     ``differing``: tasks whose first plan's sentence is shorter than its state sequence.

@@ -21,7 +21,12 @@ from coordlang.evaluation.material.compared import Compared, compared_units
 from coordlang.evaluation.material.languages import TITLES, language_for
 from coordlang.evaluation.material.orders import NATURAL, greedy_in_orders
 from coordlang.evaluation.material.paper import OPEN_ALL, OPEN_SEVERAL, SEVERAL
-from coordlang.evaluation.material.said import MOST_LISTED, Said, mean, said_in
+from coordlang.evaluation.material.sentence_counts import (
+    MOST_LISTED,
+    SentenceCounts,
+    mean,
+    sentence_counts_in,
+)
 from coordlang.evaluation.material.suite import ROW, WORLDS
 from coordlang.language.flexibility import flexibility
 
@@ -47,10 +52,13 @@ def run(unit: Unit, settings: Settings) -> Result:
             ]
         return {"open_and_expected": found}
     candidates, language = language_for(world, unit.parameters["method"], settings)
-    return {"words": len(language.words), **measures(list(said_in(candidates, language)))}
+    return {
+        "words": len(language.words),
+        **measures(list(sentence_counts_in(candidates, language))),
+    }
 
 
-def measures(tasks: Sequence[Said]) -> Result:
+def measures(tasks: Sequence[SentenceCounts]) -> Result:
     """Plans left open by the sentence of each task's first plan, and in expectation over all its
     plans.
 

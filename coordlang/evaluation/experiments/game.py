@@ -31,7 +31,7 @@ from coordlang.evaluation.lab.recipe import (
     table,
 )
 from coordlang.evaluation.material.languages import TITLES, language_for
-from coordlang.evaluation.material.said import said_in
+from coordlang.evaluation.material.sentence_counts import sentence_counts_in
 from coordlang.evaluation.material.suite import OTHERS, WORLDS
 
 #: The row of Table 1 that the paper plays on.
@@ -55,7 +55,8 @@ def run(unit: Unit, settings: Settings) -> Result:
     candidates, language = language_for(world, unit.parameters["method"], settings)
     # A task's game depends on its numbers of plans alone; a language makes few different ones.
     tasks = [
-        tuple(sorted(task.plans.values(), reverse=True)) for task in said_in(candidates, language)
+        tuple(sorted(task.plans.values(), reverse=True))
+        for task in sentence_counts_in(candidates, language)
     ]
     result: Result = {"words": len(language.words), "tasks": len(tasks), "liked": list(LIKED)}
     different = Counter(tasks)

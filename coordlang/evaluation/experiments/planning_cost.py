@@ -24,8 +24,8 @@ from coordlang.evaluation.material.languages import TITLES, language_for
 from coordlang.evaluation.material.paper import PLANNING_RATIO
 from coordlang.evaluation.material.suite import OTHERS, QUICK_ROW, ROW, WORLDS
 from coordlang.language.words import WordTable
-from coordlang.use.sentence.guided import Terrain, guided
-from coordlang.use.sentence.spoken import Spoken, speak_candidates
+from coordlang.use.sentence.astar import ExpandedStates, plan_under_sentence
+from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 
 METHODS = ("greedy", "separating", "minimal")
 
@@ -55,8 +55,8 @@ def _unit(world: str, heuristic: str, method: str, samples: int | None) -> Unit:
 def run(unit: Unit, settings: Settings) -> Result:
     world = WORLDS[unit.parameters["world"]]
     candidates, language = language_for(world, unit.parameters["method"], settings)
-    terrain = Terrain(candidates.model, WordTable.of(language, candidates.model))
-    spoken = list(speak_candidates(language, candidates))
+    terrain = ExpandedStates(candidates.model, WordTable.of(language, candidates.model))
+    spoken = list(languages_in_tasks(language, candidates))
     samples = unit.parameters["samples"]
     if samples is not None and samples < len(spoken):
         # The same tasks for every language and heuristic.
@@ -75,13 +75,15 @@ def run(unit: Unit, settings: Settings) -> Result:
     }
 
 
-def expansions(spoken: Spoken, heuristic: str, terrain: Terrain) -> tuple[int, int, int]:
+def expansions(
+    spoken: TaskLanguage, heuristic: str, terrain: ExpandedStates
+) -> tuple[int, int, int]:
     """Nodes expanded by A* without a sentence; with that of the plan it finds, pruning only as in
     the paper; and with the words still to be said as a bound, too.
     """
-    alone = guided(spoken, None, heuristic, terrain)
-    pruned = guided(spoken, alone.words, heuristic, terrain, count_words=False)
-    bounded = guided(spoken, alone.words, heuristic, terrain)
+    alone = plan_under_sentence(spoken, None, heuristic, terrain)
+    pruned = plan_under_sentence(spoken, alone.words, heuristic, terrain, count_words=False)
+    bounded = plan_under_sentence(spoken, alone.words, heuristic, terrain)
     return alone.expanded, pruned.expanded, bounded.expanded
 
 

@@ -33,7 +33,7 @@ from coordlang.evaluation.material.maps import Path, draw_map, place_of
 from coordlang.evaluation.material.suite import OTHERS, WORLDS, World
 from coordlang.tasks.task_file import ListedTask
 from coordlang.use.choices.automaton import Automaton
-from coordlang.use.sentence.spoken import Spoken, speak_candidates
+from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 from planners.joint.model import JointModel
 from planners.search.plans import Plan, Plans
 
@@ -90,7 +90,7 @@ def run(unit: Unit, settings: Settings) -> Result:
         candidates, language = language_for(CORRIDOR, asked["method"], settings, trading_rooms())
     else:
         candidates, language = language_for(WORLDS[asked["world"]], asked["method"], settings)
-    spoken = list(speak_candidates(language, candidates))
+    spoken = list(languages_in_tasks(language, candidates))
     result: Result = {"words": len(language.words)}
     if asked["world"] == "corridor":
         result["drawn"] = detour(next(one for one in spoken if _ends(one) == (START, GOAL)))
@@ -99,7 +99,7 @@ def run(unit: Unit, settings: Settings) -> Result:
     return result | {"tasks": len(spoken), **freedom(spoken)}
 
 
-def freedom(spoken: Sequence[Spoken]) -> dict[str, int]:
+def freedom(spoken: Sequence[TaskLanguage]) -> dict[str, int]:
     """Things that robots may do beyond their part of the first plan, summed over tasks and robots.
 
     A thing is a cell that a robot enters, or a subaction where there are no cells.  ``plan``:
@@ -128,7 +128,7 @@ def _things(model: JointModel, robot: int, labels: set[int]) -> set[str]:
     return {place_of(text) or text for text in texts - nothing}
 
 
-def detour(spoken: Spoken) -> Result:
+def detour(spoken: TaskLanguage) -> Result:
     """What happens when `PLACE` becomes interesting: the agreed parts, and robot 1's when it goes
     there.
     """
@@ -192,7 +192,7 @@ def _walk(model: JointModel, plan: Plan, robot: int) -> list[str]:
     return cells
 
 
-def _ends(spoken: Spoken) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _ends(spoken: TaskLanguage) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Where the robots start and end; all optimal plans of these tasks end in one state."""
     space, codec, node = spoken.space, spoken.model.codec, spoken.start
     while space.layer[node] > 0:

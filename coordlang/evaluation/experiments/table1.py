@@ -89,8 +89,8 @@ def run(unit: Unit, settings: Settings) -> Result:
     return {
         "tasks": candidates.count,
         "states": candidates.states,
-        "divergences": len(built.alphas.divergences),
-        "requiring": built.alphas.requiring,
+        "divergences": len(built.first_differences.divergences),
+        "requiring": built.first_differences.requiring,
         "words": guarantee.size,
         "lower_bound": guarantee.lower_bound,
         "proved_minimal": guarantee.proved_minimal,

@@ -15,7 +15,7 @@ from typing import Any
 from coordlang.evaluation.lab.identity import code_hash, identity, inputs, versions
 from coordlang.evaluation.lab.recipe import Record, Settings, Unit
 from coordlang.language.file import write_atomically
-from planners.errors import BadInput, Place, UsageError
+from planners.errors import BadInput, Position, UsageError
 
 #: A line of a results file, as JSON data.
 Line = dict[str, Any]
@@ -76,7 +76,7 @@ class Results:
                     break
                 raise BadInput(
                     "this line is no result",
-                    place=Place(str(path), number),
+                    position=Position(str(path), number),
                     remedy="Remove the line; its piece of work is then done again.",
                 ) from None
         return found

@@ -16,11 +16,11 @@ from random import Random
 import numpy as np
 from numpy.typing import NDArray
 
-from coordlang.evaluation.material.said import sentence_counts
+from coordlang.evaluation.material.sentence_counts import sentence_counts
 from coordlang.language.words import Guarantee, Language, WordTable, sentence
 from coordlang.use.choices.automaton import Automaton, determinise
-from coordlang.use.sentence.fitting import fitting
-from coordlang.use.sentence.spoken import Spoken
+from coordlang.use.sentence.fitting_plans import fitting
+from coordlang.use.sentence.task_language import TaskLanguage
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, counts
 
@@ -62,7 +62,7 @@ class Odds:
 class Sayings:
     """The tasks of one plan space in a language, with what has been worked out of them."""
 
-    spoken: Spoken
+    spoken: TaskLanguage
     _plans: dict[int, Plans] = field(default_factory=dict)
     _own: dict[tuple[int, tuple[int, ...]], list[Automaton]] = field(default_factory=dict)
     _survives: dict[tuple[int, tuple[int, ...], str], bool] = field(default_factory=dict)
@@ -113,7 +113,7 @@ class Sayings:
         if (task, words) not in self._own:
             one = self.spoken
             fits = fitting(
-                Spoken(one.language, one.table, one.space, task, one.word, one.covered), words
+                TaskLanguage(one.language, one.table, one.space, task, one.word, one.covered), words
             )
             self._own[task, words] = [
                 determinise(fits, robot) for robot in range(len(one.model.robots))
@@ -121,7 +121,7 @@ class Sayings:
         return self._own[task, words]
 
 
-def own_choices(spoken: Spoken, robot: int) -> Automaton:
+def own_choices(spoken: TaskLanguage, robot: int) -> Automaton:
     """The parts that a robot has in any optimal plan of the task."""
     return determinise(alone(spoken.space, spoken.task), robot)
 
@@ -130,7 +130,9 @@ def alone(space: PlanSpace, task: int) -> PlanSpace:
     """The plan space of one task out of several: as if everything were one word."""
     one = Language(("w",), {}, "w", space.model.robots, Guarantee("", 1, 1, True), {}, {}, {}, {})
     words = np.zeros(len(space), np.int64)
-    return fitting(Spoken(one, WordTable.of(one, space.model), space, task, words, True), (0,))
+    return fitting(
+        TaskLanguage(one, WordTable.of(one, space.model), space, task, words, True), (0,)
+    )
 
 
 def has_way(automaton: Automaton, forbidden: frozenset[int]) -> bool:

@@ -9,7 +9,7 @@ from random import Random
 
 import numpy as np
 
-from coordlang.required.divergences import alphas, separations, states_on_plans
+from coordlang.required.divergences import first_differences, separations, states_on_plans
 from coordlang.tasks.candidates import Candidates
 from coordlang.vocabulary.greedy import fill
 from planners.joint.matching import Ints
@@ -31,7 +31,7 @@ def greedy_in_orders(
     ``candidates.rows``.  All of them satisfy alpha for all first differences, so they are
     coordination languages (Theorem 3).
     """
-    constraints = separations(alphas(candidates.spaces).divergences)
+    constraints = separations(first_differences(candidates.spaces).divergences)
     states = states_on_plans(candidates.spaces).tolist()
     orders = dict(natural_orders(candidates, states))
     for number in range(1, randoms + 1):

@@ -13,7 +13,7 @@ from coordlang.evaluation.material.hazards import Hazard, Sayings, exact_odds
 from coordlang.evaluation.material.warehouse import Corners, Delivery, human_in
 from coordlang.language.words import Language
 from coordlang.tasks.candidates import Candidates
-from coordlang.use.sentence.spoken import Spoken, speak_candidates
+from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 from planners.errors import OutOfMemory
 
 #: Sentences of parts of plans (summed over plan-space edges) up to which all are looked at.
@@ -81,7 +81,7 @@ def _product(shares: Sequence[float]) -> float:
 
 def _only(candidates: Candidates, language: Language) -> Sayings:
     assert len(candidates.spaces) == 1, "these worlds are small"
-    return Sayings(next(iter(speak_candidates(language, candidates))))
+    return Sayings(next(iter(languages_in_tasks(language, candidates))))
 
 
 def warehouse_trials(
@@ -103,7 +103,7 @@ def warehouse_trials(
     return Trials(sayings, hazards, tuple(trials))
 
 
-def _task_numbers(spoken: Spoken) -> dict[tuple[Corners, Corners], int]:
+def _task_numbers(spoken: TaskLanguage) -> dict[tuple[Corners, Corners], int]:
     """The task of each leg; tasks are grouped by goal in a plan space, so they are found by their
     states.
     """
@@ -152,7 +152,7 @@ def subaction_trials(candidates: Candidates, language: Language) -> Trials:
     return Trials(sayings, tuple(hazards), tuple(trials))
 
 
-def _starts_meeting(spoken: Spoken, hazard: Hazard) -> list[bool]:
+def _starts_meeting(spoken: TaskLanguage, hazard: Hazard) -> list[bool]:
     """For each task: does some optimal plan need what the hazard forbids?"""
     space = spoken.space
     hit = ~hazard.spares(space)

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from coordlang.use.choices.automaton import Automaton, determinise
-from coordlang.use.choices.mixtures import Mixtures, mix
-from coordlang.use.choices.own import OwnAtoms, know_own
-from coordlang.use.sentence.fitting import fitting
-from coordlang.use.sentence.spoken import Spoken
+from coordlang.use.choices.mixtures import Mixtures, walk_mixtures
+from coordlang.use.choices.own_facts import OwnFacts, know_own
+from coordlang.use.sentence.fitting_plans import fitting
+from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import OutOfMemory
 from planners.search.plan_space import PlanSpace
 from planners.search.tuples import EdgeIndex
@@ -50,7 +50,7 @@ class Choices:
     or is None where there are too many to walk.
     """
 
-    spoken: Spoken
+    spoken: TaskLanguage
     words: tuple[int, ...]
     fits: PlanSpace
     robots: tuple[RobotChoices, ...]
@@ -65,7 +65,7 @@ class Choices:
 
 
 def choices(
-    spoken: Spoken,
+    spoken: TaskLanguage,
     words: Sequence[int],
     index: EdgeIndex | None = None,
     most: int | None = MOST,
@@ -78,14 +78,14 @@ def choices(
     own subactions alone change.
 
     ``index``: see `coordlang.use.choices.mixtures.mix`.  Raises
-    `coordlang.use.sentence.fitting.NoPlanFits`, and `OutOfMemory` if the automata, or with
+    `coordlang.use.sentence.fitting_plans.NoPlanFits`, and `OutOfMemory` if the automata, or with
     ``most=None`` the combinations, do not fit into the memory.
     """
     fits = fitting(spoken, words)
     robots = range(len(spoken.model.robots))
     plain = [determinise(fits, robot) for robot in robots]
     try:
-        mixtures = mix(spoken, fits, plain, words, index, most)
+        mixtures = walk_mixtures(spoken, fits, plain, words, index, most)
     except OutOfMemory:
         if most is None:
             raise
@@ -95,14 +95,14 @@ def choices(
 
 
 def _with_knowledge(
-    spoken: Spoken, plain: Automaton, robot: int, mixtures: Mixtures | None, most: int | None
+    spoken: TaskLanguage, plain: Automaton, robot: int, mixtures: Mixtures | None, most: int | None
 ) -> RobotChoices:
     if mixtures is not None and mixtures.space is not None:
         with suppress(OutOfMemory):  # the combinations are checked all the same
             return RobotChoices(
                 robot, determinise(mixtures.space, robot, _truth(mixtures.space), most), "exact"
             )
-    own = OwnAtoms.of(spoken.model, robot)
+    own = OwnFacts.of(spoken.model, robot)
     start = _bits(spoken.space, int(spoken.space.state[spoken.start]))
     return RobotChoices(robot, know_own(plain, own, start), "own")
 
@@ -113,5 +113,5 @@ def _truth(space: PlanSpace) -> dict[int, int]:
 
 
 def _bits(space: PlanSpace, state: int) -> int:
-    words = space.rows[state][: space.model.codec.fact_words]
+    words = space.rows[state][: space.model.codec.fact_blocks]
     return int.from_bytes(words.astype("<u8").tobytes(), "little")

@@ -14,7 +14,7 @@ import numpy as np
 
 from coordlang.required.miscoordination import Miscoordination, Trail, describe_failure
 from coordlang.use.choices.automaton import Automaton
-from coordlang.use.sentence.spoken import Spoken
+from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import OutOfMemory
 from planners.joint.conditions import Labels
 from planners.joint.matching import Ints, ranges, spans
@@ -59,8 +59,8 @@ class _Step:
     edge: Ints
 
 
-def mix(
-    spoken: Spoken,
+def walk_mixtures(
+    spoken: TaskLanguage,
     fits: PlanSpace,
     automata: Sequence[Automaton],
     words: Sequence[int],
@@ -128,7 +128,7 @@ def _edges(index: EdgeIndex, node: Ints, labels: Labels) -> Ints:
     return np.concatenate(parts)
 
 
-def _plan_space(spoken: Spoken, layers: Sequence[Ints], steps: Sequence[_Step]) -> PlanSpace:
+def _plan_space(spoken: TaskLanguage, layers: Sequence[Ints], steps: Sequence[_Step]) -> PlanSpace:
     """The walk as a plan space: nodes numbered from the goal's layer up."""
     space = spoken.space
     sizes = [len(table) for table in reversed(layers)]
@@ -153,7 +153,7 @@ def _plan_space(spoken: Spoken, layers: Sequence[Ints], steps: Sequence[_Step]) 
 
 
 def _violation(
-    spoken: Spoken,
+    spoken: TaskLanguage,
     fits: PlanSpace,
     words: Sequence[int],
     steps: Sequence[_Step],
@@ -175,7 +175,9 @@ def _violation(
     return describe_failure(spoken.space, trail, tuple(spoken.table.words[w] for w in words))
 
 
-def _with_beginning(spoken: Spoken, fits: PlanSpace, robot: int, own: Sequence[int]) -> list[int]:
+def _with_beginning(
+    spoken: TaskLanguage, fits: PlanSpace, robot: int, own: Sequence[int]
+) -> list[int]:
     """A fitting plan in which a robot begins like this, as edges of the task's plan space."""
     layers = [{int(fits.starts[0]): -1}]  # node -> the edge that led there
     for label in own:
@@ -197,7 +199,7 @@ def _with_beginning(spoken: Spoken, fits: PlanSpace, robot: int, own: Sequence[i
     return _same_edges(spoken, [fits.labels[edge].tolist() for edge in path])
 
 
-def _same_edges(spoken: Spoken, plan: Sequence[Sequence[int]]) -> list[int]:
+def _same_edges(spoken: TaskLanguage, plan: Sequence[Sequence[int]]) -> list[int]:
     """A plan, given by labels, as edges of the task's plan space."""
     space, node, path = spoken.space, spoken.start, []
     for labels in plan:

@@ -13,8 +13,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from coordlang.use.export.membership import Term, membership
-from coordlang.use.sentence.fitting import fitting
-from coordlang.use.sentence.spoken import Spoken
+from coordlang.use.sentence.fitting_plans import fitting
+from coordlang.use.sentence.task_language import TaskLanguage
 
 #: What must not begin a symbol: readers take it for a word of their own.
 _TAKEN = re.compile(r"[^a-z]|true|false|last|end|tt|ff")
@@ -36,7 +36,7 @@ class SentenceFormula:
     symbols: dict[str, str]
 
 
-def export_ltlf(spoken: Spoken, words: Sequence[int]) -> SentenceFormula:
+def export_ltlf(spoken: TaskLanguage, words: Sequence[int]) -> SentenceFormula:
     """The sentence ``words`` as a formula over the states of a plan, the initial state first.
 
     A plan has the sentence w0 w1 .. wk exactly if it is in w0 for a while, then in w1, and so on,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from coordlang.explanation.variables import truth
 from coordlang.explanation.words import word_formulas
-from coordlang.use.sentence.spoken import Spoken
+from coordlang.use.sentence.task_language import TaskLanguage
 from planners.joint.matching import Ints
 from planners.joint.states import Rows, unique_rows
 
@@ -37,7 +37,7 @@ class Membership:
         return sum(map(len, self.terms))
 
 
-def membership(spoken: Spoken, *, apart: bool = True, states: int = _STATES) -> Membership:
+def membership(spoken: TaskLanguage, *, apart: bool = True, states: int = _STATES) -> Membership:
     """The words of a language as terms: those of their formulas (`coordlang.explanation`).
 
     Exactly one term holds in each state; at least one, and shorter ones, if they need not be
@@ -109,7 +109,7 @@ def _term(literals: Sequence[str]) -> Term:
     }
 
 
-def _tree(spoken: Spoken, rows: Rows) -> Membership:
+def _tree(spoken: TaskLanguage, rows: Rows) -> Membership:
     """A binary decision tree; each test is the one that tells most about the word (least entropy,
     as in ID3).
     """

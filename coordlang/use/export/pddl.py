@@ -29,9 +29,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from coordlang.use.export.membership import Membership, Term, membership
-from coordlang.use.sentence.fitting import fitting
-from coordlang.use.sentence.spoken import Spoken
-from planners.classical import PlainAction, PlainTask, action_names, compile_plain, to_pddl
+from coordlang.use.sentence.fitting_plans import fitting
+from coordlang.use.sentence.task_language import TaskLanguage
+from planners.classical import (
+    ClassicalAction,
+    ClassicalTask,
+    action_names,
+    compile_classical,
+    to_pddl,
+)
 from planners.classical.task import Condition
 from planners.errors import BadInput
 from planners.joint.model import IDLE, JointModel, show
@@ -53,7 +59,7 @@ class Exported:
     """
 
     model: JointModel
-    plain: PlainTask
+    plain: ClassicalTask
     domain: str
     problem: str
     choices: dict[str, tuple[Choice, ...]]
@@ -87,7 +93,7 @@ class Exported:
         return tuple(tuple(step[robot] for robot in range(len(self.model.robots))) for step in done)
 
 
-def export_pddl(spoken: Spoken, words: Sequence[int], limit: int = 2000) -> Exported:
+def export_pddl(spoken: TaskLanguage, words: Sequence[int], limit: int = 2000) -> Exported:
     """The task under the sentence ``words``: its optimal plans are exactly the plans that fit, one
     to one.
 
@@ -98,7 +104,7 @@ def export_pddl(spoken: Spoken, words: Sequence[int], limit: int = 2000) -> Expo
     ----------
     limit
         Up to this many plain actions every joint action is written as one; beyond, robots choose
-        one after another (see `planners.classical.compile_plain`).
+        one after another (see `planners.classical.compile_classical`).
 
     Raises `NoPlanFits` if there is nothing to plan.
     """
@@ -106,7 +112,7 @@ def export_pddl(spoken: Spoken, words: Sequence[int], limit: int = 2000) -> Expo
     makespan, second = space.cost_of(0)
     goal = space.goals[int(space.goal[space.starts[0]])]
     task = PlanningTask("task", space.rows[space.state[space.starts[0]]], goal)
-    plain = compile_plain(model, task, limit, longest=max(1, makespan))
+    plain = compile_classical(model, task, limit, longest=max(1, makespan))
     choices = [_choices(model, plain, action) for action in plain.actions]
     tests = membership(spoken)
     out = _Naming(spoken, words, plain, tests)
@@ -151,11 +157,11 @@ def plan_names(text: str) -> list[str]:
 
 class _Naming:
     """The facts and actions that name states and follow the sentence; facts by number, as in
-    `PlainTask`.
+    `ClassicalTask`.
     """
 
     def __init__(
-        self, spoken: Spoken, words: Sequence[int], plain: PlainTask, tests: Membership
+        self, spoken: TaskLanguage, words: Sequence[int], plain: ClassicalTask, tests: Membership
     ) -> None:
         self.model, self.words, self.tests, self.table = (
             spoken.model,
@@ -188,7 +194,7 @@ class _Naming:
         self.facts.append(text)
         return len(self.facts) - 1
 
-    def within(self, action: PlainAction, chosen: Sequence[Choice]) -> PlainAction:
+    def within(self, action: ClassicalAction, chosen: Sequence[Choice]) -> ClassicalAction:
         """An action of the plain task: what ends a step leads to naming, and what is remembered is
         noted.
         """
@@ -211,7 +217,7 @@ class _Naming:
             deletes=tuple(sorted(deletes - adds)),
         )
 
-    def actions(self) -> list[PlainAction]:
+    def actions(self) -> list[ClassicalAction]:
         """Naming by one term each, then staying or going on."""
         found = []
         for word, named in self.named.items():
@@ -238,7 +244,7 @@ class _Naming:
                 )
         return found
 
-    def _goal(self, plain: PlainTask) -> tuple[Condition, ...]:
+    def _goal(self, plain: ClassicalTask) -> tuple[Condition, ...]:
         """The whole sentence is said, and the last state is named; ``reach the goal`` consumes the
         time to act.
         """
@@ -256,13 +262,15 @@ class _Naming:
         conditions: Sequence[Condition],
         adds: Sequence[int],
         deletes: Sequence[int],
-    ) -> PlainAction:
-        return PlainAction(
+    ) -> ClassicalAction:
+        return ClassicalAction(
             name, tuple(sorted(conditions)), tuple(sorted(adds)), tuple(sorted(deletes)), 0
         )
 
 
-def _choices(model: JointModel, plain: PlainTask, action: PlainAction) -> tuple[Choice, ...]:
+def _choices(
+    model: JointModel, plain: ClassicalTask, action: ClassicalAction
+) -> tuple[Choice, ...]:
     """Which robots choose what in a plain action, by its name."""
     if plain.form == "explicit":
         if action.name == "reach the goal":

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
 
-from coordlang.use.sentence.spoken import Spoken
-from coordlang.use.sentence.wishes import Memory, PlanWish, Wish
+from coordlang.use.sentence.preferences import Memory, PlanPreference, Preference
+from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import OutOfMemory
 from planners.limits import memory_left
 
@@ -16,7 +16,7 @@ _ENTRY_BYTES = 200
 
 
 @dataclass(frozen=True, slots=True)
-class Wished:
+class BestSentence:
     """The best sentence: ``words``, the exact number of ``plans`` that it leaves open, and what
     became of each wish.
 
@@ -31,14 +31,16 @@ class Wished:
     prefixes: int
 
 
-def best_sentence(spoken: Spoken, wishes: Sequence[Wish], most: int | None = None) -> Wished:
+def best_sentence(
+    spoken: TaskLanguage, wishes: Sequence[Preference], most: int | None = None
+) -> BestSentence:
     """The best sentence of the task for wishes in order of weight: the second one decides where the
     first is equal, ..
 
     - ``shortest``: fewest words;
     - ``most-plans``: most optimal plans have it;
-    - a `PlanWish`: the worst plan that the sentence leaves open has the best grade, then the best
-      plan has.  The robots may end up with any of these plans, so the worst one is what the
+    - a `PlanPreference`: the worst plan that the sentence leaves open has the best grade, then the
+      best plan has.  The robots may end up with any of these plans, so the worst one is what the
       sentence promises.
 
     Of sentences that are equal in all wishes the one with fewest words is taken, then the first by
@@ -59,7 +61,7 @@ def best_sentence(spoken: Spoken, wishes: Sequence[Wish], most: int | None = Non
     while queue:
         _, words, _, beginning = heappop(queue)
         if beginning.end is not None:
-            return Wished(words, beginning.end.plans, graph.values(beginning), prefixes)
+            return BestSentence(words, beginning.end.plans, graph.values(beginning), prefixes)
         same = graph.rest(beginning)
         if same in seen:
             continue  # the one that was here before is as good, and shorter or smaller
@@ -71,14 +73,16 @@ def best_sentence(spoken: Spoken, wishes: Sequence[Wish], most: int | None = Non
         if (most is not None and entries > most) or entries * _ENTRY_BYTES > memory_left():
             raise OutOfMemory(
                 f"{prefixes:,} beginnings of sentences were looked at, and the best sentence is not decided yet",
-                remedy="Wish for the shortest sentence first, use a smaller task, or a larger --memory-limit.",
+                remedy="Preference for the shortest sentence first, use a smaller task, or a larger --memory-limit.",
             )
     raise AssertionError("a task has at least one sentence")
 
 
 @dataclass(frozen=True, slots=True)
 class _End:
-    """The plans of a sentence: how many, and for each `PlanWish` the worst and the best grade."""
+    """The plans of a sentence: how many, and for each `PlanPreference` the worst and the best
+    grade.
+    """
 
     plans: int
     grades: tuple[tuple[int, int], ...]
@@ -103,11 +107,11 @@ class _Graph:
     Points are numbered from the start on, layer by layer.  ``following[p]`` holds pairs (point,
     number of joint actions); ``node`` and ``word`` are those of each point.  The rest bounds the
     ends of plans from p on: ``more[p]`` is the least number of further words, ``grades[p]`` the
-    least grade for each `PlanWish`, and ``open[p]``, if most plans are wished for, has for each
-    next word (-1: the end) how many plans from p can have one sentence with it, at most.
+    least grade for each `PlanPreference`, and ``open[p]``, if most plans are wished for, has for
+    each next word (-1: the end) how many plans from p can have one sentence with it, at most.
     """
 
-    wishes: tuple[Wish, ...]
+    wishes: tuple[Preference, ...]
     following: list[list[tuple[int, int]]]
     node: list[int]
     word: list[int]
@@ -116,9 +120,9 @@ class _Graph:
     open: list[dict[int, int]]
 
     @classmethod
-    def of(cls, spoken: Spoken, wishes: Sequence[Wish]) -> _Graph:
+    def of(cls, spoken: TaskLanguage, wishes: Sequence[Preference]) -> _Graph:
         following, node, memories = _points(
-            spoken, [wish for wish in wishes if isinstance(wish, PlanWish)]
+            spoken, [wish for wish in wishes if isinstance(wish, PlanPreference)]
         )
         word = [int(spoken.word[n]) for n in node]
         graph = cls(tuple(wishes), following, node, word, [0] * len(node), [()] * len(node), [])
@@ -129,7 +133,7 @@ class _Graph:
 
     def _look_ahead(self, memories: list[tuple[Memory, ...]]) -> None:
         """Fill in the bounds, from the ends of the plans back."""
-        plan_wishes = [wish for wish in self.wishes if isinstance(wish, PlanWish)]
+        plan_wishes = [wish for wish in self.wishes if isinstance(wish, PlanPreference)]
         for point in range(len(self.node) - 1, -1, -1):
             here, after = self.word[point], self.following[point]
             if not after:
@@ -236,7 +240,7 @@ class _Graph:
 
 
 def _points(
-    spoken: Spoken, wishes: Sequence[PlanWish]
+    spoken: TaskLanguage, wishes: Sequence[PlanPreference]
 ) -> tuple[list[list[tuple[int, int]]], list[int], list[tuple[Memory, ...]]]:
     """The points that plans pass, layer by layer: what follows each of them, its node, its
     memories.

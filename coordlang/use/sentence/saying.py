@@ -8,8 +8,8 @@ from pathlib import Path
 
 from coordlang.language.words import sentence
 from coordlang.tasks.task_file import formula_text
-from coordlang.use.sentence.spoken import Spoken
-from planners.errors import BadInput, Place, Refuted
+from coordlang.use.sentence.task_language import TaskLanguage
+from planners.errors import BadInput, Position, Refuted
 from planners.joint.model import IDLE, FullState, JointModel
 from planners.joint.states import Rows
 from planners.pddl.lifted import And
@@ -25,9 +25,9 @@ class NotAPlan(Refuted):
     """
 
     def __init__(
-        self, step: int, reason: str, place: Place | None = None, remedy: str | None = None
+        self, step: int, reason: str, position: Position | None = None, remedy: str | None = None
     ) -> None:
-        super().__init__(f"this is no plan: {reason}", place=place, remedy=remedy)
+        super().__init__(f"this is no plan: {reason}", position=position, remedy=remedy)
         self.step = step
 
 
@@ -44,8 +44,9 @@ class NotOptimal(Refuted):
         self.excess = excess
 
 
-def say(spoken: Spoken, plan: Sequence[Texts]) -> tuple[int, ...]:
-    """The sentence of an optimal plan (the paper's TSC), as word numbers; `Spoken.text` writes it.
+def say(spoken: TaskLanguage, plan: Sequence[Texts]) -> tuple[int, ...]:
+    """The sentence of an optimal plan (the paper's TSC), as word numbers; `TaskLanguage.text`
+    writes it.
 
     ``plan[k][i]`` is the subaction of robot i in step k as text, None if it idles (as
     `planners.search.plan_file.read_plans` gives it).  O(steps) expansions.  Raises `NotAPlan` or
@@ -65,7 +66,7 @@ def say(spoken: Spoken, plan: Sequence[Texts]) -> tuple[int, ...]:
     return sentence(words)
 
 
-def follow(spoken: Spoken, plan: Sequence[Texts]) -> tuple[Plan, list[Rows], int]:
+def follow(spoken: TaskLanguage, plan: Sequence[Texts]) -> tuple[Plan, list[Rows], int]:
     """The label numbers, the states and the second cost of a plan, optimal or not.  Raises
     `NotAPlan`.
     """
@@ -100,10 +101,10 @@ def read_plan_file(path: str | Path, model: JointModel) -> list[tuple[Texts, ...
         plans = read_plans(path, model)
     except NoSuchAction as error:
         raise NotAPlan(
-            error.step, f"in step {error.step + 1}, {error.what}", place=error.place
+            error.step, f"in step {error.step + 1}, {error.what}", position=error.position
         ) from None
     if not plans:
-        raise BadInput("there is no plan in it", place=Place(str(path)))
+        raise BadInput("there is no plan in it", position=Position(str(path)))
     return [tuple(tuple(map(_spelling, step)) for step in plan) for plan in plans]
 
 
@@ -129,7 +130,7 @@ def _numbers(model: JointModel, step: Texts, number: int) -> tuple[int, ...]:
     return found
 
 
-def _missing(spoken: Spoken, row: Rows) -> str:
+def _missing(spoken: TaskLanguage, row: Rows) -> str:
     """The first part of the goal that does not hold."""
     model, space = spoken.model, spoken.space
     goal = space.goals[space.goal[spoken.start]]
@@ -140,14 +141,16 @@ def _missing(spoken: Spoken, row: Rows) -> str:
     return f"the goal is not reached: {formula_text(part)} does not hold"
 
 
-def _edge(spoken: Spoken, node: int, labels: Sequence[int]) -> int | None:
+def _edge(spoken: TaskLanguage, node: int, labels: Sequence[int]) -> int | None:
     space = spoken.space
     first = int(space.first[node])
     found = (space.labels[first : int(space.first[node + 1])] == labels).all(axis=1).nonzero()[0]
     return first + int(found[0]) if len(found) else None
 
 
-def _leaves(spoken: Spoken, step: Texts, row: Rows, number: int, excess: tuple[int, int]) -> str:
+def _leaves(
+    spoken: TaskLanguage, step: Texts, row: Rows, number: int, excess: tuple[int, int]
+) -> str:
     """How much too costly a plan is, and where it leaves all optimal plans."""
     model, space = spoken.model, spoken.space
     makespan, second = space.cost_of(spoken.task)

@@ -8,8 +8,8 @@ from itertools import pairwise
 from typing import Any
 
 from coordlang.tasks.candidates import describe
-from coordlang.use.sentence.fitting import fitting
-from coordlang.use.sentence.spoken import Spoken
+from coordlang.use.sentence.fitting_plans import fitting
+from coordlang.use.sentence.task_language import TaskLanguage
 from planners.search.plan_file import json_count, to_json
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, counts
@@ -24,7 +24,7 @@ class Understood:
     plan.
     """
 
-    spoken: Spoken
+    spoken: TaskLanguage
     words: tuple[int, ...]
     fits: PlanSpace
     plans: Plans
@@ -35,9 +35,9 @@ class Understood:
         return self.plans.count
 
 
-def understand(spoken: Spoken, words: Sequence[int]) -> Understood:
+def understand(spoken: TaskLanguage, words: Sequence[int]) -> Understood:
     """The optimal plans of the task with the sentence ``words`` (word numbers, see
-    `Spoken.words_of`).
+    `TaskLanguage.words_of`).
 
     O(plan-space edges * words), however many plans there are.  Raises `NoPlanFits`, which says
     where the sentence first breaks.

@@ -38,9 +38,9 @@ from unified_planning.plans import PlanKind
 
 from coordlang.language.file import options_of, read_language
 from coordlang.language.words import Language
-from coordlang.use.sentence.fitting import NoPlanFits, fitting
+from coordlang.use.sentence.fitting_plans import NoPlanFits, fitting
 from coordlang.use.sentence.saying import NotAPlan, NotOptimal, say
-from coordlang.use.sentence.spoken import Spoken, speak
+from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
 from coordlang.use.unified import NAME
 from coordlang.use.unified.plans import NoSteps, of_up, to_up
 from coordlang.use.unified.translation import Subactions, Translated, translate
@@ -56,7 +56,7 @@ from planners.errors import (
 )
 from planners.limits import time_limit
 from planners.loading import ModelOptions, build
-from planners.pddl.robots import RobotChoice
+from planners.pddl.robots import RobotSelection
 from planners.search.plan_space import PlanSpace, search
 from planners.search.plans import Plans
 
@@ -89,7 +89,7 @@ class _Solved:
 
     found: Translated
     space: PlanSpace
-    spoken: Spoken | None
+    spoken: TaskLanguage | None
 
 
 class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanValidatorMixin):  # type: ignore[misc]
@@ -260,7 +260,7 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         )
         return _Solved(found, space, spoken)
 
-    def _speak(self, found: Translated) -> Spoken:
+    def _speak(self, found: Translated) -> TaskLanguage:
         """The language in this problem; texts are not compared, because the problem has none of its
         own.
         """
@@ -272,7 +272,7 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
             if k not in ("problem_sha256", "world_sha256")
         }
         language = replace(self._language, domain=domain, model=model)
-        return speak(language, found.domain, found.problem, self._options(found))
+        return language_in_task(language, found.domain, found.problem, self._options(found))
 
     def _options(self, found: Translated) -> ModelOptions:
         names = {o.name: name for name, o in found.objects.items()}
@@ -291,7 +291,7 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
             if self._robot_type is None
             else found.types.get(self._robot_type, self._robot_type)
         )
-        choice = RobotChoice(robots, kind, self._unowned or "error")  # type: ignore[arg-type]
+        choice = RobotSelection(robots, kind, self._unowned or "error")  # type: ignore[arg-type]
         return ModelOptions(choice, self._cost or "makespan", self._remember)  # type: ignore[arg-type]
 
     def _done(self, problem: Any) -> PlanGenerationResultStatus:

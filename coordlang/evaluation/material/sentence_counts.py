@@ -27,7 +27,7 @@ MOST_LISTED = 1000
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class SentenceCounts:
     """The sentences of one task.
 
     ``steps``: the joint steps of its optimal plans.  ``plans``: sentence -> how many of them have
@@ -67,20 +67,20 @@ class Said:
         return float(1 - Fraction(words) / (self.steps + 1))
 
 
-def said_in(candidates: Candidates, language: Language) -> Iterator[Said]:
+def sentence_counts_in(candidates: Candidates, language: Language) -> Iterator[SentenceCounts]:
     """What each candidate task's plans say, task by task."""
     table = WordTable.of(language, candidates.model)
     for space in candidates.spaces:
         yield from said(space, table.of_rows(space.rows)[space.state])
 
 
-def said(space: PlanSpace, word: Ints) -> list[Said]:
+def said(space: PlanSpace, word: Ints) -> list[SentenceCounts]:
     """The sentences of the tasks of one plan space; ``word`` holds the word number of each node."""
     plans = sentence_counts(space, word)
     first = _ends(space, word, 0)
     last = _ends(space, word, -1)
     layer: list[int] = space.layer.tolist()
-    return [Said(layer[n], plans[n], first[n], last[n]) for n in space.starts.tolist()]
+    return [SentenceCounts(layer[n], plans[n], first[n], last[n]) for n in space.starts.tolist()]
 
 
 def sentence_counts(

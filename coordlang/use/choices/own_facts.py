@@ -18,7 +18,7 @@ Change = bool | None
 
 
 @dataclass(frozen=True, slots=True)
-class OwnAtoms:
+class OwnFacts:
     """The facts of which every change is certain from the robot's own label: ``mask`` has their
     bits, ``others`` the rest.
 
@@ -31,7 +31,7 @@ class OwnAtoms:
     deletes: tuple[int, ...]
 
     @classmethod
-    def of(cls, model: JointModel, robot: int) -> OwnAtoms:
+    def of(cls, model: JointModel, robot: int) -> OwnFacts:
         """Read off the ground actions, without regard to what is reachable.
 
         A fact is own if no action without this robot changes it, no conditional effect does, and
@@ -62,7 +62,7 @@ class OwnAtoms:
         return cls(mask, foreign, tuple(adds), tuple(deletes))
 
 
-def know_own(automaton: Automaton, own: OwnAtoms, start: int) -> Automaton:
+def know_own(automaton: Automaton, own: OwnFacts, start: int) -> Automaton:
     """The least automaton that accepts the same subplans and says the values of the own atoms.
 
     ``start`` has the bits of the facts that are true at first.

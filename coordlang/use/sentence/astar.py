@@ -9,8 +9,8 @@ from heapq import heappop, heappush
 import numpy as np
 
 from coordlang.language.words import WordTable, sentence
-from coordlang.use.sentence.fitting import fitting
-from coordlang.use.sentence.spoken import Spoken
+from coordlang.use.sentence.fitting_plans import fitting
+from coordlang.use.sentence.task_language import TaskLanguage
 from planners.joint.model import Goal, JointModel
 from planners.joint.states import Rows, bits
 from planners.search.bounds import FAR, Heuristic, heuristic
@@ -35,7 +35,7 @@ class Search:
 
 
 @dataclass(frozen=True, slots=True)
-class Terrain:
+class ExpandedStates:
     """States met by searches with one language over one model, numbered, with their words and joint
     steps.
 
@@ -70,11 +70,11 @@ class Terrain:
         return self._steps[state]
 
 
-def guided(
-    spoken: Spoken,
+def plan_under_sentence(
+    spoken: TaskLanguage,
     words: Sequence[int] | None,
     name: str = "relaxed",
-    terrain: Terrain | None = None,
+    terrain: ExpandedStates | None = None,
     *,
     count_words: bool = True,
 ) -> Search:
@@ -84,7 +84,7 @@ def guided(
     Raises `NoPlanFits` when no optimal plan has the sentence.
     """
     space = spoken.space
-    terrain = terrain or Terrain(spoken.model, spoken.table)
+    terrain = terrain or ExpandedStates(spoken.model, spoken.table)
     goal = space.goals[space.goal[spoken.start]]
     init = space.rows[space.state[spoken.start]]
     bound = heuristic(name, spoken.model, goal)
@@ -96,7 +96,7 @@ def guided(
 
 
 def astar(
-    terrain: Terrain,
+    terrain: ExpandedStates,
     init: Rows,
     goal: Goal,
     bound: Heuristic,
@@ -185,7 +185,7 @@ def astar(
 class _Heights:
     """The lower bound of every state met, and whether it is a goal state."""
 
-    terrain: Terrain
+    terrain: ExpandedStates
     goal: Goal
     bound: Heuristic
     height: dict[int, int] = field(default_factory=dict)

@@ -61,7 +61,7 @@ class WordChange:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class SentenceDemands:
     """One sentence of one task: the number of ``plans`` that fit, each robot's part, and the
     changes of word.
     """
@@ -73,9 +73,9 @@ class Asked:
     changes: tuple[WordChange, ...]
 
 
-def asked(
+def sentence_demands(
     fitting: PlanSpace, table: WordTable, formulas: Mapping[str, Cover], few: int = 4
-) -> Asked:
+) -> SentenceDemands:
     """What a sentence asks, from the plan space of the plans that fit it (one task, one sentence).
 
     ``formulas``: the words' formulas; where several robots could be said to decide a change of
@@ -91,7 +91,7 @@ def asked(
         change = (place[target] == len(sentence)) & (place[source] < len(sentence))
         if change.any():
             sentence.append(int(word[target[change][0]]))
-    return Asked(
+    return SentenceDemands(
         sentence=tuple(table.words[w] for w in sentence),
         plans=counts(fitting)[start],
         steps=int(fitting.layer[start]),

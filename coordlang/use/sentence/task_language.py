@@ -11,7 +11,7 @@ from coordlang.language.file import check_source, options_of, recorded_list
 from coordlang.language.words import Language, WordTable
 from coordlang.tasks.candidates import Candidates
 from coordlang.tasks.task_file import ListedTask, ground_tasks
-from planners.errors import BadInput, Place
+from planners.errors import BadInput, Position
 from planners.joint.matching import Ints
 from planners.joint.model import Goal, JointModel
 from planners.loading import ModelOptions, build
@@ -20,7 +20,7 @@ from planners.search.plan_space import PlanSpace, search
 
 
 @dataclass(frozen=True, slots=True)
-class Spoken:
+class TaskLanguage:
     """A language with the optimal plans of one task.
 
     ``space`` may hold further tasks: this one is number ``task`` of ``space.starts``.  ``word`` has
@@ -74,21 +74,21 @@ class Spoken:
         return " ".join(self.table.words[word] for word in words)
 
 
-def speak(
+def language_in_task(
     language: Language,
     domain: Domain,
     problem: Problem,
     options: ModelOptions | None = None,
-    place: Place | None = None,
-) -> Spoken:
+    position: Position | None = None,
+) -> TaskLanguage:
     """A language in the task of a PDDL problem.
 
     Raises `BadInput` when domain or problem are not the language's, `ProvedImpossible` for an
     unsolvable task.
     """
-    place = place or Place("the language file")
-    check_source(language, domain, [problem], place)
-    recorded = ground_tasks(domain, problem, recorded_list(language), place)
+    position = position or Position("the language file")
+    check_source(language, domain, [problem], position)
+    recorded = ground_tasks(domain, problem, recorded_list(language), position)
     options = options or options_of(language)
     # What can be true depends on where tasks start: the states that the language speaks of must be
     # possible here.
@@ -97,22 +97,22 @@ def speak(
     unknown = _atoms(language) - loaded.model.codec.index.keys()
     if unknown:
         (extra, _), *_ = ground_tasks(
-            domain, problem, [ListedTask(tuple(sorted(unknown)), ())], place
+            domain, problem, [ListedTask(tuple(sorted(unknown)), ())], position
         )
         loaded = build(domain, [problem], options, inits=[*inits, extra])
     space = search(loaded.model, loaded.tasks[0])
     table = WordTable.of(language, loaded.model)
     covered = _covers(language, space, recorded)
-    return Spoken(language, table, space, 0, table.of_rows(space.rows)[space.state], covered)
+    return TaskLanguage(language, table, space, 0, table.of_rows(space.rows)[space.state], covered)
 
 
-def speak_candidates(language: Language, candidates: Candidates) -> Iterator[Spoken]:
+def languages_in_tasks(language: Language, candidates: Candidates) -> Iterator[TaskLanguage]:
     """A language in each of its candidate tasks."""
     table = WordTable.of(language, candidates.model)
     for space in candidates.spaces:
         word = table.of_rows(space.rows)[space.state]
         for task in range(len(space.starts)):
-            yield Spoken(language, table, space, task, word, True)
+            yield TaskLanguage(language, table, space, task, word, True)
 
 
 def _covers(

@@ -17,7 +17,7 @@ _TRIED = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Telling:
+class WordDescriptions:
     """The words with their formulas, in the order in which they are told.
 
     A formula None says "every other state".  ``in_order``: each formula speaks only of the states
@@ -35,12 +35,14 @@ class Telling:
         return sum(cover.length if cover else 1 for _, cover in self.rules)
 
 
-def telling(mapped: Mapped, formulas: dict[str, Cover], each: bool = False) -> Telling:
+def describe_words(
+    mapped: Mapped, formulas: dict[str, Cover], each: bool = False
+) -> WordDescriptions:
     """The shorter way to tell the words; with ``each`` every one by a formula of its own, exact by
     itself.
     """
     if each or len(formulas) < 2:
-        return Telling(tuple(formulas.items()), False)
+        return WordDescriptions(tuple(formulas.items()), False)
     apart = _apart(formulas)
     if not _SHORT * len(formulas) < apart.length <= _LONG * len(formulas):
         return apart
@@ -48,16 +50,16 @@ def telling(mapped: Mapped, formulas: dict[str, Cover], each: bool = False) -> T
     return ordered if ordered.length <= _SHORTER * apart.length else apart
 
 
-def _apart(formulas: dict[str, Cover]) -> Telling:
+def _apart(formulas: dict[str, Cover]) -> WordDescriptions:
     """The longest formula, if it says more than one value, is "every other state"."""
     longest = max(formulas, key=lambda word: (formulas[word].length, formulas[word].states))
     if formulas[longest].length < 2:
-        return Telling(tuple(formulas.items()), False)
+        return WordDescriptions(tuple(formulas.items()), False)
     others = tuple((word, formula) for word, formula in formulas.items() if word != longest)
-    return Telling((*others, (longest, None)), False)
+    return WordDescriptions((*others, (longest, None)), False)
 
 
-def _in_order(mapped: Mapped, formulas: dict[str, Cover]) -> Telling:
+def _in_order(mapped: Mapped, formulas: dict[str, Cover]) -> WordDescriptions:
     """Always next: the word with the shortest formula against the words still to come (of the few
     that look shortest).
     """
@@ -70,4 +72,4 @@ def _in_order(mapped: Mapped, formulas: dict[str, Cover]) -> Telling:
         best = min(left, key=lambda w: left[w].length)
         rules.append((best, cover(mapped, mapped.words.index(best), numbers)))
         del left[best]
-    return Telling((*rules, (next(iter(left)), None)), True)
+    return WordDescriptions((*rules, (next(iter(left)), None)), True)

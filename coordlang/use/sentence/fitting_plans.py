@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from coordlang.use.sentence.spoken import Spoken
+from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import Refuted
 from planners.joint.matching import Ints, ranges
 from planners.search.plan_space import PlanSpace
@@ -24,7 +24,11 @@ class NoPlanFits(Refuted):
     """
 
     def __init__(
-        self, spoken: Spoken, words: Sequence[int], length: int, following: Sequence[int | None]
+        self,
+        spoken: TaskLanguage,
+        words: Sequence[int],
+        length: int,
+        following: Sequence[int | None],
     ) -> None:
         names = [f"say {spoken.table.words[w]!r}" if w is not None else "end" for w in following]
         said = f'after "{spoken.text(words[:length])}"' if length else "at the beginning"
@@ -37,7 +41,7 @@ class NoPlanFits(Refuted):
         self.next_words = tuple(following)
 
 
-def fitting(spoken: Spoken, words: Sequence[int]) -> PlanSpace:
+def fitting(spoken: TaskLanguage, words: Sequence[int]) -> PlanSpace:
     """The task's optimal plans with the sentence ``words``: again a plan space, of one task.
 
     Its nodes are pairs (plan-space node, how many words have been said), each on some fitting plan,
@@ -72,7 +76,7 @@ def fitting(spoken: Spoken, words: Sequence[int]) -> PlanSpace:
 
 
 def _no_plan(
-    spoken: Spoken, words: Sequence[int], layers: Sequence[tuple[Ints, Ints]]
+    spoken: TaskLanguage, words: Sequence[int], layers: Sequence[tuple[Ints, Ints]]
 ) -> NoPlanFits:
     """How far plans follow the sentence, and what they say then."""
     space, word = spoken.space, spoken.word
@@ -89,7 +93,7 @@ def _no_plan(
 
 
 def _plan_space(
-    spoken: Spoken,
+    spoken: TaskLanguage,
     layers: Sequence[tuple[Ints, Ints]],
     steps: Sequence[tuple[Ints, Ints, Ints]],
     ends: NDArray[np.bool_],

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from coordlang.use.sentence.spoken import Spoken
+from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import BadInput, UsageError
 from planners.joint.model import JointModel
 from planners.joint.states import split_atoms
@@ -15,7 +15,7 @@ Memory = tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class PlanWish:
+class PlanPreference:
     """A wish about single plans, as a small automaton that reads a plan and gives it a grade, the
     lower the better.
 
@@ -32,10 +32,10 @@ class PlanWish:
 
 
 #: ``"shortest"`` and ``"most-plans"`` are wishes about whole sentences.
-Wish = str | PlanWish
+Preference = str | PlanPreference
 
 
-def read_wish(spoken: Spoken, text: str) -> Wish:
+def read_preference(spoken: TaskLanguage, text: str) -> Preference:
     """``shortest``, ``most-plans``, ``first:ROBOT`` or ``avoid:ATOMS``.  Raises `UsageError` for
     anything else.
     """
@@ -52,7 +52,7 @@ def read_wish(spoken: Spoken, text: str) -> Wish:
     )
 
 
-def first(model: JointModel, robot: str) -> PlanWish:
+def first(model: JointModel, robot: str) -> PlanPreference:
     """The robot goes first.
 
     A robot *acts* in a step if it neither idles nor does a subaction that is as good as idling.
@@ -91,10 +91,10 @@ def first(model: JointModel, robot: str) -> PlanWish:
         f"nobody goes before {robot}",
         f"another robot goes before {robot}",
     )
-    return PlanWish(f"first:{robot}", lambda _: others, step, grade, grades)
+    return PlanPreference(f"first:{robot}", lambda _: others, step, grade, grades)
 
 
-def avoid(spoken: Spoken, atoms: str) -> PlanWish:
+def avoid(spoken: TaskLanguage, atoms: str) -> PlanPreference:
     """No state of the plan, the first and last included, has all of these atoms.  Grades: 0 if so,
     else 1.
     """
@@ -106,13 +106,16 @@ def avoid(spoken: Spoken, atoms: str) -> PlanWish:
         raise UsageError(f"--wish avoid:{atoms}: {error.what}", remedy=error.remedy) from None
     if not wanted:
         raise UsageError('--wish avoid: expected atoms, as in avoid:"(at r1 c1-1)"')
-    mask = row[: codec.fact_words]
+    mask = row[: codec.fact_blocks]
     hit: list[int] = (
-        ((spoken.space.rows[:, : codec.fact_words] & mask) == mask).all(axis=1).astype(int).tolist()
+        ((spoken.space.rows[:, : codec.fact_blocks] & mask) == mask)
+        .all(axis=1)
+        .astype(int)
+        .tolist()
     )
     text = " ".join(wanted)
     grades = (f"it keeps away from {text}", f"it passes through {text}")
-    return PlanWish(
+    return PlanPreference(
         f"avoid:{text}",
         lambda state: (hit[state],),
         lambda memory, _, state: (memory[0] or hit[state],),
