@@ -1,3 +1,4 @@
-"""Coordination languages: the fewest words that let robots plan on their own and still act
-together.
+"""Coordination languages.
+
+The fewest words that let robots plan on their own and still act together.
 """

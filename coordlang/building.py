@@ -166,8 +166,9 @@ def _overlapping(
 
 
 def certificate_of(built: Built) -> Certificate:
-    """Why no partition with fewer words than the proved lower bound is a language, for others to
-    check.
+    """Why no partition with fewer words than the proved lower bound is a language.
+
+    For others to check.
 
     Uses what the method met on its way; for a method that meets nothing the search of `minimal`
     finds reasons.  As long as that takes: not anytime.

@@ -1,3 +1,4 @@
-"""Planning for several robots: PDDL -> joint model -> all optimal plans.  Knows nothing of
-languages.
+"""Planning for several robots: PDDL -> joint model -> all optimal plans.
+
+Knows nothing of languages.
 """

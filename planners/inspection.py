@@ -1,5 +1,6 @@
-"""What was understood of a domain and problem: robots, subactions, constraints, interference,
-fluents.
+"""What was understood of a domain and problem.
+
+Robots, subactions, constraints, interference, fluents.
 """
 
 from __future__ import annotations
@@ -193,8 +194,9 @@ def _interfering(model: JointModel) -> int:
 
 
 def _example(model: JointModel, init: Rows) -> str | None:
-    """Why two subactions interfere that are both possible in some state: breadth first from the
-    start, some states.
+    """Why two subactions interfere that are both possible in some state.
+
+    Breadth first from the start, some states.
     """
     stepper = model.stepper
     if not isinstance(stepper, ComposingStepper):

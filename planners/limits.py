@@ -1,5 +1,6 @@
-"""Time and memory limits of a process: over the limit, work in progress ends with an error that the
-caller can catch.
+"""Time and memory limits of a process.
+
+Over the limit, work in progress ends with an error that the caller can catch.
 
 An alarm raises `OutOfTime` wherever the program is, so that algorithms need no clock of their own;
 anytime methods catch it and return what they have.  The memory limit is the operating system's
@@ -114,8 +115,9 @@ def limit_memory(size: int | None) -> None:
 
 
 def require_memory(size: int) -> None:
-    """Raise `OutOfMemory` if the program alone, its libraries loaded, has more than ``size`` bytes
-    already.
+    """Raise `OutOfMemory` if the program alone already has more than ``size`` bytes.
+
+    Its libraries are loaded by then.
 
     To be asked before `limit_memory`: numpy aborts the process when it is loaded under a limit that
     is too small.

@@ -44,8 +44,9 @@ class ModelOptions:
 
 @dataclass(frozen=True, slots=True)
 class PlanningTask:
-    """A task ``(I, G)`` of a joint model: an initial row and a goal; ``position`` is the file that
-    it is from.
+    """A task ``(I, G)`` of a joint model.
+
+    An initial row and a goal; ``position`` is the file that it is from.
     """
 
     name: str
@@ -207,8 +208,9 @@ def _always_has_nothing_to_do(
     actions: Sequence[GroundAction],
     inits: Sequence[frozenset[Atom]],
 ) -> bool:
-    """Whether a do-nothing schema of the robot's own is as good as idling: always possible, and
-    named in no formula.
+    """Whether a do-nothing schema of the robot's own is as good as idling.
+
+    Always possible, and named in no formula.
 
     Proved for a precondition that is true, or for instances with one positive literal each of which
     at least one is true at the start, which no action makes false without making another one true,

@@ -1,5 +1,6 @@
-"""Is a certificate right?  Every reason is checked against the model, and the rest is left to a SAT
-solver.
+"""The check of a certificate.
+
+Every reason is checked against the model, and the rest is left to a SAT solver.
 
 Code of its own: it shares the joint model and the plan spaces with the builders, and the encoding,
 which is what the solver is asked about.
@@ -27,8 +28,9 @@ from planners.search.plan_space import PlanSpace
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """A certificate that holds: every partition that is a language for the tasks has at least
-    ``lower_bound`` words.
+    """A certificate that holds.
+
+    Every partition that is a language for the tasks has at least ``lower_bound`` words.
 
     ``cnf`` is the formula that was refuted, ``names`` are the keys of the states in it.
     """

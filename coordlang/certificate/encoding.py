@@ -28,8 +28,9 @@ _AT_ONCE = 50
 
 @dataclass(frozen=True, slots=True)
 class Cnf:
-    """A formula in conjunctive normal form: "the states can be given ``size`` words so that every
-    clause holds".
+    """A formula in conjunctive normal form.
+
+    "the states can be given ``size`` words so that every clause holds".
 
     The last of ``clauses`` are the necessary ones, in their order; those before say what words are.
     ``word[state]`` are the variables "the state has word 0, 1, ..", ``separated[pair]`` "the two
@@ -58,8 +59,9 @@ class Cnf:
         return "\n".join(lines) + "\n"
 
     def refuted(self, solver: str = "maplechrono") -> bool:
-        """Whether the formula is unsatisfiable, by a solver and a loop that the builders do not
-        use.
+        """Whether the formula is unsatisfiable.
+
+        Decided by a solver and a loop that the builders do not use.
         """
         from pysat.solvers import Solver
 
@@ -117,8 +119,9 @@ def _words_in_order(
 
 
 def core(clauses: Iterable[Clause], size: int) -> list[Clause]:
-    """A part of the clauses that still refutes ``size`` words, small but not least; all of them
-    where that takes long.
+    """A part of the clauses that still refutes ``size`` words, small but not least.
+
+    All of them where that takes long.
 
     Raises `ValueError` if it finds that they do not refute it.
     """

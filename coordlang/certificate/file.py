@@ -22,8 +22,9 @@ PlanTexts = list[list[str | None]]
 
 
 class WarpingPath(msgspec.Struct, frozen=True):
-    """A warping path of the states of two of a reason's ``plans`` (numbers from 0): cells (step in
-    one, in the other).
+    """A warping path of the states of two of a reason's ``plans`` (numbers from 0).
+
+    Cells (step in one, in the other).
     """
 
     plans: tuple[int, int]
@@ -31,9 +32,11 @@ class WarpingPath(msgspec.Struct, frozen=True):
 
 
 class Reason(msgspec.Struct, frozen=True):
-    """One necessary clause: plans of a task, whose mixture - robot i does its part of ``plans[i]``
-    - is no optimal plan, and warping paths that join all of them.  On some cell of these paths the
-    two states need different words.
+    """One necessary clause.
+
+    Plans of a task, whose mixture - robot i does its part of ``plans[i]`` - is no optimal plan, and
+    warping paths that join all of them.  On some cell of these paths the two states need different
+    words. On some cell of these paths the two states need different words.
 
     ``init`` are the true fluents at the start, ``goal`` the literals at the end, as in a task file.
     """

@@ -285,8 +285,9 @@ def check_outputs(
     *,
     makes_folder: bool = False,
 ) -> None:
-    """Refuse outputs that cannot be written, overwrite an input file or one another: before the
-    work, not after it.
+    """Refuse outputs that cannot be written, overwrite an input file or one another.
+
+    Before the work, not after it.
 
     ``outputs`` are pairs (option, path).  None is no file, ``-`` is stdout or stdin and not looked
     at.  ``makes_folder``: the command makes the folder itself where it is missing.  Raises
@@ -396,8 +397,9 @@ class PlanningFiles:
 def planning_files(
     metavar: str, most: int | None = None
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """DOMAIN and at most so many problems, or ``--factored DIR``; the command gets `PlanningFiles`
-    as ``pddl``.
+    """DOMAIN and at most so many problems, or ``--factored DIR``.
+
+    The command gets `PlanningFiles` as ``pddl``.
     """
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -420,8 +422,9 @@ def planning_files(
 
 
 def task_files(function: Callable[..., Any]) -> Callable[..., Any]:
-    """DOMAIN PROBLEM, or ``--factored DIR`` in their place; the command gets a `PlanningInstance`
-    maker as ``load``.
+    """DOMAIN PROBLEM, or ``--factored DIR`` in their place.
+
+    The command gets a `PlanningInstance` maker as ``load``.
     """
 
     @planning_files("DOMAIN PROBLEM", most=1)

@@ -28,8 +28,9 @@ def witness_data(witness: Miscoordination) -> dict[str, Any]:
 
 
 def show(witness: Miscoordination) -> str:
-    """A miscoordination as a person wants to see it: who follows which plan, step by step, and
-    where it breaks.
+    """A miscoordination as a person wants to see it.
+
+    Who follows which plan, step by step, and where it breaks.
     """
     width = max(len(text or "idle") for plan in witness.plans for step in plan for text in step) + 2
     lines = [f"  task: {witness.task}"]

@@ -1,5 +1,6 @@
-"""What the commands that use a language in one task share: reading it, and saying what is not
-guaranteed.
+"""What the commands that use a language in one task share.
+
+Reading it, and saying what is not guaranteed.
 """
 
 from __future__ import annotations
@@ -28,8 +29,9 @@ def read_task_language(
 
 
 def covered(spoken: TaskLanguage) -> int:
-    """The exit code of an answer: 1, and a warning on stderr, for a task that the language does not
-    cover.
+    """The exit code of an answer.
+
+    1, and a warning on stderr, for a task that the language does not cover.
     """
     if spoken.covered:
         return 0

@@ -1,3 +1,4 @@
-"""The paper's tables and figures as recipes: run, kept as data, drawn, and set beside the paper's
-own values.
+"""The paper's tables and figures as recipes.
+
+Run, kept as data, drawn, and set beside the paper's own values.
 """

@@ -1,5 +1,6 @@
-"""A language as a person reads it, and a planner: its words as short formulas over multi-valued
-variables.
+"""A language as a person reads it, and a planner.
+
+Its words as short formulas over multi-valued variables.
 """
 
 from coordlang.explanation.cover import Cover, Literal, Term

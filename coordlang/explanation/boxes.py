@@ -20,8 +20,9 @@ Bits = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Points:
-    """Points to hold (``on``) and to avoid (``off``), as values of variables with ``sizes[v]``
-    values each.
+    """Points to hold (``on``) and to avoid (``off``).
+
+    They are values of variables with ``sizes[v]`` values each.
     """
 
     sizes: tuple[int, ...]
@@ -81,8 +82,9 @@ def expand(points: Points, seed: Bits, wanted: Ints, order: Sequence[int] | None
 
 
 def _opened(points: Points, box: Bits, variable: int, critical: NDArray[np.bool_]) -> Bits:
-    """The values of a variable that can be allowed: not those of ``off`` points that nothing else
-    keeps out.
+    """The values of a variable that can be allowed.
+
+    Not those of ``off`` points that nothing else keeps out.
 
     Each ``off`` point has one value, so what can be allowed one by one can be allowed together.
     """
@@ -93,8 +95,9 @@ def _opened(points: Points, box: Bits, variable: int, critical: NDArray[np.bool_
 
 
 def _most(opened: Mapping[int, Bits], out: Bits, wanted: Ints) -> int:
-    """The variable that takes in most points, those that miss several variables counted by halves;
-    open ones first.
+    """The variable that takes in most points, those that miss several variables counted by halves.
+
+    Open ones first.
     """
     near = np.exp2(-out.sum(axis=1, dtype=np.float64))
 

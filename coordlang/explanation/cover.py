@@ -64,8 +64,9 @@ Term = tuple[Literal, ...]
 
 @dataclass(frozen=True, slots=True)
 class Cover:
-    """A disjunction of terms that is true in all states of one word and false in those of all other
-    words.
+    """A disjunction of terms that is true in exactly the states of one word.
+
+    It is false in those of all other words.
 
     ``counts[k]`` is the number of the word's states in which ``terms[k]`` is true (one state may
     satisfy several); ``states`` is the number of the word's states.  ``fewest``: it is proved that
@@ -79,8 +80,9 @@ class Cover:
 
     @property
     def length(self) -> int:
-        """How long the formula is: values that its text mentions, and one more for each term after
-        the first.
+        """How long the formula is.
+
+        Values that its text mentions, and one more for each term after the first.
         """
         return sum(literal.length for term in self.terms for literal in term) + max(
             0, len(self.terms) - 1
@@ -92,8 +94,7 @@ class Cover:
         return any(all(literal.holds(true) for literal in term) for term in self.terms)
 
     def conditions(self) -> list[tuple[str, ...]]:
-        """The same as a disjunction of conjunctions of ground atoms and negated atoms, as PDDL
-        text.
+        """The same as a disjunction of conjunctions of ground literals, as PDDL text.
 
         ``[()]`` is true, ``[]`` false.  Exact wherever the variables' invariants hold, so in all
         mapped states, and in reachable ones as far as looked at

@@ -62,8 +62,9 @@ class WordChange:
 
 @dataclass(frozen=True, slots=True)
 class SentenceDemands:
-    """One sentence of one task: the number of ``plans`` that fit, each robot's part, and the
-    changes of word.
+    """One sentence of one task.
+
+    The number of ``plans`` that fit, each robot's part, and the changes of word.
     """
 
     sentence: tuple[str, ...]
@@ -117,8 +118,9 @@ def _edges_by_step(space: PlanSpace) -> Iterator[Ints]:
 
 
 def _places(space: PlanSpace, word: Ints) -> Ints:
-    """For each node, how many changes of word lie before it: one number, as all plans have one
-    sentence.
+    """For each node, how many changes of word lie before it.
+
+    One number, as all plans have one sentence.
     """
     place = np.zeros(len(space), np.int64)
     source = space.sources
@@ -218,8 +220,9 @@ def _change(
 def _deciding(
     space: PlanSpace, table: WordTable, states: Ints, after: int, order: Sequence[int]
 ) -> tuple[int, ...]:
-    """The fewest robots, early ones in ``order`` first, whose subactions decide at each of some
-    states whether the next word is ``after``.
+    """The fewest robots whose subactions decide whether the next word is ``after``.
+
+    At each of some states; early ones in ``order`` first.
     """
     rows = space.rows[states[:_STATES]]
     steps = space.model.successors(rows)

@@ -29,7 +29,9 @@ class WordDescriptions:
 
     @property
     def length(self) -> int:
-        """Values that are mentioned, terms after the first of a formula, and one for "every other
+        """How long a description is.
+
+        Values that are mentioned, terms after the first of a formula, and one for "every other
         state".
         """
         return sum(cover.length if cover else 1 for _, cover in self.rules)
@@ -38,8 +40,9 @@ class WordDescriptions:
 def describe_words(
     mapped: Mapped, formulas: dict[str, Cover], each: bool = False
 ) -> WordDescriptions:
-    """The shorter way to tell the words; with ``each`` every one by a formula of its own, exact by
-    itself.
+    """The shorter way to tell the words.
+
+    With ``each`` every one by a formula of its own, exact by itself.
     """
     if each or len(formulas) < 2:
         return WordDescriptions(tuple(formulas.items()), False)
@@ -60,8 +63,9 @@ def _apart(formulas: dict[str, Cover]) -> WordDescriptions:
 
 
 def _in_order(mapped: Mapped, formulas: dict[str, Cover]) -> WordDescriptions:
-    """Always next: the word with the shortest formula against the words still to come (of the few
-    that look shortest).
+    """The word with the shortest formula against the words still to come, again and again.
+
+    Of the few that look shortest.
     """
     left = dict(formulas)
     rules: list[tuple[str, Cover | None]] = []

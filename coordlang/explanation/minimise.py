@@ -1,5 +1,6 @@
-"""The fewest boxes that hold some points and avoid others: two-level minimisation with multi-valued
-variables.
+"""The fewest boxes that hold some points and avoid others.
+
+Two-level minimisation with multi-valued variables.
 
 The way of espresso (Rudell and Sangiovanni-Vincentelli 1987): expand points to prime boxes, take an
 irredundant cover, reduce and expand again.  Where it is small enough, a SAT solver then looks for a
@@ -46,8 +47,9 @@ class Boxes:
 
 
 def minimise(points: Points, quick: bool = False) -> Boxes:
-    """The fewest prime boxes found that hold all ``on`` points and no ``off`` point, each with few
-    variables limited.
+    """The fewest prime boxes found that hold all ``on`` points and no ``off`` point.
+
+    Each has few variables limited.
 
     ``quick``: one pass, no proof.  Deterministic.  ``on`` and ``off`` must be disjoint.
     """
@@ -95,8 +97,9 @@ def _rank(boxes: Bits) -> tuple[int, int]:
 
 
 def _pass(points: Points, random: Random | None) -> list[Bits]:
-    """Prime boxes that hold every ``on`` point: greedy ones, or some in random orders of the
-    variables.
+    """Prime boxes that hold every ``on`` point.
+
+    Greedy ones, or some in random orders of the variables.
     """
     left = np.arange(len(points.on))
     if random:
@@ -152,8 +155,9 @@ def _apart(points: Points, boxes: Bits) -> list[int]:
 
 
 def _fewer(points: Points, number: int, needed: Sequence[int]) -> Bits | None:
-    """Boxes, ``number`` of them; an empty table if it is proved that there are none; None if that
-    was too much work.
+    """Boxes, ``number`` of them.
+
+    An empty table if it is proved that there are none; None if that was too much work.
 
     Variables of the SAT problem: box t allows column c; box t holds the ``on`` point i.
     """
@@ -191,8 +195,9 @@ def _fewer(points: Points, number: int, needed: Sequence[int]) -> Bits | None:
 
 
 def _shorten(points: Points, boxes: Bits) -> Bits:
-    """Each box again, around the points that only it holds: few variables limited, then prime
-    again.
+    """Each box again, around the points that only it holds.
+
+    Few variables limited, then prime again.
     """
     boxes = boxes.copy()
     for _ in range(2):
@@ -227,8 +232,9 @@ def _said(least: Bits, most: Bits) -> int:
 
 
 def _freed(points: Points, seed: Bits) -> Bits:
-    """The box with as few variables limited as keep all ``off`` points out, in total or (many
-    variables) greedily.
+    """The box with as few variables limited as keep all ``off`` points out.
+
+    In total or (many variables) greedily.
     """
     packed = np.unique(np.packbits(points.blocked(seed, points.off), axis=1), axis=0)
     outside = np.unpackbits(packed, axis=1, count=len(points.sizes)).astype(np.bool_)
@@ -247,8 +253,9 @@ def _freed(points: Points, seed: Bits) -> Bits:
 
 
 def _hitting(rows: NDArray[np.bool_], weights: Sequence[int]) -> set[int]:
-    """Columns of which every row has one: the fewest, and of these the least weight; greedily if
-    there are too many.
+    """Columns of which every row has one.
+
+    The fewest, and of these the least weight; greedily if there are too many.
     """
     count = rows.shape[1]
     tried = 0

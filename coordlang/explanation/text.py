@@ -17,8 +17,10 @@ _ALTERNATIVES = 4
 
 
 def literal_text(literal: Literal) -> str:
-    """``at(r2) = c``, ``at(r2) != c``, ``at(r2) in {a, b}``, ``at(r2) not in {a, b}``,
-    ``free(r1)``, ``not free(r1)``.
+    """The text of one limit on a variable.
+
+    ``at(r2) = c``, ``at(r2) != c``, ``at(r2) in {a, b}``, ``at(r2) not in {a, b}``, ``free(r1)``,
+    ``not free(r1)``.
     """
     variable, negative = literal.variable, literal.is_negative
     if variable.is_fact:

@@ -1,5 +1,6 @@
-"""PDDL fluents -> multi-valued variables: ``at(r2) = c3`` in the place of one truth value for each
-atom.
+"""PDDL fluents -> multi-valued variables.
+
+``at(r2) = c3`` in the place of one truth value for each atom.
 
 A group of atoms of which at most one is true in every state is one variable: in the mapped states,
 and in those that can be reached from them as far as looked at.  Groups are those atoms that agree
@@ -52,8 +53,9 @@ class Variable:
 
 @dataclass(frozen=True, slots=True)
 class Valuation:
-    """A table of states as values of variables: ``value[s, v]`` is the place of variable v's value
-    in its ``values``.
+    """A table of states as values of variables.
+
+    ``value[s, v]`` is the place of variable v's value in its ``values``.
     """
 
     variables: tuple[Variable, ...]
@@ -61,8 +63,9 @@ class Valuation:
 
 
 def valuation(model: JointModel, rows: Rows) -> Valuation:
-    """States as values of as few multi-valued variables as the invariants give, robots' own ones
-    first.
+    """States as values of as few multi-valued variables as the invariants give.
+
+    Robots' own ones first.
 
     A variable takes at least two values in ``rows``; facts that never change there are left out.
     Any two different states differ in some variable.
@@ -89,8 +92,9 @@ def valuation(model: JointModel, rows: Rows) -> Valuation:
 
 
 def truth(model: JointModel, rows: Rows) -> tuple[tuple[str, ...], NDArray[np.bool_]]:
-    """All atoms of the model, remembered actions too, and which are true in each state: (atoms,
-    (states, atoms)).
+    """All atoms of the model, remembered actions too, and which are true in each state.
+
+    (atoms, (states, atoms)).
     """
     codec = model.codec
     atoms = list(codec.facts)
@@ -130,8 +134,9 @@ class _Atom:
 
 @dataclass(frozen=True, slots=True)
 class _Group:
-    """Atoms that make one variable: numbers of atoms, the key's arguments, and each atom's
-    (predicate, other arguments).
+    """Atoms that make one variable.
+
+    Numbers of atoms, the key's arguments, and each atom's (predicate, other arguments).
     """
 
     key: tuple[str, ...]
@@ -159,8 +164,9 @@ _Shape = tuple[str, tuple[int, ...]]
 def _groups(
     atoms: Sequence[_Atom], holds: NDArray[np.bool_], robots: Sequence[str]
 ) -> list[_Group]:
-    """A partition of the atoms into groups that are never true together, larger and exact ones
-    first.
+    """A partition of the atoms into groups that are never true together.
+
+    Larger and exact ones first.
     """
     mutex = _never_together(holds)
     shapes = _shapes(atoms)
@@ -225,8 +231,10 @@ def _families(
     mutex: NDArray[np.bool_],
     holds: NDArray[np.bool_],
 ) -> list[tuple[_Shape, ...]]:
-    """Single shapes; and two or three shapes of different predicates that are one variable only
-    together, as ``(holds r b)`` and ``(free r)`` are: of these exactly one is true for each key.
+    """Single shapes, and two or three shapes that are one variable only together.
+
+    The latter are of different predicates, as ``(holds r b)`` and ``(free r)`` are: of these
+    exactly one is true for each key.
     """
     single = sorted(shapes)
     families: list[tuple[_Shape, ...]] = [(shape,) for shape in single]

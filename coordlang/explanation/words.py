@@ -19,8 +19,9 @@ from planners.joint.states import Rows, find_rows, unique_rows
 
 @dataclass(frozen=True, slots=True)
 class Mapped:
-    """The states that formulas must be exact on: their values and word numbers, ``states`` in each
-    word.
+    """The states that formulas must be exact on.
+
+    Their values and word numbers, ``states`` in each word.
 
     For all other states the formulas say nothing: several may be true there, or none.
     """
@@ -69,8 +70,9 @@ def all_covers(mapped: Mapped) -> dict[str, Cover]:
 def cover(
     mapped: Mapped, word: int, against: Sequence[int] | None = None, quick: bool = False
 ) -> Cover:
-    """The formula of a word that is false in all states of the words ``against`` (default: of all
-    others).
+    """The formula of a word that is false in all states of the words ``against``.
+
+    By default these are all others.
     """
     value = mapped.valuation.value
     mine = mapped.word == word

@@ -33,8 +33,9 @@ MANY = 10**300
 
 @dataclass(frozen=True, slots=True)
 class Flexibility:
-    """Measures of a partition, one entry for each candidate task (the tasks of all plan spaces, in
-    their order).
+    """Measures of a partition, one entry for each candidate task.
+
+    The tasks of all plan spaces, in their order.
 
     ``plans``: N, exact.  ``expected``: plans left open in expectation over a plan drawn uniformly.
     ``first``: plans left open by the sentence of the first plan in our order.  ``most``: plans left
@@ -89,8 +90,9 @@ def flexibility(spaces: Sequence[PlanSpace], words: Sequence[Ints]) -> Flexibili
 
 
 def edge_shares(space: PlanSpace, counted: Sequence[int]) -> Floats:
-    """For each edge the share of its source's plans that go over it; ``counted`` is
-    `planners.search.plans.counts`.
+    """For each edge the share of its source's plans that go over it.
+
+    ``counted`` is `planners.search.plans.counts`.
     """
     source, target = space.sources, space.target
     if max(counted, default=0) < 2**53:
@@ -179,8 +181,9 @@ def _measure(space: PlanSpace, word: Ints) -> Flexibility:
 
 
 def _said(sentences: _Sentences, word: Ints, source: Ints, target: Ints, rest: Ints) -> Ints:
-    """The sentences from ``source``, given those from ``target`` on: a word more where it is a new
-    one.
+    """The sentences from ``source``, given those from ``target`` on.
+
+    A word more where it is a new one.
     """
     result = rest.copy()
     fresh = word[source] != word[target]

@@ -20,8 +20,9 @@ _BETWEEN = ") ("
 
 
 def read_keys(codec: StateCodec, keys: Iterable[str]) -> tuple[Rows, Ints]:
-    """The rows of keys, and the positions of those that are no key of a state (their rows mean
-    nothing).
+    """The rows of keys, and the positions of those that are no key of a state.
+
+    The rows of these mean nothing.
     """
     atoms, place, value = _atoms(codec)
     number = {atom[1:-1]: n for n, atom in enumerate(atoms)}
@@ -91,8 +92,9 @@ def keys_of(codec: StateCodec, rows: Rows) -> list[str]:
 
 
 def _atoms(codec: StateCodec) -> tuple[tuple[str, ...], Ints, Rows]:
-    """All atoms of the model, remembered actions too, sorted; for each its word in a row, and its
-    bit or value there.
+    """All atoms of the model, remembered actions too, sorted.
+
+    For each its word in a row, and its bit or value there.
     """
     listed = [(fact, n // 64, 1 << n % 64) for n, fact in enumerate(codec.facts)]
     for robot, (name, labels) in enumerate(

@@ -1,5 +1,6 @@
-"""Overlapping words: a state may have several words, a plan several sentences, and the speaker
-chooses among them.
+"""Overlapping words: a state may have several words, a plan several sentences.
+
+The speaker chooses among them.
 
 ``words[s]`` is the set of words of state s, never empty.  A *reading* of a plan takes one of the
 words of each of its states; repeated neighbours are collapsed, and what remains is a sentence of
@@ -73,8 +74,9 @@ class Readings:
         return self._sets[number]
 
     def update(self, nodes: Iterable[int], words: Overlap) -> None:
-        """Read these nodes anew, in the order of their numbers; `TooManySentences` leaves some of
-        them as they were.
+        """Read these nodes anew, in the order of their numbers.
+
+        `TooManySentences` leaves some of them as they were.
         """
         for node in nodes:
             self.classes[node] = self._read(node, words[self._state[node]])
@@ -112,8 +114,9 @@ class Readings:
         return number
 
     def expected(self, node: int) -> float:
-        """E of a task from the node that does not require coordination: all its sentences are
-        usable.
+        """E of a task from the node that does not require coordination.
+
+        All its sentences are usable.
         """
         plans = self.plans(node)
         classes = self.classes[node].items()

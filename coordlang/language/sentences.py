@@ -1,5 +1,6 @@
-"""The sentences of a task: how many plans each leaves open, and what it asks of each robot step by
-step.
+"""The sentences of a task.
+
+How many plans each leaves open, and what it asks of each robot step by step.
 """
 
 from __future__ import annotations
@@ -49,8 +50,9 @@ def task_sentences(space: PlanSpace, task: int, table: WordTable) -> list[TaskSe
 def sentence_counts(
     space: PlanSpace, start: int, word: Sequence[int], most: int
 ) -> dict[int, Counter[tuple[int, ...]]]:
-    """For each node on the plans from ``start``: sentence (word numbers) of the rest, the node's
-    own word first -> number of plans.
+    """For each node on the plans from ``start``.
+
+    Sentence (word numbers) of the rest, the node's own word first -> number of plans.
 
     ``word`` is the word number of each node.  O(edges * sentences).  Raises `OutOfMemory` when a
     node has more than ``most`` sentences.

@@ -26,8 +26,9 @@ def pair(a: int, b: int) -> Pair:
 def warping_clause(
     u: Sequence[int], v: Sequence[int], word: Mapping[int, int] | Sequence[int]
 ) -> Clause | None:
-    """The non-identical pairs on a warping path of ``u`` and ``v`` under ``word`` with the fewest
-    non-identical cells.
+    """The non-identical pairs on a warping path with the fewest non-identical cells.
+
+    The path is one of ``u`` and ``v`` under ``word``.
 
     None if the two sentences differ.  O(|u| |v|).
     """
@@ -39,8 +40,9 @@ def warping_clause(
 def warping_path(
     u: Sequence[int], v: Sequence[int], joined: Sequence[Sequence[bool]]
 ) -> list[tuple[int, int]] | None:
-    """A warping path over cells with ``joined[i][j]`` that has the fewest non-identical cells; None
-    if there is none.
+    """A warping path over cells with ``joined[i][j]`` that has the fewest non-identical cells.
+
+    None if there is none.
     """
     best = [[_NO_PATH] * len(v) for _ in u]
     for i, a in enumerate(u):
@@ -73,8 +75,9 @@ def _before(best: list[list[int]], i: int, j: int) -> tuple[int, int, int]:
 def separation_clause(
     sequences: Sequence[Sequence[int]], word: Mapping[int, int] | Sequence[int]
 ) -> Clause | None:
-    """The clause of a failing tuple of plans: the union of warping paths from the first to each
-    other one.
+    """The clause of a failing tuple of plans.
+
+    The union of warping paths from the first to each other one.
 
     None if not all of them have one sentence.
     """

@@ -19,8 +19,9 @@ from planners.joint.states import Rows, find_rows, unique_rows
 
 @dataclass(frozen=True, slots=True)
 class Guarantee:
-    """What is known of a language: how it was made, its size, and the proved lower bound on the
-    size of any.
+    """What is known of a language.
+
+    How it was made, its size, and the proved lower bound on the size of any.
     """
 
     method: str
@@ -90,8 +91,9 @@ class WordTable:
 
 
 def words_of_states(language: Language, model: JointModel, rows: Rows) -> list[frozenset[int]]:
-    """All words of each state of a table: its own one and those of ``also``.  Raises `BadInput` as
-    `WordTable.of` does.
+    """All words of each state of a table: its own one and those of ``also``.
+
+    Raises `BadInput` as `WordTable.of` does.
     """
     own = WordTable.of(language, model).of_rows(rows).tolist()
     words = [frozenset((word,)) for word in own]
@@ -127,8 +129,9 @@ def _refuse(model: JointModel, key: str) -> NoReturn:
 
 
 def sentence(words: Iterable[int]) -> tuple[int, ...]:
-    """The words of a state sequence, repeated neighbours collapsed (the paper's task state
-    compression, TSC).
+    """The words of a state sequence, repeated neighbours collapsed.
+
+    The paper's task state compression (TSC).
     """
     result: list[int] = []
     for word in words:
@@ -140,8 +143,9 @@ def sentence(words: Iterable[int]) -> tuple[int, ...]:
 def name_words(
     model: JointModel, rows: Rows, partition: Mapping[int, int]
 ) -> tuple[tuple[str, ...], dict[str, str], str]:
-    """Words ``w0, w1, ..`` for a partition of state numbers: (words, state key -> word, default
-    word).
+    """Words ``w0, w1, ..`` for a partition of state numbers.
+
+    (words, state key -> word, default word).
 
     Words are named in the order of their first state; the default is the word with most states.
     """

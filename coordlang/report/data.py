@@ -45,8 +45,9 @@ def page_data(
     parts: Sequence[TaskPart],
     known: Mapping[str, Point] | None = None,
 ) -> dict[str, Any]:
-    """The page's data for a language and the parts to be shown; ``known``: coordinates of places
-    from a file.
+    """The page's data for a language and the parts to be shown.
+
+    ``known``: coordinates of places from a file.
     """
     first = parts[0].shown.spoken
     model = first.model
@@ -86,8 +87,9 @@ def page_data(
 
 
 def _listed_states(language: Language, tables: Tables) -> int:
-    """Enter the language's states, the first numbers, unless they are too many; how many were
-    entered.
+    """Enter the language's states, the first numbers, unless they are too many.
+
+    How many were entered.
     """
     keys = sorted(language.states)
     atoms = len(split_atoms(keys[0])) * len(keys) if keys else 0
@@ -99,8 +101,9 @@ def _listed_states(language: Language, tables: Tables) -> int:
 
 
 def _words(language: Language, model: JointModel) -> dict[str, Any]:
-    """The words in their own order, and ``told``: their numbers in the order in which their
-    formulas are to be read.
+    """The words in their own order, and ``told``.
+
+    Their numbers in the order in which their formulas are to be read.
 
     ``terms``: those of the formula, None if none was sought; ``rest``: the formula is "every other
     state".
@@ -183,8 +186,9 @@ def _label(model: JointModel, world: World, robot: int, text: str | None) -> dic
 
 
 def _state_graph(spoken: TaskLanguage) -> dict[str, Any] | None:
-    """The language's states, in the order of their keys, and the joint steps between them (either
-    way).
+    """The language's states, in the order of their keys, and the joint steps between them.
+
+    The steps are taken either way.
     """
     model, table = spoken.model, spoken.table
     keys = [model.codec.key(row) for row in table.rows]

@@ -1,5 +1,6 @@
-"""The graph of a task's plans as it is drawn and played: all of it, or plans drawn from it where it
-is too large.
+"""The graph of a task's plans as it is drawn and played.
+
+All of it, or plans drawn from it where it is too large.
 """
 
 from __future__ import annotations
@@ -46,8 +47,9 @@ class Graph:
 
 @dataclass(frozen=True, slots=True)
 class ShownSentence:
-    """A sentence (word numbers), the exact number of plans it leaves open, and that of each robot's
-    own subplans among them (None: too many to count).
+    """A sentence (word numbers) with the exact numbers of plans that it leaves open.
+
+    That of joint plans, and that of each robot's own subplans among them (None: too many to count).
     """
 
     words: tuple[int, ...]
@@ -57,8 +59,9 @@ class ShownSentence:
 
 @dataclass(frozen=True, slots=True)
 class ShownSentences:
-    """``listed`` sentences, those that leave most open first; ``total`` of the task, None if they
-    are too many.
+    """``listed`` sentences, those that leave most open first.
+
+    ``total`` of the task, None if they are too many.
     """
 
     listed: tuple[ShownSentence, ...]

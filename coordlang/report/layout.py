@@ -1,5 +1,6 @@
-"""Where places, states and plan-space nodes are drawn: files of coordinates, names that tell them,
-or graph layout.
+"""Where places, states and plan-space nodes are drawn.
+
+Files of coordinates, names that tell them, or graph layout.
 
 Everything here is deterministic: the same input gives the same coordinates.
 """
@@ -43,8 +44,9 @@ class Layout:
 def place_layout(
     names: Sequence[str], links: Sequence[tuple[str, str]], known: Mapping[str, Point] | None = None
 ) -> Layout:
-    """Points for places: as a file of coordinates says (``known``), else as their names say, else
-    by their links.
+    """Points for places, from coordinates, names or links.
+
+    As a file of coordinates says (``known``), else as their names say, else by their links.
     """
     points = (
         known
@@ -62,8 +64,9 @@ def place_layout(
 
 
 def read_coordinates(path: str | Path) -> dict[str, Point]:
-    """A file of coordinates, ``{"coordinates": {"depot": [0, 0], "town": [1, 0]}}``: x to the
-    right, y down.
+    """A file of coordinates, ``{"coordinates": {"depot": [0, 0], "town": [1, 0]}}``.
+
+    X to the right, y down.
 
     Raises `BadInput` for anything else.
     """
@@ -134,8 +137,9 @@ def _is_grid(points: Sequence[Point]) -> bool:
 
 
 def graph_layout(number: int, links: Sequence[tuple[int, int]]) -> Floats:
-    """Points (number, 2) of an undirected graph: stress majorisation (Gansner, Koren, North 2004)
-    of path lengths.
+    """Points (number, 2) of an undirected graph.
+
+    Stress majorisation (Gansner, Koren, North 2004) of path lengths.
 
     Starts from classical scaling.  The longer axis lies along x.  O(number^3).
     """
@@ -165,8 +169,9 @@ def _path_lengths(number: int, links: Sequence[tuple[int, int]]) -> Floats:
 
 
 def _scaled(wanted: Floats) -> Floats:
-    """Classical multidimensional scaling, with a little noise so that no two points start in one
-    place.
+    """Classical multidimensional scaling, with a little noise.
+
+    So no two points start in one place.
     """
     number = len(wanted)
     centre = np.eye(number) - 1 / number
@@ -195,8 +200,9 @@ def _majorise(points: Floats, wanted: Floats) -> Floats:
 
 
 def _upright(points: Floats) -> Floats:
-    """Turned so that the longer axis lies along x and the first point is on the left and above the
-    middle.
+    """Points turned so that the longer axis lies along x.
+
+    The first point is on the left and above the middle.
     """
     points = points - points.mean(axis=0)
     _, _, axes = np.linalg.svd(points, full_matrices=False)
@@ -209,8 +215,9 @@ def _upright(points: Floats) -> Floats:
 
 
 def spread(points: Floats, least: float) -> Floats:
-    """Points moved apart where two are nearer than ``least``, each as little as a few rounds of
-    pushing do.
+    """Points moved apart where two are nearer than ``least``.
+
+    Each as little as a few rounds of pushing do.
     """
     points = points.copy()
     for _ in range(_PUSHES):
@@ -236,8 +243,9 @@ def spread(points: Floats, least: float) -> Floats:
 
 
 def layer_orders(sizes: Sequence[int], edges: Sequence[tuple[int, int]]) -> list[int]:
-    """The place of each node within its layer, by the barycentre heuristic (Sugiyama, Tagawa, Toda
-    1981).
+    """The place of each node within its layer, by the barycentre heuristic.
+
+    See Sugiyama, Tagawa, Toda 1981.
 
     Nodes are numbered layer by layer, ``sizes[k]`` in layer k; edges lead from a layer to the next
     one.

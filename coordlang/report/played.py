@@ -1,5 +1,6 @@
-"""A miscoordination as it is played: what the robots do together, to the break and, where they can,
-beyond it.
+"""A miscoordination as it is played.
+
+What the robots do together, to the break and, where they can, beyond it.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ from coordlang.use.sentence.task_language import TaskLanguage
 
 @dataclass(frozen=True, slots=True)
 class Played:
-    """``states`` (keys) that the mixture passes through, the start first, as far as its steps are
-    possible.
+    """The states (keys) that the mixture passes through, as far as its steps are possible.
+
+    The start is the first.
 
     ``stops``: the number of the first step that is not possible (None: all are), and ``why`` it is
     not.  ``reaches``: does the last state satisfy the goal?

@@ -1,5 +1,6 @@
-"""Which tasks a report shows: those of the given problems, then candidate tasks of the language,
-drawn if they are many.
+"""Which tasks a report shows.
+
+Those of the given problems, then candidate tasks of the language, drawn if they are many.
 """
 
 from __future__ import annotations
@@ -43,8 +44,10 @@ class ShownTask:
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """The tasks shown.  ``looked`` tasks were drawn for it, ``requiring`` of which require
-    coordination; ``complete``: all candidate tasks are shown.
+    """The tasks shown.
+
+    ``looked`` tasks were drawn for it, ``requiring`` of which require coordination; ``complete``:
+    all candidate tasks are shown.
     """
 
     tasks: tuple[ShownTask, ...]
@@ -62,8 +65,9 @@ def select_tasks(
     options: ModelOptions | None = None,
     position: Position | None = None,
 ) -> Selection:
-    """At most ``number`` tasks: the problems' own first, then candidate tasks drawn without
-    repetition.
+    """At most ``number`` tasks.
+
+    The problems' own first, then candidate tasks drawn without repetition.
 
     Of those drawn, tasks that require coordination are preferred, up to three quarters.  Raises
     `UsageError` if the problems alone are more, `ProvedImpossible` for an unsolvable one.
@@ -117,8 +121,9 @@ def _identity(spoken: TaskLanguage) -> tuple[str, str]:
 def _candidates(
     first: TaskLanguage, domain: Domain, problem: Problem, random: Random, position: Position | None
 ) -> Iterator[TaskLanguage]:
-    """The language's candidate tasks in random order.  Under ``--tasks all`` endless repetition is
-    cut off.
+    """The language's candidate tasks in random order.
+
+    Under ``--tasks all`` endless repetition is cut off.
     """
     language = first.language
     tasks = (
@@ -146,8 +151,9 @@ def _recorded(
 
 
 def _pairs(first: TaskLanguage, random: Random) -> Iterator[tuple[Rows, Goal]]:
-    """Ordered pairs of different mapped states: under ``--tasks all`` every state of a candidate
-    task is mapped.
+    """Ordered pairs of different mapped states.
+
+    Under ``--tasks all`` every state of a candidate task is mapped.
     """
     codec = first.model.codec
     rows = first.table.rows

@@ -71,8 +71,9 @@ def _verified(spoken: TaskLanguage) -> tuple[bool | None, Miscoordination | None
 
 
 class Tables:
-    """States and labels that the page mentions, numbered in the order in which they are first
-    mentioned.
+    """States and labels that the page mentions, numbered.
+
+    In the order in which they are first mentioned.
     """
 
     def __init__(self, model: JointModel, table: WordTable) -> None:

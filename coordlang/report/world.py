@@ -31,8 +31,9 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """The things (robots first), the places and their links, and the role of every atom (by its
-    text).
+    """The things (robots first), the places and their links, and the role of every atom.
+
+    Atoms are given by their text.
     """
 
     things: tuple[str, ...]
@@ -69,8 +70,9 @@ class World:
 
 @dataclass(frozen=True, slots=True)
 class _Shape:
-    """Atoms of one predicate seen as "thing in place": the argument that is the place, and the
-    thing's (None: no thing).
+    """Atoms of one predicate seen as "thing in place".
+
+    The argument that is the place, and the thing's (None: no thing).
     """
 
     predicate: str
@@ -85,8 +87,9 @@ class _Shape:
 
 
 def find_world(model: JointModel, states: Sequence[Sequence[str]]) -> World:
-    """The world of a model.  ``states`` are known states as lists of true atoms: no thing may be in
-    two places in one.
+    """The world of a model.
+
+    ``states`` are known states as lists of true atoms: no thing may be in two places in one.
     """
     atoms = {show(atom): atom for atom in _fluents(model)}
     shapes = [shape for shape in _shapes(atoms.values()) if _moves(shape, model.actions)]
@@ -188,8 +191,9 @@ def _comes_and_goes(shape: _Shape, actions: Iterable[GroundAction]) -> bool:
 
 
 def _owner(shape: _Shape, model: JointModel) -> str | None:
-    """Whose place it is that moves without a name: the one robot's that moves it, else it is a
-    thing of its own.
+    """Whose place it is that moves without a name.
+
+    The one robot's that moves it, else it is a thing of its own.
     """
     owners = {
         action.owners for action in model.actions if any(True for _ in _changes(shape, action))
@@ -205,8 +209,9 @@ def _owner(shape: _Shape, model: JointModel) -> str | None:
 
 
 def _drop_ambiguous(roles: dict[str, Role], states: Sequence[Sequence[str]]) -> None:
-    """A thing in two places at once is not *in* a place: atoms of such a predicate say something
-    else.
+    """A thing in two places at once is not *in* a place.
+
+    Atoms of such a predicate say something else.
     """
     bad: set[tuple[str, str]] = set()
     for state in states:

@@ -1,3 +1,4 @@
-"""Where coordination is required: composition walks, first and last differences, miscoordination
-shown.
+"""Where coordination is required.
+
+Composition walks, first and last differences, miscoordination shown.
 """

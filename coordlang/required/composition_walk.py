@@ -80,8 +80,9 @@ class Walk:
 
 @dataclass(frozen=True, slots=True)
 class _Layer:
-    """One layer of the walk: its nodes, which of them fail at once, and the pairs (node, node of
-    the next layer).
+    """One layer of the walk.
+
+    Its nodes, which of them fail at once, and the pairs (node, node of the next layer).
     """
 
     nodes: Ints
@@ -159,8 +160,9 @@ def moves(
 
 
 def edges_out_of(space: PlanSpace, nodes: Ints) -> NDArray[np.float64]:
-    """How many edges of the walk leave each of its nodes: one for every choice of the plans' next
-    steps.
+    """How many edges of the walk leave each of its nodes.
+
+    One for every choice of the plans' next steps.
     """
     degree = np.diff(space.first)
     product: NDArray[np.float64] = np.prod(degree[nodes[:, :-1]].astype(np.float64), axis=1)
@@ -185,8 +187,9 @@ def _check_size(sizes: NDArray[np.float64], robots: int) -> None:
 
 
 def _forward(space: PlanSpace, index: EdgeIndex, layers: list[_Layer]) -> None:
-    """Walk down from the highest layer into ``layers``; every plan-space node starts at its own
-    layer.
+    """Walk down from the highest layer into ``layers``.
+
+    Every plan-space node starts at its own layer.
     """
     columns = space.labels.shape[1] + 1
     spans = space.layers
@@ -287,8 +290,9 @@ def _backward(space: PlanSpace, layers: Sequence[_Layer]) -> Walk:
 
 
 def unique_divergences(found: Divergences) -> Divergences:
-    """Each divergence once, sorted, and none that another one implies (same last state, fewer next
-    states).
+    """Each divergence once, sorted, and none that another one implies.
+
+    One implies another with the same last state and more next states.
     """
     bound = int(max(found.last.max(initial=0), found.following.max(initial=0))) + 2
     table = np.column_stack((found.last, found.following)) + 1
@@ -323,8 +327,9 @@ def _sorted_different(states: Ints) -> Ints:
 def _check_rest(
     held: int, parts: Sequence[Ints], progress: float, ends: NDArray[np.float64], seconds: float
 ) -> None:
-    """Stop when the part of a layer that is done shows that the rest of it does not fit: memory and
-    time are linear in it.
+    """Stop when the part of a layer that is done shows that the rest of it does not fit.
+
+    Memory and time are linear in it.
 
     ``ends``: walk edges out of the layer's first nodes, summed up; ``seconds`` were spent on the
     part that is done.

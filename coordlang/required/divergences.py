@@ -1,5 +1,6 @@
-"""Where plans that introduce RC part: ``alpha*`` over all candidate tasks, and what must be told
-apart.
+"""Where plans that introduce RC part.
+
+``alpha*`` over all candidate tasks, and what must be told apart.
 """
 
 from __future__ import annotations
@@ -72,8 +73,10 @@ def separations(divergences: Divergences) -> list[tuple[Separation, ...]]:
 
 
 def alternatives(shared: int, others: Iterable[int]) -> tuple[Separation, ...]:
-    """The ways to separate plans at a difference: any two of the different states ``others``, with
-    the shared state (-1: there is none, the plans end in different states).
+    """The ways to separate plans at a difference.
+
+    Any two of the different states ``others``, with the shared state (-1: there is none, the plans
+    end in different states).
     """
     states = sorted(set(others))
     return tuple(

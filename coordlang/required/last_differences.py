@@ -1,5 +1,6 @@
-"""Theorem 3 in full: plans that introduce RC must be separated where they first part or where they
-last meet.
+"""Theorem 3 in full: plans that introduce RC are separated where they part or meet again.
+
+They must be separated where they first part or where they last meet.
 
 Each tuple of plans that introduce RC has a *first difference* ``alpha = (p; s_1 .. s_n)``, the last
 shared state and the next ones, and a *last difference* ``beta = (t_1 .. t_n; q)``, or ends in
@@ -38,8 +39,9 @@ _LINKS = 1_000_000
 
 @dataclass(slots=True)
 class _Layer:
-    """Walk nodes ``(x_1 .. x_n, y)`` with as many joint steps to go, and what links them to the
-    layer below.
+    """Walk nodes ``(x_1 .. x_n, y)`` with as many joint steps to go.
+
+    With what links them to the layer below.
 
     ``x`` (k, robots) are plan-space nodes, ``meets``, ``parts`` (links) say whether a link leads
     from different nodes to one, or from one node shared by all plans and their mixture to different
@@ -75,9 +77,10 @@ class SeparationWalk:
         return sum(len(layer.source) for layer in self._layers)
 
     def unseparated(self, word: Ints, random: np.random.Generator) -> Iterator[Constraint]:
-        """Constraints that ``word`` (a word number for each state of the table) breaks: for every
-        unseparated first difference of plans that introduce RC, one of their unseparated last
-        differences, drawn at random.
+        """Constraints that ``word`` (a word number for each state of the table) breaks.
+
+        For every unseparated first difference of plans that introduce RC, one of their unseparated
+        last differences, drawn at random.
 
         None at all: the partition satisfies Theorem 3 for these tasks.  O(links).
         """
@@ -118,8 +121,9 @@ class SeparationWalk:
             ending[source[order]] = value[order]
 
     def every(self, most: int) -> set[Constraint] | None:
-        """All constraints of these tasks: each first difference with each last difference that can
-        follow.
+        """All constraints of these tasks.
+
+        Each first difference with each last difference that can follow.
 
         None if there may be more than ``most``.  O(links x last differences / word size).
         """
@@ -136,8 +140,9 @@ class SeparationWalk:
         return found
 
     def _differences(self) -> tuple[dict[tuple[int, ...], int], list[tuple[int, ...]]]:
-        """First differences with the last ones that can follow, as a set of bits: their numbers in
-        the second list.
+        """First differences with the last ones that can follow, as a set of bits.
+
+        Their numbers in the second list.
 
         A difference is the shared state (-1: none) and then the different ones, sorted.
         """
@@ -194,8 +199,9 @@ def ordered(alternatives: Iterable[Separation]) -> Constraint:
 
 
 def _separated(word: Ints, shared: Ints, others: Ints) -> Bools:
-    """For each difference whether some two of ``others`` (k, robots) and ``shared`` (k) lie in
-    three words.
+    """For each difference whether some two of ``others`` and ``shared`` lie in three words.
+
+    Shapes: ``others`` (k, robots), ``shared`` (k).
     """
     good = np.zeros(len(shared), np.bool_)
     common = word[shared]
@@ -236,8 +242,9 @@ def _walk(space: PlanSpace) -> list[_Layer]:
 
 
 def _links(space: PlanSpace, index: EdgeIndex, table: Ints) -> tuple[Ints, Ints, Ints]:
-    """Links out of a table of nodes: (source, different children, number of each link's child among
-    them).
+    """Links out of a table of nodes.
+
+    (source, different children, number of each link's child among them).
     """
     robots = table.shape[1] - 1
     failed = len(space)

@@ -41,16 +41,18 @@ class Miscoordination:
 
 
 def miscoordination(space: PlanSpace, task: int) -> Miscoordination | None:
-    """The plans of a task whose mixture breaks earliest, or None if the task requires no
-    coordination.
+    """The plans of a task whose mixture breaks earliest.
+
+    None if the task requires no coordination.
     """
     trail = _trail(space, np.array([space.starts[task]]), together=False)
     return describe_failure(space, trail) if trail is not None else None
 
 
 class Inseparable(ProvedImpossible):
-    """Two plans introduce RC but pass through the same states: no state-based language can tell
-    them apart.
+    """Two plans introduce RC but pass through the same states.
+
+    No state-based language can tell them apart.
     """
 
     def __init__(self, witness: Miscoordination) -> None:
@@ -89,8 +91,9 @@ class Trail:
 
 
 def _trail(space: PlanSpace, starts: Ints, *, together: bool) -> Trail | None:
-    """Breadth first through the layers, until a mixture breaks; of several breaks the first in
-    order.
+    """Breadth first through the layers, until a mixture breaks.
+
+    Of several breaks the first in order.
     """
     walked = [0, 0]
 
@@ -149,8 +152,9 @@ def _retrace(history: list[tuple[Ints, Ints, Ints]], row: int, last: tuple[int, 
 def describe_failure(
     space: PlanSpace, trail: Trail, sentence: tuple[str, ...] | None = None
 ) -> Miscoordination:
-    """A trail in words: the plans completed to the goal, the mixture up to its breaking step, and
-    why it breaks.
+    """A trail in words, with the plans completed to the goal.
+
+    The mixture goes up to its breaking step, with the reason why it breaks.
     """
     model = space.model
     robots = len(model.robots)
@@ -203,8 +207,9 @@ def _key(space: PlanSpace, node: int) -> str:
 
 
 def _reason(space: PlanSpace, node: int, labels: tuple[int, ...]) -> str:
-    """Why the mixed joint action is no optimal step in a state: not applicable, or it wastes
-    something.
+    """Why the mixed joint action is no optimal step in a state.
+
+    Not applicable, or it wastes something.
     """
     model = space.model
     row = space.rows[space.state[node]]

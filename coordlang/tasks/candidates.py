@@ -108,8 +108,9 @@ def all_pairs(
 
 
 def _all_pairs_remembering(loaded: PlanningInstance, inits: Rows) -> Candidates:
-    """The same pairs of states as without ``--remember-actions``; every task starts with no action
-    to remember.
+    """The same pairs of states as without ``--remember-actions``.
+
+    Every task starts with no action to remember.
     """
     model = loaded.model
     forgetting = replace(model, codec=replace(model.codec, memory=None))
@@ -222,8 +223,9 @@ def from_recorded(
     options: ModelOptions | None = None,
     position: Position | None = None,
 ) -> Candidates:
-    """Problems' tasks as a language file records them: searched one by one, without the rest of the
-    space.
+    """Problems' tasks as a language file records them.
+
+    Searched one by one, without the rest of the space.
     """
     ground = ground_tasks(domain, problems[0], listed, position)
     loaded = build(domain, problems, options, inits=[init for init, _ in ground])

@@ -30,8 +30,9 @@ _BATCH = 2_000_000
 def varied_tasks(
     loaded: PlanningInstance, starts: Sequence[str], goals: Sequence[str]
 ) -> tuple[ListedTask, ...]:
-    """The tasks that the patterns describe, sorted.  Without ``goals`` the problem's own goal is
-    the only one.
+    """The tasks that the patterns describe, sorted.
+
+    Without ``goals`` the problem's own goal is the only one.
 
     Raises `UsageError` for a pattern that no fact of the model matches, `ProvedImpossible` if there
     is no such task. O(reachable joint steps x goals).

@@ -27,8 +27,9 @@ VERSION = 1
 
 @dataclass(frozen=True, slots=True)
 class ListedTask:
-    """A task as a task file lists it: true fluents at the start, literals (or formulas) at the end,
-    as PDDL text.
+    """A task as a task file lists it.
+
+    True fluents at the start, literals (or formulas) at the end, as PDDL text.
     """
 
     init: tuple[str, ...]

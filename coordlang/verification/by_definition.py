@@ -28,8 +28,9 @@ _CHUNK = 500_000
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """``holds``: is it a coordination language for these tasks?  If not, ``witness`` shows one
-    miscoordination.
+    """``holds`` says whether it is a coordination language for these tasks.
+
+    If not, ``witness`` shows one miscoordination.
 
     ``tasks`` were checked with ``nodes`` nodes of the walk.
     """
@@ -80,8 +81,9 @@ class _Leads:
         self._after: dict[tuple[int, int, int], int] = {}
 
     def extend(self, lead: Ints, first: Ints, other: Ints) -> Ints:
-        """Leads after plan 1 said ``first`` and the other plan said ``other`` (-1: nothing new); -1
-        where they differ.
+        """Leads after plan 1 said ``first`` and the other plan said ``other`` (-1: nothing new).
+
+        -1 where they differ.
         """
         combined = np.column_stack((lead, first, other))
         different, inverse = np.unique(combined, axis=0, return_inverse=True)

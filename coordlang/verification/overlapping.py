@@ -40,8 +40,9 @@ _Came = tuple[_Node, tuple[int, ...]]
 def verify_overlapping(
     names: Sequence[str], words: Sequence[frozenset[int]], spaces: Sequence[PlanSpace]
 ) -> Verdict:
-    """Check overlapping words against the definition; ``words`` by the state numbers of ``spaces``,
-    ``names`` of the words.
+    """Check overlapping words against the definition.
+
+    ``words`` by the state numbers of ``spaces``, ``names`` of the words.
 
     The witness of a violation is a plan without usable sentence (that of the first robot), with one
     of its sentences and plans that have it and miscoordinate.
@@ -88,7 +89,7 @@ def _from(space: PlanSpace, starts: Ints) -> PlanSpace:
 
 
 def _overlap_after(space: PlanSpace, several: Bools) -> Bools:
-    """Of each node: does a plan from it pass through a state with several words?"""
+    """For each node whether a plan from it passes through a state with several words."""
     found: Bools = several[space.state]
     source = space.sources
     for span in space.layers:
@@ -110,8 +111,9 @@ class _Check:
         self.nodes = 0
 
     def uncovered(self, start: int, names: Sequence[str]) -> Miscoordination | None:
-        """A plan of the task without usable sentence, shown by one of its sentences; None if all
-        plans have one.
+        """A plan of the task without usable sentence, shown by one of its sentences.
+
+        None if all plans have one.
         """
         failing: dict[Sentence, Trail | None] = {}
         for sentences in self._sets(start):

@@ -26,8 +26,9 @@ _AGAIN = 40
 
 @dataclass(frozen=True, slots=True)
 class Counterexample:
-    """A failing tuple of plans with one sentence: plan-space edges, step by step, and the states of
-    each plan.
+    """A failing tuple of plans with one sentence.
+
+    Plan-space edges, step by step, and the states of each plan.
     """
 
     start: int
@@ -44,8 +45,9 @@ class _Leads:
         self._after: dict[tuple[int, int, int], int] = {}
 
     def after(self, lead: Ints, first: Ints, other: Ints) -> Ints:
-        """The leads when plan 1 said ``first`` and the other one ``other`` (-1: nothing); -1 where
-        they part.
+        """The leads when plan 1 said ``first`` and the other one ``other`` (-1: nothing).
+
+        -1 where they part.
         """
         if not len(lead):
             return lead
@@ -88,8 +90,9 @@ class _Layer:
 def counterexamples(
     space: PlanSpace, index: EdgeIndex, word: Ints, most: int, starts: Ints | None = None
 ) -> Iterator[Counterexample]:
-    """Failing tuples of plans with one sentence under ``word`` (word of each plan-space node),
-    about ``most`` of them.
+    """About ``most`` failing tuples of plans with one sentence under ``word``.
+
+    ``word`` has the word of each plan-space node.
 
     For each node that all plans and their mixture share, the rest of plans that begin alike: those
     that differ at the fewest steps, and then others.  None at all: ``word`` is a language for these
@@ -101,8 +104,9 @@ def counterexamples(
 
 
 def _forward(space: PlanSpace, index: EdgeIndex, word: Ints, starts: Ints) -> list[_Layer]:
-    """``layers[k]`` has k joint steps to go.  A node is (x_1 .. x_n, y or failed, leads), failed as
-    ``len(space)``.
+    """``layers[k]`` has k joint steps to go.
+
+    A node is (x_1 .. x_n, y or failed, leads), failed as ``len(space)``.
     """
     robots = space.labels.shape[1]
     leads = _Leads()
@@ -171,8 +175,9 @@ def _expand(
 
 
 def _backward(space: PlanSpace, layers: list[_Layer]) -> None:
-    """For each node the fewest differing steps on a way to a violation, and the move that begins
-    it.
+    """For each node the fewest differing steps on a way to a violation.
+
+    With the move that begins it.
     """
     robots = space.labels.shape[1]
     goal = layers[0]
@@ -214,8 +219,9 @@ def _retrace(space: PlanSpace, layers: list[_Layer], most: int) -> Iterator[Coun
 def _follow(
     space: PlanSpace, layers: list[_Layer], number: int, row: int, random: Random | None
 ) -> Counterexample:
-    """One way from a node to a violation: the best one, or at each node any move that still leads
-    to one.
+    """One way from a node to a violation.
+
+    The best one, or at each node any move that still leads to one.
     """
     robots = space.labels.shape[1]
     start = int(layers[number].nodes[row, 0])

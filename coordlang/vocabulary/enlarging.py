@@ -30,8 +30,9 @@ MOST_PLANS = 1_000
 
 @dataclass(frozen=True, slots=True)
 class Enlarged:
-    """Overlapping words: ``words`` of every state, ``expected`` E of each task, ``before`` that of
-    the partition.
+    """Overlapping words, with their flexibility.
+
+    ``words`` of every state, ``expected`` E of each task, ``before`` that of the partition.
 
     ``tried`` enlargements, ``stopped`` the error that ended the search early or None.
     """
@@ -70,8 +71,9 @@ def enlarge(
 
 @dataclass(frozen=True, slots=True)
 class _Coordinated:
-    """A task that requires coordination, its plans listed: the states of each, and each robot's
-    part of it.
+    """A task that requires coordination, its plans listed.
+
+    The states of each, and each robot's part of it.
     """
 
     states: tuple[tuple[int, ...], ...]
@@ -98,7 +100,7 @@ class _Coordinated:
         return sum(best) / len(best) if all(best) else 0.0
 
     def _mix(self, members: Sequence[int]) -> bool:
-        """Is every mixture of these plans optimal?"""
+        """Whether every mixture of these plans is optimal."""
         own = [
             sorted({self.parts[m][robot] for m in members}) for robot in range(len(self.parts[0]))
         ]

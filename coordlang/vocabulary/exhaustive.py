@@ -1,5 +1,6 @@
-"""The paper's brute force: all partitions by increasing size, judged by the definition.  For tiny
-inputs.
+"""The paper's brute force: all partitions by increasing size, judged by the definition.
+
+For tiny inputs.
 """
 
 from __future__ import annotations

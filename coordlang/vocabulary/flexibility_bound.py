@@ -1,5 +1,6 @@
-"""Boxes: the largest sets of plans that mix freely, and what follows for the flexibility of any
-language.
+"""Boxes: the largest sets of plans that mix freely.
+
+What follows from them for the flexibility of any language.
 
 If a set of plans is RC-free, every mixture of it is an optimal plan.  Split the robots into one
 robot i and the others: the plans are then cells of a table, rows the parts of robot i, columns the
@@ -47,8 +48,9 @@ def flexibility_bounds(spaces: Sequence[PlanSpace], requires: Sequence[Bools]) -
 
 
 def _average_box(plans: Sequence[Plan]) -> float:
-    """The size of the largest box with a plan in it, averaged over the plans: of all divisions the
-    least for each plan.
+    """The size of the largest box with a plan in it, averaged over the plans.
+
+    Of all divisions the least for each plan.
     """
     robots = len(plans[0][0])
     divisions = (
@@ -59,8 +61,9 @@ def _average_box(plans: Sequence[Plan]) -> float:
 
 
 def _box_sizes(plans: Sequence[Plan], robot: int) -> list[int]:
-    """For each plan the size of the largest box with it: rows are the robot's parts, columns those
-    of all others.
+    """For each plan the size of the largest box with it.
+
+    Rows are the robot's parts, columns those of all others.
     """
     row_of: dict[tuple[int, ...], int] = {}
     column_of: dict[tuple[tuple[int, ...], ...], int] = {}
@@ -93,8 +96,9 @@ def _box_sizes(plans: Sequence[Plan], robot: int) -> list[int]:
 
 
 def _closed(rows: set[int]) -> set[int] | None:
-    """The column sets of the boxes that cannot grow: all intersections of rows; None if there are
-    too many.
+    """The column sets of the boxes that cannot grow.
+
+    All intersections of rows; None if there are too many.
     """
     closed: set[int] = set()
     for row in sorted(rows):
@@ -106,8 +110,9 @@ def _closed(rows: set[int]) -> set[int] | None:
 
 
 def _shared(rows: Sequence[int], cells: Mapping[tuple[int, int], int]) -> list[int]:
-    """For each plan: of the rows that have its column, the columns shared with its row.  No box
-    with it is larger.
+    """For each plan: of the rows that have its column, the columns shared with its row.
+
+    No box with it is larger.
     """
     sizes = [0] * len(cells)
     for (row, column), number in cells.items():

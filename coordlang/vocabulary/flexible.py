@@ -52,8 +52,9 @@ _WORK, _MOVE = 600_000_000, 2_000
 
 
 def flexible(job: Job, found: Outcome) -> Outcome:
-    """A language with as many words as ``found`` has, at least as flexible; its bound on the number
-    of words is kept.
+    """A language with as many words as ``found`` has, at least as flexible.
+
+    Its bound on the number of words is kept.
 
     Anytime: out of time or memory, or interrupted, the best verified language so far is returned,
     with the error in ``stopped``.  ``figures`` then also hold ``flexibility`` (plans left open,
@@ -89,8 +90,9 @@ class _Search:
         return Outcome(self.best, self._found.lower_bound, figures, stopped, self._found.evidence)
 
     def _measures(self) -> dict[str, float]:
-        """What is known of the flexibility; nothing where there are too many sentences to measure
-        it.
+        """What is known of the flexibility.
+
+        Nothing where there are too many sentences to measure it.
         """
         try:
             before, after = (
@@ -240,8 +242,9 @@ class _Annealing:
         self._price = _PRICE * self._typical
 
     def _cost_of_one_state(self) -> float:
-        """What it typically costs that one state has another word than all others: the unit of heat
-        and price.
+        """What it typically costs that one state has another word than all others.
+
+        The unit of heat and price.
         """
         word = np.zeros_like(self._word)
         most = self._objective.expected(word)
@@ -317,8 +320,9 @@ class _Annealing:
             self.best_value, self._pending = self.value, self._word.copy()
 
     def _draw(self) -> dict[int, int]:
-        """A random change: one state, the states that a symmetry takes one to, or two states
-        exchange their words.
+        """A random change of one state, of a state and its images, or of two states.
+
+        One state, the states that a symmetry takes one to, or two states exchange their words.
         """
         kind = self._random.random()
         state = self._random.choice(self._states)
@@ -354,8 +358,9 @@ def _measured(job: Job, partition: Partition) -> Flexibility:
 def _parts(
     spaces: Sequence[PlanSpace], requires: Sequence[Bools]
 ) -> list[tuple[PlanSpace, EdgeIndex, Ints]]:
-    """The tasks that require coordination, in parts that are searched for counterexamples one after
-    the other.
+    """The tasks that require coordination, in parts.
+
+    The parts are searched for counterexamples one after the other.
     """
     parts = []
     for space, required in zip(spaces, requires, strict=True):

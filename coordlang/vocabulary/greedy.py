@@ -53,8 +53,9 @@ def fill(states: Sequence[int], constraints: Sequence[tuple[Separation, ...]]) -
 
 
 class _Choices:
-    """Constraints with several alternatives: merging two states rules out those that keep them
-    apart.
+    """Constraints with several alternatives.
+
+    Merging two states rules out those that keep them apart.
     """
 
     def __init__(self) -> None:

@@ -18,8 +18,9 @@ Partition = Mapping[int, int]
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A partition to find: of ``states`` (numbers in ``candidates.rows``; those on optimal plans),
-    for ``candidates``.
+    """A partition to find.
+
+    Of ``states`` (numbers in ``candidates.rows``; those on optimal plans), for ``candidates``.
 
     ``incumbent`` is a partition that is known to be a language, what an anytime method returns in
     the worst case. ``check`` verifies a partition by definition and raises if it is none; an
@@ -44,8 +45,9 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """Why a clause is necessary: plans of ``space`` whose mixture fails, or their image under a
-    symmetry.
+    """Why a clause is necessary.
+
+    Plans of ``space`` whose mixture fails, or their image under a symmetry.
     """
 
     space: PlanSpace

@@ -93,8 +93,9 @@ def refute(job: Job, size: int) -> Mapping[Clause, Evidence]:
 
 
 class _Search:
-    """Closes in on the least number of words: ``lower`` is proved to be needed, ``best`` is a
-    language.
+    """Closes in on the least number of words.
+
+    ``lower`` is proved to be needed, ``best`` is a language.
     """
 
     def __init__(self, job: Job) -> None:
@@ -163,8 +164,9 @@ class _Search:
         return _parts(self._job.candidates.spaces, Random(self._job.seed))
 
     def _decide(self, size: int, parts: Sequence[_Part], effort: SolverBudget) -> bool:
-        """Find a language with ``size`` words or prove that there is none; False if the effort was
-        not enough.
+        """Find a language with ``size`` words or prove that there is none.
+
+        False if the effort was not enough.
         """
         try:
             partition = self._refine(size, parts, effort)

@@ -1,5 +1,6 @@
-"""The flexibility of partitions that differ in few states, measured again and again: the inner loop
-of `flexible`.
+"""The flexibility of partitions that differ in few states, measured again and again.
+
+The inner loop of `flexible`.
 
 The same sum as `coordlang.language.flexibility`, E = sum_s n_s^2 / N for every task.  Two things
 make it fast.  Sentences are told apart by 63-bit hashes, not by tables.  And when some states
@@ -29,8 +30,9 @@ _KEEP = 20_000_000
 
 @dataclass(frozen=True, slots=True)
 class _Layer:
-    """Nodes ``low:high`` of a part; its edges go from ``source`` to ``target``, both counted from
-    their layers' first node.
+    """Nodes ``low:high`` of a part.
+
+    Its edges go from ``source`` to ``target``, both counted from their layers' first node.
 
     ``state`` of each node; of each edge ``leaving`` and ``entering`` the states at its ends,
     ``share`` of the source's plans.
@@ -48,8 +50,9 @@ class _Layer:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """Some tasks of a plan space: the layers of their plan graph, the node of each task and its
-    number of plans.
+    """Some tasks of a plan space.
+
+    The layers of their plan graph, the node of each task and its number of plans.
     """
 
     tasks: Ints
@@ -86,8 +89,9 @@ def _sentences_above(
     word: Ints,
     code: NDArray[np.uint64],
 ) -> tuple[Ints, NDArray[np.uint64], Floats]:
-    """Entries (node, sentence, share of its plans) of a layer from those of the layer below, sorted
-    by node.
+    """Entries (node, sentence, share of its plans) of a layer from those of the layer below.
+
+    Sorted by node.
     """
     leaving, entering = word[layer.leaving], word[layer.entering]
     source, weight = layer.source, layer.share
@@ -111,8 +115,9 @@ def _sentences_above(
 
 
 class Objective:
-    """Flexibility of partitions of the states of ``spaces``: one number for each task, in the order
-    of the spaces.
+    """Flexibility of partitions of the states of ``spaces``.
+
+    One number for each task, in the order of the spaces.
     """
 
     def __init__(self, spaces: Sequence[PlanSpace], words: int) -> None:
@@ -134,8 +139,9 @@ class Objective:
         return np.concatenate([self._one(part, word) for part in self._all])
 
     def update(self, expected: Floats, word: Ints, changed: Sequence[int]) -> Floats:
-        """E of every task when ``changed`` states have got other words than ``expected`` was
-        measured with.
+        """E of every task when ``changed`` states have got other words.
+
+        Other than ``expected`` was measured with.
         """
         parts = [self._through(state) for state in changed]
         if sum(part.edges for own in parts for part in own) >= sum(
@@ -149,8 +155,9 @@ class Objective:
         return result
 
     def room(self, expected: Floats, bound: Floats, changed: Sequence[int]) -> float:
-        """How much the average can rise at most when ``changed`` states get other words; ``bound``
-        of each task's E.
+        """How much the average can rise at most when ``changed`` states get other words.
+
+        ``bound`` of each task's E.
         """
         tasks = {id(part): part.tasks for state in changed for part in self._through(state)}
         if not tasks:

@@ -32,8 +32,9 @@ _MOST = 200
 
 @dataclass(frozen=True, slots=True)
 class PairLanguage:
-    """A smallest language for pairs of robots: ``words`` of the states, ``size`` how many;
-    ``pairs`` by robots' numbers.
+    """A smallest language for pairs of robots.
+
+    ``words`` of the states, ``size`` how many; ``pairs`` by robots' numbers.
 
     ``nodes`` and ``edges`` of the composition walks, ``clauses`` that were met.
     """
@@ -47,8 +48,9 @@ class PairLanguage:
 
 
 def divided(space: PlanSpace, side: Sequence[int]) -> PlanSpace:
-    """The plan space of two robots: those in ``side`` as the first one, all others as the second
-    one.
+    """The plan space of two robots.
+
+    Those in ``side`` as the first one, all others as the second one.
     """
     others = [robot for robot in range(space.labels.shape[1]) if robot not in side]
     merged = []
@@ -122,8 +124,9 @@ def _words(
     clauses: list[Clause],
     size: int,
 ) -> dict[int, int] | None:
-    """A partition into ``size`` words without counterexample, or None if there is none; new clauses
-    are added to the list.
+    """A partition into ``size`` words without counterexample, or None if there is none.
+
+    New clauses are added to the list.
     """
     colouring = PartitionProblem(most_constrained_first(states, clauses), size)
     try:
@@ -159,8 +162,9 @@ def _violated(
 
 
 def together(languages: Sequence[PairLanguage]) -> dict[int, int]:
-    """The partition by all pairs' words at once: plans with one sentence under it have one sentence
-    in each language.
+    """The partition by all pairs' words at once.
+
+    Plans with one sentence under it have one sentence in each language.
     """
     number: dict[tuple[int, ...], int] = {}
     states = sorted(languages[0].words)
@@ -171,8 +175,9 @@ def together(languages: Sequence[PairLanguage]) -> dict[int, int]:
 
 
 def unsafe_pair(spaces: Sequence[PlanSpace], words: Sequence[int]) -> tuple[int, int] | None:
-    """A pair of robots for which the partition ``words`` (by state number) is no language; None if
-    there is none.
+    """A pair of robots for which the partition ``words`` (by state number) is no language.
+
+    None if there is none.
     """
     robots = spaces[0].labels.shape[1]
     word = np.array(words, np.int64)

@@ -19,8 +19,9 @@ _GROWN = 2
 
 
 class PartitionProblem:
-    """An incremental SAT problem: give each of ``states`` one of ``size`` words so that every
-    clause holds.
+    """An incremental SAT problem.
+
+    Give each of ``states`` one of ``size`` words so that every clause holds.
 
     Variables: state has word, pair is separated.  Words are interchangeable; the symmetry is broken
     by the order of ``states``: a state may take word w only if an earlier state has word w - 1.
@@ -54,9 +55,10 @@ class PartitionProblem:
         self._solver.add_clause([self._all_separate(pairs) for pairs in alternatives])
 
     def add_lex_leaders(self, symmetries: Sequence[Sequence[int]], pairs: Sequence[Pair]) -> None:
-        """Of partitions that are images of each other, allow the one that separates the first of
-        ``pairs`` (and of such the one that separates the second, ..): a lex-leader constraint over
-        so many pairs.
+        """A lex-leader constraint over so many ``pairs``, to break symmetry.
+
+        Of partitions that are images of each other, allow the one that separates the first of
+        ``pairs`` (and of such the one that separates the second, ..).
 
         ``symmetries`` map states to states.  No proof is lost if every requirement's images are
         required as well.
@@ -75,8 +77,9 @@ class PartitionProblem:
                 self._solver.add_clause([*before, -here, -there, equal])
 
     def solve(self, conflicts: int | None = None) -> dict[int, int] | None:
-        """A partition (state -> word), or None if there is none: a proof that ``size`` words do not
-        suffice.
+        """A partition (state -> word), or None if there is none.
+
+        A proof that ``size`` words do not suffice.
 
         Raises `Undecided` after about so many ``conflicts`` of the solver.
         """
@@ -145,8 +148,9 @@ class PartitionProblem:
 
 
 class PartitionProblems(Generic[Requirement]):
-    """The colouring problem of each number of words, kept as long as it is undecided: a solver goes
-    on where it stopped.
+    """The colouring problem of each number of words, kept as long as it is undecided.
+
+    A solver goes on where it stopped.
 
     ``start`` makes a problem with all requirements that are known; ``require`` adds one.
     """
@@ -191,14 +195,16 @@ class _Kept:
 
 
 class Undecided(Exception):
-    """The effort allowed was used up: a number of words is not decided yet, and others may be
-    easier.
+    """The effort allowed was used up.
+
+    A number of words is not decided yet, and others may be easier.
     """
 
 
 def solved(solver: Any, assumptions: Sequence[int] = (), conflicts: int | None = None) -> bool:
-    """Whether a python-sat solver's clauses can be satisfied.  Raises `Undecided` after so many
-    ``conflicts``.
+    """Whether a python-sat solver's clauses can be satisfied.
+
+    Raises `Undecided` after so many ``conflicts``.
 
     In slices: the solver hears no signal (time limit, Ctrl-C), so it must come back now and then.
     """
@@ -274,8 +280,9 @@ def most_asked(clauses: Iterable[Clause], most: int) -> list[Pair]:
 
 
 def most_constrained_first(states: Iterable[int], clauses: Iterable[Clause]) -> list[int]:
-    """States in the order of how much the clauses ask of them: a good order to break the symmetry
-    of words.
+    """States in the order of how much the clauses ask of them.
+
+    A good order to break the symmetry of words.
     """
     demand: dict[int, float] = {}
     for clause in clauses:

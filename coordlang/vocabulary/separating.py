@@ -1,5 +1,6 @@
-"""The least partition that satisfies Theorem 3 - alpha or beta, or with ``alpha_only`` alpha - with
-proof, by SAT.
+"""The least partition that satisfies Theorem 3, with proof, by SAT.
+
+Theorem 3 in full, alpha or beta; with ``alpha_only`` alpha.
 
 Between `greedy`, which satisfies alpha, and `minimal`, which is least among all languages:
 separating words tell RC plans apart where they part or where they meet, so a sentence can be
@@ -47,8 +48,9 @@ def separating(job: Job) -> Outcome:
 
 
 def quickly(job: Job) -> Outcome:
-    """A separating partition with fewer words than the job's incumbent, as far as a short search
-    finds one; else that.
+    """A separating partition with fewer words than the job's incumbent, or the incumbent.
+
+    As far as a short search finds one.
     """
     return _searched(job, _AlphaOrBeta(job), _short)
 
@@ -78,8 +80,9 @@ def _searched(job: Job, search: _Search, run: Callable[[_Search], None]) -> Outc
 
 
 class _Search:
-    """Closes in on the least number of words from below; subclasses know where constraints come
-    from.
+    """Closes in on the least number of words from below.
+
+    Subclasses know where constraints come from.
     """
 
     def __init__(self, job: Job) -> None:
@@ -112,8 +115,9 @@ class _Search:
         raise NotImplementedError
 
     def decide(self, size: int, effort: SolverBudget) -> bool:
-        """Find a separating partition with ``size`` words, or prove that there is none; False: not
-        with this effort.
+        """Find a separating partition with ``size`` words, or prove that there is none.
+
+        False: not with this effort.
         """
         for _ in range(effort.rounds):
             self._job.progress(
@@ -183,8 +187,9 @@ class _AlphaOnly(_Search):
 
 
 class _AlphaOrBeta(_Search):
-    """All constraints where they are few: the more the solver knows, the shorter its proofs.  Else
-    they are asked of the composition walks, with their images under the model's symmetries.
+    """All constraints where they are few: the more the solver knows, the shorter its proofs.
+
+    Else they are asked of the composition walks, with their images under the model's symmetries.
     """
 
     def prepare(self) -> None:
@@ -244,8 +249,9 @@ def _image(constraint: Constraint, permutation: Sequence[int]) -> Constraint:
 
 
 def _clique(edges: Iterable[Pair]) -> list[int]:
-    """A large clique, the best that greedy search finds from any state: its states need words of
-    their own.
+    """A large clique, the best that greedy search finds from any state.
+
+    Its states need words of their own.
     """
     near: dict[int, set[int]] = {}
     for a, b in sorted(edges):

@@ -1,5 +1,6 @@
-"""Symmetries of a joint model: permutations of its states that map plans to plans and tasks to
-tasks.
+"""Symmetries of a joint model.
+
+Permutations of its states that map plans to plans and tasks to tasks.
 
 Found from the PDDL objects (permutations that keep the static facts), not from any geometry, and
 checked on the ground actions, the states and the tasks before use.  The image of a failing tuple of
@@ -64,8 +65,9 @@ def state_symmetries(candidates: Candidates) -> list[Ints]:
 
 
 def symmetries(candidates: Candidates) -> list[Symmetry]:
-    """Permutations of the state numbers in ``candidates.rows``, without the identity (at most
-    `MOST`).
+    """Permutations of the state numbers in ``candidates.rows``, without the identity.
+
+    At most `MOST`.
 
     Empty under ``--remember-actions``, or where the search finds none: symmetries only save work.
     """
@@ -91,8 +93,9 @@ def symmetries(candidates: Candidates) -> list[Symmetry]:
 
 
 def closed(permutations: Sequence[Ints]) -> bool:
-    """Whether the permutations and the identity are a group: one after another is one of them
-    again.
+    """Whether the permutations and the identity are a group.
+
+    One after another is one of them again.
     """
     if not permutations:
         return True
@@ -107,8 +110,9 @@ def _used(model: JointModel) -> set[str]:
 
 
 def _renamings(domain: Domain, problem: Problem, used: set[str]) -> Iterator[Renaming]:
-    """Permutations of the ``used`` objects that keep types, the static facts about them and the
-    domain's constants.
+    """Permutations of the ``used`` objects that keep types, static facts and constants.
+
+    The static facts about the objects, and the domain's constants.
 
     Backtracking over objects in the order in which facts join them, each among those that look
     alike; it gives up after `_TRIED` assignments.
@@ -158,8 +162,9 @@ def _alike(name: str, looks: dict[str, int], image: dict[str, str]) -> list[str]
 def _looks(
     domain: Domain, problem: Problem, statics: set[tuple[str, ...]], used: set[str]
 ) -> dict[str, int]:
-    """A number for each object, equal for those that types and static facts cannot tell apart
-    (colour refinement).
+    """A number for each object, equal for those that cannot be told apart.
+
+    By types and static facts (colour refinement).
     """
     start = {
         name: (name if name in domain.constants else "", tuple(sorted(types)))
@@ -189,8 +194,9 @@ def _numbered(keys: Mapping[str, object]) -> dict[str, int]:
 
 
 def _joined_order(objects: Iterable[str], statics: set[tuple[str, ...]]) -> list[str]:
-    """Objects so that each, where possible, shares a fact with an earlier one: mistakes are then
-    met early.
+    """Objects so that each, where possible, shares a fact with an earlier one.
+
+    Mistakes are then met early.
     """
     near: dict[str, set[str]] = {name: set() for name in objects}
     for fact in statics:
@@ -207,8 +213,9 @@ def _joined_order(objects: Iterable[str], statics: set[tuple[str, ...]]) -> list
 
 
 def _keeps_actions(model: JointModel, renaming: Renaming) -> bool:
-    """Whether ground actions go to ground actions of the same cost, and robots to robots that idle
-    alike.
+    """Whether ground actions go to ground actions of the same cost.
+
+    And robots to robots that idle alike.
     """
     if model.is_joint_action:
         if any(renaming.get(robot, robot) != robot for robot in model.robots):

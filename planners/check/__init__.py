@@ -1,3 +1,4 @@
-"""The independent twin: the rules of joint steps once more, and a plan checker that uses nothing
-else.
+"""The independent twin.
+
+The rules of joint steps once more, and a plan checker that uses nothing else.
 """

@@ -1,5 +1,6 @@
-"""The rules of joint steps, read literally: one state and one step at a time, over states that are
-plain sets of atoms.
+"""The rules of joint steps, read literally.
+
+One state and one step at a time, over states that are plain sets of atoms.
 
 The independent twin of grounding and composition (docs/pddl.md has the rules): nothing is shared
 with them, only the lifted nouns and the robots.  Formulas are never rewritten; they are read in
@@ -44,8 +45,9 @@ Literal = tuple[Atom | StepAtom, bool]
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """What a formula is read against: the state before the step, the subactions of the step, and
-    who acts.
+    """What a formula is read against.
+
+    The state before the step, the subactions of the step, and who acts.
 
     A negative action formula never speaks of the robots in ``acting`` (empty for conditions of
     effects and goals). ``step`` None leaves the step open: every literal about it then counts as
@@ -59,8 +61,9 @@ class Moment:
 
 @dataclass(frozen=True, slots=True)
 class Instance:
-    """A schema with arguments, and the robots that must choose it together; ``name`` is what
-    formulas call it.
+    """A schema with arguments, and the robots that must choose it together.
+
+    ``name`` is what formulas call it.
     """
 
     schema: Schema
@@ -148,9 +151,7 @@ class Rules:
         return self._instances[label]
 
     def possible(self, state: State, label: str) -> bool:
-        """Whether some step could hold the subaction in a state, as far as its own precondition
-        says.
-        """
+        """Whether some step could hold the subaction in a state, by its own precondition."""
         found = self._known(label)
         moment = Moment(state, None, found.owners)
         return self.holds(found.schema.precondition, found.binding, True, moment)
@@ -179,7 +180,9 @@ class Rules:
         return Instance(schema, StepAtom(schema.name, args), binding, owners)
 
     def _wrong_choice(self, chosen: Sequence[Instance | None]) -> str | None:
-        """Idling where it is not allowed, somebody else's action, a shared action that not all its
+        """Labels that no step may have.
+
+        Idling where it is not allowed, another robot's action, a shared action that not all its
         owners chose.
         """
         robots = self.team.robots
@@ -267,8 +270,9 @@ class Rules:
         }
 
     def _joined(self, one: Instance, other: Instance) -> bool:
-        """Linked by the network: of one constraint that takes two or more, or of two that depend on
-        each other.
+        """Linked by the network.
+
+        Of one constraint that takes two or more, or of two that depend on each other.
         """
         by_name = {constraint.name: constraint for constraint in self.domain.constraints}
         pairs = [(c.name, c.name) for c in self.domain.constraints if c.low > 1]
@@ -278,8 +282,9 @@ class Rules:
         )
 
     def touched(self, action: Instance) -> Touched:
-        """Conditional effects count as if they fired and their conditions as required; adding wins
-        over deleting.
+        """Conditional effects count as if they fired and their conditions as required.
+
+        Adding wins over deleting.
         """
         if action.name in self._touched:
             return self._touched[action.name]
@@ -353,8 +358,9 @@ class Rules:
                 yield self.bind(schema, args)
 
     def _match_parts(self, schema: Schema, labels: Labels) -> Binding | None:
-        """The parameters that the labels determine, or None if the labels are not the schema's
-        parts.
+        """The parameters that the labels determine.
+
+        None if the labels are not the schema's parts.
         """
         templates: dict[str, tuple[Term, ...] | None] = {
             part.robot: part.template for part in schema.parts
@@ -413,8 +419,9 @@ class Rules:
     def _required(
         self, formula: Formula, binding: Binding, positive: bool, acting: tuple[int, ...]
     ) -> frozenset[Literal] | None:
-        """The literals left after statics, equalities and types are simplified; None if that makes
-        it false.
+        """The literals left after statics, equalities and types are simplified.
+
+        None if that makes it false.
 
         A formula that this makes true requires nothing, whatever stands inside.
         """

@@ -1,4 +1,4 @@
-"""Independent plan checker: is this sequence of joint steps a plan?
+"""Independent plan checker: whether a sequence of joint steps is a plan.
 
 Reads `planners.check.rules`, the rules of joint steps taken literally, and nothing of grounding,
 composition or search.
@@ -40,8 +40,7 @@ def validate(
     goal: Formula | None = None,
     allow_idle: Sequence[bool] | None = None,
 ) -> Verdict:
-    """Check that every step is a legal joint step where it is taken and that the goal holds at the
-    end.
+    """Check that every step is legal where it is taken and that the goal holds at the end.
 
     Parameters
     ----------

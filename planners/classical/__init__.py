@@ -42,8 +42,9 @@ __all__ = [
 def compile_classical(
     model: JointModel, task: PlanningTask, limit: int = 2000, longest: int = LONGEST
 ) -> ClassicalTask:
-    """The plain form of a task: explicit with at most ``limit`` plain actions, else
-    select-then-apply.
+    """The plain form of a task.
+
+    Explicit with at most ``limit`` plain actions, else select-then-apply.
 
     Parameters
     ----------

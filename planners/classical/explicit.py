@@ -17,8 +17,9 @@ class TooManyError(Exception):
 
 
 def explicit(team: Choosers, model: JointModel, goal: Goal, step_cost: int, limit: int) -> Writer:
-    """One plain action per joint action, or one per case where it has disjunctions or conditional
-    effects.
+    """One classical action per joint action.
+
+    One per case where it has disjunctions or conditional effects.
     """
     out = Writer(fact_atoms(model))
     for step in _joint_steps(team, limit):
@@ -41,7 +42,8 @@ def explicit(team: Choosers, model: JointModel, goal: Goal, step_cost: int, limi
 
 
 def _joint_steps(team: Choosers, limit: int) -> Iterator[tuple[int, ...]]:
-    """The sets of actions that may share a step as far as owners and interference say;
+    """The sets of actions that may share a step as far as owners and interference say.
+
     `TooManyError` beyond a limit.
     """
     partial: list[tuple[int, ...]] = [()]
@@ -63,8 +65,9 @@ def _joint_steps(team: Choosers, limit: int) -> Iterator[tuple[int, ...]]:
 
 
 def _name(team: Choosers, step: Sequence[int]) -> str:
-    """The label tuple: ground actions of joint-action PDDL that do the same with the same labels
-    are one.
+    """Ground actions by their label tuple.
+
+    Ground actions of joint-action PDDL that do the same with the same labels are one.
     """
     chosen = {robot: team.actions[n].label for n in step for robot in team.owners[n]}
     parts = next((team.actions[n].parts for n in step), ()) or [
@@ -76,9 +79,7 @@ def _name(team: Choosers, step: Sequence[int]) -> str:
 def _cases_of(
     team: Choosers, model: JointModel, step: Sequence[int]
 ) -> Iterator[tuple[Known, set[Atom], set[Atom]]]:
-    """The disjoint cases (what is known, adds, deletes) in which a joint action is applicable,
-    however it turns out.
-    """
+    """The disjoint cases in which a joint action is applicable, as (known, adds, deletes)."""
     chosen = {StepAtom(team.actions[n].schema, team.actions[n].args) for n in step}
     on_state = state_reader(model)
 
@@ -110,8 +111,9 @@ def _lookup(known: Known) -> Callable[[Leaf], Formula]:
 def _split(
     known: Known, formulas: Sequence[Formula], conditions: Sequence[Formula]
 ) -> Iterator[dict[Atom, bool]]:
-    """Disjoint conjunctions of literals that together say ``formulas`` and each decide all
-    ``conditions``.
+    """Disjoint conjunctions that together say ``formulas`` and decide all ``conditions``.
+
+    Each is a conjunction of literals.
     """
     found = literals_of(joined(And, (put(f, _lookup(known)) for f in formulas)))
     if found is None:

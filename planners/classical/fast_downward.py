@@ -1,5 +1,6 @@
-"""The independent cross-check: the optimal cost of a task by Fast Downward, through
-unified-planning.
+"""The independent cross-check.
+
+The optimal cost of a task by Fast Downward, through unified-planning.
 
 unified-planning runs in a child process of its own group and in a directory of its own, so that
 nothing of it is left behind, whatever happens: no file, no output, no process.
@@ -40,8 +41,9 @@ _NO_MEMORY = re.compile(
 
 
 class FastDownwardFailed(CoordlangError):
-    """Fast Downward gave no answer: the cost that was to be checked is neither confirmed nor
-    refuted.
+    """Fast Downward gave no answer.
+
+    The cost that was to be checked is neither confirmed nor refuted.
     """
 
     exit_code = 3
@@ -49,8 +51,9 @@ class FastDownwardFailed(CoordlangError):
 
 @dataclass(frozen=True, slots=True)
 class FastDownwardAnswer:
-    """What Fast Downward says of a task: its optimal cost (makespan, second component), None if it
-    is unsolvable.
+    """What Fast Downward says of a task.
+
+    Its optimal cost (makespan, second component), None if it is unsolvable.
 
     ``actions`` is the number of plain actions that it got, in the form ``form``; ``seconds`` are
     wall time.
@@ -106,8 +109,9 @@ def optimal_cost(
 def total_cost(
     plain: ClassicalTask, *, time_limit: float | None = None, memory_limit: int | None = None
 ) -> int | None:
-    """The total cost of an optimal plan of a plain task by Fast Downward, None if there is none;
-    see `optimal_cost`.
+    """The total cost of an optimal plan of a plain task by Fast Downward, None if there is none.
+
+    See `optimal_cost`.
     """
     return _solve(plain, time_limit, time_limit, memory_limit)
 
@@ -163,8 +167,9 @@ def _solve(
 
 
 def _run(directory: Path, left: float | None) -> int:
-    """Run the worker in a directory; its exit code.  However this ends, the worker and its children
-    are gone.
+    """Run the worker in a directory; its exit code.
+
+    However this ends, the worker and its children are gone.
     """
     home = str(Path(__file__).resolve().parents[2])
     path = os.pathsep.join(p for p in (home, os.environ.get("PYTHONPATH")) if p)

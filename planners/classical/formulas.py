@@ -27,8 +27,9 @@ def conjuncts(formula: Formula) -> tuple[Formula, ...]:
 
 
 def put(formula: Formula, value: Callable[[Leaf], Formula]) -> Formula:
-    """A formula with its leaves replaced, truth values simplified away, conjunctions in
-    conjunctions flattened.
+    """A formula with its leaves replaced and simplified.
+
+    Truth values are simplified away, conjunctions in conjunctions flattened.
     """
     match formula:
         case Atom() | StepAtom():
@@ -70,8 +71,9 @@ def negated(formula: Formula) -> Formula:
 
 
 def literals_of(formula: Formula) -> tuple[dict[Atom, bool], list[Formula]] | None:
-    """The literals that a formula demands and its other conjuncts, or None if it contradicts itself
-    at once.
+    """The literals that a formula demands, and its other conjuncts.
+
+    None if it contradicts itself at once.
     """
     known: dict[Atom, bool] = {}
     rest: list[Formula] = []

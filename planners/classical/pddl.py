@@ -61,8 +61,9 @@ def _all_of(names: Sequence[str], conditions: Iterable[Condition]) -> str:
 
 
 def _safe_names(texts: Iterable[str]) -> list[str]:
-    """For each text a PDDL name of its own: letters, digits, ``-`` and ``_``, beginning with a
-    letter.
+    """For each text a PDDL name of its own.
+
+    Letters, digits, ``-`` and ``_``, beginning with a letter.
     """
     taken: dict[str, int] = defaultdict(int)
     used: set[str] = set()

@@ -12,8 +12,9 @@ from planners.pddl.lifted import FALSE, TRUE, And, Atom, Formula, Not, Or, StepA
 
 
 def select_then_apply(team: Choosers, model: JointModel, goal: Goal, step_cost: int) -> Writer:
-    """Stages of a step: all choose; all check; all undo (rarely); all apply.  Robots without work
-    skip a stage.
+    """Stages of a step: all choose; all check; all undo (rarely); all apply.
+
+    Robots without work skip a stage.
     """
     out = Writer(fact_atoms(model))
     value = _of_choices(team, model)
@@ -66,8 +67,9 @@ def _carry_out(
 
 
 class _Choice:
-    """A subaction of its first owner: what is read when it is chosen, checked afterwards, and done
-    at last.
+    """A subaction of its first owner.
+
+    What is read when it is chosen, checked afterwards, and done at last.
 
     ``literals`` is None if they contradict each other.  ``groups`` are its conditional effects by
     condition.  ``early`` are the atoms that it may both delete and conditionally add: their deletes
@@ -111,8 +113,9 @@ class _Choice:
 
 
 def _of_choices(team: Choosers, model: JointModel) -> Callable[[Leaf], Formula]:
-    """The meaning of leaves on the plain facts: that a subaction is done means that its first owner
-    has chosen it.
+    """The meaning of leaves on the plain facts.
+
+    That a subaction is done means that its first owner has chosen it.
     """
     on_state = state_reader(model)
     who = {
@@ -139,8 +142,9 @@ def _choose(
     step_cost: int,
     kinds: Sequence[str],
 ) -> None:
-    """One robot's choosing of a subaction (or of idling), unless an earlier robot's choice forbids
-    it.
+    """One robot's choosing of a subaction, or of idling.
+
+    An earlier robot's choice may forbid it.
     """
     here, after = stage
     label = choice.label if choice else "idle"

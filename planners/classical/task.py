@@ -19,8 +19,9 @@ LONGEST = 100
 
 @dataclass(frozen=True, slots=True)
 class ClassicalAction:
-    """A ground STRIPS action with negative preconditions; facts by number, ``adds`` and ``deletes``
-    are disjoint.
+    """A ground STRIPS action with negative preconditions.
+
+    Facts by number, ``adds`` and ``deletes`` are disjoint.
     """
 
     name: str
@@ -49,8 +50,9 @@ class ClassicalTask:
     highest_cost: int
 
     def cost(self, total: int) -> tuple[int, int] | None:
-        """An optimal total cost as (makespan, second cost); None if ``step_cost`` is too small to
-        be sure.
+        """An optimal total cost as (makespan, second cost).
+
+        None if ``step_cost`` is too small to be sure.
 
         A plan of ``k`` steps costs from ``step_cost * k`` to ``(step_cost + highest_cost) * k``,
         which is less than ``step_cost * m`` for every ``k < m`` when ``step_cost > highest_cost *

@@ -55,8 +55,9 @@ class Writer:
         gain: tuple[Atom, ...] = (),
         otherwise: Atom | None = None,
     ) -> None:
-        """Zero-cost actions that lead from ``start`` to ``end`` (and add ``gain``) exactly if
-        ``formula`` holds.
+        """Zero-cost actions from ``start`` to ``end`` that apply exactly if ``formula`` holds.
+
+        They also add ``gain``.
 
         With ``otherwise`` they lead there if it does not hold.  Formulas are evaluated from left to
         right, as in a programming language, so that there is one way in every state, and the size
@@ -117,8 +118,9 @@ class Writer:
 
 
 def own_fact(kind: str, *args: str) -> Atom:
-    """A fact of the compilation: its predicate contains a space, so that no name of the user's can
-    be the same.
+    """A fact of the compilation.
+
+    Its predicate contains a space, so that no name of the user's can be the same.
     """
     assert " " in kind
     return Atom(kind, args)

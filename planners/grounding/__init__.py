@@ -1,5 +1,6 @@
-"""Lifted actions -> ground actions: Tarski finds the reachable arguments, we evaluate the rest
-exactly.
+"""Lifted actions -> ground actions.
+
+Tarski finds the reachable arguments, we evaluate the rest exactly.
 """
 
 from planners.grounding.instantiate import (

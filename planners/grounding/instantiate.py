@@ -1,5 +1,6 @@
-"""Ground actions: arguments put in, static atoms, equalities and types evaluated, the rest in
-negation normal form.
+"""Ground actions: arguments put in, statics evaluated, the rest in negation normal form.
+
+Static atoms, equalities and types are evaluated.
 """
 
 from __future__ import annotations
@@ -81,8 +82,9 @@ def label(name: str, args: Iterable[str]) -> str:
 def ground_actions(
     domain: Domain, problem: Problem, team: Team, *, also: Iterable[Atom] = (), costs: bool = False
 ) -> tuple[GroundAction, ...]:
-    """All ground actions that may ever be applied, sorted by schema (in domain order) and
-    arguments.
+    """All ground actions that may ever be applied.
+
+    Sorted by schema (in domain order) and arguments.
 
     Parameters
     ----------
@@ -239,8 +241,9 @@ class _Grounder:
         return atom
 
     def _guards_of(self, f: Forall | Exists) -> tuple[Atom, ...]:
-        """Static atoms without which an instance of the quantified part is no matter: false under
-        ``exists``, true under ``forall``.
+        """Static atoms without which an instance of the quantified part is no matter.
+
+        False under ``exists``, true under ``forall``.
         """
         if id(f) not in self._guards:
             part = f.part if isinstance(f, Exists) else _negated(f.part)
@@ -259,8 +262,9 @@ class _Grounder:
     def _bindings(
         self, variables: tuple[Variable, ...], binding: Binding, guards: tuple[Atom, ...] = ()
     ) -> Iterator[Binding]:
-        """Values for the variables, in the order of the objects; without such as make one of the
-        guards false.
+        """Values for the variables, in the order of the objects.
+
+        Without such as make one of the guards false.
 
         The first guard that leaves the fewest facts is looked up; the others are left to the
         formula.
@@ -283,8 +287,9 @@ class _Grounder:
     def _facts_of(
         self, guard: Atom, outer: Binding, names: Sequence[str]
     ) -> tuple[Atom, list[tuple[str, ...]]] | None:
-        """A guard with the facts that may match it, if an argument is known by which to look them
-        up.
+        """A guard with the facts that may match it.
+
+        The facts are looked up by an argument that is known, if there is one.
         """
         known = [(n, outer.get(arg, arg)) for n, arg in enumerate(guard.args) if arg not in names]
         lists = [self._facts.get((guard.predicate, n, value), []) for n, value in known]

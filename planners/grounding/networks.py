@@ -1,5 +1,6 @@
-"""Concurrency networks -> formulas about the joint step, in the preconditions of the ground actions
-they bind.
+"""Concurrency networks as formulas about the joint step.
+
+The formulas stand in the preconditions of the ground actions that they bind.
 """
 
 from __future__ import annotations
@@ -45,8 +46,9 @@ def apply_network(
 
 
 def _check_types(domain: Domain, problem: Problem, constraint: Constraint) -> None:
-    """Raise `BadInput` for a position whose type excludes the parameter's: the constraint would
-    never match.
+    """Raise `BadInput` for a position whose type excludes the parameter's.
+
+    The constraint would never match.
     """
     schemas = {schema.name: schema for schema in domain.schemas}
     types = {"object", *domain.types}

@@ -1,5 +1,6 @@
-"""The arguments with which each action can ever be applied, by Tarski's reachability program
-(clingo).
+"""The arguments with which each action can ever be applied.
+
+They are found by Tarski's reachability program (clingo).
 
 Tarski gets a relaxed core of the domain: one sort, types as static predicates, the positive atoms
 of each conjunctive precondition, and add effects.  What is left out (negation, disjunction,
@@ -62,8 +63,9 @@ def reachable_arguments(
 
 
 def _failure(error: Exception) -> CoordlangError:
-    """Tarski's error as ours: clingo out of memory (it may also be killed for it), or anything
-    else.
+    """Tarski's error as ours.
+
+    Clingo out of memory (it may also be killed for it), or anything else.
     """
     text = str(error)
     if any(

@@ -74,8 +74,9 @@ class ComposingStepper:
         )
 
     def choices(self, rows: Rows) -> list[tuple[Ints, Ints]]:
-        """For each robot the labels whose conditions on the state hold, by state: (first index,
-        labels), CSR.
+        """For each robot the labels whose conditions on the state hold, by state.
+
+        (first index, labels), CSR.
         """
         return [self._options(robot, number, rows) for number, robot in enumerate(self._robot)]
 
@@ -227,9 +228,7 @@ class _Subactions:
     def drop_unmet(
         self, fits: NDArray[np.bool_], robot: int, rows: Rows, source: Ints, labels: Labels
     ) -> None:
-        """Clear ``fits`` where this robot's subaction has a formula about the joint step that is
-        not met.
-        """
+        """Clear ``fits`` where a formula of this robot's subaction about the joint step is not met."""
         asks = np.flatnonzero(self._has_step_formula[labels[:, robot]])
         if not len(asks):
             return

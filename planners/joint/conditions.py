@@ -27,8 +27,9 @@ class Evaluator:
     def holds(
         self, formula: Formula, rows: Rows, which: Ints, labels: Labels | None = None
     ) -> NDArray[np.bool_]:
-        """For each ``k``: does ``formula`` hold in ``rows[which[k]]`` when the robots do
-        ``labels[k]``?
+        """Whether ``formula`` holds in ``rows[which[k]]`` when the robots do ``labels[k]``.
+
+        One entry for each ``k``.
         """
         match formula:
             case Truth(value):

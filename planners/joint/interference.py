@@ -151,8 +151,9 @@ def _meeting(
     right: Sequence[Footprint | None],
     kinds: Sequence[tuple[str, str]],
 ) -> NDArray[np.bool_]:
-    """Table: does an atom stand in one field of the one and in the other field of the other, either
-    way round?
+    """Whether an atom stands in one field of the one and in the other field of the other.
+
+    A table, either way round.
     """
     table = np.zeros((len(left), len(right)), np.bool_)
     for first, second in (*kinds, *((b, a) for a, b in kinds)):

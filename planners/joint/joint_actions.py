@@ -102,8 +102,9 @@ class JointActionStepper:
         return f"the joint action {self._actions[found[0]].label} is not applicable here"
 
     def name(self, row: Rows, labels: Sequence[int]) -> str:
-        """The ground joint action that these labels are in a state: the cheapest, as `steps` takes
-        it.
+        """The ground joint action that these labels are in a state.
+
+        The cheapest, as `steps` takes it.
         """
         found = np.flatnonzero((self._labels == np.array(labels)).all(axis=1))
         _, operators = self._applicable(row[None, :])

@@ -1,5 +1,6 @@
-"""Which operators are applicable in which states: a discrimination tree over required facts, for
-whole layers of states at a time.
+"""Which operators are applicable in which states.
+
+A discrimination tree over required facts, for whole layers of states at a time.
 """
 
 from __future__ import annotations
@@ -25,8 +26,9 @@ def ranges(starts: Ints, counts: Ints) -> Ints:
 
 
 def spans(sizes: NDArray[np.float64], most: int) -> Iterator[slice]:
-    """Cut a table so that the sizes of each piece sum to at most ``most``; a larger row is a piece
-    of its own.
+    """Cut a table so that the sizes of each piece sum to at most ``most``.
+
+    A larger row is a piece of its own.
     """
     ends = np.cumsum(sizes)
     start = 0

@@ -30,8 +30,9 @@ NO_FACT = "(no fact holds)"
 
 @dataclass(frozen=True, slots=True)
 class FullState:
-    """A goal that is one state: every fluent as in the row (given as a tuple of words, so that it
-    can be hashed).
+    """A goal that is one state.
+
+    Every fluent as in the row (given as a tuple of words, so that it can be hashed).
     """
 
     words: tuple[int, ...]
@@ -144,8 +145,9 @@ def show(atom: Atom | StepAtom) -> str:
 
 
 def own_text(text: str, robot: str) -> str:
-    """A subaction's text as the robot says it of itself: ``(pass r1 r2 ball)`` of r1 is ``pass r2
-    ball``.
+    """A subaction's text as the robot says it of itself.
+
+    ``(pass r1 r2 ball)`` of r1 is ``pass r2 ball``.
 
     Without the parentheses and the first of its arguments that is the robot's name; a further one
     is what it acts on.

@@ -306,8 +306,9 @@ def _fields(document: Document, item: Group) -> dict[str, tuple[Expression, ...]
 def _parameter_items(
     document: Document, fields: dict[str, tuple[Expression, ...]]
 ) -> tuple[tuple[Expression, ...], str | None]:
-    """The full typed list of parameters, the agent's first unless it stands among them; the agent's
-    name.
+    """The full typed list of parameters, the agent's first unless it stands among them.
+
+    The agent's name.
     """
     listed: tuple[Expression, ...] = ()
     if fields.get(":parameters"):

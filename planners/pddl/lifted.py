@@ -141,8 +141,9 @@ class Constraint:
 
 @dataclass(frozen=True, slots=True)
 class Domain:
-    """A domain; ``types`` maps each type to its direct supertypes, ``predicates`` a name to its
-    arities.
+    """A domain as read: types, predicates and actions.
+
+    ``types`` maps each type to its direct supertypes, ``predicates`` a name to its arities.
 
     ``constraints`` and ``dependences`` are the concurrency network: a pair (v, w) says that whoever
     matches w needs somebody who matches v with the same binding, in the same step.

@@ -1,5 +1,6 @@
-"""Concurrency networks (Crosby, Jonsson, Rovatsos 2014): constraints on how many do an action
-together.
+"""Concurrency networks (Crosby, Jonsson, Rovatsos 2014).
+
+Constraints on how many do an action together.
 """
 
 from __future__ import annotations

@@ -156,8 +156,9 @@ def _declared(domain: Domain, problem: Problem) -> tuple[tuple[str, ...], str] |
 
 
 def _possible_agents(domain: Domain, problem: Problem, schema: Schema) -> tuple[str, ...]:
-    """The objects of the agent's type; in untyped domains those that its static type predicates
-    hold for.
+    """The objects of the agent's type.
+
+    In untyped domains those that its static type predicates hold for.
     """
     agent = schema.parameters[schema.agent or 0]
     objects = objects_of(domain, problem, agent.types)
@@ -205,8 +206,9 @@ def _detect(domain: Domain, problem: Problem) -> tuple[tuple[str, ...], str]:
 
 
 def _kinds(domain: Domain, problem: Problem) -> list[str]:
-    """What can be given as ``--robot-type``: the likely types, else all that some action takes,
-    else unary predicates.
+    """What can be given as ``--robot-type``.
+
+    The likely types, else all that some action takes, else unary predicates.
     """
     taken = [p.types for schema in domain.schemas for p in schema.parameters]
     every = [

@@ -41,9 +41,10 @@ def blind(model: JointModel, goal: Goal) -> Heuristic:
 
 
 def relaxed(model: JointModel, goal: Goal) -> Heuristic:
-    """h^max with all robots acting at once: the steps until all atoms of the goal have been true,
-    if nothing were ever deleted and nobody were in anybody's way (Bonet and Geffner 2001, here with
-    joint steps as the unit of time).
+    """h^max with all robots acting at once.
+
+    The steps until all atoms of the goal have been true, if nothing were ever deleted and nobody
+    were in anybody's way (Bonet and Geffner 2001, here with joint steps as the unit of time).
 
     On a map it is the longest of the robots' own shortest paths.  O(literals of the ground actions)
     a state and layer.
@@ -176,8 +177,9 @@ def _distance(one: _Place, other: _Place) -> int:
 
 
 def _ways(model: JointModel) -> Iterator[tuple[frozenset[int], int]]:
-    """Every (facts that must be true, fact that becomes true) of the ground actions, negative
-    literals left out.
+    """Every (facts that must be true, fact that becomes true) of the ground actions.
+
+    Negative literals are left out.
     """
     known = model.evaluator.facts
     for action in model.actions:

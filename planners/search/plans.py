@@ -38,8 +38,9 @@ def counts(space: PlanSpace) -> list[int]:
 
 @dataclass(frozen=True, slots=True)
 class Plans:
-    """The optimal plans of one task as a sequence in a stable order: lexicographic by label
-    numbers.
+    """The optimal plans of one task as a sequence in a stable order.
+
+    Lexicographic by label numbers.
 
     ``space`` holds the task's plans as paths from node ``start``; ``counted`` is `counts` of it.
     """

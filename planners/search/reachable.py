@@ -44,8 +44,9 @@ class Space:
 
 
 def blocks(model: JointModel, rows: Rows) -> Iterator[tuple[int, Steps]]:
-    """`JointModel.successors` of a long table in pieces: (number of the piece's first row, its
-    steps).
+    """`JointModel.successors` of a long table in pieces.
+
+    (number of the piece's first row, its steps).
 
     The first piece is short; how many steps its states have says how long the next ones may be.
     """
@@ -89,8 +90,9 @@ def explore(model: JointModel, inits: Rows) -> Space:
 
 
 def count(model: JointModel, inits: Rows) -> tuple[int, int]:
-    """How many states `explore` finds, and how many joint steps between them, in the memory that
-    the states take.
+    """How many states `explore` finds, and how many joint steps between them.
+
+    Needs only the memory that the states take.
     """
     layer, _ = unique_rows(inits)
     seen = layer

@@ -42,8 +42,9 @@ def unique_tuples(table: Ints, bounds: list[int]) -> tuple[Ints, Ints]:
 
 @dataclass(frozen=True, slots=True)
 class EdgeIndex:
-    """Finds the edge of a node with given labels, robot by robot (a tree over label tuples, without
-    overflow).
+    """Finds the edge of a node with given labels.
+
+    Robot by robot: a tree over label tuples, without overflow.
 
     ``keys[i]`` are sorted codes (prefix, label of robot i); a prefix is first the node, then the
     number of the code one robot earlier; the last number is the edge itself.

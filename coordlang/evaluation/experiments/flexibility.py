@@ -59,8 +59,9 @@ def run(unit: Unit, settings: Settings) -> Result:
 
 
 def measures(tasks: Sequence[SentenceCounts]) -> Result:
-    """Plans left open by the sentence of each task's first plan, and in expectation over all its
-    plans.
+    """Plans left open by the sentence of each task's first plan, and in expectation.
+
+    The expectation is over all its plans.
 
     ``several``: tasks in which the first plan's sentence leaves more than one plan open.
     """

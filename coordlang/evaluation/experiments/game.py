@@ -1,5 +1,6 @@
-"""A coordination game: the speaker proposes until the listener accepts, plans in one game,
-sentences in the other.
+"""A coordination game.
+
+The speaker proposes until the listener accepts, plans in one game, sentences in the other.
 
 The listener likes ``k`` of the task's optimal plans, drawn at random.  It accepts a plan that it
 likes, and a sentence that some plan which it likes has.  The speaker does not know them and
@@ -86,8 +87,9 @@ def run(unit: Unit, settings: Settings) -> Result:
 
 
 def play(sizes: Sequence[int], liked: int, random: Random) -> tuple[int, int]:
-    """Proposals of one game each, with plans and with sentences; ``sizes``: the numbers of plans of
-    the sentences.
+    """Proposals of one game each, with plans and with sentences.
+
+    ``sizes``: the numbers of plans of the sentences.
     """
     owner = [sentence for sentence, number in enumerate(sizes) for _ in range(number)]
     likes = set(random.sample(range(len(owner)), min(liked, len(owner))))
@@ -100,15 +102,17 @@ def play(sizes: Sequence[int], liked: int, random: Random) -> tuple[int, int]:
 
 
 def expected_for_plans(plans: int, liked: int) -> Fraction:
-    """Expected proposals until one of ``liked`` plans among ``plans`` is proposed, in random order:
+    """Expected proposals until one of ``liked`` plans among ``plans`` is proposed, in random order.
+
     (N + 1) / (k + 1).
     """
     return Fraction(plans + 1, liked + 1)
 
 
 def expected_for_sentences(sizes: Sequence[int], liked: int) -> Fraction:
-    """The same for sentences in random order: with m of D sentences acceptable it is (D + 1) / (m +
-    1).
+    """The same for sentences in random order.
+
+    With m of D sentences acceptable it is (D + 1) / (m + 1).
 
     How many of the sets of ``liked`` plans meet exactly m sentences is the coefficient of ``x^liked
     y^m`` in the product of ``1 + y ((1 + x)^n - 1)`` over the sentences with n plans each.
@@ -130,8 +134,9 @@ def expected_for_sentences(sizes: Sequence[int], liked: int) -> Fraction:
 
 
 def expected_widest_first(sizes: Sequence[int], liked: int) -> Fraction:
-    """The same for sentences that leave most plans open first: the sum over j of the chance that
-    the first j all fail.
+    """The same for sentences that leave most plans open first.
+
+    The sum over j of the chance that the first j all fail.
     """
     left = sum(sizes)
     ways = comb(left, liked)

@@ -78,8 +78,10 @@ def run(unit: Unit, settings: Settings) -> Result:
 def expansions(
     spoken: TaskLanguage, heuristic: str, terrain: ExpandedStates
 ) -> tuple[int, int, int]:
-    """Nodes expanded by A* without a sentence; with that of the plan it finds, pruning only as in
-    the paper; and with the words still to be said as a bound, too.
+    """Nodes expanded by A* without a sentence.
+
+    With that of the plan it finds, pruning only as in the paper; and with the words still to be
+    said as a bound, too.
     """
     alone = plan_under_sentence(spoken, None, heuristic, terrain)
     pruned = plan_under_sentence(spoken, alone.words, heuristic, terrain, count_words=False)

@@ -1,5 +1,6 @@
-"""The motivating scenario: a place of interest appears, one robot makes a detour, and the other one
-never knows.
+"""The motivating scenario.
+
+A place of interest appears, one robot makes a detour, and the other one never knows.
 
 On the map `corridor` two robots trade rooms through a corridor with one passing place.  They have
 agreed on the sentence of the first optimal plan.  Then a place becomes interesting that robot 1
@@ -50,8 +51,9 @@ START, GOAL, PLACE = ("c0-0", "c0-8"), ("c2-8", "c2-0"), "c2-7"
 
 
 def trading_rooms() -> tuple[ListedTask, ...]:
-    """The candidate tasks: robot 1 from any cell of the left room to any of the right one, robot 2
-    the other way.
+    """The candidate tasks.
+
+    Robot 1 from any cell of the left room to any of the right one, robot 2 the other way.
     """
     left, right = ROOMS
     return tuple(
@@ -129,8 +131,9 @@ def _things(model: JointModel, robot: int, labels: set[int]) -> set[str]:
 
 
 def detour(spoken: TaskLanguage) -> Result:
-    """What happens when `PLACE` becomes interesting: the agreed parts, and robot 1's when it goes
-    there.
+    """What happens when `PLACE` becomes interesting.
+
+    The agreed parts, and robot 1's when it goes there.
     """
     sayings = Sayings(spoken)
     plan, words = sayings.first(spoken.task)

@@ -223,7 +223,7 @@ def _starred(record: Record | None) -> str | None:
 
 
 def _proved(record: Record) -> bool:
-    """Is it proved that no language of the method's kind has fewer words?"""
+    """Whether it is proved that no language of the method's kind has fewer words."""
     r = record.result
     separating = r["work"].get("separating_lower_bound") == r["words"] and not r["stopped"]
     return bool(r["proved_minimal"] or separating)

@@ -1,5 +1,6 @@
-"""What a result depends on, as hashes: results of other code, files or parameters are not taken for
-these.
+"""What a result depends on, as hashes.
+
+Results of other code, files or parameters are not taken for these.
 """
 
 from __future__ import annotations

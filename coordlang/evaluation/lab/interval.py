@@ -26,8 +26,9 @@ def wilson(successes: int, runs: int) -> tuple[float, float]:
 
 
 def mean_interval(values: list[float]) -> tuple[float, float]:
-    """The 95 % confidence interval of a mean, by the normal approximation; the mean itself for a
-    single value.
+    """The 95 % confidence interval of a mean, by the normal approximation.
+
+    The mean itself for a single value.
     """
     number = len(values)
     mean = sum(values) / number

@@ -1,5 +1,6 @@
-"""The results told on one page: every experiment with its tables and figures, and what differs from
-the paper, and why.
+"""The results told on one page.
+
+Every experiment with its tables and figures, and what differs from the paper, and why.
 """
 
 from __future__ import annotations
@@ -23,8 +24,9 @@ def sections(records: Mapping[str, Sequence[Record]]) -> dict[str, Section]:
 
 
 def write_page(results: Results, page: Path, png: bool = True) -> tuple[Path, ...]:
-    """Draw the figures of all results of a folder into it, and write the page beside them; the
-    files written.
+    """Draw the figures of all results of a folder into it, and write the page beside them.
+
+    The files written.
     """
     lines = {name: list(results.lines(name).values()) for name in RECIPES}
     told = sections({name: [record_of(line) for line in found] for name, found in lines.items()})

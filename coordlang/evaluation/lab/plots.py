@@ -1,5 +1,6 @@
-"""The kinds of figures that experiments draw, in one style: colour-blind safe, every series also
-with a marker of its own.
+"""The kinds of figures that experiments draw, in one style.
+
+Colour-blind safe, every series also with a marker of its own.
 """
 
 from __future__ import annotations
@@ -49,8 +50,9 @@ _STYLE: Any = {
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """Values to draw, None where there is none; ``low`` and ``high`` are intervals around them,
-    ``exact`` what they estimate.
+    """Values to draw, None where there is none.
+
+    ``low`` and ``high`` are intervals around them, ``exact`` what they estimate.
 
     ``kind`` chooses colour and marker, ``label`` is what the legend says.
     """
@@ -67,8 +69,9 @@ class Series:
 def drawing(
     width: float, height: float, panels: int = 1, rows: int = 1
 ) -> Iterator[tuple[Figure, list[Axes]]]:
-    """An empty figure (inches) with its axes side by side, in rows, in our style and away from any
-    display.
+    """An empty figure (inches) with its axes side by side, in rows.
+
+    In our style and away from any display.
     """
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -103,8 +106,9 @@ def colour(kind: str) -> str:
 def by_category(
     categories: Sequence[str], series: Sequence[Series], unit: str, *, level: float | None = None
 ) -> Figure:
-    """Markers over categories, with intervals where the series has them; ``unit`` labels the value
-    axis.
+    """Markers over categories, with intervals where the series has them.
+
+    ``unit`` labels the value axis.
 
     ``level``: a value that means no difference.
     """
@@ -182,8 +186,9 @@ def lines(
     unit: str,
     dashed: Sequence[Series] = (),
 ) -> Figure:
-    """Lines over numbers (``series``: with markers and intervals; ``dashed``: without, the exact
-    values).
+    """Lines over numbers.
+
+    ``series``: with markers and intervals; ``dashed``: without, the exact values.
     """
     with drawing(6.4, 3.8) as (figure, [axes]):
         for one in dashed:
@@ -225,8 +230,9 @@ def _numbers(values: Sequence[float | None]) -> list[float]:
 
 
 def per_task(plan: Sequence[float], sentence: Sequence[Series], unit: str) -> Figure:
-    """The paper's figure of communication: one column for each task, the plan's length above the
-    sentences'.
+    """The paper's figure of communication.
+
+    One column for each task, the plan's length above the sentences'.
     """
     x = range(1, len(plan) + 1)
     with drawing(9.0, 3.4) as (figure, [axes]):
@@ -254,8 +260,9 @@ def per_task(plan: Sequence[float], sentence: Sequence[Series], unit: str) -> Fi
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """A histogram: the values of one kind, its mean and, where there is one, the paper's mean of
-    the same thing.
+    """A histogram of the values of one kind.
+
+    With its mean and, where there is one, the paper's mean of the same thing.
     """
 
     kind: str

@@ -91,8 +91,9 @@ Headline = tuple[str, str, str, str]
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """An experiment told: Markdown blocks and figures in their order, and what differs from the
-    paper, with the reason.
+    """An experiment told.
+
+    Markdown blocks and figures in their order, and what differs from the paper, with the reason.
     """
 
     blocks: tuple[str | Figure, ...]
@@ -106,8 +107,9 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """An experiment: ``units`` lists its pieces of work, ``run`` does one, ``section`` tells their
-    results.
+    """An experiment as a recipe.
+
+    ``units`` lists its pieces of work, ``run`` does one, ``section`` tells their results.
 
     ``section`` gets the records of all units, in the order of ``units``.
     """

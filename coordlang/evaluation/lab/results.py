@@ -1,5 +1,6 @@
-"""Results on disk: one JSON line for each piece of work, appended as soon as it is done, so that a
-killed run can go on.
+"""Results on disk, one JSON line for each piece of work.
+
+A line is appended as soon as its work is done, so that a killed run can go on.
 """
 
 from __future__ import annotations
@@ -41,8 +42,9 @@ class Results:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Raise `UsageError` if another process writes here; the system unlocks when a process
-        dies.
+        """Raise `UsageError` if another process writes here.
+
+        The system unlocks when a process dies.
         """
         lock = self.folder / ".lock"
         with open(lock, "w") as file:

@@ -1,5 +1,6 @@
-"""Runs pieces of work in processes of their own, keeps every result at once, and leaves out what is
-known already.
+"""Runs pieces of work in processes of their own.
+
+Every result is kept at once, and what is known already is left out.
 """
 
 from __future__ import annotations
@@ -36,8 +37,9 @@ class Progress:
 
 
 class UnitFailed(CoordlangError):
-    """A piece of work ended with an error that is no limit: a bug, or a file that is not as it
-    should be.
+    """A piece of work ended with an error that is no limit.
+
+    A bug, or a file that is not as it should be.
     """
 
 
@@ -98,8 +100,9 @@ class _Worker:
         self.connection.send(unit)
 
     def receive(self) -> Record:
-        """What became of the unit; a process that died had no memory left (the system kills those
-        first).
+        """What became of the unit.
+
+        A process that died had no memory left (the system kills those first).
         """
         assert self.unit is not None
         unit, self.unit = self.unit, None

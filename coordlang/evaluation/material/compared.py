@@ -1,5 +1,6 @@
-"""What the experiments that compare languages on one row of Table 1 share: their units, and their
-records by kind.
+"""What the experiments that compare languages on one row of Table 1 share.
+
+Their units, and their records by kind.
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ from coordlang.evaluation.material.suite import OTHERS, QUICK_ROW, ROW, WORLDS
 def compared_units(
     experiment: str, settings: Settings, effort: float, flexible: float
 ) -> list[Unit]:
-    """A unit for each language of the row and of the worlds that are no grids, and one for the
-    orders of the row.
+    """A unit for each language of the row and of the other worlds, and one for the orders.
+
+    The other worlds are those that are no grids; the orders are those of the row.
 
     ``effort`` of a language, ``flexible`` of the most flexible one.
     """
@@ -34,8 +36,9 @@ def compared_units(
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """The records that came to their end: of the languages of ``row``, of its orders, of other
-    worlds.
+    """The records that came to their end.
+
+    Of the languages of ``row``, of its orders, of other worlds.
     """
 
     row: str
@@ -60,8 +63,9 @@ class Compared:
         )
 
     def greedy_and_minimal(self) -> tuple[Result, Result] | None:
-        """Results to be put beside the paper's; None if it is not the paper's row, or one of them
-        is missing.
+        """Results to be put beside the paper's.
+
+        None if it is not the paper's row, or one of them is missing.
         """
         of = {record.unit.parameters["method"]: record.result for record in self.languages}
         return (

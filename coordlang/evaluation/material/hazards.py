@@ -1,5 +1,6 @@
-"""Something turns out to be impossible after everybody has committed: do the plan and the sentence
-survive it?
+"""Something turns out to be impossible after everybody has committed.
+
+Do the plan and the sentence survive it?
 
 A *hazard* forbids some subactions.  A robot that has committed to a plan survives if its part needs
 none of them.  One that has committed to a sentence survives if one of its own choices
@@ -33,7 +34,7 @@ class Hazard:
     forbidden: tuple[frozenset[int], ...]
 
     def breaks(self, plan: Plan) -> bool:
-        """Does some robot's part of the plan need what is forbidden?"""
+        """Whether some robot's part of the plan needs what is forbidden."""
         return any(
             label in own for step in plan for label, own in zip(step, self.forbidden, strict=True)
         )
@@ -48,9 +49,10 @@ class Hazard:
 
 @dataclass(frozen=True, slots=True)
 class Odds:
-    """Exact shares for one task and one hazard: of its optimal plans, how many survive; of plans
-    drawn uniformly, how many have a sentence that survives; and whether any optimal plan survives
-    at all (what a new agreement could save).
+    """Exact shares for one task and one hazard.
+
+    Of its optimal plans, how many survive; of plans drawn uniformly, how many have a sentence that
+    survives; and whether any optimal plan survives at all (what a new agreement could save).
     """
 
     plan: float
@@ -80,8 +82,9 @@ class Sayings:
         return plan, self._sentence(task, plan)
 
     def first(self, task: int) -> tuple[Plan, tuple[int, ...]]:
-        """The first optimal plan of a task in the order of `planners.search.plans.Plans`, and its
-        sentence.
+        """The first optimal plan of a task, and its sentence.
+
+        In the order of `planners.search.plans.Plans`.
         """
         space, node, plan = self.spoken.space, int(self.spoken.space.starts[task]), []
         while space.layer[node] > 0:
@@ -101,7 +104,7 @@ class Sayings:
         return sentence(words)
 
     def survives(self, task: int, words: tuple[int, ...], hazard: Hazard) -> bool:
-        """Has every robot a choice under the sentence that needs nothing forbidden?"""
+        """Whether every robot has a choice under the sentence that needs nothing forbidden."""
         key = (task, words, hazard.name)
         if key not in self._survives:
             own = zip(self.choices(task, words), hazard.forbidden, strict=True)
@@ -136,7 +139,7 @@ def alone(space: PlanSpace, task: int) -> PlanSpace:
 
 
 def has_way(automaton: Automaton, forbidden: frozenset[int]) -> bool:
-    """Is there a subplan without forbidden labels?"""
+    """Whether there is a subplan without forbidden labels."""
     alive = {0}
     for _ in automaton.layers[1:]:
         alive = {

@@ -30,8 +30,9 @@ TITLES = {
 def language_for(
     world: World, method: str, settings: Settings, listed: tuple[ListedTask, ...] = ()
 ) -> tuple[Candidates, Language]:
-    """The candidate tasks of a world and a language for them; "flexible" is ``--method minimal
-    --prefer flexible``.
+    """The candidate tasks of a world and a language for them.
+
+    "flexible" is ``--method minimal --prefer flexible``.
 
     Raises `OutOfTime` or `OutOfMemory` where a limit ended the method early: what it then has
     depends on the machine, and no experiment is made with it.

@@ -27,8 +27,9 @@ class Path:
 
 
 def place_of(text: str) -> str | None:
-    """The cell that a subaction such as ``(move r1 c0-0 c0-1)`` leads to, None if its last argument
-    is none.
+    """The cell that a subaction such as ``(move r1 c0-0 c0-1)`` leads to.
+
+    None if its last argument is none.
     """
     last = text.strip("()").split()[-1]
     return last if _CELL.fullmatch(last) else None

@@ -1,5 +1,6 @@
-"""The greedy method with its states in other orders: what of its results is the method's and what
-the order's.
+"""The greedy method with its states in other orders.
+
+What of its results is the method's and what the order's.
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ NATURAL = ("by number", "by number, reversed", "by name", "breadth first", "dept
 def greedy_in_orders(
     candidates: Candidates, randoms: int, random: Random
 ) -> Iterator[tuple[str, Ints]]:
-    """Partitions that the greedy method fills when it tries the states in `NATURAL` and in random
-    orders.
+    """Partitions that the greedy method fills in different orders of the states.
+
+    It tries the states in `NATURAL` and in random orders.
 
     Each is given with the name of its order, as the word number of every state of
     ``candidates.rows``.  All of them satisfy alpha for all first differences, so they are
@@ -44,8 +46,9 @@ def greedy_in_orders(
 
 
 def natural_orders(candidates: Candidates, states: list[int]) -> Mapping[str, list[int]]:
-    """Orders that an implementation may well have: as states are numbered or named, or as a search
-    meets them from the problem's initial state.
+    """Orders that an implementation may well have.
+
+    As states are numbered or named, or as a search meets them from the problem's initial state.
     """
     codec = candidates.model.codec
     searched = _searched(candidates)
@@ -59,8 +62,9 @@ def natural_orders(candidates: Candidates, states: list[int]) -> Mapping[str, li
 
 
 def _searched(candidates: Candidates) -> dict[str, list[int]]:
-    """All states, as breadth-first and as depth-first search meet them; what neither reaches comes
-    at the end.
+    """All states, as breadth-first and as depth-first search meet them.
+
+    What neither reaches comes at the end.
     """
     model, rows = candidates.model, candidates.rows
     start = int(find_rows(rows, candidates.loaded.tasks[0].init[None, :])[0])

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class PaperRow:
-    """A row of Table 1: candidate tasks, reachable states, words of the paper's greedy method, its
-    seconds.
+    """A row of the paper's Table 1.
+
+    Candidate tasks, reachable states, words of the paper's greedy method, its seconds.
 
     ``exact`` is the least number of words where the paper's exhaustive search ended,
     ``exact_seconds`` what it took.

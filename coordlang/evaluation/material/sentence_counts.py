@@ -1,5 +1,6 @@
-"""What the plans of every candidate task say in a language: its sentences, and how many plans each
-of them has.
+"""What the plans of every candidate task say in a language.
+
+Its sentences, and how many plans each of them has.
 """
 
 from __future__ import annotations
@@ -61,8 +62,9 @@ class SentenceCounts:
         return min(map(len, self.plans))
 
     def saving(self, words: Fraction | int) -> float:
-        """Communication saving of a sentence: the share of the plan's states (steps + 1) that need
-        no word.
+        """Communication saving of a sentence.
+
+        The share of the plan's states (steps + 1) that need no word.
         """
         return float(1 - Fraction(words) / (self.steps + 1))
 
@@ -86,8 +88,9 @@ def said(space: PlanSpace, word: Ints) -> list[SentenceCounts]:
 def sentence_counts(
     space: PlanSpace, word: Ints, keep: NDArray[np.bool_] | None = None, most: int | None = None
 ) -> list[Mapping[Words, int]]:
-    """For each node: sentence -> how many plans from there have it; only plans over edges of
-    ``keep`` where it is given.
+    """For each node: sentence -> how many plans from there have it.
+
+    Only plans over edges of ``keep`` where it is given.
 
     Backward over the plan graph, for all tasks at once: O(edges * sentences of a node).  Raises
     `OutOfMemory` when that becomes more than ``most`` steps.
@@ -116,8 +119,9 @@ def sentence_counts(
 
 
 def _ends(space: PlanSpace, word: Ints, which: int) -> list[Words]:
-    """For each node the sentence of the plan that always takes edge number ``which`` (0: first, -1:
-    last).
+    """For each node the sentence of the plan that always takes the first or the last edge.
+
+    ``which`` is the edge's number (0: first, -1: last).
     """
     words: list[int] = word.tolist()
     found: list[Words] = []

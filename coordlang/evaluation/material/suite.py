@@ -14,8 +14,9 @@ from planners.pddl import read_domain, read_problem
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """A domain, one of its problems, and candidate tasks: ``"all"``, ``"problem"`` or the name of a
-    task file.
+    """A domain, one of its problems, and candidate tasks.
+
+    ``"all"``, ``"problem"`` or the name of a task file.
 
     ``name`` is what tables call it; files are below the folder ``domains``.
     """
@@ -83,8 +84,9 @@ WORLDS = {world.name: world for world in (*ROWS, *OTHERS)}
 
 
 def find_domains(given: str | None) -> Path:
-    """The folder of the shipped domains: as given, else ``domains`` here or beside the package (a
-    checkout).
+    """The folder of the shipped domains.
+
+    As given, else ``domains`` here or beside the package (a checkout).
 
     Raises `UsageError` if there is none.
     """

@@ -1,5 +1,6 @@
-"""Trials: a task is agreed on, something turns out to be impossible, and the plan or the sentence
-survives it or not.
+"""Trials of tasks in which something turns out to be impossible after agreement.
+
+The plan or the sentence survives it or not.
 """
 
 from __future__ import annotations
@@ -22,8 +23,9 @@ MOST_SENTENCES = 2_000_000
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """Tasks (by number) to be done one after the other, and the hazard that appears when they
-    begin.
+    """Tasks (by number) to be done one after the other, and a hazard.
+
+    The hazard appears when they begin.
     """
 
     tasks: tuple[int, ...]
@@ -39,8 +41,9 @@ class Trials:
     trials: tuple[Trial, ...]
 
     def sample(self, runs: int, random: Random) -> dict[str, int]:
-        """Successes in random trials: the same task, hazard and plan for both, the sentence being
-        that plan's.
+        """Successes in random trials.
+
+        The same task, hazard and plan for both, the sentence being that plan's.
         """
         plan = sentence = 0
         for _ in range(runs):
@@ -52,8 +55,9 @@ class Trials:
         return {"runs": runs, "plan": plan, "sentence": sentence}
 
     def exact(self) -> dict[str, float] | None:
-        """Success rates over all trials, plans drawn uniformly; *possible*: some optimal plan would
-        have done.
+        """Success rates over all trials, plans drawn uniformly.
+
+        *possible*: some optimal plan would have done.
 
         None where there are too many sentences to look at all of them.
         """
@@ -104,8 +108,9 @@ def warehouse_trials(
 
 
 def _task_numbers(spoken: TaskLanguage) -> dict[tuple[Corners, Corners], int]:
-    """The task of each leg; tasks are grouped by goal in a plan space, so they are found by their
-    states.
+    """The task of each leg.
+
+    Tasks are grouped by goal in a plan space, so they are found by their states.
     """
     space, codec = spoken.space, spoken.model.codec
     found = {}
@@ -124,8 +129,9 @@ def _corners(key: str) -> Corners:
 
 
 def subaction_trials(candidates: Candidates, language: Language) -> Trials:
-    """On other worlds a subaction turns out to be impossible that some optimal plan of the task
-    needs.
+    """On other worlds a subaction turns out to be impossible.
+
+    Some optimal plan of the task needs it.
     """
     sayings = _only(candidates, language)
     model, space = candidates.model, sayings.spoken.space
@@ -153,7 +159,7 @@ def subaction_trials(candidates: Candidates, language: Language) -> Trials:
 
 
 def _starts_meeting(spoken: TaskLanguage, hazard: Hazard) -> list[bool]:
-    """For each task: does some optimal plan need what the hazard forbids?"""
+    """For each task whether some optimal plan needs what the hazard forbids."""
     space = spoken.space
     hit = ~hazard.spares(space)
     meets = [False] * len(space)

@@ -42,8 +42,9 @@ class Delivery:
 
     @property
     def legs(self) -> tuple[tuple[Corners, Corners], ...]:
-        """The tasks, one after the other; nothing is to be done for the first if the robots stand
-        where they fetch.
+        """The tasks, one after the other.
+
+        Nothing is to be done for the first if the robots stand where they fetch.
         """
         return tuple(
             leg for leg in ((self.start, self.fetch), (self.fetch, self.bring)) if leg[0] != leg[1]

@@ -34,8 +34,9 @@ _SMALL = 1 << 24
 
 @dataclass(frozen=True, slots=True)
 class Automaton:
-    """A deterministic automaton over one robot's label numbers (0: idle); state 0 is where it
-    starts.
+    """A deterministic automaton over one robot's label numbers (0: idle).
+
+    State 0 is where it starts.
 
     ``layers[k]`` are the states after k steps (joint steps done by all); those of the last layer
     are final.  The moves of state s are ``label[first[s]:first[s + 1]]`` to ``target[..]``, sorted
@@ -113,8 +114,9 @@ def determinise(
 def minimised(
     moves: Sequence[Sequence[Mapping[int, int]]], known: Sequence[Sequence[Knowledge]]
 ) -> Automaton:
-    """The least automaton of a deterministic one given in layers: states are merged that agree on
-    everything to come.
+    """The least automaton of a deterministic one given in layers.
+
+    States are merged that agree on everything to come.
 
     ``moves[k][s]`` leads from state s of layer k by a label to a state of layer k + 1; layer 0 has
     one state.
@@ -140,8 +142,9 @@ def minimised(
 def _numbered(
     merged: Sequence[Sequence[tuple[Knowledge, tuple[tuple[int, int], ...]]]],
 ) -> Automaton:
-    """States in the order in which a walk by layers and labels meets them: the same automaton has
-    the same numbers.
+    """States in the order in which a walk by layers and labels meets them.
+
+    The same automaton has the same numbers.
     """
     order = [0]
     bounds, first, label, target, known = [0], [0], [], [], []

@@ -1,5 +1,6 @@
-"""A robot's choices: exactly the subplans that it may follow under a sentence, whatever the others
-choose from theirs.
+"""A robot's choices: exactly the subplans that it may follow under a sentence.
+
+Whatever the others choose from theirs.
 
 The optimal plans with one sentence are RC-free, so every combination of one own subplan for each
 robot is an optimal plan. Robot i's subplans are therefore the own parts of those plans, no more and
@@ -33,8 +34,9 @@ Atoms = Literal["exact", "own"]
 
 @dataclass(frozen=True, slots=True)
 class RobotChoices:
-    """One robot's choices: an automaton that accepts its subplans, and says what the robot knows in
-    each state.
+    """One robot's choices.
+
+    An automaton that accepts its subplans, and says what the robot knows in each state.
     """
 
     robot: int
@@ -58,8 +60,9 @@ class Choices:
 
     @property
     def guaranteed(self) -> bool:
-        """Is every combination optimal?  Proved by walking them all, or else by the language's own
-        guarantee.
+        """Whether every combination is optimal.
+
+        Proved by walking them all, or else by the language's own guarantee.
         """
         return self.spoken.covered if self.mixtures is None else self.mixtures.holds
 

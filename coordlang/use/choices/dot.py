@@ -1,5 +1,6 @@
-"""Robots' choices drawn: their automata in Graphviz' language, one cluster a robot, one rank a
-step.
+"""Robots' choices drawn.
+
+Their automata in Graphviz' language, one cluster a robot, one rank a step.
 """
 
 from __future__ import annotations
@@ -30,8 +31,9 @@ def to_dot(choices: Choices, robots: Sequence[int] | None = None) -> str:
 
 
 def distinguishing(choices: Choices, own: RobotChoices, states: range) -> list[list[str]]:
-    """For each state of one step the atoms known to be true there, without those known to be true
-    in all of them.
+    """For each state of one step the atoms known to be true there.
+
+    Without those known to be true in all of them.
     """
     known = own.automaton.known[states.start : states.stop]
     everywhere = reduce(and_, (true for true, _ in known))

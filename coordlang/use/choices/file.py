@@ -40,8 +40,9 @@ def to_bytes(choices: Choices, robots: Sequence[int] | None = None) -> bytes:
 
 
 def monitor(choices: Choices, robot: str) -> Monitor:
-    """A run-time monitor of one robot's choices.  Raises
-    `coordlang.use.choices.monitor.MonitorError` for an unknown robot.
+    """A run-time monitor of one robot's choices.
+
+    Raises `coordlang.use.choices.monitor.MonitorError` for an unknown robot.
     """
     names = choices.spoken.model.robots
     return Monitor(to_data(choices, [names.index(robot)] if robot in names else None), robot)

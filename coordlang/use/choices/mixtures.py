@@ -1,5 +1,6 @@
-"""Every combination of the robots' choices, walked: are they all optimal, and in which states can
-they be?
+"""Every combination of the robots' choices, walked.
+
+Are they all optimal, and in which states can they be?
 
 A direct proof, from the definition, for one task and one sentence: nodes are ``(a_1 .. a_n, y)``,
 the state of each robot's automaton and the plan-space node that all of them together have reached.
@@ -43,14 +44,15 @@ class Mixtures:
 
     @property
     def holds(self) -> bool:
-        """Is every combination an optimal plan?"""
+        """Whether every combination is an optimal plan."""
         return self.violation is None
 
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """The joint moves out of one layer: numbers of nodes in it and in the next one, labels,
-    plan-space edges.
+    """The joint moves out of one layer.
+
+    Numbers of nodes in it and in the next one, labels, plan-space edges.
     """
 
     source: Ints

@@ -1,5 +1,6 @@
-"""A robot's choices at run time: what may it do next, and are the detours that it wants still
-possible?
+"""A robot's choices at run time.
+
+What may it do next, and are the detours that it wants still possible?
 
 This file needs Python's standard library and nothing else, so that a robot can carry it: copy it
 beside a choices file (docs/formats.md), which ``coordlang choices --format json`` writes.  Neither
@@ -33,8 +34,9 @@ class MonitorError(ValueError):
 
 
 class NotAllowed(MonitorError):
-    """The robot did what it may not do; ``step`` counts from 0, ``allowed`` are what it could have
-    done (None: idle).
+    """The robot did what it may not do.
+
+    ``step`` counts from 0, ``allowed`` are what it could have done (None: idle).
     """
 
     def __init__(
@@ -81,8 +83,9 @@ class Detour:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Whether a detour is still possible: ``subplan`` is one way to do it (the first in order),
-    ``subplans`` their number.
+    """Whether a detour is still possible.
+
+    ``subplan`` is one way to do it (the first in order), ``subplans`` their number.
 
     True in a condition iff it is possible.
     """
@@ -189,8 +192,9 @@ class Monitor:
         return self._promised
 
     def allowed(self) -> tuple[str | None, ...]:
-        """What the robot may do next (None: idle), sorted, idling first; nothing when it has
-        finished.
+        """What the robot may do next (None: idle), sorted, idling first.
+
+        Nothing when it has finished.
         """
         return tuple(text for text, _ in self._moves(self._promised, self._left, self._position))
 
@@ -219,8 +223,9 @@ class Monitor:
         return fact in self._true[state]
 
     def can(self, detour: Detour | None = None, /, **wanted: Texts) -> Answer:
-        """Can all this still be had at once, promises kept?  ``can(visit="(at r1 c)",
-        never="idle")``; see `Detour`.
+        """Whether all this can still be had at once, promises kept.
+
+        ``can(visit="(at r1 c)", never="idle")``; see `Detour`.
 
         O(automaton * 2^(visits and dos)).
         """
@@ -275,8 +280,9 @@ class Monitor:
         return self._enter(detour, self._next[state][text], kept)
 
     def _counts(self, detour: Detour, start: Position) -> dict[Position, int]:
-        """How many subplans from each position make the detour, for all positions from ``start``
-        on.
+        """How many subplans from each position make the detour.
+
+        For all positions from ``start`` on.
         """
         whole = sum(1 << 2 * bit for bit in range(len(detour.visit))) + sum(
             2 << 2 * bit for bit in range(len(detour.do))
@@ -348,8 +354,9 @@ def _entry(data: Any, robot: str | None) -> Any:
 
 
 def _check_moves(states: Sequence[Mapping[str, Any]]) -> None:
-    """Raise unless there are states and every one leads to states of the next step, from state 0 in
-    step 0.
+    """Raise unless there are states and every one leads to states of the next step.
+
+    From state 0 in step 0.
     """
     if not states or states[0]["step"] != 0:
         raise MonitorError("the automaton has no state 0 in step 0")

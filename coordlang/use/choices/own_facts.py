@@ -1,5 +1,6 @@
-"""The atoms that a robot's own subactions alone change: what it knows without asking what the
-others may do.
+"""The atoms that a robot's own subactions alone change.
+
+What it knows without asking what the others may do.
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ Change = bool | None
 
 @dataclass(frozen=True, slots=True)
 class OwnFacts:
-    """The facts of which every change is certain from the robot's own label: ``mask`` has their
-    bits, ``others`` the rest.
+    """The facts of which every change is certain from the robot's own label.
+
+    ``mask`` has their bits, ``others`` the rest.
 
     ``adds`` and ``deletes`` have the bits that each label number changes.
     """
@@ -86,8 +88,9 @@ def know_own(automaton: Automaton, own: OwnFacts, start: int) -> Automaton:
 
 
 def _changes(model: JointModel, effects: Sequence[GroundEffect]) -> tuple[dict[int, Change], int]:
-    """What effects certainly do to each fact, and the facts that they change under a condition
-    only.
+    """What effects certainly do to each fact.
+
+    With the facts that they change under a condition only.
     """
     done: dict[int, Change] = {}
     unsure = 0

@@ -72,8 +72,9 @@ class _Facts:
 
 
 def disjoint(facts: _Facts, terms: Sequence[Term]) -> list[Term]:
-    """Terms that hold in the same states, no two in the same state: larger ones first, of others
-    only what is left.
+    """Terms that hold in the same states, no two in the same state.
+
+    Larger ones first, of others only what is left.
 
     ``t`` without ``a & b`` is ``t & !a`` or ``t & a & !b`` (the disjoint sharp of two-level
     minimisation); parts in which there is no state are dropped.
@@ -110,8 +111,9 @@ def _term(literals: Sequence[str]) -> Term:
 
 
 def _tree(spoken: TaskLanguage, rows: Rows) -> Membership:
-    """A binary decision tree; each test is the one that tells most about the word (least entropy,
-    as in ID3).
+    """A binary decision tree.
+
+    Each test is the one that tells most about the word (least entropy, as in ID3).
     """
     word = spoken.table.of_rows(rows)
     atoms, values = truth(spoken.model, rows)

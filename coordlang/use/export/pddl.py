@@ -94,8 +94,9 @@ class Exported:
 
 
 def export_pddl(spoken: TaskLanguage, words: Sequence[int], limit: int = 2000) -> Exported:
-    """The task under the sentence ``words``: its optimal plans are exactly the plans that fit, one
-    to one.
+    """The task under the sentence ``words``.
+
+    Its optimal plans are exactly the plans that fit, one to one.
 
     The cost of a plan is that of the joint plan: ``plain.cost`` of the total cost is (makespan,
     second component).
@@ -136,8 +137,9 @@ def export_pddl(spoken: TaskLanguage, words: Sequence[int], limit: int = 2000) -
 
 
 def plan_names(text: str) -> list[str]:
-    """The actions in a plan file of another planner: one ``(name)`` a line, perhaps with a step
-    before it.
+    """The actions in a plan file of another planner.
+
+    One ``(name)`` a line, perhaps with a step before it.
 
     Comments (``;``) are left out.  Raises `BadInput` for a line that is none.
     """
@@ -156,8 +158,9 @@ def plan_names(text: str) -> list[str]:
 
 
 class _Naming:
-    """The facts and actions that name states and follow the sentence; facts by number, as in
-    `ClassicalTask`.
+    """The facts and actions that name states and follow the sentence.
+
+    Facts by number, as in `ClassicalTask`.
     """
 
     def __init__(
@@ -195,8 +198,9 @@ class _Naming:
         return len(self.facts) - 1
 
     def within(self, action: ClassicalAction, chosen: Sequence[Choice]) -> ClassicalAction:
-        """An action of the plain task: what ends a step leads to naming, and what is remembered is
-        noted.
+        """An action of the plain task.
+
+        What ends a step leads to naming, and what is remembered is noted.
         """
         conditions, adds, deletes = {*action.preconditions}, {*action.adds}, {*action.deletes}
         if self.explicit:
@@ -245,8 +249,9 @@ class _Naming:
         return found
 
     def _goal(self, plain: ClassicalTask) -> tuple[Condition, ...]:
-        """The whole sentence is said, and the last state is named; ``reach the goal`` consumes the
-        time to act.
+        """The whole sentence is said, and the last state is named.
+
+        ``reach the goal`` consumes the time to act.
         """
         conditions = {*plain.goal, (self.said[-1], True)}
         if all(number < self.own or number == self.between for number, _ in plain.goal):

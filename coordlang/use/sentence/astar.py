@@ -36,8 +36,9 @@ class Search:
 
 @dataclass(frozen=True, slots=True)
 class ExpandedStates:
-    """States met by searches with one language over one model, numbered, with their words and joint
-    steps.
+    """States met by searches with one language over one model.
+
+    They are numbered, with their words and joint steps.
 
     It only saves work: searches of many tasks, or with and without a sentence, expand the same
     states.
@@ -104,8 +105,9 @@ def astar(
     *,
     count_words: bool = True,
 ) -> Search | None:
-    """An optimal plan with the sentence ``words``, if it is the sentence of an optimal plan; any
-    optimal plan without one.
+    """An optimal plan with the sentence ``words``, if it is the sentence of an optimal plan.
+
+    Any optimal plan without one.
 
     For another sentence it may find a longer plan or none.
 

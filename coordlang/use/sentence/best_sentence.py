@@ -17,8 +17,9 @@ _ENTRY_BYTES = 200
 
 @dataclass(frozen=True, slots=True)
 class BestSentence:
-    """The best sentence: ``words``, the exact number of ``plans`` that it leaves open, and what
-    became of each wish.
+    """The best sentence, and what became of each wish.
+
+    ``words``, and the exact number of ``plans`` that it leaves open.
 
     ``values`` has one value for each wish: the number of words, the number of plans, or (grade of
     the worst plan left open, grade of the best).  ``prefixes`` is how many beginnings of sentences
@@ -34,8 +35,9 @@ class BestSentence:
 def best_sentence(
     spoken: TaskLanguage, wishes: Sequence[Preference], most: int | None = None
 ) -> BestSentence:
-    """The best sentence of the task for wishes in order of weight: the second one decides where the
-    first is equal, ..
+    """The best sentence of the task for wishes in order of weight.
+
+    The second one decides where the first is equal, ..
 
     - ``shortest``: fewest words;
     - ``most-plans``: most optimal plans have it;
@@ -80,8 +82,9 @@ def best_sentence(
 
 @dataclass(frozen=True, slots=True)
 class _End:
-    """The plans of a sentence: how many, and for each `PlanPreference` the worst and the best
-    grade.
+    """The plans of a sentence.
+
+    How many, and for each `PlanPreference` the worst and the best grade.
     """
 
     plans: int
@@ -90,8 +93,10 @@ class _End:
 
 @dataclass(frozen=True, slots=True)
 class _Beginning:
-    """The beginning of a sentence: ``counts`` has how many beginnings of plans come to each point
-    with the first state of its last word.  ``end`` is there for a whole sentence.
+    """The beginning of a sentence.
+
+    ``counts`` has how many beginnings of plans come to each point with the first state of its last
+    word.  ``end`` is there for a whole sentence.
     """
 
     words: tuple[int, ...]
@@ -101,8 +106,9 @@ class _Beginning:
 
 @dataclass(frozen=True, slots=True)
 class _Graph:
-    """The task's plans as paths of *points*: pairs of a plan-space node and what the wishes
-    remember there.
+    """The task's plans as paths of *points*.
+
+    Pairs of a plan-space node and what the wishes remember there.
 
     Points are numbered from the start on, layer by layer.  ``following[p]`` holds pairs (point,
     number of joint actions); ``node`` and ``word`` are those of each point.  The rest bounds the
@@ -195,8 +201,9 @@ class _Graph:
         return tuple(worth[wish] if isinstance(wish, str) else next(grades) for wish in self.wishes)
 
     def bound(self, beginning: _Beginning) -> tuple[object, ...]:
-        """The best values that any sentence with this beginning can have, the smaller the better;
-        the length last.
+        """The best values that any sentence with this beginning can have, the smaller the better.
+
+        The length last.
         """
         if beginning.end is not None:
             values = self.values(beginning)
@@ -225,8 +232,9 @@ class _Graph:
         return max(total.values())
 
     def _best_grades(self, beginning: _Beginning) -> list[tuple[int, int]]:
-        """(Worst, best) at least: some node's plans go on, and all that came to this node can go on
-        in the same way.
+        """(Worst, best) at least.
+
+        Some node's plans go on, and all that came to this node can go on in the same way.
         """
         by_node: dict[int, list[tuple[int, ...]]] = {}
         for point in beginning.counts:
@@ -242,8 +250,9 @@ class _Graph:
 def _points(
     spoken: TaskLanguage, wishes: Sequence[PlanPreference]
 ) -> tuple[list[list[tuple[int, int]]], list[int], list[tuple[Memory, ...]]]:
-    """The points that plans pass, layer by layer: what follows each of them, its node, its
-    memories.
+    """The points that plans pass, layer by layer.
+
+    What follows each of them, its node, its memories.
     """
     space = spoken.space
     start = spoken.start, tuple(wish.start(int(space.state[spoken.start])) for wish in wishes)

@@ -19,8 +19,9 @@ _LONGEST = 40
 
 @dataclass(frozen=True, slots=True)
 class Ink:
-    """The colour of a word, and the colour of text on it; ``again``: every colour is in use
-    already.
+    """The colour of a word, and the colour of text on it.
+
+    ``again``: every colour is in use already.
     """
 
     fill: str

@@ -37,8 +37,9 @@ _SWEEPS = 12
 
 @dataclass(slots=True)
 class _Item:
-    """A box of a column: a node or the text of an edge.  ``before`` and ``after`` are its
-    neighbours' numbers.
+    """A box of a column: a node or the text of an edge.
+
+    ``before`` and ``after`` are its neighbours' numbers.
     """
 
     width: float
@@ -137,8 +138,9 @@ def _place(items: list[_Item], columns: list[list[int]]) -> None:
 
 
 def _stack(items: list[_Item], column: Sequence[int], wanted: Sequence[float]) -> None:
-    """Put a column's boxes below each other, as near as can be to where they are wanted (least
-    squares).
+    """Put a column's boxes below each other, as near as can be to where they are wanted.
+
+    By least squares.
 
     With the heights above subtracted this is isotonic regression: pools of boxes that touch move
     together.

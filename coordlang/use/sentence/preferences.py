@@ -16,8 +16,9 @@ Memory = tuple[int, ...]
 
 @dataclass(frozen=True, slots=True)
 class PlanPreference:
-    """A wish about single plans, as a small automaton that reads a plan and gives it a grade, the
-    lower the better.
+    """A wish about single plans, as a small automaton.
+
+    It reads a plan and gives it a grade, the lower the better.
 
     ``start`` gives the memory in the initial state, ``step`` the memory after a joint step into a
     state, ``grade`` the grade of a plan by the memory at its end.  A state is given by its number
@@ -36,8 +37,9 @@ Preference = str | PlanPreference
 
 
 def read_preference(spoken: TaskLanguage, text: str) -> Preference:
-    """``shortest``, ``most-plans``, ``first:ROBOT`` or ``avoid:ATOMS``.  Raises `UsageError` for
-    anything else.
+    """``shortest``, ``most-plans``, ``first:ROBOT`` or ``avoid:ATOMS``.
+
+    Raises `UsageError` for anything else.
     """
     kind, _, argument = text.strip().partition(":")
     if text.strip() in ("shortest", "most-plans"):
@@ -95,8 +97,9 @@ def first(model: JointModel, robot: str) -> PlanPreference:
 
 
 def avoid(spoken: TaskLanguage, atoms: str) -> PlanPreference:
-    """No state of the plan, the first and last included, has all of these atoms.  Grades: 0 if so,
-    else 1.
+    """No state of the plan, the first and last included, has all of these atoms.
+
+    Grades: 0 if so, else 1.
     """
     codec = spoken.model.codec
     try:

@@ -45,8 +45,9 @@ class NotOptimal(Refuted):
 
 
 def say(spoken: TaskLanguage, plan: Sequence[Texts]) -> tuple[int, ...]:
-    """The sentence of an optimal plan (the paper's TSC), as word numbers; `TaskLanguage.text`
-    writes it.
+    """The sentence of an optimal plan (the paper's TSC), as word numbers.
+
+    `TaskLanguage.text` writes it.
 
     ``plan[k][i]`` is the subaction of robot i in step k as text, None if it idles (as
     `planners.search.plan_file.read_plans` gives it).  O(steps) expansions.  Raises `NotAPlan` or
@@ -67,8 +68,9 @@ def say(spoken: TaskLanguage, plan: Sequence[Texts]) -> tuple[int, ...]:
 
 
 def follow(spoken: TaskLanguage, plan: Sequence[Texts]) -> tuple[Plan, list[Rows], int]:
-    """The label numbers, the states and the second cost of a plan, optimal or not.  Raises
-    `NotAPlan`.
+    """The label numbers, the states and the second cost of a plan, optimal or not.
+
+    Raises `NotAPlan`.
     """
     model, space = spoken.model, spoken.space
     row = space.rows[space.state[spoken.start]]

@@ -17,8 +17,9 @@ from planners.search.plans import Plan, Plans, counts
 
 @dataclass(frozen=True, slots=True)
 class Understood:
-    """A sentence in one task: ``fits`` are the optimal plans that have it, ``plans`` the same
-    counted and listed.
+    """A sentence in one task.
+
+    ``fits`` are the optimal plans that have it, ``plans`` the same counted and listed.
 
     In ``fits`` a node is a joint state and how many words have been said; every node is on some
     plan.
@@ -36,8 +37,9 @@ class Understood:
 
 
 def understand(spoken: TaskLanguage, words: Sequence[int]) -> Understood:
-    """The optimal plans of the task with the sentence ``words`` (word numbers, see
-    `TaskLanguage.words_of`).
+    """The optimal plans of the task with the sentence ``words``.
+
+    Word numbers, see `TaskLanguage.words_of`.
 
     O(plan-space edges * words), however many plans there are.  Raises `NoPlanFits`, which says
     where the sentence first breaks.
@@ -64,8 +66,9 @@ class DagNode:
 
 @dataclass(frozen=True, slots=True)
 class DagEdge:
-    """The joint actions from one node (number in `Dag.nodes`) to another: each one a text or None
-    (idle) per robot.
+    """The joint actions from one node (number in `Dag.nodes`) to another.
+
+    Each one a text or None (idle) per robot.
     """
 
     source: int
@@ -136,8 +139,9 @@ def dag(understood: Understood, most: int | None = None) -> Dag:
 def understood_data(
     understood: Understood, listed: Sequence[Plan], graph: Dag | None
 ) -> dict[str, Any]:
-    """The JSON form: a plan file (docs/formats.md) with the sentence, the guarantee and, if given,
-    the DAG.
+    """The JSON form: a plan file with the sentence, the guarantee and the DAG.
+
+    See docs/formats.md; the DAG is there if it was given.
     """
     spoken = understood.spoken
     data = {

@@ -9,8 +9,9 @@ NAME = "coordlang"
 
 
 def register(environment: Any = None) -> None:
-    """Add the engine to the factory of a unified-planning environment (default: the global one);
-    twice does no harm.
+    """Add the engine to the factory of a unified-planning environment (default: the global one).
+
+    Twice does no harm.
     """
     from unified_planning.environment import get_environment
 

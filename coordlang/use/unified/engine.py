@@ -156,8 +156,9 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
 
     @staticmethod
     def supported_kind() -> ProblemKind:
-        """Costs of actions and lengths of plans are no metrics here: the makespan always comes
-        first.
+        """Costs of actions and lengths of plans are no metrics here.
+
+        The makespan always comes first.
         """
         kind = ProblemKind(version=LATEST_PROBLEM_KIND_VERSION)
         for group, features in _FEATURES.items():
@@ -261,8 +262,9 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         return _Solved(found, space, spoken)
 
     def _speak(self, found: Translated) -> TaskLanguage:
-        """The language in this problem; texts are not compared, because the problem has none of its
-        own.
+        """The language in this problem.
+
+        Texts are not compared, because the problem has none of its own.
         """
         assert self._language is not None
         domain = {key: value for key, value in self._language.domain.items() if key != "sha256"}
@@ -332,8 +334,9 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
     # Validation.
 
     def _validate(self, problem: Any, plan: Any) -> ValidationResult:
-        """By the rules of joint steps (`planners.check.validate`); under a sentence the plan must
-        be optimal and fit, too.
+        """By the rules of joint steps (`planners.check.validate`).
+
+        Under a sentence the plan must be optimal and fit, too.
         """
         try:
             found = translate(problem, self._subactions)

@@ -24,8 +24,9 @@ _RESERVED = frozenset(
 
 
 class Names:
-    """Names of one kind (types, predicates, actions or objects): each thing gets a PDDL name of its
-    own.
+    """Names of one kind (types, predicates, actions or objects).
+
+    Each thing gets a PDDL name of its own.
 
     What is a PDDL name already, in lower case, is kept if nobody has it.
     """

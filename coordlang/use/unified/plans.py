@@ -47,8 +47,9 @@ def to_up(found: Translated, plans: Plans, plan: Plan, kind: Any, environment: A
 def of_up(
     found: Translated, model: JointModel, team: Team, plan: Any
 ) -> list[tuple[Texts, tuple[Any, ...]]]:
-    """The joint steps of a unified-planning plan: what each robot does, and the actions that say
-    it.
+    """The joint steps of a unified-planning plan.
+
+    What each robot does, and the actions that say it.
 
     A partial-order plan is read layer by layer, each action as early as its predecessors allow.
     Raises `NoSteps`.
@@ -69,8 +70,9 @@ def of_up(
 
 
 def label(found: Translated, action: Any) -> str:
-    """The ground action that an action instance stands for, as PDDL text.  Raises `KeyError` for a
-    foreign action.
+    """The ground action that an action instance stands for, as PDDL text.
+
+    Raises `KeyError` for a foreign action.
     """
     agent = None
     if action.agent is not None:

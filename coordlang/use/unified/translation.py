@@ -210,8 +210,9 @@ class _Writer:
         return sorted(found)
 
     def text(self, node: Any, agent: Any, *, inside: bool = False) -> str:
-        """An expression as PDDL; own fluents are those of ``agent``, which is a variable ``inside``
-        its actions.
+        """An expression as PDDL.
+
+        Own fluents are those of ``agent``, which is a variable ``inside`` its actions.
         """
         if node.is_bool_constant():
             return "(and)" if node.is_true() else "(or)"
