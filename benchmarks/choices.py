@@ -20,7 +20,7 @@ from coordlang.use.choices.choices import choices
 from coordlang.use.choices.file import to_bytes
 from coordlang.use.sentence.task_language import languages_in_tasks
 from planners.pddl import read_domain, read_problem
-from planners.search.tuples import EdgeIndex
+from planners.search.edge_index import EdgeIndex
 
 GRID = Path(__file__).resolve().parents[1] / "domains" / "grid"
 

@@ -199,7 +199,7 @@ def k_star(row: Row, cost: str) -> dict[str, object]:
     from planners.search.plans import Plans
 
     loaded = load(row, cost)
-    from planners.search.plan_space import search
+    from planners.search.optimal_plans import search
 
     space = search(loaded.model, loaded.tasks[0])
     ours = Plans.of(space).count

@@ -24,10 +24,10 @@ import numpy as np
 from coordlang.language.file import read_language, write_language
 from coordlang.language.words import Guarantee, Language, WordTable, name_words
 from planners.joint.model import JointModel
-from planners.joint.states import Rows, unique_rows
 from planners.loading import build
 from planners.pddl import parse_problem, read_domain
 from planners.pddl.sexpr import Source
+from planners.tables import Rows, unique_rows
 
 DOMAINS = Path(__file__).parents[1] / "domains"
 HEIGHT, WIDTH = 11, 10

@@ -21,10 +21,10 @@ from coordlang.language.words import WordTable
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary.pairwise import pair_languages, together
-from planners.joint.states import unique_rows
 from planners.limits import time_limit
 from planners.loading import ModelOptions
 from planners.pddl import read_domain, read_problem
+from planners.tables import unique_rows
 
 DOMAINS = Path(__file__).parent.parent / "domains"
 PROBLEMS = (

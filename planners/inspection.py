@@ -16,7 +16,6 @@ from planners.grounding import GroundAction
 from planners.joint.composition import ComposingStepper
 from planners.joint.interference import conflict, footprint
 from planners.joint.model import JointModel, show
-from planners.joint.states import Rows, find_rows, unique_rows
 from planners.loading import PlanningInstance
 from planners.pddl.lifted import (
     And,
@@ -32,6 +31,7 @@ from planners.pddl.lifted import (
     Truth,
     Variable,
 )
+from planners.tables import Rows, find_rows, unique_rows
 
 #: States in which an example of interference is looked for.
 _LOOK_AT = 2000

@@ -13,7 +13,7 @@ from planners.joint.composition import ComposingStepper
 from planners.joint.conditions import Evaluator
 from planners.joint.joint_actions import JointActionStepper
 from planners.joint.model import IDLE, Cost, Goal, JointModel, show
-from planners.joint.states import Rows, StateCodec
+from planners.joint.states import StateCodec
 from planners.limits import reaching
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import TRUE, Atom, Domain, Problem, StepAtom
@@ -26,6 +26,7 @@ from planners.pddl.robots import (
     static_atoms,
     without_idle_environment,
 )
+from planners.tables import Rows
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,9 +21,10 @@ from coordlang.tasks.candidates import Candidates
 from coordlang.tasks.task_file import goal_text
 from planners.errors import BadInput, Refuted
 from planners.joint.model import JointModel
-from planners.joint.states import find_rows, split_atoms
+from planners.joint.states import split_atoms
 from planners.pddl.sexpr import Expression, Source, Word, parse
 from planners.search.plan_space import PlanSpace
+from planners.tables import find_rows
 
 
 @dataclass(frozen=True, slots=True)

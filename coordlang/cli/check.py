@@ -26,7 +26,7 @@ def command(as_json: bool, load: Callable[[], PlanningInstance]) -> int:
     """
     from planners.classical.fast_downward import optimal_cost
     from planners.errors import ProvedImpossible
-    from planners.search.plan_space import search
+    from planners.search.optimal_plans import search
 
     loaded = load()
     model, task = loaded.model, loaded.tasks[0]

@@ -61,8 +61,8 @@ def command(
 
     A plan is a sequence of joint actions; plans are listed in a stable order.
     """
+    from planners.search.optimal_plans import search
     from planners.search.plan_file import to_ipc, to_json
-    from planners.search.plan_space import search
     from planners.search.plans import Plans
 
     check_listing(only_count, most, sample)

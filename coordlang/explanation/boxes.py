@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.joint.matching import Ints
+from planners.tables import Ints
 
 Bits = NDArray[np.bool_]
 

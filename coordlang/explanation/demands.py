@@ -11,11 +11,10 @@ import numpy as np
 
 from coordlang.explanation.cover import Cover
 from coordlang.language.words import WordTable
-from planners.joint.matching import Ints, ranges
 from planners.joint.model import own_text
-from planners.joint.states import find_rows
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
+from planners.tables import Ints, find_rows, ranges
 
 #: More sets of plan-space nodes than this in one step, and a robot's subplans are not counted.
 _SETS = 5_000

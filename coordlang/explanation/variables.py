@@ -18,9 +18,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.joint.matching import Ints
 from planners.joint.model import JointModel
-from planners.joint.states import Rows, find_rows, unique_rows
+from planners.tables import Ints, Rows, find_rows, unique_rows
 
 #: States and joint steps looked at to find out what holds in all reachable states.
 _STATES = 20_000

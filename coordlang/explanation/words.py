@@ -12,9 +12,8 @@ from coordlang.explanation.cover import Cover, Literal, Term
 from coordlang.explanation.minimise import minimise
 from coordlang.explanation.variables import Valuation, valuation
 from coordlang.language.words import Language, WordTable
-from planners.joint.matching import Ints
 from planners.joint.model import JointModel
-from planners.joint.states import Rows, find_rows, unique_rows
+from planners.tables import Ints, Rows, find_rows, unique_rows
 
 
 @dataclass(frozen=True, slots=True)

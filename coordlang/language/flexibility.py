@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.errors import OutOfMemory
-from planners.joint.matching import Ints, ranges
 from planners.limits import memory_left
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
+from planners.tables import Ints, ranges
 
 Floats = NDArray[np.float64]
 

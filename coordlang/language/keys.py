@@ -12,8 +12,8 @@ from itertools import chain, islice, pairwise, repeat
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.joint.matching import Ints
-from planners.joint.states import Rows, StateCodec
+from planners.joint.states import StateCodec
+from planners.tables import Ints, Rows
 
 _BLOCK = 50_000
 _BETWEEN = ") ("

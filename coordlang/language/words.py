@@ -12,9 +12,8 @@ import numpy as np
 
 from coordlang.language.keys import keys_of, read_keys
 from planners.errors import BadInput
-from planners.joint.matching import Ints
 from planners.joint.model import JointModel
-from planners.joint.states import Rows, find_rows, unique_rows
+from planners.tables import Ints, Rows, find_rows, unique_rows
 
 
 @dataclass(frozen=True, slots=True)

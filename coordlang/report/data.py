@@ -22,7 +22,8 @@ from coordlang.report.task import Tables, TaskPart, task_data, told
 from coordlang.report.world import World, find_world
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.joint.model import JointModel, own_text
-from planners.joint.states import find_rows, split_atoms
+from planners.joint.states import split_atoms
+from planners.tables import find_rows
 
 #: States of the language beyond which their graph is not drawn, they are not listed, formulas are
 #: not sought.

@@ -17,9 +17,9 @@ from coordlang.use.choices.automaton import determinise
 from coordlang.use.sentence.fitting_plans import fitting
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import OutOfMemory
-from planners.joint.matching import Ints, ranges
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans, counts
+from planners.tables import Ints, ranges
 
 #: Plan-space edges of one task beyond which plans are drawn.
 EDGES = 4_000

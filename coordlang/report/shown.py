@@ -16,10 +16,10 @@ from coordlang.tasks.task_file import goal_text, ground_tasks
 from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
 from planners.errors import OutOfMemory, Position, ProvedImpossible, UsageError
 from planners.joint.model import FullState, Goal
-from planners.joint.states import Rows
 from planners.loading import ModelOptions, PlanningTask
 from planners.pddl.lifted import Domain, Problem
-from planners.search.plan_space import search
+from planners.search.optimal_plans import search
+from planners.tables import Rows
 
 #: Tasks looked at for each one shown, so that enough of them require coordination.
 _TRIES = 12

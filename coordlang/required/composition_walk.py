@@ -18,12 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.errors import OutOfMemory, OutOfTime
-from planners.joint.matching import Ints, ranges, spans
 from planners.limits import memory_left, reaching, time_left
+from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.search.tuples import EdgeIndex, unique_tuples
-
-Bools = NDArray[np.bool_]
+from planners.tables import Bools, Ints, ranges, spans, unique_tuples
 
 #: Walk edges handled at a time.
 _CHUNK = 1_000_000

@@ -12,8 +12,8 @@ import numpy as np
 
 from coordlang.language.warping import pair
 from coordlang.required.composition_walk import Divergences, Walk, unique_divergences, walk
-from planners.joint.matching import Ints
 from planners.search.plan_space import PlanSpace
+from planners.tables import Ints
 
 
 @dataclass(frozen=True, slots=True)

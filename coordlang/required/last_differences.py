@@ -21,14 +21,14 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from coordlang.required.composition_walk import FAILED, Bools, moves
+from coordlang.required.composition_walk import FAILED, moves
 from coordlang.required.divergences import Separation, alternatives
 from planners.errors import OutOfMemory
-from planners.joint.matching import Ints
 from planners.joint.states import bits
 from planners.limits import memory_left
+from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.search.tuples import EdgeIndex, unique_tuples
+from planners.tables import Bools, Ints, unique_tuples
 
 #: At least one of these must hold.
 Constraint = tuple[Separation, ...]

@@ -9,11 +9,12 @@ import numpy as np
 from coordlang.required.composition_walk import FAILED, INSTEAD, moves
 from coordlang.tasks.candidates import describe
 from planners.errors import ProvedImpossible
-from planners.joint.matching import Ints
 from planners.limits import reaching
 from planners.loading import PlanningTask
-from planners.search.plan_space import PlanSpace, search
-from planners.search.tuples import EdgeIndex, unique_tuples
+from planners.search.edge_index import EdgeIndex
+from planners.search.optimal_plans import search
+from planners.search.plan_space import PlanSpace
+from planners.tables import Ints, unique_tuples
 
 #: One joint step as text: each robot's subaction, None for idling.
 Step = tuple[str | None, ...]

@@ -11,12 +11,10 @@ import numpy as np
 from coordlang.tasks.task_file import ListedTask, goal_atoms, goal_text, ground_tasks
 from planners.errors import BadInput, Position, ProvedImpossible
 from planners.joint.model import NO_FACT, FullState, Goal, JointModel, show
-from planners.joint.states import Rows, find_rows, unique_rows
 from planners.loading import ModelOptions, PlanningInstance, PlanningTask, build
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.robots import fluent_predicates
-from planners.search.plan_space import (
-    PlanSpace,
+from planners.search.optimal_plans import (
     TaskGroup,
     joined,
     plan_spaces,
@@ -24,7 +22,9 @@ from planners.search.plan_space import (
     search_each,
     solvable,
 )
+from planners.search.plan_space import PlanSpace
 from planners.search.reachable import explore
+from planners.tables import Rows, find_rows, unique_rows
 
 Kind = Literal["problems", "all", "file"]
 

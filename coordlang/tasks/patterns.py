@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from coordlang.tasks.task_file import ListedTask, goal_atoms
 from planners.errors import ProvedImpossible, UsageError
-from planners.joint.matching import Ints
 from planners.loading import PlanningInstance
-from planners.search.plan_space import distances
+from planners.search.optimal_plans import distances
 from planners.search.reachable import Space, explore
+from planners.tables import Ints
 
 #: Entries of the table (goals, states) filled at a time.
 _BATCH = 2_000_000

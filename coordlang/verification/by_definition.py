@@ -18,10 +18,9 @@ import numpy as np
 from coordlang.language.words import WordTable, sentence
 from coordlang.required.miscoordination import Miscoordination, Trail, describe_failure
 from planners.errors import OutOfMemory
-from planners.joint.matching import Ints
-from planners.joint.states import unique_rows
 from planners.limits import memory_left, reaching
 from planners.search.plan_space import PlanSpace
+from planners.tables import Ints, unique_rows
 
 _CHUNK = 500_000
 

@@ -18,13 +18,12 @@ import numpy as np
 
 from coordlang.language.overlapping import Sentence
 from coordlang.language.words import WordTable
-from coordlang.required.composition_walk import Bools, walk
+from coordlang.required.composition_walk import walk
 from coordlang.required.miscoordination import Miscoordination, Trail, describe_failure
 from coordlang.verification.by_definition import Verdict, verify
 from planners.errors import OutOfMemory
-from planners.joint.matching import Ints
-from planners.joint.states import unique_rows
 from planners.search.plan_space import PlanSpace
+from planners.tables import Bools, Ints, unique_rows
 
 #: Different sets of sentences, or walk nodes, of one task.
 _MOST = 2_000_000

@@ -15,9 +15,9 @@ from random import Random
 import numpy as np
 
 from coordlang.required.composition_walk import FAILED, moves
-from planners.joint.matching import Ints
+from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.search.tuples import EdgeIndex, unique_tuples
+from planners.tables import Ints, unique_tuples
 
 _FAR = np.iinfo(np.int64).max // 4
 #: Random ways to a violation that are taken from one start at most.

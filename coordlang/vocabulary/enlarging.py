@@ -17,11 +17,11 @@ import numpy as np
 
 from coordlang.language.flexibility import Floats
 from coordlang.language.overlapping import Overlap, Readings, Sentence, TooManySentences, readings
-from coordlang.required.composition_walk import Bools
 from coordlang.vocabulary.objective import nodes_above
 from planners.limits import STOPPING, stop_clock
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans, counts
+from planners.tables import Bools
 
 #: A task that requires coordination and has more plans than this keeps the sentences of the
 #: partition.

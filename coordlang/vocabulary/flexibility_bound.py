@@ -17,10 +17,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from coordlang.language.flexibility import MANY, Floats
-from coordlang.required.composition_walk import Bools
 from planners.joint.states import bits
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, counts
+from planners.tables import Bools
 
 #: Tasks with more plans than this are bounded by their number of plans.
 MOST_PLANS = 3_000

@@ -18,7 +18,7 @@ import numpy as np
 
 from coordlang.language.flexibility import Flexibility, Floats, flexibility
 from coordlang.language.warping import Clause, pair, separation_clause
-from coordlang.required.composition_walk import Bools, walk
+from coordlang.required.composition_walk import walk
 from coordlang.vocabulary.counterexamples import counterexamples
 from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from coordlang.vocabulary.job import Job, Outcome, Partition
@@ -26,10 +26,10 @@ from coordlang.vocabulary.objective import Objective
 from coordlang.vocabulary.sat import reduce
 from coordlang.vocabulary.symmetry import state_symmetries
 from planners.errors import OutOfMemory
-from planners.joint.matching import Ints
 from planners.limits import STOPPING, stop_clock
+from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.search.tuples import EdgeIndex
+from planners.tables import Bools, Ints
 
 #: Moves of the first cooling, for each state and word and at least; each cooling that pays is
 #: followed by one twice as long.

@@ -33,10 +33,10 @@ from coordlang.vocabulary.sat import (
 from coordlang.vocabulary.separating import quickly as separated
 from coordlang.vocabulary.symmetry import Symmetry, closed, symmetries
 from planners.errors import OutOfMemory
-from planners.joint.matching import Ints
 from planners.limits import STOPPING, stop_clock
+from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.search.tuples import EdgeIndex
+from planners.tables import Ints
 
 #: Tasks are searched for counterexamples in parts, one after another: at least so many, of at most
 #: so many tasks.

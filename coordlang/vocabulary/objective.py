@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coordlang.language.flexibility import MANY, Floats, edge_shares
-from planners.joint.matching import Ints, ranges
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
+from planners.tables import Ints, ranges
 
 _MIX = np.uint64(0x9E3779B97F4A7C15)
 #: Edges kept in parts of plan graphs, one part for each state; beyond, parts are cut out anew each

@@ -23,8 +23,8 @@ from coordlang.required.composition_walk import walk
 from coordlang.required.miscoordination import Inseparable, inseparable, separable
 from coordlang.vocabulary.counterexamples import counterexamples
 from coordlang.vocabulary.sat import PartitionProblem, most_constrained_first, reduce
+from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.search.tuples import EdgeIndex
 
 #: Counterexamples taken at a time.
 _MOST = 200

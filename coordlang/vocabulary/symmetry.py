@@ -17,12 +17,11 @@ from itertools import islice
 import numpy as np
 
 from coordlang.tasks.candidates import Candidates
-from planners.joint.matching import Ints
 from planners.joint.model import FullState, Goal, JointModel, show
-from planners.joint.states import find_rows
 from planners.pddl.lifted import And, Atom, Domain, Not, Or, Problem, Truth
 from planners.pddl.robots import fluent_predicates, natural
 from planners.search.plan_space import PlanSpace
+from planners.tables import Ints, find_rows
 
 Renaming = Mapping[str, str]
 

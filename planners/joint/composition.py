@@ -11,11 +11,12 @@ from planners.errors import OutOfMemory
 from planners.grounding import GroundAction, GroundEffect
 from planners.joint.conditions import Evaluator, Labels, speaks_of_step
 from planners.joint.interference import compatible, conflict, conjuncts
-from planners.joint.matching import Ints, Matcher, ranges, spans
+from planners.joint.matching import Matcher
 from planners.joint.model import Cost, Steps, show
-from planners.joint.states import Rows, StateCodec
+from planners.joint.states import StateCodec
 from planners.limits import memory_left
 from planners.pddl.lifted import TRUE, Atom, Formula, Not, StepAtom
+from planners.tables import Ints, Rows, ranges, spans
 
 #: Joint steps composed at a time, before compatibility is looked up.
 _CHUNK = 1_000_000

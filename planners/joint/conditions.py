@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.joint.matching import Ints
-from planners.joint.states import Rows, test_bits
+from planners.joint.states import test_bits
 from planners.pddl.lifted import And, Atom, Formula, Not, Or, StepAtom, Truth
+from planners.tables import Ints, Rows
 
 Labels = NDArray[np.int32]
 

@@ -10,10 +10,11 @@ from planners.errors import BadInput, Position
 from planners.grounding import GroundAction, GroundEffect
 from planners.joint.composition import cost_of, split
 from planners.joint.conditions import Evaluator
-from planners.joint.matching import Ints, Matcher
+from planners.joint.matching import Matcher
 from planners.joint.model import Cost, Steps
-from planners.joint.states import Rows, StateCodec
+from planners.joint.states import StateCodec
 from planners.pddl.lifted import TRUE, Formula
+from planners.tables import Ints, Rows
 
 
 class JointActionStepper:

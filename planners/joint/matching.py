@@ -6,12 +6,12 @@ A discrimination tree over required facts, for whole layers of states at a time.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+<<<<<<< HEAD
 from planners.joint.states import Rows, test_bits
 
 Ints = NDArray[np.int64]
@@ -37,6 +37,10 @@ def spans(sizes: NDArray[np.float64], most: int) -> Iterator[slice]:
         end = max(start + 1, int(np.searchsorted(ends, before + most, side="right")))
         yield slice(start, end)
         start = end
+=======
+from planners.joint.states import test_bits
+from planners.tables import Ints, Rows, ranges
+>>>>>>> e7da2c2 (search: a plan space answers for itself (edges, paths, layers, descendants, unfoldings); tables of numbers have a file of their own)
 
 
 @dataclass(frozen=True, slots=True)

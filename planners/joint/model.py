@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from planners.grounding import GroundAction, label
 from planners.joint.conditions import Evaluator, Labels
-from planners.joint.matching import Ints
-from planners.joint.states import Rows, StateCodec
+from planners.joint.states import StateCodec
 from planners.pddl.lifted import Atom, Formula, StepAtom
+from planners.tables import Ints, Rows
 
 Cost = Literal["makespan", "makespan+actions", "makespan+cost"]
 

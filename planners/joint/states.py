@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.errors import BadInput
+from planners.tables import Rows
 
-Rows = NDArray[np.uint64]
 _WORD_BITS = 64
 
 
@@ -158,35 +158,3 @@ def test_bits(rows: Rows, which: NDArray[np.int64], facts: NDArray[np.int64]) ->
 def stack(rows: Sequence[Rows], width: int) -> Rows:
     """Rows one below the other; an empty table keeps its width."""
     return np.array(rows, np.uint64).reshape(len(rows), width)
-
-
-def unique_rows(rows: Rows) -> tuple[Rows, NDArray[np.int64]]:
-    """The different rows, sorted, and for each input row its number among them."""
-    if rows.shape[1] == 1:
-        values, inverse = np.unique(rows[:, 0], return_inverse=True)
-        return values[:, None], inverse.reshape(-1)
-    order = np.lexsort(rows.T[::-1])
-    ordered = rows[order]
-    fresh = np.ones(len(rows), np.bool_)
-    fresh[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    inverse = np.empty(len(rows), np.int64)
-    inverse[order] = np.cumsum(fresh) - 1
-    return ordered[fresh], inverse
-
-
-def find_rows(table: Rows, rows: Rows) -> NDArray[np.int64]:
-    """For each of ``rows`` its number in the sorted ``table`` (as made by `unique_rows`), or -1."""
-    if len(table) == 0:
-        return np.full(len(rows), -1, np.int64)
-    keys, wanted = _comparable(table), _comparable(rows)
-    found = np.minimum(np.searchsorted(keys, wanted), len(table) - 1)
-    return np.where(keys[found] == wanted, found, -1)
-
-
-def _comparable(rows: Rows) -> NDArray[np.generic]:
-    """Rows as one sortable value each, in the order of `unique_rows`."""
-    if rows.shape[1] == 1:
-        return rows[:, 0]
-    # Big-endian bytes compare like the numbers, word by word.
-    wide = np.ascontiguousarray(rows.astype(">u8"))
-    return wide.view(f"V{8 * rows.shape[1]}").reshape(-1)

@@ -13,10 +13,9 @@ import numpy as np
 
 from planners.errors import UsageError
 from planners.joint.composition import split
-from planners.joint.matching import Ints
 from planners.joint.model import FullState, Goal, JointModel
-from planners.joint.states import Rows
 from planners.pddl.lifted import And, Atom, Formula
+from planners.tables import Ints, Rows
 
 #: The value of a state from which the goal is proved unreachable.
 FAR = 2**31

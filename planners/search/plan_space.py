@@ -1,4 +1,4 @@
-"""All optimal plans of tasks, as a layered graph whose paths they are.
+"""The optimal plans of tasks as paths of one layered graph, and what can be asked of it.
 
 Costs are lexicographic, makespan first: with ``d(s)`` the cost from ``s`` to the goal, the optimal
 plans from ``I`` are exactly the paths of edges ``s -> t`` with ``d(s) = c(edge) + d(t)``.  All of
@@ -12,25 +12,35 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from planners.errors import ProvedImpossible
 from planners.joint.conditions import Labels
-from planners.joint.matching import Ints, ranges
-from planners.joint.model import Goal, JointModel, Steps
-from planners.joint.states import Rows, find_rows, unique_rows
-from planners.limits import reaching
-from planners.loading import PlanningTask
-from planners.search.reachable import Space, blocks
+from planners.joint.model import Goal, JointModel
+from planners.tables import Bools, Ints, Rows, ranges
 
-#: (goal, state) pairs handled in one plan space when many tasks are asked for.
-_BATCH = 2_000_000
-#: Joint steps kept from the forward search; beyond, layers are expanded again on the way back.
-_KEEP = 8_000_000
-_FAR = np.iinfo(np.int64).max // 4
 
-#: The steps of a layer in pieces: (number of the first state, steps).
-Stored = list[tuple[int, Steps]]
+@dataclass(frozen=True, slots=True)
+class LayerEdges:
+    """All edges out of the nodes of one layer.
+
+    ``edges`` are their numbers, one after another; ``source`` and ``target`` (edges) the nodes.
+    """
+
+    edges: Ints
+    source: Ints
+    target: Ints
+
+
+@dataclass(frozen=True, slots=True)
+class UnfoldingStep:
+    """The edges from one layer of an unfolding to the next (`PlanSpace.from_layers`).
+
+    ``source`` numbers nodes of the upper layer, ``target`` of the lower one; ``edge`` is the edge of
+    the unfolded plan space that each stands for.  Sorted by source, then by labels.
+    """
+
+    source: Ints
+    edge: Ints
+    target: Ints
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,363 +85,218 @@ class PlanSpace:
         """The optimal cost of a task: (makespan, second component)."""
         return int(self.layer[self.starts[task]]), int(self.second[task])
 
+    # ---- one node, one edge
+
+    def out_edges(self, node: int) -> range:
+        """The edges out of a node, in the order of their labels."""
+        return range(int(self.first[node]), int(self.first[node + 1]))
+
+    def target_of(self, edge: int) -> int:
+        """The node that an edge leads to."""
+        return int(self.target[edge])
+
+    def labels_of(self, edge: int) -> tuple[int, ...]:
+        """The robots' labels on an edge."""
+        return tuple(self.labels[edge].tolist())
+
+    def successors(self, node: int) -> list[int]:
+        """The targets of `out_edges`: a node comes once for each edge that leads to it."""
+        found: list[int] = self.target[self.first[node] : self.first[node + 1]].tolist()
+        return found
+
+    def edge_with(self, node: int, labels: Sequence[int]) -> int | None:
+        """The edge out of a node with these labels, None if there is none.  O(edges of the node)."""
+        edges = self.out_edges(node)
+        same = (self.labels[edges.start : edges.stop] == np.asarray(labels)).all(axis=1)
+        found = np.flatnonzero(same)
+        return edges.start + int(found[0]) if len(found) else None
+
+    # ---- paths: plans as the edges that they take
+
+    def first_path(self, node: int) -> list[int]:
+        """The edges of the first plan from a node, in the order of `planners.search.plans.Plans`."""
+        path = []
+        while self.layer[node] > 0:
+            path.append(int(self.first[node]))
+            node = int(self.target[path[-1]])
+        return path
+
+    def path_with(self, node: int, steps: Sequence[Sequence[int]]) -> list[int] | None:
+        """The edges of the path from a node with these labels, None where it leaves the graph."""
+        path = []
+        for labels in steps:
+            edge = self.edge_with(node, labels)
+            if edge is None:
+                return None
+            path.append(edge)
+            node = int(self.target[edge])
+        return path
+
+    def nodes_on(self, node: int, path: Sequence[int]) -> list[int]:
+        """The nodes that a path passes through: the one that it starts from, then its targets."""
+        return [node, *self.target[list(path)].tolist()] if path else [node]
+
+    # ---- many at once
+
     @property
     def sources(self) -> Ints:
         """The source node of each edge."""
         return np.repeat(np.arange(len(self)), np.diff(self.first))
 
+    @property
+    def out_degrees(self) -> Ints:
+        """The number of edges out of each node."""
+        return np.diff(self.first)
 
-def search(model: JointModel, task: PlanningTask) -> PlanSpace:
-    """All optimal plans of one task, expanding only states nearer than the goal.
+    def targets(self, edges: Ints) -> Ints:
+        """The nodes that these edges lead to."""
+        found: Ints = self.target[edges]
+        return found
 
-    Forward search to the first layer that holds a goal state, then back along optimal edges.
-    Raises `ProvedImpossible` if the goal cannot be reached.
-    """
-    layers: list[Rows] = []
-    kept: list[Stored | None] = []
+    def robot_labels(self, robot: int, edges: Ints | slice | None = None) -> Ints:
+        """One robot's label on each of these edges (None: on all)."""
+        column = self.labels[:, robot] if edges is None else self.labels[edges, robot]
+        return column.astype(np.int64)
 
-    def so_far() -> str:
-        return (
-            f"{sum(map(len, layers)):,} states within {len(layers) - 1} steps of the initial state of {task.name}, "
-            f"{len(layers[-1]) if layers else 0:,} of them new in the last step"
+    def edges_from(self, nodes: Ints) -> tuple[Ints, Ints]:
+        """All edges out of many nodes: for each its position in ``nodes``, and its number."""
+        counts = self.first[nodes + 1] - self.first[nodes]
+        return np.repeat(np.arange(len(nodes)), counts), ranges(self.first[nodes], counts)
+
+    def first_edges(self, nodes: Ints) -> Ints:
+        """The first edge out of each of these nodes, none of which may be at a goal."""
+        found: Ints = self.first[nodes]
+        return found
+
+    def layer_edges(self, layer: int) -> LayerEdges:
+        """The edges out of the nodes of a layer, by its number (0: the goals, which have none)."""
+        low, high = np.searchsorted(self.layer, (layer, layer + 1))
+        return self._edges_of(int(low), int(high))
+
+    def edges_by_layer(self) -> Iterator[LayerEdges]:
+        """`layer_edges` of every layer above the goals, the lowest first."""
+        for nodes in self.layers[1:]:
+            yield self._edges_of(nodes.start, nodes.stop)
+
+    def _edges_of(self, low: int, high: int) -> LayerEdges:
+        start, end = int(self.first[low]), int(self.first[high])
+        source = np.repeat(np.arange(low, high), np.diff(self.first[low : high + 1]))
+        return LayerEdges(np.arange(start, end), source, self.target[start:end])
+
+    def descendants(self, nodes: Ints) -> Bools:
+        """Which nodes paths from these nodes reach, these included (nodes).  O(edges)."""
+        reached = np.zeros(len(self), np.bool_)
+        reached[nodes] = True
+        for span in reversed(self.layers[1:]):
+            below = self._edges_of(span.start, span.stop)
+            reached[below.target[reached[below.source]]] = True
+        return reached
+
+    def ancestors(self, nodes: Ints | Bools) -> Bools:
+        """From which nodes paths reach these nodes (numbers or a mask), these included.  O(edges)."""
+        leads = np.zeros(len(self), np.bool_)
+        leads[nodes] = True
+        for below in self.edges_by_layer():
+            leads[below.source[leads[below.target]]] = True
+        return leads
+
+    # ---- other plan spaces made of this one
+
+    def with_tasks(self, starts: Ints, second: Ints) -> PlanSpace:
+        """The same graph with other tasks, cut down to what their plans pass through."""
+        return replace(self, starts=starts, second=second).reduced()
+
+    def reduced(self) -> PlanSpace:
+        """The part of the graph that the tasks' plans pass through."""
+        alive = self.descendants(self.starts)
+        if alive.all():
+            return self
+        number = np.cumsum(alive) - 1
+        source = self.sources
+        kept = alive[source]
+        return replace(
+            self,
+            state=self.state[alive],
+            goal=self.goal[alive],
+            layer=self.layer[alive],
+            first=np.searchsorted(number[source[kept]], np.arange(int(alive.sum()) + 1)),
+            target=number[self.target[kept]],
+            labels=self.labels[kept],
+            cost=self.cost[kept],
+            starts=number[self.starts],
         )
 
-    with reaching(so_far, "a task with a shorter plan, fewer objects or fewer robots"):
-        _forward(model, task, layers, kept)
-        return _backward(model, task, layers, kept)
-
-
-def _forward(
-    model: JointModel, task: PlanningTask, layers: list[Rows], kept: list[Stored | None]
-) -> None:
-    """Fill ``layers`` with the states by their distance from the start.
-
-    ``kept`` gets the joint steps out of them.
-    """
-    layer = task.init[None, :]
-    seen = layer
-    total = 0
-    layers.append(layer)
-    while not model.holds(task.goal, layer).any():
-        fresh: list[Rows] = []
-        steps_here: Stored | None = []
-        for start, steps in blocks(model, layer):
-            total += len(steps)
-            if total > _KEEP:
-                steps_here = None
-            if steps_here is not None:
-                steps_here.append((start, steps))
-            fresh.append(unique_rows(steps.result)[0])
-        new, _ = unique_rows(np.concatenate(fresh))
-        layer = new[find_rows(seen, new) < 0]
-        if not len(layer):
-            raise ProvedImpossible(
-                f"task {task.name}: the goal cannot be reached",
-                position=task.position,
-                remedy=_searched(len(seen)),
-            )
-        seen, _ = unique_rows(np.concatenate((seen, layer)))
-        layers.append(layer)
-        kept.append(steps_here)
-
-
-def _searched(states: int) -> str:
-    return (
-        f"All {states:,} reachable states were searched."
-        if states > 1
-        else "No other state can be reached."
-    )
-
-
-def _backward(
-    model: JointModel,
-    task: PlanningTask,
-    layers: list[Rows],
-    kept: list[Stored | None],
-) -> PlanSpace:
-    """Keep the edges that lead to the goal in time and at least cost.
-
-    From the last layer to the first.
-    """
-    goal_rows = layers[-1][model.holds(task.goal, layers[-1])]
-    tables = [goal_rows]
-    best = [np.zeros(len(goal_rows), np.int64)]
-    edges: list[tuple[Ints, Ints, Labels, Ints]] = []
-    for rows, stored in zip(reversed(layers[:-1]), reversed(kept), strict=True):
-        source, target, labels, cost = _edges_into(model, rows, stored, tables[-1])
-        value = np.full(len(rows), _FAR)
-        np.minimum.at(value, source, cost + best[-1][target])
-        tight = cost + best[-1][target] == value[source]
-        alive = np.flatnonzero(value < _FAR)
-        number = np.cumsum(value < _FAR) - 1
-        edges.append((number[source[tight]], target[tight], labels[tight], cost[tight]))
-        tables.append(rows[alive])
-        best.append(value[alive])
-    offsets = np.cumsum([0, *(len(t) for t in tables)])
-    source = np.concatenate([e[0] + offsets[k + 1] for k, e in enumerate(edges)] or [_none()])
-    graph = PlanSpace(
-        model=model,
-        rows=np.concatenate(tables),
-        state=np.arange(offsets[-1]),
-        goal=np.zeros(offsets[-1], np.int64),
-        layer=np.repeat(np.arange(len(tables)), np.diff(offsets)),
-        first=np.searchsorted(source, np.arange(offsets[-1] + 1)),
-        target=np.concatenate([e[1] + offsets[k] for k, e in enumerate(edges)] or [_none()]),
-        labels=np.concatenate(
-            [e[2] for e in edges] or [np.zeros((0, len(model.robots)), np.int32)]
-        ),
-        cost=np.concatenate([e[3] for e in edges] or [_none()]),
-        goals=(task.goal,),
-        starts=np.array([offsets[-2]]),
-        second=best[-1][:1],
-    )
-    return _reachable(_sort_states(graph))
-
-
-def _edges_into(
-    model: JointModel, rows: Rows, stored: Stored | None, table: Rows
-) -> tuple[Ints, Ints, Labels, Ints]:
-    """The steps from ``rows`` into the sorted ``table``."""
-    parts: list[tuple[Ints, Ints, Labels, Ints]] = []
-    for start, block in stored if stored is not None else blocks(model, rows):
-        target = find_rows(table, block.result)
-        hit = target >= 0
-        parts.append((block.source[hit] + start, target[hit], block.labels[hit], block.cost[hit]))
-    source, target, labels, cost = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return source, target, labels, cost
-
-
-def _sort_states(graph: PlanSpace) -> PlanSpace:
-    """The same graph with a sorted table of states."""
-    rows, number = unique_rows(graph.rows)
-    return replace(graph, rows=rows, state=number[graph.state])
-
-
-def search_each(model: JointModel, tasks: Sequence[PlanningTask]) -> PlanSpace:
-    """`search` for each task, as one plan space in which every task has a goal of its own."""
-    return joined([search(model, task) for task in tasks])
-
-
-def joined(spaces: Sequence[PlanSpace]) -> PlanSpace:
-    """Plan spaces of one task each as one plan space in which every task has a goal of its own."""
-    if len(spaces) == 1:
-        return spaces[0]
-    rows, number = unique_rows(np.concatenate([s.rows for s in spaces]))
-    row_offset = np.cumsum([0, *(len(s.rows) for s in spaces)])
-    node_offset = np.cumsum([0, *(len(s) for s in spaces)])
-    together = PlanSpace(
-        model=spaces[0].model,
-        rows=rows,
-        state=np.concatenate([number[s.state + row_offset[k]] for k, s in enumerate(spaces)]),
-        goal=np.repeat(np.arange(len(spaces)), np.diff(node_offset)),
-        layer=np.concatenate([s.layer for s in spaces]),
-        first=np.concatenate(
-            [
-                [0],
-                *(
-                    s.first[1:] + sum(len(q.target) for q in spaces[:k])
-                    for k, s in enumerate(spaces)
-                ),
-            ]
-        ),
-        target=np.concatenate([s.target + node_offset[k] for k, s in enumerate(spaces)]),
-        labels=np.concatenate([s.labels for s in spaces]),
-        cost=np.concatenate([s.cost for s in spaces]),
-        goals=tuple(space.goals[0] for space in spaces),
-        starts=np.array([s.starts[0] + node_offset[k] for k, s in enumerate(spaces)]),
-        second=np.concatenate([s.second for s in spaces]),
-    )
-    return _reordered(together, np.lexsort((together.state, together.goal, together.layer)))
-
-
-@dataclass(frozen=True, slots=True)
-class TaskGroup:
-    """Tasks with one goal.
-
-    ``inits`` is a table of initial states, or None for every other state that can reach it.
-    """
-
-    goal: Goal
-    inits: Rows | None = None
-
-
-def solvable(space: Space, groups: Sequence[TaskGroup]) -> list[TaskGroup]:
-    """The groups without the tasks whose goal cannot be reached."""
-    size = max(1, _BATCH // max(1, len(space)))
-    kept = []
-    for start in range(0, len(groups), size):
-        batch = groups[start : start + size]
-        far = distances(
-            space, np.stack([space.model.holds(group.goal, space.rows) for group in batch])
+    def reordered(self, order: Ints) -> PlanSpace:
+        """The same graph with its nodes in another order: new node k is old node ``order[k]``."""
+        number = np.empty(len(order), np.int64)
+        number[order] = np.arange(len(order))
+        counts = np.diff(self.first)[order]
+        edges = ranges(self.first[order], counts)
+        return replace(
+            self,
+            state=self.state[order],
+            goal=self.goal[order],
+            layer=self.layer[order],
+            first=np.concatenate(([0], np.cumsum(counts))),
+            target=number[self.target[edges]],
+            labels=self.labels[edges],
+            cost=self.cost[edges],
+            starts=number[self.starts],
         )
-        for own, group in zip(far, batch, strict=True):
-            inits = (
-                group.inits
-                if group.inits is None
-                else group.inits[own[space.numbers(group.inits)] >= 0]
-            )
-            if inits is None or len(inits):
-                kept.append(replace(group, inits=inits))
-    return kept
 
+    @classmethod
+    def from_layers(
+        cls,
+        space: PlanSpace,
+        layers: Sequence[Ints],
+        steps: Sequence[UnfoldingStep],
+        task: int,
+        ends: Bools | None = None,
+    ) -> PlanSpace:
+        """A plan space of one task that unfolds part of ``space``: copies of its nodes and edges.
 
-def plan_spaces(space: Space, groups: Sequence[TaskGroup]) -> Iterator[PlanSpace]:
-    """The optimal plans of many tasks over one explored space, in batches of goals.
-
-    One backward pass per goal serves every initial state.  Raises `ProvedImpossible` for a task
-    whose goal cannot be reached.
-    """
-    size = max(1, _BATCH // max(1, len(space)))
-    for start in range(0, len(groups), size):
-
-        def so_far(done: int = start) -> str:
-            return f"the optimal plans to {done:,} of {len(groups):,} goals, over {len(space):,} states"
-
-        with reaching(so_far, "fewer candidate tasks (a task file)"):
-            batch = _batch(space, groups[start : start + size])
-        yield batch
-
-
-def _batch(space: Space, groups: Sequence[TaskGroup]) -> PlanSpace:
-    reached = np.stack([space.model.holds(group.goal, space.rows) for group in groups])
-    distance = distances(space, reached)
-    states: list[Ints] = []
-    for number, group in enumerate(groups):
-        if group.inits is None:
-            states.append(np.flatnonzero(distance[number] > 0))
-            continue
-        found = space.numbers(group.inits)
-        bad = np.flatnonzero((found < 0) | (distance[number, found] < 0))
-        if len(bad):
-            raise ProvedImpossible(
-                f"the goal cannot be reached from {space.model.state_text(group.inits[bad[0]])}",
-                remedy=_searched(len(space)),
-            )
-        states.append(found)
-    second, graph = _second_costs(space, distance)
-    node = np.full(distance.shape, -1)
-    node[graph.goal, graph.state] = np.arange(len(graph))
-    goal = np.repeat(np.arange(len(groups)), [len(s) for s in states])
-    state = np.concatenate(states)
-    return _reachable(
-        replace(
-            graph,
-            goals=tuple(group.goal for group in groups),
-            starts=node[goal, state],
-            second=second[goal, state],
+        Parameters
+        ----------
+        layers
+            For each layer, from the start down, the nodes of ``space`` that its nodes are copies of.
+        steps
+            The edges between consecutive layers, one fewer than there are layers.
+        task
+            The task of ``space`` whose second cost component is kept; the new task starts at the
+            only node of the first layer.
+        ends
+            Which nodes of the last layer count (default: all); what leads to none of them is left
+            out.  At least one path must end in them.
+        """
+        alive = [np.ones(len(layers[-1]), np.bool_) if ends is None else ends]
+        for nodes_above, step in zip(reversed(layers[:-1]), reversed(steps), strict=True):
+            here = np.zeros(len(nodes_above), np.bool_)
+            here[step.source[alive[-1][step.target]]] = True
+            alive.append(here)
+        nodes = [of[keep] for of, keep in zip(reversed(layers), alive, strict=True)]
+        offsets = np.cumsum([0, *(len(n) for n in nodes)])
+        numbers = [np.cumsum(keep) - 1 + low for keep, low in zip(alive, offsets, strict=False)]
+        sources, targets, edges = [_none()], [_none()], [_none()]
+        for step, ((below, low), (above, high)) in zip(
+            reversed(steps), pairwise(zip(alive, numbers, strict=True)), strict=True
+        ):
+            kept = below[step.target] & above[step.source]
+            sources.append(high[step.source[kept]])
+            targets.append(low[step.target[kept]])
+            edges.append(step.edge[kept])
+        node, edge = np.concatenate(nodes), np.concatenate(edges)
+        return replace(
+            space,
+            state=space.state[node],
+            goal=space.goal[node],
+            layer=space.layer[node],
+            first=np.searchsorted(np.concatenate(sources), np.arange(len(node) + 1)),
+            target=np.concatenate(targets),
+            labels=space.labels[edge],
+            cost=space.cost[edge],
+            starts=np.array([len(node) - 1]),
+            second=space.second[[task]],
         )
-    )
-
-
-def distances(space: Space, reached: NDArray[np.bool_]) -> Ints:
-    """Least makespan from every state to every goal, (goals, states), -1 where there is none.
-
-    ``reached`` (goals, states): which states satisfy which goal.  O(goals x joint steps).
-    """
-    order = np.argsort(space.target, kind="stable")
-    source = np.repeat(np.arange(len(space)), np.diff(space.first))[order]
-    into = np.searchsorted(space.target[order], np.arange(len(space) + 1))
-    distance = np.where(reached, 0, -1)
-    goal, state = np.nonzero(reached)
-    steps = 0
-    while len(goal):
-        steps += 1
-        counts = into[state + 1] - into[state]
-        before = source[ranges(into[state], counts)]
-        code = np.unique(np.repeat(goal, counts) * len(space) + before)
-        goal, state = np.divmod(code, len(space))
-        new = distance[goal, state] < 0
-        goal, state = goal[new], state[new]
-        distance[goal, state] = steps
-    return distance
-
-
-def _second_costs(space: Space, distance: Ints) -> tuple[Ints, PlanSpace]:
-    """The least second cost component at least makespan, and the graph of the optimal edges."""
-    goal, state = np.nonzero(distance >= 0)
-    layer = distance[goal, state]
-    order = np.lexsort((state, goal, layer))
-    goal, state, layer = goal[order], state[order], layer[order]
-    node = np.full(distance.shape, -1)
-    node[goal, state] = np.arange(len(goal))
-    counts = space.first[state + 1] - space.first[state]
-    step = ranges(space.first[state], counts)
-    source = np.repeat(np.arange(len(goal)), counts)
-    after = distance[goal[source], space.target[step]]
-    keep = (after == layer[source] - 1) & (layer[source] > 0)
-    source, step = source[keep], step[keep]
-    target = node[goal[source], space.target[step]]
-    cost = space.cost[step]
-    value = np.where(layer == 0, 0, _FAR)
-    if cost.any():
-        bounds = np.searchsorted(layer[source], np.arange(int(layer.max(initial=0)) + 2))
-        for low, high in pairwise(bounds[1:]):
-            span = slice(low, high)
-            np.minimum.at(value, source[span], cost[span] + value[target[span]])
-        keep = cost + value[target] == value[source]
-        source, step, target, cost = source[keep], step[keep], target[keep], cost[keep]
-    else:
-        value = np.zeros(len(goal), np.int64)
-    second = np.zeros(distance.shape, np.int64)
-    second[goal, state] = value
-    return second, PlanSpace(
-        model=space.model,
-        rows=space.rows,
-        state=state,
-        goal=goal,
-        layer=layer,
-        first=np.searchsorted(source, np.arange(len(goal) + 1)),
-        target=target,
-        labels=space.labels[step],
-        cost=cost,
-        goals=(),
-        starts=_none(),
-        second=_none(),
-    )
-
-
-def _reachable(graph: PlanSpace) -> PlanSpace:
-    """The part of the graph that the tasks' initial nodes reach."""
-    alive = np.zeros(len(graph), np.bool_)
-    alive[graph.starts] = True
-    source = graph.sources
-    for span in reversed(graph.layers):
-        low, high = graph.first[span.start], graph.first[span.stop]
-        alive[graph.target[low:high][alive[source[low:high]]]] = True
-    if alive.all():
-        return graph
-    number = np.cumsum(alive) - 1
-    kept = alive[source]
-    return replace(
-        graph,
-        state=graph.state[alive],
-        goal=graph.goal[alive],
-        layer=graph.layer[alive],
-        first=np.searchsorted(number[source[kept]], np.arange(int(alive.sum()) + 1)),
-        target=number[graph.target[kept]],
-        labels=graph.labels[kept],
-        cost=graph.cost[kept],
-        starts=number[graph.starts],
-    )
-
-
-def _reordered(graph: PlanSpace, order: Ints) -> PlanSpace:
-    """The same graph with its nodes in another order."""
-    number = np.empty(len(order), np.int64)
-    number[order] = np.arange(len(order))
-    counts = np.diff(graph.first)[order]
-    edges = ranges(graph.first[order], counts)
-    return replace(
-        graph,
-        state=graph.state[order],
-        goal=graph.goal[order],
-        layer=graph.layer[order],
-        first=np.concatenate(([0], np.cumsum(counts))),
-        target=number[graph.target[edges]],
-        labels=graph.labels[edges],
-        cost=graph.cost[edges],
-        starts=number[graph.starts],
-    )
 
 
 def _none() -> Ints:

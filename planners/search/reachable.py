@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from planners.joint.conditions import Labels
-from planners.joint.matching import Ints
 from planners.joint.model import JointModel, Steps
-from planners.joint.states import Rows, find_rows, unique_rows
 from planners.limits import reaching
+from planners.tables import Ints, Rows, find_rows, unique_rows
 
 #: States expanded at a time, and the joint steps that this should give: they bound the memory of
 #: one expansion.

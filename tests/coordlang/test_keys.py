@@ -11,7 +11,8 @@ import pytest
 from coordlang.language import keys
 from coordlang.language.keys import keys_of, read_keys
 from planners.errors import BadInput
-from planners.joint.states import Rows, StateCodec
+from planners.joint.states import StateCodec
+from planners.tables import Rows
 
 
 def random_codec(random: Random) -> StateCodec:

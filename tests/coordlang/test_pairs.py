@@ -14,9 +14,10 @@ from coordlang.required.miscoordination import Inseparable, inseparable
 from coordlang.tasks.candidates import Candidates, from_problems
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary.pairwise import language_for, pair_languages, together, unsafe_pair
-from planners.joint.states import split_atoms, unique_rows
+from planners.joint.states import split_atoms
 from planners.pddl import read_domain, read_problem
 from planners.search.plans import Plan
+from planners.tables import unique_rows
 from tests.conftest import DOMAINS
 from tests.coordlang import naive
 from tests.coordlang.test_flexible import listed, on_graph, partitions

@@ -8,7 +8,8 @@ from coordlang.required.miscoordination import inseparable, miscoordination
 from planners.loading import build
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
-from planners.search.plan_space import PlanSpace, search
+from planners.search.optimal_plans import search
+from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
 
 

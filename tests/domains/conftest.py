@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from planners.loading import PlanningInstance, load
-from planners.search.plan_space import PlanSpace, search
+from planners.search.optimal_plans import search
+from planners.search.plan_space import PlanSpace
 from planners.search.reachable import Space, explore
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -20,7 +20,8 @@ from planners.joint.model import FullState
 from planners.loading import build
 from planners.pddl import parse_problem, read_domain
 from planners.pddl.sexpr import Source
-from planners.search.plan_space import PlanSpace, TaskGroup, plan_spaces
+from planners.search.optimal_plans import TaskGroup, plan_spaces
+from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans, counts
 from planners.search.reachable import Space, explore
 

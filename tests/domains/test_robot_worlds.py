@@ -24,7 +24,7 @@ from planners.joint.model import Cost
 from planners.loading import ModelOptions, PlanningInstance, load
 from planners.pddl import read_domain, read_problem
 from planners.pddl.robots import static_atoms
-from planners.search.plan_space import search
+from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from planners.search.reachable import Space
 

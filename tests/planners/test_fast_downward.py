@@ -22,7 +22,7 @@ from planners.loading import ModelOptions, PlanningInstance, build, load
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
-from planners.search.plan_space import search
+from planners.search.optimal_plans import search
 
 FOREIGN = Path(__file__).parents[3] / "shared" / "data" / "foreign"
 

@@ -24,7 +24,7 @@ from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import And, Atom, Domain, Formula, Not, Problem
 from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
-from planners.search.plan_space import TaskGroup, plan_spaces, search
+from planners.search.optimal_plans import TaskGroup, plan_spaces, search
 from planners.search.plans import Plans
 from planners.search.reachable import explore
 

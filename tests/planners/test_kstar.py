@@ -12,7 +12,7 @@ import pytest
 
 from planners.classical import compile_classical, to_pddl
 from planners.loading import load
-from planners.search.plan_space import search
+from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 
 pytestmark = pytest.mark.slow

@@ -21,11 +21,12 @@ from planners import grounding
 from planners.errors import CoordlangError, OutOfMemory, OutOfTime
 from planners.grounding import instantiate
 from planners.joint.model import Stepper, Steps
-from planners.joint.states import Rows
 from planners.limits import reaching, time_left, time_limit
 from planners.loading import PlanningInstance, load
-from planners.search.plan_space import PlanSpace, TaskGroup, plan_spaces, search
+from planners.search.optimal_plans import TaskGroup, plan_spaces, search
+from planners.search.plan_space import PlanSpace
 from planners.search.reachable import count, explore
+from planners.tables import Rows
 
 DOMAINS = Path(__file__).parents[2] / "domains"
 
@@ -196,14 +197,14 @@ def test_the_goals_done_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     loaded = corners()
     space = explore(loaded.model, loaded.tasks[0].init[None, :])
     groups = [TaskGroup(loaded.tasks[0].goal)] * 3
-    monkeypatch.setattr("planners.search.plan_space._BATCH", len(space))
+    monkeypatch.setattr("planners.search.optimal_plans._BATCH", len(space))
     batches = plan_spaces(space, groups)
     next(batches)
 
     def fail(*_: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr("planners.search.plan_space.distances", fail)
+    monkeypatch.setattr("planners.search.optimal_plans.distances", fail)
     with pytest.raises(OutOfMemory) as caught:
         next(batches)
     assert "the optimal plans to 1 of 3 goals, over 72 states" in str(caught.value)
@@ -302,7 +303,7 @@ def test_work_in_pieces_is_the_same_work(problem: str, monkeypatch: pytest.Monke
     monkeypatch.setattr("planners.search.reachable._STEPS", 40)
     monkeypatch.setattr("planners.joint.composition._CHUNK", 11)
     for keep in (8_000_000, 100, 0):
-        monkeypatch.setattr("planners.search.plan_space._KEEP", keep)
+        monkeypatch.setattr("planners.search.optimal_plans._KEEP", keep)
         pieces = search(loaded.model, loaded.tasks[0])
         for name in ("rows", "state", "layer", "first", "target", "labels", "cost", "starts"):
             assert (getattr(pieces, name) == getattr(whole, name)).all(), name

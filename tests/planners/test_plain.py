@@ -17,14 +17,14 @@ from planners import classical as plain_module
 from planners.classical import ClassicalTask, compile_classical, to_pddl
 from planners.errors import BadInput, ProvedImpossible
 from planners.joint.model import Cost, FullState, JointModel
-from planners.joint.states import Rows
 from planners.loading import ModelOptions, PlanningInstance, PlanningTask, build
 from planners.pddl.domain import parse_domain
 from planners.pddl.problem import parse_problem
 from planners.pddl.robots import RobotSelection, Unowned
 from planners.pddl.sexpr import Source
-from planners.search.plan_space import search
+from planners.search.optimal_plans import search
 from planners.search.reachable import explore
+from planners.tables import Rows
 
 COSTS: tuple[Cost, ...] = ("makespan", "makespan+actions")
 FORMS = {"explicit": 100_000, "select-then-apply": 0}

@@ -15,7 +15,7 @@ from planners.classical import compile_classical
 from planners.errors import BadInput
 from planners.joint.model import Cost, FullState
 from planners.loading import PlanningInstance
-from planners.search.plan_space import search
+from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from planners.search.reachable import explore
 

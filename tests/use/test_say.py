@@ -21,8 +21,8 @@ from coordlang.use.sentence.task_language import TaskLanguage
 from planners.check.validate import validate
 from planners.errors import BadInput, Position, ProvedImpossible
 from planners.loading import PlanningTask
+from planners.search.optimal_plans import search
 from planners.search.plan_file import Texts, only_one_plan, texts
-from planners.search.plan_space import search
 from planners.search.plans import Plan, Plans
 from tests.conftest import Command
 from tests.use.naive_sentences import SHIPPED, by_sentence, random_spoken, shipped

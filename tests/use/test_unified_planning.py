@@ -34,7 +34,7 @@ from coordlang.use.unified.translation import translate
 from planners.loading import ModelOptions, load
 from planners.pddl import read_domain
 from planners.pddl.robots import RobotSelection
-from planners.search.plan_space import search
+from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from tests.conftest import DOMAINS, Command
 

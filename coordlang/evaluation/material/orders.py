@@ -13,8 +13,7 @@ import numpy as np
 from coordlang.required.divergences import first_differences, separations, states_on_plans
 from coordlang.tasks.candidates import Candidates
 from coordlang.vocabulary.greedy import fill
-from planners.joint.matching import Ints
-from planners.joint.states import find_rows
+from planners.tables import Ints, find_rows
 
 #: Random orders of the states that experiments try.
 ORDERS = 100

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from coordlang.language.words import Language, WordTable
 from coordlang.tasks.candidates import Candidates
 from planners.errors import OutOfMemory
-from planners.joint.matching import Ints
 from planners.search.plan_space import PlanSpace
+from planners.tables import Ints
 
 #: A sentence as word numbers.
 Words = tuple[int, ...]

@@ -17,10 +17,9 @@ from operator import and_, or_
 import numpy as np
 
 from planners.errors import OutOfMemory
-from planners.joint.matching import Ints
 from planners.limits import memory_left
 from planners.search.plan_space import PlanSpace
-from planners.search.tuples import unique_tuples
+from planners.tables import Ints, unique_tuples
 
 #: What the robot knows in a state: (atoms certainly true, atoms possibly true), as sets of bits:
 #: fact k is bit k.

@@ -20,8 +20,8 @@ from coordlang.use.choices.own_facts import OwnFacts, know_own
 from coordlang.use.sentence.fitting_plans import fitting
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import OutOfMemory
+from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.search.tuples import EdgeIndex
 
 #: Combinations of the robots' moves beyond which exact knowledge is not tried, unless it was asked
 #: for.

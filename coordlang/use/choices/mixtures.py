@@ -18,10 +18,10 @@ from coordlang.use.choices.automaton import Automaton
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import OutOfMemory
 from planners.joint.conditions import Labels
-from planners.joint.matching import Ints, ranges, spans
 from planners.limits import memory_left
+from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.search.tuples import EdgeIndex, unique_tuples
+from planners.tables import Ints, ranges, spans, unique_tuples
 
 #: Joint moves handled at a time.
 _CHUNK = 1_000_000

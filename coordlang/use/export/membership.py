@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from coordlang.explanation.variables import truth
 from coordlang.explanation.words import word_formulas
 from coordlang.use.sentence.task_language import TaskLanguage
-from planners.joint.matching import Ints
-from planners.joint.states import Rows, unique_rows
+from planners.tables import Ints, Rows, unique_rows
 
 #: A conjunction of literals: atom (as in a state's key) -> its value.
 Term = dict[str, bool]

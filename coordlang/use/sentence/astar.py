@@ -12,9 +12,10 @@ from coordlang.language.words import WordTable, sentence
 from coordlang.use.sentence.fitting_plans import fitting
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.joint.model import Goal, JointModel
-from planners.joint.states import Rows, bits
+from planners.joint.states import bits
 from planners.search.bounds import FAR, Heuristic, heuristic
 from planners.search.plans import Plan
+from planners.tables import Rows
 
 
 @dataclass(frozen=True, slots=True)

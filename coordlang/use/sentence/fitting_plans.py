@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import Refuted
-from planners.joint.matching import Ints, ranges
 from planners.search.plan_space import PlanSpace
+from planners.tables import Ints, ranges
 
 
 class NoPlanFits(Refuted):

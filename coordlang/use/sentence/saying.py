@@ -11,10 +11,10 @@ from coordlang.tasks.task_file import formula_text
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import BadInput, Position, Refuted
 from planners.joint.model import IDLE, FullState, JointModel
-from planners.joint.states import Rows
 from planners.pddl.lifted import And
 from planners.search.plan_file import NoSuchAction, Texts, read_plans
 from planners.search.plans import Plan
+from planners.tables import Rows
 
 
 class NotAPlan(Refuted):

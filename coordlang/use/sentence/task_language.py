@@ -12,11 +12,12 @@ from coordlang.language.words import Language, WordTable
 from coordlang.tasks.candidates import Candidates
 from coordlang.tasks.task_file import ListedTask, ground_tasks
 from planners.errors import BadInput, Position
-from planners.joint.matching import Ints
 from planners.joint.model import Goal, JointModel
 from planners.loading import ModelOptions, build
 from planners.pddl.lifted import TRUE, And, Atom, Domain, Formula, Problem
-from planners.search.plan_space import PlanSpace, search
+from planners.search.optimal_plans import search
+from planners.search.plan_space import PlanSpace
+from planners.tables import Ints
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,7 +57,8 @@ from planners.errors import (
 from planners.limits import time_limit
 from planners.loading import ModelOptions, build
 from planners.pddl.robots import RobotSelection
-from planners.search.plan_space import PlanSpace, search
+from planners.search.optimal_plans import search
+from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans
 
 _Status = PlanGenerationResultStatus

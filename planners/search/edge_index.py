@@ -7,37 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.joint.matching import Ints
-from planners.joint.states import unique_rows
 from planners.search.plan_space import PlanSpace
-
-#: Values a coded tuple may have.
-_MOST = 2**63 - 1
-
-
-def unique_tuples(table: Ints, bounds: list[int]) -> tuple[Ints, Ints]:
-    """The different rows of ``table``, sorted, and each row's number among them.
-
-    ``bounds[k]`` is one more than the largest value of column k; values start at 0.  Columns are
-    packed into as few 64-bit codes as they fit, so that most tables sort as plain numbers.
-    """
-    codes: list[Ints] = []
-    code = np.zeros(len(table), np.int64)
-    size = 1
-    for column, bound in enumerate(bounds):
-        if size * bound > _MOST:
-            codes.append(code)
-            code, size = np.zeros(len(table), np.int64), 1
-        code = code * bound + table[:, column]
-        size *= bound
-    codes.append(code)
-    if len(codes) == 1:
-        _, position, inverse = np.unique(code, return_index=True, return_inverse=True)
-        return table[position], inverse.reshape(-1)
-    _, inverse = unique_rows(np.stack(codes, axis=1).astype(np.uint64))
-    position = np.zeros(int(inverse.max(initial=-1)) + 1, np.int64)
-    position[inverse] = np.arange(len(table))
-    return table[position], inverse
+from planners.tables import Ints
 
 
 @dataclass(frozen=True, slots=True)

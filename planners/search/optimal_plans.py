@@ -1,0 +1,335 @@
+"""All optimal plans of tasks: search forward, then back along optimal edges."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from planners.errors import ProvedImpossible
+from planners.joint.conditions import Labels
+from planners.joint.model import Goal, JointModel, Steps
+from planners.limits import reaching
+from planners.loading import PlanningTask
+from planners.search.plan_space import PlanSpace
+from planners.search.reachable import Space, blocks
+from planners.tables import Bools, Ints, Rows, find_rows, ranges, unique_rows
+
+#: (goal, state) pairs handled in one plan space when many tasks are asked for.
+_BATCH = 2_000_000
+#: Joint steps kept from the forward search; beyond, layers are expanded again on the way back.
+_KEEP = 8_000_000
+_FAR = np.iinfo(np.int64).max // 4
+
+#: The steps of a layer in pieces: (number of the first state, steps).
+Stored = list[tuple[int, Steps]]
+
+
+def search(model: JointModel, task: PlanningTask) -> PlanSpace:
+    """All optimal plans of one task, expanding only states nearer than the goal.
+
+    Forward search to the first layer that holds a goal state, then back along optimal edges.
+    Raises `ProvedImpossible` if the goal cannot be reached.
+    """
+    layers: list[Rows] = []
+    kept: list[Stored | None] = []
+
+    def so_far() -> str:
+        return (
+            f"{sum(map(len, layers)):,} states within {len(layers) - 1} steps of the initial state of {task.name}, "
+            f"{len(layers[-1]) if layers else 0:,} of them new in the last step"
+        )
+
+    with reaching(so_far, "a task with a shorter plan, fewer objects or fewer robots"):
+        _forward(model, task, layers, kept)
+        return _backward(model, task, layers, kept)
+
+
+def _forward(
+    model: JointModel, task: PlanningTask, layers: list[Rows], kept: list[Stored | None]
+) -> None:
+    """Fill ``layers`` with the states by their distance from the start, ``kept`` with the joint
+    steps out of them.
+    """
+    layer = task.init[None, :]
+    seen = layer
+    total = 0
+    layers.append(layer)
+    while not model.holds(task.goal, layer).any():
+        fresh: list[Rows] = []
+        steps_here: Stored | None = []
+        for start, steps in blocks(model, layer):
+            total += len(steps)
+            if total > _KEEP:
+                steps_here = None
+            if steps_here is not None:
+                steps_here.append((start, steps))
+            fresh.append(unique_rows(steps.result)[0])
+        new, _ = unique_rows(np.concatenate(fresh))
+        layer = new[find_rows(seen, new) < 0]
+        if not len(layer):
+            raise ProvedImpossible(
+                f"task {task.name}: the goal cannot be reached",
+                position=task.position,
+                remedy=_searched(len(seen)),
+            )
+        seen, _ = unique_rows(np.concatenate((seen, layer)))
+        layers.append(layer)
+        kept.append(steps_here)
+
+
+def _searched(states: int) -> str:
+    return (
+        f"All {states:,} reachable states were searched."
+        if states > 1
+        else "No other state can be reached."
+    )
+
+
+def _backward(
+    model: JointModel,
+    task: PlanningTask,
+    layers: list[Rows],
+    kept: list[Stored | None],
+) -> PlanSpace:
+    """Keep the edges that lead to the goal in time and at least cost, from the last layer to the
+    first.
+    """
+    goal_rows = layers[-1][model.holds(task.goal, layers[-1])]
+    tables = [goal_rows]
+    best = [np.zeros(len(goal_rows), np.int64)]
+    edges: list[tuple[Ints, Ints, Labels, Ints]] = []
+    for rows, stored in zip(reversed(layers[:-1]), reversed(kept), strict=True):
+        source, target, labels, cost = _edges_into(model, rows, stored, tables[-1])
+        value = np.full(len(rows), _FAR)
+        np.minimum.at(value, source, cost + best[-1][target])
+        tight = cost + best[-1][target] == value[source]
+        alive = np.flatnonzero(value < _FAR)
+        number = np.cumsum(value < _FAR) - 1
+        edges.append((number[source[tight]], target[tight], labels[tight], cost[tight]))
+        tables.append(rows[alive])
+        best.append(value[alive])
+    offsets = np.cumsum([0, *(len(t) for t in tables)])
+    source = np.concatenate([e[0] + offsets[k + 1] for k, e in enumerate(edges)] or [_none()])
+    graph = PlanSpace(
+        model=model,
+        rows=np.concatenate(tables),
+        state=np.arange(offsets[-1]),
+        goal=np.zeros(offsets[-1], np.int64),
+        layer=np.repeat(np.arange(len(tables)), np.diff(offsets)),
+        first=np.searchsorted(source, np.arange(offsets[-1] + 1)),
+        target=np.concatenate([e[1] + offsets[k] for k, e in enumerate(edges)] or [_none()]),
+        labels=np.concatenate(
+            [e[2] for e in edges] or [np.zeros((0, len(model.robots)), np.int32)]
+        ),
+        cost=np.concatenate([e[3] for e in edges] or [_none()]),
+        goals=(task.goal,),
+        starts=np.array([offsets[-2]]),
+        second=best[-1][:1],
+    )
+    return _sort_states(graph).reduced()
+
+
+def _edges_into(
+    model: JointModel, rows: Rows, stored: Stored | None, table: Rows
+) -> tuple[Ints, Ints, Labels, Ints]:
+    """The steps from ``rows`` into the sorted ``table``."""
+    parts: list[tuple[Ints, Ints, Labels, Ints]] = []
+    for start, block in stored if stored is not None else blocks(model, rows):
+        target = find_rows(table, block.result)
+        hit = target >= 0
+        parts.append((block.source[hit] + start, target[hit], block.labels[hit], block.cost[hit]))
+    source, target, labels, cost = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return source, target, labels, cost
+
+
+def _sort_states(graph: PlanSpace) -> PlanSpace:
+    """The same graph with a sorted table of states."""
+    rows, number = unique_rows(graph.rows)
+    return replace(graph, rows=rows, state=number[graph.state])
+
+
+def search_each(model: JointModel, tasks: Sequence[PlanningTask]) -> PlanSpace:
+    """`search` for each task, as one plan space in which every task has a goal of its own."""
+    return joined([search(model, task) for task in tasks])
+
+
+def joined(spaces: Sequence[PlanSpace]) -> PlanSpace:
+    """Plan spaces of one task each as one plan space in which every task has a goal of its own."""
+    if len(spaces) == 1:
+        return spaces[0]
+    rows, number = unique_rows(np.concatenate([s.rows for s in spaces]))
+    row_offset = np.cumsum([0, *(len(s.rows) for s in spaces)])
+    node_offset = np.cumsum([0, *(len(s) for s in spaces)])
+    together = PlanSpace(
+        model=spaces[0].model,
+        rows=rows,
+        state=np.concatenate([number[s.state + row_offset[k]] for k, s in enumerate(spaces)]),
+        goal=np.repeat(np.arange(len(spaces)), np.diff(node_offset)),
+        layer=np.concatenate([s.layer for s in spaces]),
+        first=np.concatenate(
+            [
+                [0],
+                *(
+                    s.first[1:] + sum(len(q.target) for q in spaces[:k])
+                    for k, s in enumerate(spaces)
+                ),
+            ]
+        ),
+        target=np.concatenate([s.target + node_offset[k] for k, s in enumerate(spaces)]),
+        labels=np.concatenate([s.labels for s in spaces]),
+        cost=np.concatenate([s.cost for s in spaces]),
+        goals=tuple(space.goals[0] for space in spaces),
+        starts=np.array([s.starts[0] + node_offset[k] for k, s in enumerate(spaces)]),
+        second=np.concatenate([s.second for s in spaces]),
+    )
+    return together.reordered(np.lexsort((together.state, together.goal, together.layer)))
+
+
+@dataclass(frozen=True, slots=True)
+class TaskGroup:
+    """Tasks with one goal.  ``inits`` is a table of initial states, or None for every other state
+    that can reach it.
+    """
+
+    goal: Goal
+    inits: Rows | None = None
+
+
+def solvable(space: Space, groups: Sequence[TaskGroup]) -> list[TaskGroup]:
+    """The groups without the tasks whose goal cannot be reached."""
+    size = max(1, _BATCH // max(1, len(space)))
+    kept = []
+    for start in range(0, len(groups), size):
+        batch = groups[start : start + size]
+        far = distances(
+            space, np.stack([space.model.holds(group.goal, space.rows) for group in batch])
+        )
+        for own, group in zip(far, batch, strict=True):
+            inits = (
+                group.inits
+                if group.inits is None
+                else group.inits[own[space.numbers(group.inits)] >= 0]
+            )
+            if inits is None or len(inits):
+                kept.append(replace(group, inits=inits))
+    return kept
+
+
+def plan_spaces(space: Space, groups: Sequence[TaskGroup]) -> Iterator[PlanSpace]:
+    """The optimal plans of many tasks over one explored space, in batches of goals.
+
+    One backward pass per goal serves every initial state.  Raises `ProvedImpossible` for a task
+    whose goal cannot be reached.
+    """
+    size = max(1, _BATCH // max(1, len(space)))
+    for start in range(0, len(groups), size):
+
+        def so_far(done: int = start) -> str:
+            return f"the optimal plans to {done:,} of {len(groups):,} goals, over {len(space):,} states"
+
+        with reaching(so_far, "fewer candidate tasks (a task file)"):
+            batch = _batch(space, groups[start : start + size])
+        yield batch
+
+
+def _batch(space: Space, groups: Sequence[TaskGroup]) -> PlanSpace:
+    reached = np.stack([space.model.holds(group.goal, space.rows) for group in groups])
+    distance = distances(space, reached)
+    states: list[Ints] = []
+    for number, group in enumerate(groups):
+        if group.inits is None:
+            states.append(np.flatnonzero(distance[number] > 0))
+            continue
+        found = space.numbers(group.inits)
+        bad = np.flatnonzero((found < 0) | (distance[number, found] < 0))
+        if len(bad):
+            raise ProvedImpossible(
+                f"the goal cannot be reached from {space.model.state_text(group.inits[bad[0]])}",
+                remedy=_searched(len(space)),
+            )
+        states.append(found)
+    second, graph = _second_costs(space, distance)
+    node = np.full(distance.shape, -1)
+    node[graph.goal, graph.state] = np.arange(len(graph))
+    goal = np.repeat(np.arange(len(groups)), [len(s) for s in states])
+    state = np.concatenate(states)
+    return replace(
+        graph,
+        goals=tuple(group.goal for group in groups),
+        starts=node[goal, state],
+        second=second[goal, state],
+    ).reduced()
+
+
+def distances(space: Space, reached: Bools) -> Ints:
+    """Least makespan from every state to every goal, (goals, states), -1 where there is none.
+
+    ``reached`` (goals, states): which states satisfy which goal.  O(goals x joint steps).
+    """
+    order = np.argsort(space.target, kind="stable")
+    source = np.repeat(np.arange(len(space)), np.diff(space.first))[order]
+    into = np.searchsorted(space.target[order], np.arange(len(space) + 1))
+    distance = np.where(reached, 0, -1)
+    goal, state = np.nonzero(reached)
+    steps = 0
+    while len(goal):
+        steps += 1
+        counts = into[state + 1] - into[state]
+        before = source[ranges(into[state], counts)]
+        code = np.unique(np.repeat(goal, counts) * len(space) + before)
+        goal, state = np.divmod(code, len(space))
+        new = distance[goal, state] < 0
+        goal, state = goal[new], state[new]
+        distance[goal, state] = steps
+    return distance
+
+
+def _second_costs(space: Space, distance: Ints) -> tuple[Ints, PlanSpace]:
+    """The least second cost component at least makespan, and the graph of the optimal edges."""
+    goal, state = np.nonzero(distance >= 0)
+    layer = distance[goal, state]
+    order = np.lexsort((state, goal, layer))
+    goal, state, layer = goal[order], state[order], layer[order]
+    node = np.full(distance.shape, -1)
+    node[goal, state] = np.arange(len(goal))
+    counts = space.first[state + 1] - space.first[state]
+    step = ranges(space.first[state], counts)
+    source = np.repeat(np.arange(len(goal)), counts)
+    after = distance[goal[source], space.target[step]]
+    keep = (after == layer[source] - 1) & (layer[source] > 0)
+    source, step = source[keep], step[keep]
+    target = node[goal[source], space.target[step]]
+    cost = space.cost[step]
+    value = np.where(layer == 0, 0, _FAR)
+    if cost.any():
+        bounds = np.searchsorted(layer[source], np.arange(int(layer.max(initial=0)) + 2))
+        for low, high in pairwise(bounds[1:]):
+            span = slice(low, high)
+            np.minimum.at(value, source[span], cost[span] + value[target[span]])
+        keep = cost + value[target] == value[source]
+        source, step, target, cost = source[keep], step[keep], target[keep], cost[keep]
+    else:
+        value = np.zeros(len(goal), np.int64)
+    second = np.zeros(distance.shape, np.int64)
+    second[goal, state] = value
+    return second, PlanSpace(
+        model=space.model,
+        rows=space.rows,
+        state=state,
+        goal=goal,
+        layer=layer,
+        first=np.searchsorted(source, np.arange(len(goal) + 1)),
+        target=target,
+        labels=space.labels[step],
+        cost=cost,
+        goals=(),
+        starts=_none(),
+        second=_none(),
+    )
+
+
+def _none() -> Ints:
+    return np.zeros(0, np.int64)
