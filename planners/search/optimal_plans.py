@@ -50,8 +50,9 @@ def search(model: JointModel, task: PlanningTask) -> PlanSpace:
 def _forward(
     model: JointModel, task: PlanningTask, layers: list[Rows], kept: list[Stored | None]
 ) -> None:
-    """Fill ``layers`` with the states by their distance from the start, ``kept`` with the joint
-    steps out of them.
+    """Fill ``layers`` with the states by their distance from the start.
+
+    ``kept`` gets the joint steps out of them.
     """
     layer = task.init[None, :]
     seen = layer
@@ -94,9 +95,7 @@ def _backward(
     layers: list[Rows],
     kept: list[Stored | None],
 ) -> PlanSpace:
-    """Keep the edges that lead to the goal in time and at least cost, from the last layer to the
-    first.
-    """
+    """Keep the edges that lead to the goal in time and at least cost, from the last layer back."""
     goal_rows = layers[-1][model.holds(task.goal, layers[-1])]
     tables = [goal_rows]
     best = [np.zeros(len(goal_rows), np.int64)]
@@ -190,8 +189,9 @@ def joined(spaces: Sequence[PlanSpace]) -> PlanSpace:
 
 @dataclass(frozen=True, slots=True)
 class TaskGroup:
-    """Tasks with one goal.  ``inits`` is a table of initial states, or None for every other state
-    that can reach it.
+    """Tasks with one goal.
+
+    ``inits`` is a table of initial states, or None for every other state that can reach it.
     """
 
     goal: Goal
