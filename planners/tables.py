@@ -30,8 +30,9 @@ def ranges(starts: Ints, counts: Ints) -> Ints:
 
 
 def spans(sizes: NDArray[np.float64], most: int) -> Iterator[slice]:
-    """Cut a table so that the sizes of each piece sum to at most ``most``; a larger row is a piece
-    of its own.
+    """Cut a table so that the sizes of each piece sum to at most ``most``.
+
+    A larger row is a piece of its own.
     """
     ends = np.cumsum(sizes)
     start = 0

@@ -11,36 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-<<<<<<< HEAD
-from planners.joint.states import Rows, test_bits
-
-Ints = NDArray[np.int64]
-
-
-def ranges(starts: Ints, counts: Ints) -> Ints:
-    """``[s, s+1, .., s+c-1]`` for every pair, joined."""
-    total = int(counts.sum())
-    ends = np.cumsum(counts)
-    within: Ints = np.arange(total) + np.repeat(starts - (ends - counts), counts)
-    return within
-
-
-def spans(sizes: NDArray[np.float64], most: int) -> Iterator[slice]:
-    """Cut a table so that the sizes of each piece sum to at most ``most``.
-
-    A larger row is a piece of its own.
-    """
-    ends = np.cumsum(sizes)
-    start = 0
-    while start < len(sizes):
-        before = ends[start - 1] if start else 0.0
-        end = max(start + 1, int(np.searchsorted(ends, before + most, side="right")))
-        yield slice(start, end)
-        start = end
-=======
 from planners.joint.states import test_bits
 from planners.tables import Ints, Rows, ranges
->>>>>>> e7da2c2 (search: a plan space answers for itself (edges, paths, layers, descendants, unfoldings); tables of numbers have a file of their own)
 
 
 @dataclass(frozen=True, slots=True)
