@@ -1,4 +1,4 @@
-"""The check of a certificate.
+"""The check of a certificate, in code of its own.
 
 Every reason is checked against the model, and the rest is left to a SAT solver.
 

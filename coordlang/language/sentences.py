@@ -1,7 +1,4 @@
-"""The sentences of a task.
-
-How many plans each leaves open, and what it asks of each robot step by step.
-"""
+"""The sentences of a task: the plans that each leaves open, and what it asks of each robot."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When do two state sequences have one sentence?  Warping paths, and the shortest of them.
+"""When two state sequences have one sentence: warping paths, and the shortest of them.
 
 Key fact (proved in docs/concepts.md): ``u`` and ``v`` have the same sentence under ``f`` iff there
 is a *warping path*: cells ``(i, j)`` from ``(0, 0)`` to the last indices, steps ``(1, 0)``, ``(0,

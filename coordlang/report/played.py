@@ -1,7 +1,4 @@
-"""A miscoordination as it is played.
-
-What the robots do together, to the break and, where they can, beyond it.
-"""
+"""A miscoordination played to its break and, where the robots can, beyond it."""
 
 from __future__ import annotations
 

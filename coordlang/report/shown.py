@@ -1,6 +1,6 @@
-"""Which tasks a report shows.
+"""Which tasks a report shows: those of problems, then candidate tasks of the language.
 
-Those of the given problems, then candidate tasks of the language, drawn if they are many.
+Candidate tasks are drawn at random if they are many.
 """
 
 from __future__ import annotations

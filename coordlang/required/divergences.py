@@ -1,6 +1,6 @@
-"""Where plans that introduce RC part.
+"""First differences: where plans that introduce RC part, over all candidate tasks.
 
-``alpha*`` over all candidate tasks, and what must be told apart.
+The sets ``alpha*``, and what must be told apart.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Is it a coordination language?  Checked by definition, in code of its own.
+"""Verification of a partition by definition, in code of its own.
 
 Shares the joint model and the plan spaces with the builders, nothing else.  Walks n plans of a task
 in step and carries ``(x_1 .. x_n, y or failed)`` and the *leads*: the words by which the sentence

@@ -1,4 +1,4 @@
-"""Are overlapping words a coordination language?  Checked by definition, in code of its own.
+"""Verification of overlapping words by definition, in code of its own.
 
 For every candidate task every optimal plan must have a usable sentence: one whose plans are
 RC-free.  Shares with the builder the joint model, the plan spaces and the words, nothing else.

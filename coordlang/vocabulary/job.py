@@ -1,4 +1,4 @@
-"""What every method gets and gives."""
+"""The interface of the methods: a `Job` in, an `Outcome` out."""
 
 from __future__ import annotations
 

@@ -1,10 +1,8 @@
-"""Symmetries of a joint model.
+"""Symmetries of a joint model: permutations of its states that map plans to plans.
 
-Permutations of its states that map plans to plans and tasks to tasks.
-
-Found from the PDDL objects (permutations that keep the static facts), not from any geometry, and
-checked on the ground actions, the states and the tasks before use.  The image of a failing tuple of
-plans fails too, so the image of a necessary clause is necessary.
+They map tasks to tasks, too.  Found from the PDDL objects (permutations that keep the static facts),
+not from any geometry, and checked on the ground actions, the states and the tasks before use.  The
+image of a failing tuple of plans fails too, so the image of a necessary clause is necessary.
 """
 
 from __future__ import annotations

@@ -1,4 +1,1 @@
-"""The independent twin.
-
-The rules of joint steps once more, and a plan checker that uses nothing else.
-"""
+"""The independent twin of grounding and composition: rules of joint steps, and a plan checker."""

@@ -1,6 +1,4 @@
-"""The independent cross-check.
-
-The optimal cost of a task by Fast Downward, through unified-planning.
+"""The optimal cost of a task by Fast Downward: the independent cross-check.
 
 unified-planning runs in a child process of its own group and in a directory of its own, so that
 nothing of it is left behind, whatever happens: no file, no output, no process.

@@ -1,6 +1,4 @@
-"""The child process of `planners.classical.fast_downward`.
-
-One plain task solved by Fast Downward through unified-planning.
+"""The child process in which Fast Downward solves one classical task.
 
 ``python -m planners.classical.fast_downward_worker TASK RESULT`` reads the task (JSON, see
 `planners.classical.fast_downward.as_json`) and writes one JSON object: ``{"status": .., "total":

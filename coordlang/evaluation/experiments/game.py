@@ -1,6 +1,6 @@
-"""A coordination game.
+"""A coordination game: the speaker proposes until the listener accepts.
 
-The speaker proposes until the listener accepts, plans in one game, sentences in the other.
+It proposes plans in one game, sentences in the other.
 
 The listener likes ``k`` of the task's optimal plans, drawn at random.  It accepts a plan that it
 likes, and a sentence that some plan which it likes has.  The speaker does not know them and

@@ -1,6 +1,6 @@
-"""The motivating scenario.
+"""The motivating scenario: a place of interest appears, and one robot makes a detour.
 
-A place of interest appears, one robot makes a detour, and the other one never knows.
+The other robot never knows.
 
 On the map `corridor` two robots trade rooms through a corridor with one passing place.  They have
 agreed on the sentence of the first optimal plan.  Then a place becomes interesting that robot 1

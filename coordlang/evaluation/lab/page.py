@@ -1,6 +1,6 @@
-"""The results told on one page.
+"""The results of all experiments, written as one page.
 
-Every experiment with its tables and figures, and what differs from the paper, and why.
+With tables and figures, and what differs from the paper, and why.
 """
 
 from __future__ import annotations

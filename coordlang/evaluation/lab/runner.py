@@ -1,6 +1,6 @@
-"""Runs pieces of work in processes of their own.
+"""Pieces of work run in processes of their own, every result kept at once.
 
-Every result is kept at once, and what is known already is left out.
+What is known already is left out.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Something turns out to be impossible after everybody has committed.
+"""Hazards: something turns out to be impossible after the robots have committed.
 
-Do the plan and the sentence survive it?
+The question is whether the plan and the sentence survive it.
 
 A *hazard* forbids some subactions.  A robot that has committed to a plan survives if its part needs
 none of them.  One that has committed to a sentence survives if one of its own choices

@@ -1,6 +1,6 @@
-"""Robots' choices drawn.
+"""Robots' choices drawn in Graphviz' language.
 
-Their automata in Graphviz' language, one cluster a robot, one rank a step.
+One cluster for each automaton, one rank for each step.
 """
 
 from __future__ import annotations
