@@ -30,8 +30,7 @@ from coordlang.language.sentences import task_sentences
 from coordlang.language.words import sentence
 from coordlang.required.miscoordination import Inseparable
 from coordlang.tasks.candidates import from_problems
-from coordlang.use.export.pddl import Exported, export_pddl
-from coordlang.use.sentence.fitting_plans import fitting
+from coordlang.use.export.pddl import PddlExport, export_pddl
 from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 from planners.errors import CoordlangError, OutOfMemory
 from planners.loading import ModelOptions
@@ -123,14 +122,14 @@ def row(
     name: str,
     spoken: TaskLanguage,
     words: tuple[int, ...],
-    exported: Exported,
+    exported: PddlExport,
     seconds: float,
     *,
     other: bool,
 ) -> Row:
     """All answers for one exported problem."""
     plans = Plans.of(spoken.space, spoken.task)
-    fits = Plans.of(fitting(spoken, words)).count
+    fits = Plans.of(spoken.plans_with(words)).count
     found: dict[str, int | None] = dict.fromkeys(("kstar", "symk", "fast_downward"))
     if other:
         with tempfile.TemporaryDirectory(prefix="coordlang-") as directory:
@@ -166,7 +165,7 @@ def by_listing(spoken: TaskLanguage, plans: Plans, words: tuple[int, ...]) -> in
     return sum(sentence(word[state] for state in plans.states(plan)) == words for plan in plans)
 
 
-def by_kstar(folder: Path, exported: Exported, seconds: float) -> int | None:
+def by_kstar(folder: Path, exported: PddlExport, seconds: float) -> int | None:
     """The number of optimal plans that K* lists, read back as joint plans, all different."""
     try:
         from kstar_planner.planners import run_planner
@@ -191,7 +190,7 @@ def by_kstar(folder: Path, exported: Exported, seconds: float) -> int | None:
     return _distinct(found)
 
 
-def by_symk(folder: Path, exported: Exported, seconds: float) -> int | None:
+def by_symk(folder: Path, exported: PddlExport, seconds: float) -> int | None:
     """The number of optimal plans that SymK lists, read back as joint plans, all different."""
     try:
         from up_symk.symk_base import get_resource_path
@@ -222,7 +221,7 @@ def by_symk(folder: Path, exported: Exported, seconds: float) -> int | None:
     return _distinct([exported.joint_plan(plan_names(text)) for text in texts])
 
 
-def by_fast_downward(exported: Exported, seconds: float) -> int | None:
+def by_fast_downward(exported: PddlExport, seconds: float) -> int | None:
     """The optimal cost by Fast Downward, through unified-planning."""
     from planners.classical.fast_downward import total_cost
 

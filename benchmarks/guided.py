@@ -18,7 +18,7 @@ The paper reports 1.6 times fewer nodes on GWB7.  For each language and heuristi
 
 "pruned" is the paper's search: what does not fit the sentence is pruned, nothing else.  "+words"
 also takes the number of words still to say as a lower bound on the steps.  Ties are broken as
-`coordlang.use.sentence.astar.astar` says.  All plans found are checked to be optimal and to have
+`coordlang.use.sentence.guided_search.a_star` says.  All plans found are checked to be optimal and to have
 the sentence.
 """
 
@@ -33,7 +33,7 @@ from table1 import ROWS, candidates_of
 
 from coordlang.building import build_language
 from coordlang.language.sentences import task_sentences
-from coordlang.use.sentence.astar import ExpandedStates, plan_under_sentence
+from coordlang.use.sentence.guided_search import ExpandedStates, plan_under_sentence
 from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 
 

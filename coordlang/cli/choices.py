@@ -144,26 +144,26 @@ def _judged(found: Choices, check: bool) -> int:
     if walked is not None and walked.violation is not None:
         why = (
             "the file holds no coordination language"
-            if found.spoken.covered
+            if found.task_language.covered
             else "the language does not cover it"
         )
         click.echo(f"coordlang: refuted: choices of this task miscoordinate; {why}", err=True)
         click.echo(show(walked.violation), err=True)
         return 1
-    if check and not found.spoken.covered:
+    if check and not found.task_language.covered:
         click.echo(
             "coordlang: note: the language does not cover this task; --check proved this sentence",
             err=True,
         )
         return 0
-    return covered(found.spoken)
+    return covered(found.task_language)
 
 
 def _text(found: Choices, chosen: list[int], check: bool) -> str:
     from coordlang.tasks.candidates import describe
     from planners.search.plans import Plans
 
-    spoken = found.spoken
+    spoken = found.task_language
     plans = counted(Plans.of(found.fits).count, "plan")
     lines = [
         f"The task {describe(spoken.space, spoken.task)}",
@@ -186,7 +186,7 @@ def _table(found: Choices, own: RobotChoices) -> list[str]:
     """The automaton state by state: what may be done there, where it leads, what is known there."""
     from coordlang.use.choices.dot import distinguishing
 
-    model, automaton = found.spoken.model, own.automaton
+    model, automaton = found.task_language.model, own.automaton
     subplans = counted(automaton.count, "subplan")
     lines = [
         f"{model.robots[own.robot]} may follow {subplans} ({counted(len(automaton), 'state')}):"

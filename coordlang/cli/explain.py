@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from coordlang.explanation.cover import Cover
     from coordlang.explanation.demands import SentenceDemands
     from coordlang.explanation.descriptions import WordDescriptions
-    from coordlang.explanation.words import Mapped
+    from coordlang.explanation.words import MappedStates
     from coordlang.language.sentences import TaskSentence
     from coordlang.use.sentence.task_language import TaskLanguage
 
@@ -103,12 +103,11 @@ def command(
 
 
 def _only(spoken: TaskLanguage, sentences: list[TaskSentence], sentence: str) -> list[TaskSentence]:
-    from coordlang.use.sentence.fitting_plans import fitting
 
     words = spoken.words_of(sentence)
     said = [s for s in sentences if s.words == tuple(spoken.table.words[w] for w in words)]
     if not said:
-        fitting(spoken, words)  # raises, and says where no plan fits any more
+        spoken.plans_with(words)  # raises, and says where no plan fits any more
     return said
 
 
@@ -116,16 +115,15 @@ def _asked(
     spoken: TaskLanguage, formulas: dict[str, Cover], sentence: TaskSentence
 ) -> SentenceDemands:
     from coordlang.explanation.demands import sentence_demands
-    from coordlang.use.sentence.fitting_plans import fitting
 
     return sentence_demands(
-        fitting(spoken, spoken.words_of(sentence.words)), spoken.table, formulas
+        spoken.plans_with(spoken.words_of(sentence.words)), spoken.table, formulas
     )
 
 
 def _data(
     spoken: TaskLanguage,
-    mapped: Mapped,
+    mapped: MappedStates,
     formulas: dict[str, Cover],
     told: WordDescriptions,
     sentences: list[TaskSentence],
@@ -165,8 +163,8 @@ def _data(
     }
 
 
-def _words(spoken: TaskLanguage, mapped: Mapped, told: WordDescriptions) -> str:
-    from coordlang.explanation.text import telling_text
+def _words(spoken: TaskLanguage, mapped: MappedStates, told: WordDescriptions) -> str:
+    from coordlang.explanation.text import descriptions_text
 
     language = spoken.language
     g = language.guarantee
@@ -179,7 +177,7 @@ def _words(spoken: TaskLanguage, mapped: Mapped, told: WordDescriptions) -> str:
     ]
     if told.in_order:
         lines.append("The first formula that is true in a state gives its word:")
-    lines.append(telling_text(told, mapped))
+    lines.append(descriptions_text(told, mapped))
     long = [word for word, formula in told.rules if formula and not formula.fewest]
     if not mapped.word.size:
         return "\n".join([*lines, f"No state is mapped: the word is always {language.default}."])

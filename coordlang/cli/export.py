@@ -24,7 +24,7 @@ from coordlang.cli.app import (
 
 if TYPE_CHECKING:
     from coordlang.use.export.ltlf import SentenceFormula
-    from coordlang.use.export.pddl import Exported
+    from coordlang.use.export.pddl import PddlExport
     from coordlang.use.sentence.task_language import TaskLanguage
 
 
@@ -108,7 +108,7 @@ def command(
     return covered(spoken)
 
 
-def _write_pddl(exported: Exported, output: str | None, as_json: bool) -> None:
+def _write_pddl(exported: PddlExport, output: str | None, as_json: bool) -> None:
     from coordlang.cli.speaking import write
     from coordlang.language.file import write_atomically
     from planners.errors import UsageError
@@ -129,7 +129,7 @@ def _write_pddl(exported: Exported, output: str | None, as_json: bool) -> None:
     click.echo(f"written to {output}: domain.pddl, problem.pddl: {size} for the words")
 
 
-def _data(exported: Exported) -> dict[str, Any]:
+def _data(exported: PddlExport) -> dict[str, Any]:
     model = exported.model
     return {
         "domain": exported.domain,
@@ -171,7 +171,7 @@ def _write_formula(formula: SentenceFormula, output: str | None, as_json: bool) 
 def _write_plan(
     spoken: TaskLanguage,
     words: tuple[int, ...],
-    exported: Exported,
+    exported: PddlExport,
     back: str,
     output: str | None,
     as_json: bool,
@@ -179,7 +179,6 @@ def _write_plan(
     """A plan of the exported problem, which must be an optimal one, as an ordinary plan file."""
     from coordlang.cli.speaking import write
     from coordlang.use.export.pddl import plan_names
-    from coordlang.use.sentence.fitting_plans import fitting
     from planners.errors import BadInput, Position, Refuted
     from planners.search.plan_file import only_one_plan, to_ipc, to_json
     from planners.search.plans import Plans
@@ -196,7 +195,7 @@ def _write_plan(
         plan = exported.joint_plan(plan_names(text))
     except BadInput as error:
         raise BadInput(error.what, position=place, remedy=error.remedy) from None
-    plans = Plans.of(fitting(spoken, words))
+    plans = Plans.of(spoken.plans_with(words))
     if plans.rank(plan) is None:
         raise Refuted(
             "this is no optimal plan of the exported problem",

@@ -18,8 +18,8 @@ from coordlang.cli.app import (
 )
 
 if TYPE_CHECKING:
-    from coordlang.use.sentence.astar import Search
     from coordlang.use.sentence.best_sentence import BestSentence
+    from coordlang.use.sentence.guided_search import GuidedPlan
     from coordlang.use.sentence.preferences import Preference
 
 
@@ -61,10 +61,10 @@ def command(
     the sentence go to stderr.
     """
     from coordlang.cli.speaking import covered, read_task_language
-    from coordlang.use.sentence.astar import ExpandedStates, plan_under_sentence
     from coordlang.use.sentence.best_sentence import best_sentence
+    from coordlang.use.sentence.guided_search import ExpandedStates, plan_under_sentence
+    from coordlang.use.sentence.open_plans import OpenPlans, open_plans_data
     from coordlang.use.sentence.preferences import read_preference
-    from coordlang.use.sentence.understanding import understand, understood_data
     from planners.search.plan_file import to_ipc
 
     if (sentence is None) == (not wishes):
@@ -76,9 +76,9 @@ def command(
     terrain = ExpandedStates(spoken.model, spoken.table)
     found = plan_under_sentence(spoken, words, heuristic, terrain)
     without = plan_under_sentence(spoken, None, heuristic, terrain)
-    understood = understand(spoken, words)
+    understood = OpenPlans.of(spoken, words)
     if as_json:
-        data = understood_data(understood, [found.plan], None)
+        data = open_plans_data(understood, [found.plan], None)
         data["search"] = {
             "heuristic": heuristic,
             **_work(found),
@@ -98,7 +98,7 @@ def command(
     return covered(spoken)
 
 
-def _work(search: Search) -> dict[str, int]:
+def _work(search: GuidedPlan) -> dict[str, int]:
     return {"expanded": search.expanded, "generated": search.generated, "states": search.states}
 
 

@@ -33,7 +33,7 @@ def command(
     sentence a line.
     """
     from coordlang.cli.speaking import covered, read_task_language
-    from coordlang.use.sentence.saying import read_plan_file, say
+    from coordlang.use.sentence.plan_sentence import read_plan_file, sentence_of_plan
     from planners.errors import CoordlangError
 
     spoken = read_task_language(language, domain, problem, given)
@@ -41,7 +41,7 @@ def command(
     sentences = []
     for number, steps in enumerate(plans, 1):
         try:
-            sentences.append(spoken.text(say(spoken, steps)))
+            sentences.append(spoken.text(sentence_of_plan(spoken, steps)))
         except CoordlangError as error:
             if len(plans) > 1:
                 error.what = f"plan {number} of {len(plans)}: {error.what}"

@@ -21,7 +21,7 @@ from coordlang.cli.app import (
 )
 
 if TYPE_CHECKING:
-    from coordlang.use.sentence.understanding import Understood
+    from coordlang.use.sentence.open_plans import OpenPlans
     from planners.search.plans import Plan
 
 _DEFAULT_MAX = 10
@@ -86,7 +86,7 @@ def command(
     and the DAG.
     """
     from coordlang.cli.speaking import covered, read_task_language, write
-    from coordlang.use.sentence.understanding import understand
+    from coordlang.use.sentence.open_plans import OpenPlans
 
     form = form_of(form, as_json)
     check_listing(only_count, most, sample)
@@ -100,7 +100,7 @@ def command(
         )
     check_outputs([("-o", output)], [language, domain, problem])
     spoken = read_task_language(language, domain, problem, given)
-    understood = understand(spoken, spoken.words_of(sentence))
+    understood = OpenPlans.of(spoken, spoken.words_of(sentence))
     if form in ("dot", "svg"):
         write(_drawn(understood, form, nodes or _DEFAULT_NODES), output)
         return covered(spoken)
@@ -120,12 +120,12 @@ def command(
     return covered(spoken)
 
 
-def _drawn(understood: Understood, form: str, nodes: int) -> str:
+def _drawn(understood: OpenPlans, form: str, nodes: int) -> str:
     from coordlang.use.sentence.drawing import cut_note, to_dot
     from coordlang.use.sentence.picture import to_svg
-    from coordlang.use.sentence.understanding import dag
+    from coordlang.use.sentence.plan_dag import plan_dag
 
-    graph = dag(understood, nodes)
+    graph = plan_dag(understood, nodes)
     note = cut_note(graph)
     if note:
         click.echo(f"coordlang: note: {note}; --nodes N draws more", err=True)
@@ -133,17 +133,18 @@ def _drawn(understood: Understood, form: str, nodes: int) -> str:
 
 
 def _data(
-    understood: Understood, listed: list[Plan], only_count: bool, sampled: bool, nodes: int | None
+    understood: OpenPlans, listed: list[Plan], only_count: bool, sampled: bool, nodes: int | None
 ) -> str:
-    from coordlang.use.sentence.understanding import dag, understood_data
+    from coordlang.use.sentence.open_plans import open_plans_data
+    from coordlang.use.sentence.plan_dag import plan_dag
 
-    data = understood_data(understood, listed, None if only_count else dag(understood, nodes))
+    data = open_plans_data(understood, listed, None if only_count else plan_dag(understood, nodes))
     if sampled:
         data["complete"] = False
     return json.dumps(data) + "\n"
 
 
-def _listed(understood: Understood, listed: list[Plan], sampled: bool) -> str:
+def _listed(understood: OpenPlans, listed: list[Plan], sampled: bool) -> str:
     from planners.search.plan_file import to_ipc
 
     parts = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from coordlang.explanation.cover import Cover
-from coordlang.explanation.words import Mapped, cover
+from coordlang.explanation.words import MappedStates, cover
 
 #: Formulas of up to this length need no order, and those of over that length are beyond reading in
 #: any order.
@@ -38,7 +38,7 @@ class WordDescriptions:
 
 
 def describe_words(
-    mapped: Mapped, formulas: dict[str, Cover], each: bool = False
+    mapped: MappedStates, formulas: dict[str, Cover], each: bool = False
 ) -> WordDescriptions:
     """The shorter way to tell the words.
 
@@ -62,10 +62,9 @@ def _apart(formulas: dict[str, Cover]) -> WordDescriptions:
     return WordDescriptions((*others, (longest, None)), False)
 
 
-def _in_order(mapped: Mapped, formulas: dict[str, Cover]) -> WordDescriptions:
-    """The word with the shortest formula against the words still to come, again and again.
-
-    Of the few that look shortest.
+def _in_order(mapped: MappedStates, formulas: dict[str, Cover]) -> WordDescriptions:
+    """Always next: the word with the shortest formula against the words still to come (of the few
+    that look shortest).
     """
     left = dict(formulas)
     rules: list[tuple[str, Cover | None]] = []

@@ -9,7 +9,7 @@ from typing import Any
 from coordlang.explanation.cover import Cover, Literal, Term
 from coordlang.explanation.demands import RobotPart, SentenceDemands, WordChange
 from coordlang.explanation.descriptions import WordDescriptions
-from coordlang.explanation.words import Mapped
+from coordlang.explanation.words import MappedStates
 
 #: Terms of one formula, and alternatives of one choice, that are written out.
 _TERMS = 12
@@ -84,7 +84,7 @@ def cover_data(cover: Cover) -> dict[str, Any]:
     }
 
 
-def telling_text(told: WordDescriptions, mapped: Mapped) -> str:
+def descriptions_text(told: WordDescriptions, mapped: MappedStates) -> str:
     """The words and their formulas, a term a line where there are several."""
     lines = []
     states = dict(zip(mapped.words, mapped.states, strict=True))

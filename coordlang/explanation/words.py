@@ -17,10 +17,9 @@ from planners.tables import Ints, Rows, find_rows, unique_rows
 
 
 @dataclass(frozen=True, slots=True)
-class Mapped:
-    """The states that formulas must be exact on.
-
-    Their values and word numbers, ``states`` in each word.
+class MappedStates:
+    """The states that formulas must be exact on: their values and word numbers, ``states`` in each
+    word.
 
     For all other states the formulas say nothing: several may be true there, or none.
     """
@@ -34,7 +33,7 @@ class Mapped:
         return [int(n) for n in np.bincount(self.word, minlength=len(self.words))]
 
 
-def mapped_states(language: Language, model: JointModel, also: Rows | None = None) -> Mapped:
+def mapped_states(language: Language, model: JointModel, also: Rows | None = None) -> MappedStates:
     """The states that a language maps (and ``also`` these, which have their word by its default)."""
     table = WordTable.of(language, model)
     rows, word = table.rows, table.word
@@ -43,7 +42,7 @@ def mapped_states(language: Language, model: JointModel, also: Rows | None = Non
         more = more[find_rows(rows, more) < 0] if len(rows) else more
         rows = np.concatenate((rows, more))
         word = np.concatenate((word, np.full(len(more), table.default)))
-    return Mapped(table.words, valuation(model, rows), word)
+    return MappedStates(table.words, valuation(model, rows), word)
 
 
 def word_formulas(
@@ -61,13 +60,13 @@ def word_formulas(
     return all_covers(mapped_states(language, model, also))
 
 
-def all_covers(mapped: Mapped) -> dict[str, Cover]:
+def all_covers(mapped: MappedStates) -> dict[str, Cover]:
     """Each word's formula; see `word_formulas`."""
     return {word: cover(mapped, number) for number, word in enumerate(mapped.words)}
 
 
 def cover(
-    mapped: Mapped, word: int, against: Sequence[int] | None = None, quick: bool = False
+    mapped: MappedStates, word: int, against: Sequence[int] | None = None, quick: bool = False
 ) -> Cover:
     """The formula of a word that is false in all states of the words ``against``.
 
@@ -91,7 +90,9 @@ def cover(
     return Cover(terms, tuple(int(c) for c in counts), int(mine.sum()), boxes.fewest)
 
 
-def _term(mapped: Mapped, points: Points, least: Sequence[bool], prime: Sequence[bool]) -> Term:
+def _term(
+    mapped: MappedStates, points: Points, least: Sequence[bool], prime: Sequence[bool]
+) -> Term:
     """What is shortest to say between the least box and the prime one."""
     literals = []
     for variable, start in zip(mapped.valuation.variables, points.offset.tolist(), strict=True):
@@ -106,7 +107,7 @@ def _term(mapped: Mapped, points: Points, least: Sequence[bool], prime: Sequence
     return tuple(literals)
 
 
-def _box_of(mapped: Mapped, terms: Sequence[Term]) -> Bits:
+def _box_of(mapped: MappedStates, terms: Sequence[Term]) -> Bits:
     rows = []
     for term in terms:
         values = {literal.variable.name: literal.values for literal in term}

@@ -14,7 +14,6 @@ from coordlang.language.sentences import sentence_counts
 from coordlang.language.words import sentence
 from coordlang.report.layout import layer_orders
 from coordlang.use.choices.automaton import determinise
-from coordlang.use.sentence.fitting_plans import fitting
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import OutOfMemory
 from planners.search.plan_space import PlanSpace
@@ -125,7 +124,7 @@ def shown_sentences(spoken: TaskLanguage, graph: Graph, seed: int) -> ShownSente
         plans = {
             words: counts(fits)[int(fits.starts[0])]
             for words in said
-            for fits in [fitting(spoken, words)]
+            for fits in [spoken.plans_with(words)]
         }
     else:
         plans = all_of_them
@@ -161,7 +160,7 @@ def _drawn_sentences(spoken: TaskLanguage, graph: Graph, seed: int) -> list[tupl
 
 
 def _own_counts(spoken: TaskLanguage, words: tuple[int, ...]) -> tuple[int | None, ...]:
-    fits = fitting(spoken, words)
+    fits = spoken.plans_with(words)
     return tuple(_own_count(fits, robot) for robot in range(len(spoken.model.robots)))
 
 

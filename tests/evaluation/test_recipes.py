@@ -24,7 +24,7 @@ from coordlang.evaluation.material.paper import (
 )
 from coordlang.evaluation.material.suite import OTHERS, ROWS, WORLDS, find_domains
 from coordlang.language.words import WordTable
-from coordlang.use.sentence.astar import ExpandedStates
+from coordlang.use.sentence.guided_search import ExpandedStates
 from coordlang.use.sentence.task_language import languages_in_tasks
 from coordlang.vocabulary.sat import PartitionProblem
 from planners.errors import OutOfTime, UsageError

@@ -8,7 +8,6 @@ from itertools import product
 import pytest
 
 from coordlang.report.page import LARGEST, make_report
-from coordlang.use.sentence.fitting_plans import fitting
 from coordlang.use.sentence.task_language import language_in_task
 from planners.pddl.lifted import And
 from planners.search.plans import Plans
@@ -65,7 +64,7 @@ def test_plans_are_those_of_the_planner(open_page: Opener) -> None:
     opened = open_page(world.report.html)
     checked = 0
     for number, entry in list(enumerate(world.data["tasks"][0]["sentences"]))[::6]:
-        fits = fitting(spoken, entry["words"])
+        fits = spoken.plans_with(entry["words"])
         plans = Plans.of(fits)
         assert entry["plans"] == str(plans.count)
         opened.page.click(f"[data-sentence='{number}']")
@@ -128,7 +127,7 @@ def test_a_robots_options_are_its_own_subplans(open_page: Opener) -> None:
     for entry, robots in zip(world.data["tasks"][0]["sentences"], ways, strict=False):
         plans = [
             [spoken.model.texts(step) for step in plan]
-            for plan in Plans.of(fitting(spoken, entry["words"]))
+            for plan in Plans.of(spoken.plans_with(entry["words"]))
         ]
         for robot, found in enumerate(robots):
             expected = {tuple(step[robot] or "idle" for step in plan) for plan in plans}

@@ -22,12 +22,14 @@ Own = tuple[int, ...]
 Known = tuple[frozenset[str], frozenset[str]]
 
 
-def sentences(spoken: TaskLanguage, most: int) -> dict[tuple[int, ...], list[Plan]]:
+def sentences(task_language: TaskLanguage, most: int) -> dict[tuple[int, ...], list[Plan]]:
     """All optimal plans of the task by their sentence; raises `naive.TooLarge`."""
     groups: dict[tuple[int, ...], list[Plan]] = {}
-    word = spoken.table.of_rows(spoken.space.rows)
-    for plan in naive.listed(spoken.space, spoken.task, most):
-        said = naive.sentence([int(word[s]) for s in naive.states(spoken.space, spoken.task, plan)])
+    word = task_language.table.of_rows(task_language.space.rows)
+    for plan in naive.listed(task_language.space, task_language.task, most):
+        said = naive.sentence(
+            [int(word[s]) for s in naive.states(task_language.space, task_language.task, plan)]
+        )
         groups.setdefault(said, []).append(plan)
     return groups
 
@@ -36,14 +38,14 @@ def sentences(spoken: TaskLanguage, most: int) -> dict[tuple[int, ...], list[Pla
 class Listed:
     """The plans of one sentence, and all plans of the task."""
 
-    spoken: TaskLanguage
+    task_language: TaskLanguage
     plans: list[Plan]
     optimal: set[Plan]
 
     @cached_property
     def own(self) -> list[set[Own]]:
         """For each robot its own parts of the plans."""
-        robots = len(self.spoken.model.robots)
+        robots = len(self.task_language.model.robots)
         return [
             {tuple(step[robot] for step in plan) for plan in self.plans} for robot in range(robots)
         ]
@@ -67,8 +69,8 @@ class Listed:
     @cached_property
     def facts(self) -> dict[tuple[Own, ...], list[frozenset[str]]]:
         """The true facts along every combination."""
-        space, codec = self.spoken.space, self.spoken.model.codec
-        plans = Plans(space, self.spoken.start, [])
+        space, codec = self.task_language.space, self.task_language.model.codec
+        plans = Plans(space, self.task_language.start, [])
         return {
             chosen: [
                 frozenset(codec.decode(space.rows[s])) & set(codec.facts)
@@ -79,7 +81,7 @@ class Listed:
 
     def knows(self, robot: int) -> dict[Own, Known]:
         """Own beginning -> what has one value after it, whatever the others chose."""
-        everything = frozenset(self.spoken.model.codec.facts)
+        everything = frozenset(self.task_language.model.codec.facts)
         found: dict[Own, Known] = {}
         for chosen, along in self.facts.items():
             for step, here in enumerate(along):
@@ -126,7 +128,8 @@ class Listed:
     ) -> bool:
         ahead = [known[own[:step]] for step in range(here, len(own) + 1)]
         texts = [
-            self.spoken.model.labels[robot][label] if label else "idle" for label in own[here:]
+            self.task_language.model.labels[robot][label] if label else "idle"
+            for label in own[here:]
         ]
         return (
             all(any(atom in true for true, _ in ahead) for atom in detour.visit)
@@ -141,13 +144,13 @@ def like(pattern: str, text: str) -> bool:
 
 
 def listed(
-    spoken: TaskLanguage, most_plans: int, most_combinations: int
+    task_language: TaskLanguage, most_plans: int, most_combinations: int
 ) -> Iterator[tuple[tuple[int, ...], Listed]]:
     """Every sentence of a task with what it leaves open; raises `naive.TooLarge`."""
-    groups = sentences(spoken, most_plans)
+    groups = sentences(task_language, most_plans)
     optimal = {plan for group in groups.values() for plan in group}
     for words, plans in groups.items():
-        found = Listed(spoken, plans, optimal)
+        found = Listed(task_language, plans, optimal)
         if found.combinations > most_combinations:
             raise naive.TooLarge
         yield words, found

@@ -60,7 +60,7 @@ def shipped(name: str) -> tuple[Candidates, TaskLanguage]:
     raise AssertionError(name)
 
 
-def random_spoken(seed: int, robots: int) -> tuple[Candidates, TaskLanguage]:
+def random_task_language(seed: int, robots: int) -> tuple[Candidates, TaskLanguage]:
     """A task of a random model, one of its longer ones, under a random partition; some states are
     left to the default.
 
@@ -128,19 +128,19 @@ def spoken_in(candidates: Candidates, language: Language) -> TaskLanguage:
     return TaskLanguage(language, table, space, 0, table.of_rows(space.rows)[space.state], True)
 
 
-def by_sentence(spoken: TaskLanguage) -> dict[tuple[str, ...], set[Plan]]:
+def by_sentence(task_language: TaskLanguage) -> dict[tuple[str, ...], set[Plan]]:
     """All optimal plans of the task by their sentences.  Raises `TooLarge`."""
-    space, language = spoken.space, spoken.language
+    space, language = task_language.space, task_language.language
     keys = [space.model.codec.key(row) for row in space.rows]
     groups: dict[tuple[str, ...], set[Plan]] = {}
-    for plan in listed(space, spoken.task, MOST):
+    for plan in listed(space, task_language.task, MOST):
         words = [
             language.states.get(keys[s], language.default)
-            for s in Plans(space, spoken.start, []).states(plan)
+            for s in Plans(space, task_language.start, []).states(plan)
         ]
         said = tuple(word for n, word in enumerate(words) if n == 0 or word != words[n - 1])
         groups.setdefault(said, set()).add(plan)
     return groups
 
 
-__all__ = ["SHIPPED", "TooLarge", "by_sentence", "random_spoken", "shipped"]
+__all__ = ["SHIPPED", "TooLarge", "by_sentence", "random_task_language", "shipped"]

@@ -22,7 +22,6 @@ from coordlang.use.choices.automaton import Automaton, determinise
 from coordlang.use.choices.choices import Choices, RobotChoices, choices
 from coordlang.use.choices.file import monitor
 from coordlang.use.choices.own_facts import OwnFacts
-from coordlang.use.sentence.fitting_plans import fitting
 from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 from coordlang.verification.by_definition import verify
 from planners.errors import OutOfMemory, ProvedImpossible
@@ -137,10 +136,10 @@ def with_twins(
     """(seed, task, sentence, what is listed of it) over many random models."""
     for seed in range(models):
         with suppress(Unsuitable):
-            for spoken in make(seed, robots):
+            for task_language in make(seed, robots):
                 with suppress(naive.TooLarge):
-                    for words, twin in list(listed(spoken, *SIZES[robots])):
-                        yield seed, spoken, words, twin
+                    for words, twin in list(listed(task_language, *SIZES[robots])):
+                        yield seed, task_language, words, twin
 
 
 def moves(automaton: Automaton) -> list[dict[int, int]]:
@@ -151,7 +150,7 @@ def check_automata(found: Choices, twin: Listed) -> None:
     """Each automaton accepts exactly the robot's own parts, is deterministic, and the least that
     knows what it knows.
     """
-    facts = found.spoken.model.codec.facts
+    facts = found.task_language.model.codec.facts
     for own, parts in zip(found.robots, twin.own, strict=True):
         automaton = own.automaton
         assert accepted(moves(automaton)) == parts
@@ -184,8 +183,8 @@ def check_combinations(found: Choices, twin: Listed) -> None:
     """Every combination of choices, stepped through all robots' monitors, is an optimal plan; they
     allow no others.
     """
-    labels = found.spoken.model.labels
-    robots = found.spoken.model.robots
+    labels = found.task_language.model.labels
+    robots = found.task_language.model.robots
     for chosen in product(*(accepted(moves(own.automaton)) for own in found.robots)):
         monitors = [monitor(found, robot) for robot in robots]
         for step in zip(*chosen, strict=True):
@@ -202,8 +201,8 @@ def check_combinations(found: Choices, twin: Listed) -> None:
 def test_every_combination_is_optimal(robots: int, models: int) -> None:
     seen: Counter[str] = Counter()
     stepped: Counter[int] = Counter()
-    for seed, spoken, words, twin in with_twins(spoken_in, robots, models):
-        found = choices(spoken, words)
+    for seed, task_language, words, twin in with_twins(spoken_in, robots, models):
+        found = choices(task_language, words)
         assert found.guaranteed
         assert found.mixtures is not None
         assert found.mixtures.space is not None
@@ -232,8 +231,8 @@ def test_a_broken_language_is_found_out(robots: int, models: int) -> None:
     fails.
     """
     seen: Counter[bool] = Counter()
-    for _, spoken, words, twin in with_twins(at_random, robots, models):
-        found = choices(spoken, words)
+    for _, task_language, words, twin in with_twins(at_random, robots, models):
+        found = choices(task_language, words)
         assert found.mixtures is not None
         assert found.mixtures.holds == found.guaranteed == twin.mixes
         seen[twin.mixes] += 1
@@ -253,7 +252,7 @@ def check_violation(found: Choices, twin: Listed) -> None:
     assert found.mixtures is not None
     shown = found.mixtures.violation
     assert shown is not None
-    model = found.spoken.model
+    model = found.task_language.model
     followed = tuple(tuple(model.numbers(step) for step in plan) for plan in shown.plans)
     assert set(followed) <= set(twin.plans)
     mixed = naive.mixture(followed)
@@ -270,25 +269,25 @@ def test_own_atoms_are_known(robots: int, models: int) -> None:
     else is said.
     """
     seen: Counter[str] = Counter()
-    for _, spoken, words, twin in with_twins(at_random, robots, models):
+    for _, task_language, words, twin in with_twins(at_random, robots, models):
         if not twin.mixes:
             continue
-        found = choices(spoken, words, most=0)
+        found = choices(task_language, words, most=0)
         if len(found.robots[0].automaton.layers) > 1:
             assert found.mixtures is None
             check_automata(found, twin)
             for own in found.robots:
                 assert own.atoms == "own"
-                check_own_atoms(spoken, own, twin, seen)
+                check_own_atoms(task_language, own, twin, seen)
     assert min(seen["true"], seen["false"], seen["unknown"]) >= 100, seen
 
 
 def check_own_atoms(
-    spoken: TaskLanguage, own: RobotChoices, twin: Listed, seen: Counter[str]
+    task_language: TaskLanguage, own: RobotChoices, twin: Listed, seen: Counter[str]
 ) -> None:
     known = twin.knows(own.robot)
-    mask = OwnFacts.of(spoken.model, own.robot).mask
-    facts = spoken.model.codec.facts
+    mask = OwnFacts.of(task_language.model, own.robot).mask
+    facts = task_language.model.codec.facts
     for part in twin.own[own.robot]:
         state = 0
         for step, label in enumerate((*part, None)):
@@ -353,26 +352,26 @@ def shipped(folder: str, name: str) -> Iterator[TaskLanguage]:
 @pytest.mark.parametrize(("folder", "name"), SHIPPED)
 def test_shipped_domains(folder: str, name: str) -> None:
     robots = 0
-    for spoken in shipped(folder, name):
-        robots = max(robots, len(spoken.model.robots))
+    for task_language in shipped(folder, name):
+        robots = max(robots, len(task_language.model.robots))
         try:
-            twins = list(listed(spoken, 2000, 3000))
+            twins = list(listed(task_language, 2000, 3000))
         except naive.TooLarge:
             twins = []
         for words, twin in twins[:12]:
-            found = choices(spoken, words)
+            found = choices(task_language, words)
             assert found.guaranteed
             assert found.mixtures is not None
             check_automata(found, twin)
             if twin.combinations <= 200:
                 check_combinations(found, twin)
         if not twins:
-            plan = next(iter(Plans.of(spoken.space, spoken.task)))
-            states = Plans(spoken.space, spoken.start, []).states(plan)
+            plan = next(iter(Plans.of(task_language.space, task_language.task)))
+            states = Plans(task_language.space, task_language.start, []).states(plan)
             words = naive.sentence(
-                [int(spoken.table.of_rows(spoken.space.rows[[s]])[0]) for s in states]
+                [int(task_language.table.of_rows(task_language.space.rows[[s]])[0]) for s in states]
             )
-            assert choices(spoken, words).guaranteed
+            assert choices(task_language, words).guaranteed
     assert robots == 3 or not name.startswith("three-robots")
 
 
@@ -385,12 +384,12 @@ def test_own_atoms_of_shipped_domains(folder: str, name: str) -> None:
     known.
     """
     seen: Counter[str] = Counter()
-    for spoken in shipped(folder, name):
+    for task_language in shipped(folder, name):
         with suppress(naive.TooLarge):
-            for words, twin in list(listed(spoken, 2000, 3000))[:6]:
-                for own in choices(spoken, words, most=0).robots:
+            for words, twin in list(listed(task_language, 2000, 3000))[:6]:
+                for own in choices(task_language, words, most=0).robots:
                     assert own.atoms == "own"
-                    check_own_atoms(spoken, own, twin, seen)
+                    check_own_atoms(task_language, own, twin, seen)
     assert seen["unknown"] >= 10
 
 
@@ -401,9 +400,9 @@ def test_all_tasks_of_the_t_map() -> None:
     language = build_language(candidates, "minimal").language
     assert len(language.words) == 3
     tasks = 0
-    for spoken in languages_in_tasks(language, candidates):
-        for words, twin in listed(spoken, 1000, 1000):
-            found = choices(spoken, words)
+    for task_language in languages_in_tasks(language, candidates):
+        for words, twin in listed(task_language, 1000, 1000):
+            found = choices(task_language, words)
             check_automata(found, twin)
             check_combinations(found, twin)
         tasks += 1
@@ -435,9 +434,9 @@ def test_choices_may_leave_the_sentence(robots: int) -> None:
     word = np.array([1 + len(begun[s]) % 2 if layer[s] == 1 else 0 for s in range(len(space.rows))])
     table = WordTable(("start", "even", "odd"), space.rows, word, 0)
     assert verify(table, candidates.spaces).holds
-    spoken = TaskLanguage(None, table, space, 0, word[space.state], True)  # type: ignore[arg-type]
-    for words, twin in listed(spoken, 100, 100):
-        found = choices(spoken, words)
+    task_language = TaskLanguage(None, table, space, 0, word[space.state], True)  # type: ignore[arg-type]
+    for words, twin in listed(task_language, 100, 100):
+        found = choices(task_language, words)
         check_automata(found, twin)
         check_combinations(found, twin)
         assert [own.automaton.count for own in found.robots] == [2] * robots
@@ -445,9 +444,9 @@ def test_choices_may_leave_the_sentence(robots: int) -> None:
 
 
 def test_too_many_are_refused_with_an_estimate(monkeypatch: pytest.MonkeyPatch) -> None:
-    spoken = next(shipped("grid", "corners-4x4"))
-    words = spoken.words_of(sentence_of(spoken))
-    fits = fitting(spoken, words)
+    task_language = next(shipped("grid", "corners-4x4"))
+    words = task_language.words_of(sentence_of(task_language))
+    fits = task_language.plans_with(words)
     with pytest.raises(
         OutOfMemory, match=r"after 1 of 6 steps their subsets have 1 members, at this rate about"
     ):
@@ -457,16 +456,18 @@ def test_too_many_are_refused_with_an_estimate(monkeypatch: pytest.MonkeyPatch) 
     with pytest.raises(
         OutOfMemory, match=r"step 1 has \d+ combinations of what the robots may do"
     ) as caught:
-        choices(spoken, words, most=None)
+        choices(task_language, words, most=None)
     assert caught.value.exit_code == 22
-    assert choices(spoken, words).mixtures is None
-    assert choices(spoken, words).guaranteed
+    assert choices(task_language, words).mixtures is None
+    assert choices(task_language, words).guaranteed
 
 
-def sentence_of(spoken: TaskLanguage) -> str:
-    plan = next(iter(Plans.of(spoken.space, spoken.task)))
-    states = Plans(spoken.space, spoken.start, []).states(plan)
-    return spoken.text(naive.sentence(spoken.table.of_rows(spoken.space.rows[states]).tolist()))
+def sentence_of(task_language: TaskLanguage) -> str:
+    plan = next(iter(Plans.of(task_language.space, task_language.task)))
+    states = Plans(task_language.space, task_language.start, []).states(plan)
+    return task_language.text(
+        naive.sentence(task_language.table.of_rows(task_language.space.rows[states]).tolist())
+    )
 
 
 def test_a_task_that_starts_at_its_goal() -> None:
@@ -475,9 +476,9 @@ def test_a_task_that_starts_at_its_goal() -> None:
     from planners.pddl.lifted import TRUE
 
     candidates = from_problems(domain, [replace(problem, goal=TRUE)])
-    (spoken,) = languages_in_tasks(build_language(candidates).language, candidates)
-    found = choices(spoken, (int(spoken.word[spoken.start]),))
-    for own, robot in zip(found.robots, spoken.model.robots, strict=True):
+    (task_language,) = languages_in_tasks(build_language(candidates).language, candidates)
+    found = choices(task_language, (int(task_language.word[task_language.start]),))
+    for own, robot in zip(found.robots, task_language.model.robots, strict=True):
         assert len(own.automaton) == own.automaton.count == 1
         at = monitor(found, robot)
         assert at.finished

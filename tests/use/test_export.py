@@ -26,7 +26,7 @@ from coordlang.tasks.candidates import from_problems
 from coordlang.use.export import membership as membership_module
 from coordlang.use.export.ltlf import export_ltlf, symbols_of
 from coordlang.use.export.membership import membership
-from coordlang.use.export.pddl import Exported, export_pddl, plan_names
+from coordlang.use.export.pddl import PddlExport, export_pddl, plan_names
 from coordlang.use.sentence.fitting_plans import NoPlanFits
 from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 from planners.classical import action_names
@@ -45,7 +45,7 @@ SEEDS = {"few": range(80), "many": range(80, 600)}
 BOTH = pytest.mark.parametrize("lot", ["few", pytest.param("many", marks=pytest.mark.slow)])
 
 
-def random_spoken(seed: int) -> TaskLanguage | None:
+def random_task_language(seed: int) -> TaskLanguage | None:
     """A random task with a random partition of its reachable states, some of them left to the
     default.
 
@@ -85,31 +85,34 @@ def random_spoken(seed: int) -> TaskLanguage | None:
 
 @cache
 def tasks(lot: str) -> tuple[TaskLanguage, ...]:
-    found = map(random_spoken, SEEDS[lot])
-    return tuple(spoken for spoken in found if spoken is not None)
+    found = map(random_task_language, SEEDS[lot])
+    return tuple(task_language for task_language in found if task_language is not None)
 
 
 def rich() -> TaskLanguage:
     """A task with several sentences, one of which has several words and leaves several plans open."""
-    for spoken in tasks("few"):
-        sentences = by_sentence(spoken)
+    for task_language in tasks("few"):
+        sentences = by_sentence(task_language)
         if len(sentences) > 1 and any(
             len(plans) > 1 and len(words) > 1 for words, plans in sentences.items()
         ):
-            return spoken
+            return task_language
     raise AssertionError("no such task")
 
 
-def by_sentence(spoken: TaskLanguage) -> dict[tuple[int, ...], set[Plan]]:
+def by_sentence(task_language: TaskLanguage) -> dict[tuple[int, ...], set[Plan]]:
     """The definition: every optimal plan with the words of its states, repeated ones collapsed."""
-    plans, found = Plans.of(spoken.space, spoken.task), dict[tuple[int, ...], set[Plan]]()
+    plans, found = (
+        Plans.of(task_language.space, task_language.task),
+        dict[tuple[int, ...], set[Plan]](),
+    )
     for plan in plans:
-        words = spoken.table.of_rows(spoken.space.rows[plans.states(plan)])
+        words = task_language.table.of_rows(task_language.space.rows[plans.states(plan)])
         found.setdefault(sentence(words.tolist()), set()).add(plan)
     return found
 
 
-def planned(exported: Exported) -> list[Plan]:
+def planned(exported: PddlExport) -> list[Plan]:
     """The joint plans of all optimal plans of an exported problem."""
     names = action_names(exported.plain)
     return [exported.joint_plan([names[n] for n in plan]) for plan in optimal_plans(exported.plain)]
@@ -117,36 +120,44 @@ def planned(exported: Exported) -> list[Plan]:
 
 @BOTH
 def test_the_optimal_plans_are_the_plans_that_fit(lot: str) -> None:
-    for spoken in tasks(lot):
-        for words, plans in islice(by_sentence(spoken).items(), 4):
+    for task_language in tasks(lot):
+        for words, plans in islice(by_sentence(task_language).items(), 4):
             for form, limit in FORMS.items():
-                exported = export_pddl(spoken, words, limit)
+                exported = export_pddl(task_language, words, limit)
                 assert exported.plain.form == form
                 assert Counter(planned(exported)) == Counter(plans)
                 assert optimal_plans(exported.plain).cost == exported.cost
-                assert exported.plain.cost(exported.cost) == spoken.space.cost_of(spoken.task)
+                assert exported.plain.cost(exported.cost) == task_language.space.cost_of(
+                    task_language.task
+                )
 
 
 def test_the_random_tasks_are_worth_it() -> None:
     """Some have several sentences, some sentences leave several plans open; some remember actions,
     some have three robots.
     """
-    listed = [(spoken, by_sentence(spoken)) for spoken in tasks("few")]
+    listed = [(task_language, by_sentence(task_language)) for task_language in tasks("few")]
     both = [any(len(p) > 1 for p in found.values()) for _, found in listed if len(found) > 1]
     assert (len(listed) >= 20, len(both) >= 4, sum(both) >= 3) == (True, True, True)
-    assert {spoken.model.remembers for spoken, _ in listed} == {True, False}
-    assert {len(spoken.model.robots) for spoken, _ in listed} == {2, 3}
-    assert {spoken.model.is_joint_action for spoken, _ in listed} == {True, False}
+    assert {task_language.model.remembers for task_language, _ in listed} == {True, False}
+    assert {len(task_language.model.robots) for task_language, _ in listed} == {2, 3}
+    assert {task_language.model.is_joint_action for task_language, _ in listed} == {True, False}
 
 
 @BOTH
 def test_one_term_in_every_state(lot: str) -> None:
-    for spoken in tasks(lot):
-        rows = np.concatenate((spoken.table.rows, spoken.space.rows[spoken.space.state]))
-        words = spoken.table.of_rows(rows).tolist()
-        states = [frozenset(spoken.model.codec.decode(row)) for row in rows]
-        exact, tree = membership(spoken), membership(spoken, states=0)
-        for found, most in ((exact, 1), (tree, 1), (membership(spoken, apart=False), len(rows))):
+    for task_language in tasks(lot):
+        rows = np.concatenate(
+            (task_language.table.rows, task_language.space.rows[task_language.space.state])
+        )
+        words = task_language.table.of_rows(rows).tolist()
+        states = [frozenset(task_language.model.codec.decode(row)) for row in rows]
+        exact, tree = membership(task_language), membership(task_language, states=0)
+        for found, most in (
+            (exact, 1),
+            (tree, 1),
+            (membership(task_language, apart=False), len(rows)),
+        ):
             for state, word in zip(states, words, strict=True):
                 true = [
                     n
@@ -217,10 +228,15 @@ def true_at(formula: tuple[object, ...], states: Sequence[frozenset[str]], place
     raise AssertionError(formula)
 
 
-def symbols_in(spoken: TaskLanguage, plan: Plan, symbols: dict[str, str]) -> list[frozenset[str]]:
+def symbols_in(
+    task_language: TaskLanguage, plan: Plan, symbols: dict[str, str]
+) -> list[frozenset[str]]:
     """The states of a plan as the sets of symbols that hold."""
-    plans = Plans.of(spoken.space, spoken.task)
-    states = [set(spoken.model.codec.decode(spoken.space.rows[n])) for n in plans.states(plan)]
+    plans = Plans.of(task_language.space, task_language.task)
+    states = [
+        set(task_language.model.codec.decode(task_language.space.rows[n]))
+        for n in plans.states(plan)
+    ]
     return [
         frozenset(symbol for symbol, atom in symbols.items() if atom in state) for state in states
     ]
@@ -229,14 +245,14 @@ def symbols_in(spoken: TaskLanguage, plan: Plan, symbols: dict[str, str]) -> lis
 @BOTH
 def test_the_formula_is_true_of_the_plans_that_fit_and_of_no_other(lot: str) -> None:
     answers = Counter[bool]()
-    for spoken in tasks(lot):
-        sentences = by_sentence(spoken)
+    for task_language in tasks(lot):
+        sentences = by_sentence(task_language)
         for words in islice(sentences, 3):
-            exported = export_ltlf(spoken, words)
+            exported = export_ltlf(task_language, words)
             formula = parse(exported.formula)
             for other, plans in sentences.items():
                 for plan in islice(sorted(plans), 10):
-                    held = true_at(formula, symbols_in(spoken, plan, exported.symbols), 0)
+                    held = true_at(formula, symbols_in(task_language, plan, exported.symbols), 0)
                     assert held == (other == words)
                     answers[held] += 1
     assert min(answers[True], answers[False]) > 10
@@ -246,15 +262,17 @@ def test_no_word_may_be_skipped(t_map: tuple[Path, Path]) -> None:
     """A plan that stays in w0 does not say "w0 w2 w1 w0", though nothing else is wrong with it."""
     domain = read_domain(t_map[0])
     candidates = from_problems(domain, [read_problem(t_map[1], domain)])
-    spoken = next(languages_in_tasks(build_language(candidates, "minimal").language, candidates))
-    sentences = by_sentence(spoken)
+    task_language = next(
+        languages_in_tasks(build_language(candidates, "minimal").language, candidates)
+    )
+    sentences = by_sentence(task_language)
     assert any(len(set(words)) == 1 for words in sentences)
     assert any(words[0] == words[-1] and len(words) > 2 for words in sentences)
     for words in sentences:
-        exported = export_ltlf(spoken, words)
+        exported = export_ltlf(task_language, words)
         held = {
             other: true_at(
-                parse(exported.formula), symbols_in(spoken, min(plans), exported.symbols), 0
+                parse(exported.formula), symbols_in(task_language, min(plans), exported.symbols), 0
             )
             for other, plans in sentences.items()
         }
@@ -266,13 +284,13 @@ def test_an_independent_library_says_the_same() -> None:
         "flloat.parser.ltlf", reason="flloat is not installed"
     ).LTLfParser()
     answers = Counter[bool]()
-    for spoken in tasks("few"):
-        sentences = by_sentence(spoken)
+    for task_language in tasks("few"):
+        sentences = by_sentence(task_language)
         for words in islice(sentences, 2):
-            exported = export_ltlf(spoken, words)
+            exported = export_ltlf(task_language, words)
             formula = parser(exported.formula)
             for other, plans in islice(sentences.items(), 4):
-                states = symbols_in(spoken, min(plans), exported.symbols)
+                states = symbols_in(task_language, min(plans), exported.symbols)
                 trace = [
                     {symbol: symbol in state for symbol in exported.symbols} for state in states
                 ]
@@ -282,8 +300,8 @@ def test_an_independent_library_says_the_same() -> None:
 
 
 def test_the_formula_over_words_is_the_same_with_their_formulas() -> None:
-    spoken = rich()
-    exported = export_ltlf(spoken, max(by_sentence(spoken), key=len))
+    task_language = rich()
+    exported = export_ltlf(task_language, max(by_sentence(task_language), key=len))
     text = re.sub(r"[a-z][a-z0-9_]*", lambda m: exported.words[m.group()], exported.over_words)
     assert text == exported.formula
 
@@ -309,11 +327,11 @@ def test_symbols_are_readable_and_stay_apart() -> None:
 
 
 def test_a_sentence_that_no_plan_has() -> None:
-    spoken = rich()
-    longest = max(by_sentence(spoken), key=len)
+    task_language = rich()
+    longest = max(by_sentence(task_language), key=len)
     for export in (export_pddl, export_ltlf):
         with pytest.raises(NoPlanFits):
-            export(spoken, (*longest, longest[-2]))
+            export(task_language, (*longest, longest[-2]))
 
 
 def test_plan_files_of_other_planners() -> None:
@@ -337,9 +355,9 @@ def test_a_plan_that_is_cut_off_or_none() -> None:
 
 
 def test_the_export_is_the_same_every_time() -> None:
-    spoken = rich()
-    words = max(by_sentence(spoken), key=len)
-    one, other = (export_pddl(spoken, words, 0) for _ in range(2))
+    task_language = rich()
+    words = max(by_sentence(task_language), key=len)
+    one, other = (export_pddl(task_language, words, 0) for _ in range(2))
     assert (one.domain, one.problem, one.choices) == (other.domain, other.problem, other.choices)
 
 

@@ -37,22 +37,22 @@ def spoken_of(folder: str, name: str) -> TaskLanguage:
 
 @pytest.fixture(scope="module")
 def three_cells() -> Choices:
-    spoken = spoken_of("three-cells", "problem")
-    return choices(spoken, spoken.words_of("w1 w0"))
+    task_language = spoken_of("three-cells", "problem")
+    return choices(task_language, task_language.words_of("w1 w0"))
 
 
 @pytest.fixture(scope="module")
 def corridor() -> Choices:
-    spoken = spoken_of("corridor", "problem")
-    return choices(spoken, spoken.words_of(sentence_of(spoken)))
+    task_language = spoken_of("corridor", "problem")
+    return choices(task_language, task_language.words_of(sentence_of(task_language)))
 
 
-def texts(spoken: TaskLanguage, robot: int, own: Own) -> list[str | None]:
-    return [spoken.model.labels[robot][label] if label else None for label in own]
+def texts(task_language: TaskLanguage, robot: int, own: Own) -> list[str | None]:
+    return [task_language.model.labels[robot][label] if label else None for label in own]
 
 
 def random_detour(
-    random: Random, spoken: TaskLanguage, robot: int, left: set[Own], known: dict[Own, Known]
+    random: Random, task_language: TaskLanguage, robot: int, left: set[Own], known: dict[Own, Known]
 ) -> Detour:
     """What tells two of the subplans that are left apart, or anything else; each kind not at all,
     once or twice.
@@ -64,7 +64,7 @@ def random_detour(
         return tuple(random.sample(telling, min(len(telling), random.choice([0, 0, 0, 1, 1, 2]))))
 
     def done(own: Own) -> set[str]:
-        found = {text or "idle" for text in texts(spoken, robot, own)}
+        found = {text or "idle" for text in texts(task_language, robot, own)}
         return found | (
             {f"{text.rsplit(' ', 1)[0]} *)" for text in found if " " in text}
             if random.random() < 0.3
@@ -78,9 +78,9 @@ def random_detour(
         return set().union(*along(own, 0))
 
     def avoided(own: Own) -> set[str]:
-        return set(spoken.model.codec.facts).intersection(*along(own, 1))
+        return set(task_language.model.codec.facts).intersection(*along(own, 1))
 
-    anything = set(spoken.model.codec.facts)
+    anything = set(task_language.model.codec.facts)
     if random.random() < 0.3:  # also what is never known
         return Detour(some(anything, set()), some(anything, set()))
     return Detour(
@@ -113,19 +113,19 @@ def test_detours_against_the_definition(robots: int, models: int) -> None:
     walked.
     """
     seen: Counter[str] = Counter()
-    for seed, spoken, words, twin in with_twins(spoken_in, robots, models):
+    for seed, task_language, words, twin in with_twins(spoken_in, robots, models):
         random = Random(seed)
-        data = json.loads(to_bytes(choices(spoken, words)))
-        for robot, name in enumerate(spoken.model.robots):
+        data = json.loads(to_bytes(choices(task_language, words)))
+        for robot, name in enumerate(task_language.model.robots):
             known = twin.knows(robot)
             for _ in range(8 if len(twin.own[robot]) > 1 else 1):
-                check_detours(random, spoken, twin, Monitor(data, name), robot, known, seen)
+                check_detours(random, task_language, twin, Monitor(data, name), robot, known, seen)
     assert min(seen["possible"], seen["impossible"], seen["less is left"]) >= models, seen
 
 
 def check_detours(
     random: Random,
-    spoken: TaskLanguage,
+    task_language: TaskLanguage,
     twin: Listed,
     at: Monitor,
     robot: int,
@@ -141,15 +141,15 @@ def check_detours(
         chosen = random.choice(sorted(left))
         stop = random.choice([here, random.randint(here, len(chosen))])
         for label in chosen[here:stop]:
-            at.did(spoken.model.labels[robot][label] if label else None)
+            at.did(task_language.model.labels[robot][label] if label else None)
         here = stop
         left = {own for own in left if own[:here] == chosen[:here]}
-        for number, fact in enumerate(spoken.model.codec.facts):
+        for number, fact in enumerate(task_language.model.codec.facts):
             true, false = known[chosen[:here]]
             assert at.known(fact) == (True if fact in true else False if fact in false else None), (
                 number
             )
-        detour = random_detour(random, spoken, robot, left, known)
+        detour = random_detour(random, task_language, robot, left, known)
         expected = twin.fulfilling(robot, chosen[:here], detour, known) & left
         answer = at.can(detour)
         assert bool(answer) == bool(expected)
@@ -162,10 +162,12 @@ def check_detours(
                 at.commit(detour)
             assert (at.allowed(), at.remaining, at.step, at.promised) == before
             continue
-        assert answer.subplan in {tuple(texts(spoken, robot, own[here:])) for own in expected}
+        assert answer.subplan in {
+            tuple(texts(task_language, robot, own[here:])) for own in expected
+        }
         at.commit(detour)
         assert at.remaining == len(expected)
-        assert subplans(at) == {tuple(texts(spoken, robot, own)) for own in expected}
+        assert subplans(at) == {tuple(texts(task_language, robot, own)) for own in expected}
         seen["less is left"] += len(expected) < len(left)
         left = expected
 
@@ -209,7 +211,7 @@ def test_a_promise_is_kept(corridor: Choices) -> None:
     """In the corridor somebody has a detour to choose; a promise narrows what is allowed, step by
     step.
     """
-    for robot in corridor.spoken.model.robots:
+    for robot in corridor.task_language.model.robots:
         at = monitor(corridor, robot)
         if at.remaining > 1:
             break
@@ -279,7 +281,7 @@ def test_a_robot_can_carry_it(three_cells: Choices, tmp_path: Path) -> None:
 def test_from_the_file_as_from_the_object(corridor: Choices, tmp_path: Path) -> None:
     path = tmp_path / "choices.json"
     path.write_bytes(to_bytes(corridor))
-    for robot in corridor.spoken.model.robots:
+    for robot in corridor.task_language.model.robots:
         pairs = [(monitor(corridor, robot), Monitor.read(str(path), robot))]
         while pairs:
             one, other = pairs.pop()

@@ -437,10 +437,10 @@ def test_a_sentence_leaves_exactly_its_plans() -> None:
     found = translate(problem)
     candidates = from_problems(found.domain, [found.problem])
     language = build_language(candidates).language
-    spoken = next(languages_in_tasks(language, candidates))
+    task_language = next(languages_in_tasks(language, candidates))
     everything = sorted(str(steps_of(found, plan)) for plan in all_plans(problem))
     listed = []
-    sentences = task_sentences(spoken.space, 0, spoken.table)
+    sentences = task_sentences(task_language.space, 0, task_language.table)
     assert len(sentences) > 1
     for sentence in sentences:
         text = " ".join(sentence.words)

@@ -24,7 +24,7 @@ from coordlang.evaluation.material.languages import TITLES, language_for
 from coordlang.evaluation.material.paper import PLANNING_RATIO
 from coordlang.evaluation.material.suite import OTHERS, QUICK_ROW, ROW, WORLDS
 from coordlang.language.words import WordTable
-from coordlang.use.sentence.astar import ExpandedStates, plan_under_sentence
+from coordlang.use.sentence.guided_search import ExpandedStates, plan_under_sentence
 from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 
 METHODS = ("greedy", "separating", "minimal")

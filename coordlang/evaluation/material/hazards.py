@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coordlang.evaluation.material.sentence_counts import sentence_counts
-from coordlang.language.words import Guarantee, Language, WordTable, sentence
+from coordlang.language.words import sentence
 from coordlang.use.choices.automaton import Automaton, determinise
-from coordlang.use.sentence.fitting_plans import fitting
+from coordlang.use.sentence.fitting_plans import plans_with_sentence
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, counts
@@ -115,9 +115,7 @@ class Sayings:
         """What each robot may do under a sentence of a task."""
         if (task, words) not in self._own:
             one = self.spoken
-            fits = fitting(
-                TaskLanguage(one.language, one.table, one.space, task, one.word, one.covered), words
-            )
+            fits = plans_with_sentence(one.space, one.word, task, words, one.table.words)
             self._own[task, words] = [
                 determinise(fits, robot) for robot in range(len(one.model.robots))
             ]
@@ -131,11 +129,8 @@ def own_choices(spoken: TaskLanguage, robot: int) -> Automaton:
 
 def alone(space: PlanSpace, task: int) -> PlanSpace:
     """The plan space of one task out of several: as if everything were one word."""
-    one = Language(("w",), {}, "w", space.model.robots, Guarantee("", 1, 1, True), {}, {}, {}, {})
     words = np.zeros(len(space), np.int64)
-    return fitting(
-        TaskLanguage(one, WordTable.of(one, space.model), space, task, words, True), (0,)
-    )
+    return plans_with_sentence(space, words, task, (0,), ("w",))
 
 
 def has_way(automaton: Automaton, forbidden: frozenset[int]) -> bool:

@@ -16,8 +16,7 @@ from typing import Literal
 
 from coordlang.use.choices.automaton import Automaton, determinise
 from coordlang.use.choices.mixtures import Mixtures, walk_mixtures
-from coordlang.use.choices.own_facts import OwnFacts, know_own
-from coordlang.use.sentence.fitting_plans import fitting
+from coordlang.use.choices.own_facts import OwnFacts, with_own_facts
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import OutOfMemory
 from planners.search.edge_index import EdgeIndex
@@ -52,7 +51,7 @@ class Choices:
     or is None where there are too many to walk.
     """
 
-    spoken: TaskLanguage
+    task_language: TaskLanguage
     words: tuple[int, ...]
     fits: PlanSpace
     robots: tuple[RobotChoices, ...]
@@ -64,11 +63,11 @@ class Choices:
 
         Proved by walking them all, or else by the language's own guarantee.
         """
-        return self.spoken.covered if self.mixtures is None else self.mixtures.holds
+        return self.task_language.covered if self.mixtures is None else self.mixtures.holds
 
 
 def choices(
-    spoken: TaskLanguage,
+    task_language: TaskLanguage,
     words: Sequence[int],
     index: EdgeIndex | None = None,
     most: int | None = MOST,
@@ -84,30 +83,36 @@ def choices(
     `coordlang.use.sentence.fitting_plans.NoPlanFits`, and `OutOfMemory` if the automata, or with
     ``most=None`` the combinations, do not fit into the memory.
     """
-    fits = fitting(spoken, words)
-    robots = range(len(spoken.model.robots))
+    fits = task_language.plans_with(words)
+    robots = range(len(task_language.model.robots))
     plain = [determinise(fits, robot) for robot in robots]
     try:
-        mixtures = walk_mixtures(spoken, fits, plain, words, index, most)
+        mixtures = walk_mixtures(task_language, fits, plain, words, index, most)
     except OutOfMemory:
         if most is None:
             raise
         mixtures = None
-    own = tuple(_with_knowledge(spoken, plain[robot], robot, mixtures, most) for robot in robots)
-    return Choices(spoken, tuple(words), fits, own, mixtures)
+    own = tuple(
+        _with_knowledge(task_language, plain[robot], robot, mixtures, most) for robot in robots
+    )
+    return Choices(task_language, tuple(words), fits, own, mixtures)
 
 
 def _with_knowledge(
-    spoken: TaskLanguage, plain: Automaton, robot: int, mixtures: Mixtures | None, most: int | None
+    task_language: TaskLanguage,
+    plain: Automaton,
+    robot: int,
+    mixtures: Mixtures | None,
+    most: int | None,
 ) -> RobotChoices:
     if mixtures is not None and mixtures.space is not None:
         with suppress(OutOfMemory):  # the combinations are checked all the same
             return RobotChoices(
                 robot, determinise(mixtures.space, robot, _truth(mixtures.space), most), "exact"
             )
-    own = OwnFacts.of(spoken.model, robot)
-    start = _bits(spoken.space, int(spoken.space.state[spoken.start]))
-    return RobotChoices(robot, know_own(plain, own, start), "own")
+    own = OwnFacts.of(task_language.model, robot)
+    start = _bits(task_language.space, int(task_language.space.state[task_language.start]))
+    return RobotChoices(robot, with_own_facts(plain, own, start), "own")
 
 
 def _truth(space: PlanSpace) -> dict[int, int]:

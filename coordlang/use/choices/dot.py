@@ -37,7 +37,7 @@ def distinguishing(choices: Choices, own: RobotChoices, states: range) -> list[l
     """
     known = own.automaton.known[states.start : states.stop]
     everywhere = reduce(and_, (true for true, _ in known))
-    facts = choices.spoken.model.codec.facts
+    facts = choices.task_language.model.codec.facts
     return [
         [text for bit, text in enumerate(facts) if (true & ~everywhere) >> bit & 1]
         for true, _ in known
@@ -45,7 +45,7 @@ def distinguishing(choices: Choices, own: RobotChoices, states: range) -> list[l
 
 
 def _cluster(choices: Choices, own: RobotChoices) -> list[str]:
-    model, automaton = choices.spoken.model, own.automaton
+    model, automaton = choices.task_language.model, own.automaton
     name, labels = model.robots[own.robot], model.labels[own.robot]
     title = f"{name}: {automaton.count:,} subplan{'s' * (automaton.count != 1)}"
     lines = [f"  subgraph cluster_{own.robot} {{", f"    label={quoted(title)};"]

@@ -17,17 +17,17 @@ from planners.search.plans import Plans
 
 def to_data(choices: Choices, robots: Sequence[int] | None = None) -> dict[str, Any]:
     """The data of a choices file, of all robots or of those with these numbers."""
-    spoken = choices.spoken
+    task_language = choices.task_language
     chosen = choices.robots if robots is None else [choices.robots[robot] for robot in robots]
     return {
         "format": FORMAT,
         "version": VERSION,
-        "domain": dict(spoken.language.domain) if spoken.language else {},
-        "robots": list(spoken.model.robots),
-        "task": describe(spoken.space, spoken.task),
-        "sentence": spoken.text(choices.words),
+        "domain": dict(task_language.language.domain) if task_language.language else {},
+        "robots": list(task_language.model.robots),
+        "task": describe(task_language.space, task_language.task),
+        "sentence": task_language.text(choices.words),
         "plans": json_count(Plans.of(choices.fits).count),
-        "covered": spoken.covered,
+        "covered": task_language.covered,
         "guaranteed": choices.guaranteed,
         "combinations_walked": choices.mixtures.nodes if choices.mixtures is not None else None,
         "choices": [_robot(choices, own) for own in chosen],
@@ -44,12 +44,12 @@ def monitor(choices: Choices, robot: str) -> Monitor:
 
     Raises `coordlang.use.choices.monitor.MonitorError` for an unknown robot.
     """
-    names = choices.spoken.model.robots
+    names = choices.task_language.model.robots
     return Monitor(to_data(choices, [names.index(robot)] if robot in names else None), robot)
 
 
 def _robot(choices: Choices, own: RobotChoices) -> dict[str, Any]:
-    model, automaton = choices.spoken.model, own.automaton
+    model, automaton = choices.task_language.model, own.automaton
     labels = model.labels[own.robot]
     ever = 0
     for true, possible in automaton.known:

@@ -62,7 +62,7 @@ class _Step:
 
 
 def walk_mixtures(
-    spoken: TaskLanguage,
+    task_language: TaskLanguage,
     fits: PlanSpace,
     automata: Sequence[Automaton],
     words: Sequence[int],
@@ -72,16 +72,16 @@ def walk_mixtures(
     """Walk all combinations of the robots' subplans in the task's optimal plans, layer by layer.
 
     ``fits`` are the plans with the sentence ``words``, ``automata`` each robot's subplans in them;
-    ``index`` is ``EdgeIndex.of(spoken.space)``, to be given when many sentences of one plan space
+    ``index`` is ``EdgeIndex.of(task_language.space)``, to be given when many sentences of one plan space
     are asked for.
 
     At most (product of the automata's layers) * (layer of the plan space) nodes.  Raises
     `OutOfMemory` with an estimate before they fill the memory, or beyond ``most`` joint moves.
     """
-    space = spoken.space
+    space = task_language.space
     index = index or EdgeIndex.of(space)
     robots = len(automata)
-    table = np.array([[0] * robots + [spoken.start]])
+    table = np.array([[0] * robots + [task_language.start]])
     layers = [table]
     steps: list[_Step] = []
     walked, held = 1, 0
@@ -92,7 +92,12 @@ def walk_mixtures(
         broken = np.flatnonzero(edge < 0)
         if len(broken):
             found = _violation(
-                spoken, fits, words, steps, int(source[broken[0]]), labels[broken[0]].tolist()
+                task_language,
+                fits,
+                words,
+                steps,
+                int(source[broken[0]]),
+                labels[broken[0]].tolist(),
             )
             return Mixtures(None, found, walked)
         reached = np.column_stack((after, space.target[edge]))
@@ -101,7 +106,7 @@ def walk_mixtures(
         layers.append(table)
         walked += len(table)
         held += 40 * len(edge) + table.nbytes
-    return Mixtures(_plan_space(spoken, layers, steps), None, walked)
+    return Mixtures(_plan_space(task_language, layers, steps), None, walked)
 
 
 def _moves(automata: Sequence[Automaton], table: Ints) -> tuple[Ints, Labels, Ints]:
@@ -130,9 +135,11 @@ def _edges(index: EdgeIndex, node: Ints, labels: Labels) -> Ints:
     return np.concatenate(parts)
 
 
-def _plan_space(spoken: TaskLanguage, layers: Sequence[Ints], steps: Sequence[_Step]) -> PlanSpace:
+def _plan_space(
+    task_language: TaskLanguage, layers: Sequence[Ints], steps: Sequence[_Step]
+) -> PlanSpace:
     """The walk as a plan space: nodes numbered from the goal's layer up."""
-    space = spoken.space
+    space = task_language.space
     sizes = [len(table) for table in reversed(layers)]
     offset = np.cumsum([0, *sizes])
     node = np.concatenate([table[:, -1] for table in reversed(layers)])
@@ -150,12 +157,12 @@ def _plan_space(spoken: TaskLanguage, layers: Sequence[Ints], steps: Sequence[_S
         labels=space.labels[edge],
         cost=space.cost[edge],
         starts=np.array([len(node) - 1]),
-        second=space.second[[spoken.task]],
+        second=space.second[[task_language.task]],
     )
 
 
 def _violation(
-    spoken: TaskLanguage,
+    task_language: TaskLanguage,
     fits: PlanSpace,
     words: Sequence[int],
     steps: Sequence[_Step],
@@ -170,15 +177,17 @@ def _violation(
         row = int(step.source[arrival])
     done.reverse()
     paths = [
-        _with_beginning(spoken, fits, robot, [own[robot] for own in done])
+        _with_beginning(task_language, fits, robot, [own[robot] for own in done])
         for robot in range(len(labels))
     ]
-    trail = Trail(spoken.start, tuple(zip(*paths, strict=True)))
-    return describe_failure(spoken.space, trail, tuple(spoken.table.words[w] for w in words))
+    trail = Trail(task_language.start, tuple(zip(*paths, strict=True)))
+    return describe_failure(
+        task_language.space, trail, tuple(task_language.table.words[w] for w in words)
+    )
 
 
 def _with_beginning(
-    spoken: TaskLanguage, fits: PlanSpace, robot: int, own: Sequence[int]
+    task_language: TaskLanguage, fits: PlanSpace, robot: int, own: Sequence[int]
 ) -> list[int]:
     """A fitting plan in which a robot begins like this, as edges of the task's plan space."""
     layers = [{int(fits.starts[0]): -1}]  # node -> the edge that led there
@@ -198,12 +207,12 @@ def _with_beginning(
     path.reverse()
     while fits.layer[fits.target[path[-1]]] > 0:
         path.append(int(fits.first[fits.target[path[-1]]]))
-    return _same_edges(spoken, [fits.labels[edge].tolist() for edge in path])
+    return _same_edges(task_language, [fits.labels[edge].tolist() for edge in path])
 
 
-def _same_edges(spoken: TaskLanguage, plan: Sequence[Sequence[int]]) -> list[int]:
+def _same_edges(task_language: TaskLanguage, plan: Sequence[Sequence[int]]) -> list[int]:
     """A plan, given by labels, as edges of the task's plan space."""
-    space, node, path = spoken.space, spoken.start, []
+    space, node, path = task_language.space, task_language.start, []
     for labels in plan:
         edges = range(int(space.first[node]), int(space.first[node + 1]))
         path.append(next(edge for edge in edges if space.labels[edge].tolist() == list(labels)))

@@ -64,7 +64,7 @@ class OwnFacts:
         return cls(mask, foreign, tuple(adds), tuple(deletes))
 
 
-def know_own(automaton: Automaton, own: OwnFacts, start: int) -> Automaton:
+def with_own_facts(automaton: Automaton, own: OwnFacts, start: int) -> Automaton:
     """The least automaton that accepts the same subplans and says the values of the own atoms.
 
     ``start`` has the bits of the facts that are true at first.

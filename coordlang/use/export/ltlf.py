@@ -13,7 +13,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from coordlang.use.export.membership import Term, membership
-from coordlang.use.sentence.fitting_plans import fitting
 from coordlang.use.sentence.task_language import TaskLanguage
 
 #: What must not begin a symbol: readers take it for a word of their own.
@@ -36,19 +35,21 @@ class SentenceFormula:
     symbols: dict[str, str]
 
 
-def export_ltlf(spoken: TaskLanguage, words: Sequence[int]) -> SentenceFormula:
+def export_ltlf(task_language: TaskLanguage, words: Sequence[int]) -> SentenceFormula:
     """The sentence ``words`` as a formula over the states of a plan, the initial state first.
 
     A plan has the sentence w0 w1 .. wk exactly if it is in w0 for a while, then in w1, and so on,
     and in wk to the end: ``w0 & (w0 U (w1 & (w1 U .. G(wk))))``.  Raises `NoPlanFits` if no optimal
     plan does.
     """
-    fitting(spoken, words)
-    terms = membership(spoken, apart=False).terms
+    task_language.plans_with(words)
+    terms = membership(task_language, apart=False).terms
     used = sorted(set(words))
     atoms = sorted({atom for word in used for term in terms[word] for atom in term})
     symbol = dict(zip(atoms, symbols_of(atoms), strict=True))
-    names = dict(zip(used, symbols_of([spoken.table.words[word] for word in used]), strict=True))
+    names = dict(
+        zip(used, symbols_of([task_language.table.words[word] for word in used]), strict=True)
+    )
     meaning = {word: disjunction(terms[word], symbol) for word in used}
     return SentenceFormula(
         formula=_in_turn([meaning[word] for word in words]),

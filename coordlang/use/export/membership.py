@@ -36,22 +36,25 @@ class Membership:
         return sum(map(len, self.terms))
 
 
-def membership(spoken: TaskLanguage, *, apart: bool = True, states: int = _STATES) -> Membership:
+def membership(
+    task_language: TaskLanguage, *, apart: bool = True, states: int = _STATES
+) -> Membership:
     """The words of a language as terms: those of their formulas (`coordlang.explanation`).
 
     Exactly one term holds in each state; at least one, and shorter ones, if they need not be
     ``apart``.  For more than ``states`` states they are the leaves of a decision tree: found
     faster, up to twice as many, but never more than states.
     """
-    rows = spoken.space.rows[np.unique(spoken.space.state)]
-    rows, _ = unique_rows(np.concatenate((spoken.table.rows, rows)))
+    rows = task_language.space.rows[np.unique(task_language.space.state)]
+    rows, _ = unique_rows(np.concatenate((task_language.table.rows, rows)))
     if len(rows) > states:
-        return _tree(spoken, rows)
-    atoms, holds = truth(spoken.model, rows)
+        return _tree(task_language, rows)
+    atoms, holds = truth(task_language.model, rows)
     facts = _Facts({atom: number for number, atom in enumerate(atoms)}, holds)
-    formulas = word_formulas(spoken.language, spoken.model, rows)
+    formulas = word_formulas(task_language.language, task_language.model, rows)
     covers = [
-        [_term(literals) for literals in formulas[word].conditions()] for word in spoken.table.words
+        [_term(literals) for literals in formulas[word].conditions()]
+        for word in task_language.table.words
     ]
     return Membership(tuple(tuple(disjoint(facts, cover) if apart else cover) for cover in covers))
 
@@ -109,14 +112,13 @@ def _term(literals: Sequence[str]) -> Term:
     }
 
 
-def _tree(spoken: TaskLanguage, rows: Rows) -> Membership:
-    """A binary decision tree.
-
-    Each test is the one that tells most about the word (least entropy, as in ID3).
+def _tree(task_language: TaskLanguage, rows: Rows) -> Membership:
+    """A binary decision tree; each test is the one that tells most about the word (least entropy,
+    as in ID3).
     """
-    word = spoken.table.of_rows(rows)
-    atoms, values = truth(spoken.model, rows)
-    terms: list[list[Term]] = [[] for _ in spoken.table.words]
+    word = task_language.table.of_rows(rows)
+    atoms, values = truth(task_language.model, rows)
+    terms: list[list[Term]] = [[] for _ in task_language.table.words]
     todo: list[tuple[Ints, Term]] = [(np.arange(len(rows)), {})]
     while todo:
         here, term = todo.pop()

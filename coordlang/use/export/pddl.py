@@ -29,7 +29,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from coordlang.use.export.membership import Membership, Term, membership
-from coordlang.use.sentence.fitting_plans import fitting
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.classical import (
     ClassicalAction,
@@ -49,7 +48,7 @@ Choice = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True)
-class Exported:
+class PddlExport:
     """A task under a sentence for other planners.
 
     ``domain`` and ``problem`` are PDDL text; ``plain`` is the same as data.  ``choices`` says for
@@ -93,10 +92,9 @@ class Exported:
         return tuple(tuple(step[robot] for robot in range(len(self.model.robots))) for step in done)
 
 
-def export_pddl(spoken: TaskLanguage, words: Sequence[int], limit: int = 2000) -> Exported:
-    """The task under the sentence ``words``.
-
-    Its optimal plans are exactly the plans that fit, one to one.
+def export_pddl(task_language: TaskLanguage, words: Sequence[int], limit: int = 2000) -> PddlExport:
+    """The task under the sentence ``words``: its optimal plans are exactly the plans that fit, one
+    to one.
 
     The cost of a plan is that of the joint plan: ``plain.cost`` of the total cost is (makespan,
     second component).
@@ -109,21 +107,21 @@ def export_pddl(spoken: TaskLanguage, words: Sequence[int], limit: int = 2000) -
 
     Raises `NoPlanFits` if there is nothing to plan.
     """
-    space, model = fitting(spoken, words), spoken.model
+    space, model = task_language.plans_with(words), task_language.model
     makespan, second = space.cost_of(0)
     goal = space.goals[int(space.goal[space.starts[0]])]
     task = PlanningTask("task", space.rows[space.state[space.starts[0]]], goal)
     plain = compile_classical(model, task, limit, longest=max(1, makespan))
     choices = [_choices(model, plain, action) for action in plain.actions]
-    tests = membership(spoken)
-    out = _Naming(spoken, words, plain, tests)
+    tests = membership(task_language)
+    out = _Naming(task_language, words, plain, tests)
     actions = [
         out.within(action, chosen) for action, chosen in zip(plain.actions, choices, strict=True)
     ]
     actions += out.actions()
     plain = replace(
         plain,
-        name=f'under "{spoken.text(words)}"',
+        name=f'under "{task_language.text(words)}"',
         facts=tuple(out.facts),
         init=plain.init | out.init,
         actions=tuple(actions),
@@ -133,7 +131,7 @@ def export_pddl(spoken: TaskLanguage, words: Sequence[int], limit: int = 2000) -
     domain, problem = to_pddl(plain)
     named = dict(zip(action_names(plain), choices, strict=True))
     cost = plain.step_cost * makespan + second
-    return Exported(model, plain, domain, problem, named, cost, tests.size)
+    return PddlExport(model, plain, domain, problem, named, cost, tests.size)
 
 
 def plan_names(text: str) -> list[str]:
@@ -164,13 +162,17 @@ class _Naming:
     """
 
     def __init__(
-        self, spoken: TaskLanguage, words: Sequence[int], plain: ClassicalTask, tests: Membership
+        self,
+        task_language: TaskLanguage,
+        words: Sequence[int],
+        plain: ClassicalTask,
+        tests: Membership,
     ) -> None:
         self.model, self.words, self.tests, self.table = (
-            spoken.model,
+            task_language.model,
             words,
             tests,
-            spoken.table.words,
+            task_language.table.words,
         )
         self.facts, self.init = list(plain.facts), set[int]()
         self.known = {show(atom): number for atom, number in self.model.evaluator.facts.items()}
@@ -178,7 +180,9 @@ class _Naming:
             {a for terms in tests.terms for t in terms for a in t if a.startswith("(last ")}
         )
         if self.model.remembers:
-            key = self.model.codec.decode(spoken.space.rows[spoken.space.state[spoken.start]])
+            key = self.model.codec.decode(
+                task_language.space.rows[task_language.space.state[task_language.start]]
+            )
             for atom in self.remembered:
                 self.known[atom] = self.fact(atom)
             self.init |= {self.known[atom] for atom in key if atom in self.remembered}

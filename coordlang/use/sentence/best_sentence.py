@@ -33,7 +33,7 @@ class BestSentence:
 
 
 def best_sentence(
-    spoken: TaskLanguage, wishes: Sequence[Preference], most: int | None = None
+    task_language: TaskLanguage, wishes: Sequence[Preference], most: int | None = None
 ) -> BestSentence:
     """The best sentence of the task for wishes in order of weight.
 
@@ -55,7 +55,7 @@ def best_sentence(
     Lyngsø and Pedersen 2002 on hidden Markov models): raises `OutOfMemory` when the beginnings have
     more than ``most`` entries, or more than the memory holds.
     """
-    graph = _Graph.of(spoken, wishes)
+    graph = _Graph.of(task_language, wishes)
     start = _Beginning((graph.word[0],), {0: 1}, None)
     queue = [(graph.bound(start), start.words, 0, start)]
     seen: set[object] = set()
@@ -126,11 +126,11 @@ class _Graph:
     open: list[dict[int, int]]
 
     @classmethod
-    def of(cls, spoken: TaskLanguage, wishes: Sequence[Preference]) -> _Graph:
+    def of(cls, task_language: TaskLanguage, wishes: Sequence[Preference]) -> _Graph:
         following, node, memories = _points(
-            spoken, [wish for wish in wishes if isinstance(wish, PlanPreference)]
+            task_language, [wish for wish in wishes if isinstance(wish, PlanPreference)]
         )
-        word = [int(spoken.word[n]) for n in node]
+        word = [int(task_language.word[n]) for n in node]
         graph = cls(tuple(wishes), following, node, word, [0] * len(node), [()] * len(node), [])
         if "most-plans" in wishes:
             graph.open.extend({} for _ in node)
@@ -248,14 +248,17 @@ class _Graph:
 
 
 def _points(
-    spoken: TaskLanguage, wishes: Sequence[PlanPreference]
+    task_language: TaskLanguage, wishes: Sequence[PlanPreference]
 ) -> tuple[list[list[tuple[int, int]]], list[int], list[tuple[Memory, ...]]]:
     """The points that plans pass, layer by layer.
 
     What follows each of them, its node, its memories.
     """
-    space = spoken.space
-    start = spoken.start, tuple(wish.start(int(space.state[spoken.start])) for wish in wishes)
+    space = task_language.space
+    start = (
+        task_language.start,
+        tuple(wish.start(int(space.state[task_language.start])) for wish in wishes),
+    )
     number = {start: 0}
     points, following = [start], []
     for node, memories in points:  # grows while it is walked

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from coordlang.use.sentence.understanding import Dag, DagEdge, DagNode
+from coordlang.use.sentence.plan_dag import DagEdge, DagNode, PlanDag
 from planners.joint.model import NO_FACT, own_text
 from planners.joint.states import split_atoms
 
@@ -29,7 +29,7 @@ class Ink:
     again: bool
 
 
-def inks(dag: Dag) -> dict[str, Ink]:
+def inks(dag: PlanDag) -> dict[str, Ink]:
     """A colour for each word of the sentence, in the order in which they are first said."""
     result = {}
     for number, word in enumerate(dict.fromkeys(dag.sentence)):
@@ -40,7 +40,7 @@ def inks(dag: Dag) -> dict[str, Ink]:
     return result
 
 
-def node_lines(dag: Dag) -> list[list[str]]:
+def node_lines(dag: PlanDag) -> list[list[str]]:
     """What is written in each node: its atoms, without those that are true in all nodes."""
     atoms = [split_atoms(node.key) for node in dag.nodes]
     states = [set(a) for a, node in zip(atoms, dag.nodes, strict=True) if not node.merged]
@@ -55,7 +55,7 @@ def node_lines(dag: Dag) -> list[list[str]]:
     ]
 
 
-def edge_lines(dag: Dag, edge: DagEdge) -> list[str]:
+def edge_lines(dag: PlanDag, edge: DagEdge) -> list[str]:
     """What is written at an edge: one line for each robot, for each of its first joint actions."""
     lines: list[str] = []
     for action in edge.actions[:_ACTIONS_SHOWN]:
@@ -67,7 +67,7 @@ def edge_lines(dag: Dag, edge: DagEdge) -> list[str]:
     return [*lines, f"or {rest:,} more"] if rest > 0 else lines
 
 
-def cut_note(dag: Dag) -> str | None:
+def cut_note(dag: PlanDag) -> str | None:
     """What a cut DAG does not show."""
     if not dag.cut:
         return None
@@ -78,7 +78,7 @@ def cut_note(dag: Dag) -> str | None:
     )
 
 
-def headline(dag: Dag) -> str:
+def headline(dag: PlanDag) -> str:
     """What the drawing shows, in a line."""
     return f'"{" ".join(dag.sentence)}" leaves {plans_text(dag.count)} open'
 
@@ -88,7 +88,7 @@ def plans_text(number: int) -> str:
     return f"{number:,} plan{'s' * (number != 1)}" if number < 10**12 else f"{number:.2e} plans"
 
 
-def to_dot(dag: Dag) -> str:
+def to_dot(dag: PlanDag) -> str:
     """Graphviz text, layers from left to right.  The same DAG gives the same text."""
     ink, lines = inks(dag), node_lines(dag)
     note = cut_note(dag)

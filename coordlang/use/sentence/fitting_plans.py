@@ -9,7 +9,6 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import Refuted
 from planners.search.plan_space import PlanSpace
 from planners.tables import Ints, ranges
@@ -18,46 +17,85 @@ from planners.tables import Ints, ranges
 class NoPlanFits(Refuted):
     """No optimal plan of the task has this sentence.
 
-    ``fitting`` is the longest beginning of the sentence that some plan still says, and
-    ``next_words`` what plans with that beginning can say after it (``None`` among them: such a plan
-    may end there).
+    Parameters
+    ----------
+    sentence
+        The word numbers of the sentence.
+    length
+        How many of its first words some optimal plan has; with the next one no plan is left.
+    next_words
+        The word numbers that can follow there, None where a plan may end.
+    names
+        The words by number.
+
+    Attributes
+    ----------
+    fitting
+        The longest prefix of the sentence that is the prefix of some plan's sentence.
+    next_words
+        What can follow it (see the parameter).
     """
 
     def __init__(
         self,
-        spoken: TaskLanguage,
-        words: Sequence[int],
+        sentence: Sequence[int],
         length: int,
-        following: Sequence[int | None],
+        next_words: Sequence[int | None],
+        names: Sequence[str],
     ) -> None:
-        names = [f"say {spoken.table.words[w]!r}" if w is not None else "end" for w in following]
-        said = f'after "{spoken.text(words[:length])}"' if length else "at the beginning"
-        wrong = f"says {spoken.table.words[words[length]]!r}" if length < len(words) else "ends"
+        text = " ".join(names[word] for word in sentence)
+        prefix = " ".join(names[word] for word in sentence[:length])
+        following = [f"say {names[w]!r}" if w is not None else "end" for w in next_words]
+        where = f'after "{prefix}"' if length else "at the beginning"
+        wrong = f"says {names[sentence[length]]!r}" if length < len(sentence) else "ends"
         super().__init__(
-            f'no optimal plan has the sentence "{spoken.text(words)}": {said} no plan {wrong}',
-            remedy=f"There plans {' or '.join(names)}.",
+            f'no optimal plan has the sentence "{text}": {where} no plan {wrong}',
+            remedy=f"There plans {' or '.join(following)}.",
         )
-        self.fitting = tuple(words[:length])
-        self.next_words = tuple(following)
+        self.fitting = tuple(sentence[:length])
+        self.next_words = tuple(next_words)
 
 
-def fitting(spoken: TaskLanguage, words: Sequence[int]) -> PlanSpace:
-    """The task's optimal plans with the sentence ``words``: again a plan space, of one task.
+def plans_with_sentence(
+    space: PlanSpace, word: Ints, task: int, sentence: Sequence[int], names: Sequence[str]
+) -> PlanSpace:
+    """The optimal plans of a task that have a sentence, as a plan space of one task.
 
-    Its nodes are pairs (plan-space node, how many words have been said), each on some fitting plan,
-    so that `planners.search.plans.Plans.of` counts, ranks and samples exactly the plans that fit.
-    ``state``, ``goal`` and the table of states are those of ``spoken.space``.
+    O(nodes * words of the sentence), layer by layer.
 
-    O(nodes * words), in numpy layer by layer.  Raises `NoPlanFits` if there is none.
+    Parameters
+    ----------
+    space
+        The optimal plans of one or several tasks.
+    word
+        The word number of each of its nodes, (nodes).
+    task
+        The number of the task in ``space.starts``.
+    sentence
+        Word numbers, no two neighbours equal.
+    names
+        The words by number, for messages.
+
+    Returns
+    -------
+    PlanSpace
+        Its nodes are pairs (node of ``space``, number of words passed), each on some plan with the
+        sentence, so that `planners.search.plans.Plans.of` counts, ranks and samples exactly these
+        plans.  The table of states and the goals are those of ``space``.
+
+    Raises
+    ------
+    NoPlanFits
+        If no optimal plan of the task has the sentence.
     """
-    space, word = spoken.space, spoken.word
-    length = len(words)
-    if not length or word[spoken.start] != words[0]:
-        raise NoPlanFits(spoken, words, 0, [int(word[spoken.start])])
-    said = np.array([*words, -1])
-    layers: list[tuple[Ints, Ints]] = [(np.array([spoken.start]), np.array([0]))]
+    start = int(space.starts[task])
+    length = len(sentence)
+    if not length or word[start] != sentence[0]:
+        raise NoPlanFits(sentence, 0, [int(word[start])], names)
+    said = np.array([*sentence, -1])
+    layers: list[tuple[Ints, Ints]] = [(np.array([start]), np.array([0]))]
     steps: list[tuple[Ints, Ints, Ints]] = []
-    for _ in range(int(space.layer[spoken.start])):
+    for _ in range(int(space.layer[start])):
         node, place = layers[-1]
         counts = space.first[node + 1] - space.first[node]
         edge = ranges(space.first[node], counts)
@@ -71,15 +109,18 @@ def fitting(spoken: TaskLanguage, words: Sequence[int]) -> PlanSpace:
         steps.append((source, edge, number.reshape(-1)))
     ends = layers[-1][1] == length - 1
     if not ends.any():
-        raise _no_plan(spoken, words, layers)
-    return _plan_space(spoken, layers, steps, ends)
+        raise _no_plan(space, word, sentence, layers, names)
+    return _plan_space(space, task, layers, steps, ends)
 
 
 def _no_plan(
-    spoken: TaskLanguage, words: Sequence[int], layers: Sequence[tuple[Ints, Ints]]
+    space: PlanSpace,
+    word: Ints,
+    sentence: Sequence[int],
+    layers: Sequence[tuple[Ints, Ints]],
+    names: Sequence[str],
 ) -> NoPlanFits:
-    """How far plans follow the sentence, and what they say then."""
-    space, word = spoken.space, spoken.word
+    """The error that says how far plans follow the sentence, and which words they have then."""
     furthest = max(int(place.max()) for _, place in layers if len(place))
     following: set[int | None] = set()
     for node, place in layers:
@@ -88,18 +129,18 @@ def _no_plan(
             following |= set(word[targets].tolist()) - {int(word[here])}
             if space.layer[here] == 0:
                 following.add(None)
-    known = sorted(w for w in following if w is not None)
-    return NoPlanFits(spoken, words, furthest + 1, [*known, *([None] if None in following else [])])
+    next_words = sorted(following, key=lambda w: (w is None, w))
+    return NoPlanFits(sentence, furthest + 1, next_words, names)
 
 
 def _plan_space(
-    spoken: TaskLanguage,
+    space: PlanSpace,
+    task: int,
     layers: Sequence[tuple[Ints, Ints]],
     steps: Sequence[tuple[Ints, Ints, Ints]],
     ends: NDArray[np.bool_],
 ) -> PlanSpace:
     """What leads to the end, numbered from the goal's layer up."""
-    space = spoken.space
     alive = [ends]
     for source, _, target in reversed(steps):
         number = len(layers[len(layers) - len(alive) - 1][0])
@@ -131,5 +172,5 @@ def _plan_space(
         labels=space.labels[edge],
         cost=space.cost[edge],
         starts=np.array([len(node) - 1]),
-        second=space.second[[spoken.task]],
+        second=space.second[[task]],
     )

@@ -20,7 +20,7 @@ from coordlang.use.sentence.drawing import (
     node_lines,
     plans_text,
 )
-from coordlang.use.sentence.understanding import Dag
+from coordlang.use.sentence.plan_dag import PlanDag
 
 # Pixels.  Text is monospaced, so that its width is known.
 _FONT = 11
@@ -49,7 +49,7 @@ class _Item:
     after: list[int] = field(default_factory=list)
 
 
-def to_svg(dag: Dag) -> str:
+def to_svg(dag: PlanDag) -> str:
     """A self-contained SVG picture.  The same DAG gives the same bytes."""
     ink, lines = inks(dag), node_lines(dag)
     texts = [edge_lines(dag, edge) for edge in dag.edges]
@@ -91,7 +91,7 @@ def to_svg(dag: Dag) -> str:
 
 
 def _items(
-    dag: Dag, lines: Sequence[list[str]], texts: Sequence[list[str]]
+    dag: PlanDag, lines: Sequence[list[str]], texts: Sequence[list[str]]
 ) -> tuple[list[_Item], list[list[int]]]:
     """The boxes, nodes first, and the columns from left to right: nodes, texts, nodes, .."""
     items = [
@@ -175,7 +175,7 @@ def _open(width: float, height: float, title: str, task: str) -> list[str]:
     ]
 
 
-def _heading(dag: Dag, ink: dict[str, Ink], title: Sequence[str]) -> list[str]:
+def _heading(dag: PlanDag, ink: dict[str, Ink], title: Sequence[str]) -> list[str]:
     """The title, the task, the note about a cut, and the sentence as coloured words."""
     out = [
         _text(_MARGIN, 28, title[0], size=14, weight="bold"),
@@ -194,7 +194,7 @@ def _heading(dag: Dag, ink: dict[str, Ink], title: Sequence[str]) -> list[str]:
     return out
 
 
-def _chips_end(dag: Dag) -> float:
+def _chips_end(dag: PlanDag) -> float:
     return 2 * _MARGIN + sum(_CHAR * len(word) + 2 * _PAD + 6 for word in dag.sentence)
 
 

@@ -36,18 +36,17 @@ class PlanPreference:
 Preference = str | PlanPreference
 
 
-def read_preference(spoken: TaskLanguage, text: str) -> Preference:
-    """``shortest``, ``most-plans``, ``first:ROBOT`` or ``avoid:ATOMS``.
-
-    Raises `UsageError` for anything else.
+def read_preference(task_language: TaskLanguage, text: str) -> Preference:
+    """``shortest``, ``most-plans``, ``first:ROBOT`` or ``avoid:ATOMS``.  Raises `UsageError` for
+    anything else.
     """
     kind, _, argument = text.strip().partition(":")
     if text.strip() in ("shortest", "most-plans"):
         return text.strip()
     if kind == "first":
-        return first(spoken.model, argument.strip().lower())
+        return first(task_language.model, argument.strip().lower())
     if kind == "avoid":
-        return avoid(spoken, argument)
+        return avoid(task_language, argument)
     raise UsageError(
         f"--wish {text!r}: there is no such wish",
         remedy='Say shortest, most-plans, first:ROBOT or avoid:"(ATOM) ..".',
@@ -96,12 +95,11 @@ def first(model: JointModel, robot: str) -> PlanPreference:
     return PlanPreference(f"first:{robot}", lambda _: others, step, grade, grades)
 
 
-def avoid(spoken: TaskLanguage, atoms: str) -> PlanPreference:
-    """No state of the plan, the first and last included, has all of these atoms.
-
-    Grades: 0 if so, else 1.
+def avoid(task_language: TaskLanguage, atoms: str) -> PlanPreference:
+    """No state of the plan, the first and last included, has all of these atoms.  Grades: 0 if so,
+    else 1.
     """
-    codec = spoken.model.codec
+    codec = task_language.model.codec
     try:
         wanted = split_atoms(" ".join(atoms.lower().split()).replace("( ", "(").replace(" )", ")"))
         row = codec.encode(wanted)
@@ -111,7 +109,7 @@ def avoid(spoken: TaskLanguage, atoms: str) -> PlanPreference:
         raise UsageError('--wish avoid: expected atoms, as in avoid:"(at r1 c1-1)"')
     mask = row[: codec.fact_blocks]
     hit: list[int] = (
-        ((spoken.space.rows[:, : codec.fact_blocks] & mask) == mask)
+        ((task_language.space.rows[:, : codec.fact_blocks] & mask) == mask)
         .all(axis=1)
         .astype(int)
         .tolist()

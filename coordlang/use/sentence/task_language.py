@@ -11,6 +11,7 @@ from coordlang.language.file import check_source, options_of, recorded_list
 from coordlang.language.words import Language, WordTable
 from coordlang.tasks.candidates import Candidates
 from coordlang.tasks.task_file import ListedTask, ground_tasks
+from coordlang.use.sentence.fitting_plans import plans_with_sentence
 from planners.errors import BadInput, Position
 from planners.joint.model import Goal, JointModel
 from planners.loading import ModelOptions, build
@@ -69,6 +70,10 @@ class TaskLanguage:
                     remedy="Write a word once, however long the plan stays in it.",
                 )
         return tuple(known[word] for word in words)
+
+    def plans_with(self, words: Sequence[int]) -> PlanSpace:
+        """The task's optimal plans with the sentence ``words``; see `plans_with_sentence`."""
+        return plans_with_sentence(self.space, self.word, self.task, words, self.table.words)
 
     def text(self, words: Sequence[int]) -> str:
         """A sentence as it is written."""

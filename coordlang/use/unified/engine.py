@@ -38,8 +38,8 @@ from unified_planning.plans import PlanKind
 
 from coordlang.language.file import options_of, read_language
 from coordlang.language.words import Language
-from coordlang.use.sentence.fitting_plans import NoPlanFits, fitting
-from coordlang.use.sentence.saying import NotAPlan, NotOptimal, say
+from coordlang.use.sentence.fitting_plans import NoPlanFits
+from coordlang.use.sentence.plan_sentence import NotAPlan, NotOptimal, sentence_of_plan
 from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
 from coordlang.use.unified import NAME
 from coordlang.use.unified.plans import NoSteps, of_up, to_up
@@ -90,7 +90,7 @@ class _Solved:
 
     found: Translated
     space: PlanSpace
-    spoken: TaskLanguage | None
+    task_language: TaskLanguage | None
 
 
 class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanValidatorMixin):  # type: ignore[misc]
@@ -254,13 +254,13 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         if self._language is None:
             loaded = build(found.domain, [found.problem], self._options(found))
             return _Solved(found, search(loaded.model, loaded.tasks[0]), None)
-        spoken = self._speak(found)
+        task_language = self._speak(found)
         space = (
-            spoken.space
+            task_language.space
             if self._sentence is None
-            else fitting(spoken, spoken.words_of(self._sentence))
+            else task_language.plans_with(task_language.words_of(self._sentence))
         )
-        return _Solved(found, space, spoken)
+        return _Solved(found, space, task_language)
 
     def _speak(self, found: Translated) -> TaskLanguage:
         """The language in this problem.
@@ -317,7 +317,7 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
             PlanKind.SEQUENTIAL_PLAN if whole else PlanKind.PARTIAL_ORDER_PLAN
         )
         messages = []
-        if solved.spoken is not None and not solved.spoken.covered:
+        if solved.task_language is not None and not solved.task_language.covered:
             text = "the language does not cover this task: it guarantees nothing here"
             messages.append(LogMessage(LogLevel.WARNING, text))
         makespan, second = plans.space.cost_of(0)
@@ -356,13 +356,15 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
             reason = f"step {verdict.step + 1}: {verdict.reason}"
             return self._invalid(reason, FailedValidationReason.INAPPLICABLE_ACTION, action)
         if self._sentence is not None:
-            spoken = self._speak(found)
+            task_language = self._speak(found)
             try:
-                said = say(spoken, [texts for texts, _ in steps])
+                said = sentence_of_plan(task_language, [texts for texts, _ in steps])
             except (NotAPlan, NotOptimal) as error:
                 return self._invalid(str(error), None)
-            if said != spoken.words_of(self._sentence):
-                return self._invalid(f'the sentence of this plan is "{spoken.text(said)}"', None)
+            if said != task_language.words_of(self._sentence):
+                return self._invalid(
+                    f'the sentence of this plan is "{task_language.text(said)}"', None
+                )
         return ValidationResult(
             ValidationResultStatus.VALID, self.name, metrics={"makespan": str(len(steps))}
         )

@@ -16,29 +16,30 @@ from hypothesis import strategies as st
 
 from coordlang.use.sentence.drawing import COLOURS, cut_note, edge_lines, inks, node_lines, to_dot
 from coordlang.use.sentence.fitting_plans import NoPlanFits
+from coordlang.use.sentence.open_plans import OpenPlans, open_plans_data
 from coordlang.use.sentence.picture import _items, _place, to_svg
+from coordlang.use.sentence.plan_dag import PlanDag, plan_dag
 from coordlang.use.sentence.task_language import TaskLanguage
-from coordlang.use.sentence.understanding import Dag, dag, understand, understood_data
 from planners.search.plan_file import texts
 from planners.search.plans import Plan
 from tests.conftest import DOMAINS, Command
-from tests.use.naive_sentences import SHIPPED, by_sentence, random_spoken, shipped
+from tests.use.naive_sentences import SHIPPED, by_sentence, random_task_language, shipped
 
 
-def check(spoken: TaskLanguage, seed: int) -> None:
+def check(task_language: TaskLanguage, seed: int) -> None:
     """Every sentence of the task, and sentences near them."""
-    groups = by_sentence(spoken)
+    groups = by_sentence(task_language)
     for words, plans in list(groups.items())[:40]:
-        understood = understand(spoken, spoken.words_of(words))
+        understood = OpenPlans.of(task_language, task_language.words_of(words))
         assert understood.count == len(plans)
         assert set(understood.plans) == plans
-        check_dag(spoken, dag(understood), plans)
+        check_dag(task_language, plan_dag(understood), plans)
     random = Random(seed)
     for _ in range(8):
-        check_broken(spoken, near(spoken, random, list(groups)), groups)
+        check_broken(task_language, near(task_language, random, list(groups)), groups)
 
 
-def check_dag(spoken: TaskLanguage, graph: Dag, plans: set[Plan]) -> None:
+def check_dag(task_language: TaskLanguage, graph: PlanDag, plans: set[Plan]) -> None:
     """Its paths are the plans, its nodes have the right words and counts."""
     assert graph.count == len(plans)
     assert not graph.cut
@@ -54,39 +55,43 @@ def check_dag(spoken: TaskLanguage, graph: Dag, plans: set[Plan]) -> None:
             found.add(tuple(actions))
             through.update(path)
         stack += [([*path, target], [*actions, action]) for target, action in out.get(path[-1], [])]
-    assert found == {texts(spoken.model, plan) for plan in plans}
+    assert found == {texts(task_language.model, plan) for plan in plans}
     for number, node in enumerate(graph.nodes):
-        assert node.word == spoken.language.states.get(node.key, spoken.language.default)
+        assert node.word == task_language.language.states.get(
+            node.key, task_language.language.default
+        )
         assert graph.sentence[node.said - 1] == node.word
         assert node.plans == through[number]
 
 
-def near(spoken: TaskLanguage, random: Random, sentences: list[tuple[str, ...]]) -> tuple[str, ...]:
+def near(
+    task_language: TaskLanguage, random: Random, sentences: list[tuple[str, ...]]
+) -> tuple[str, ...]:
     """A sentence with a word changed, left out or put in."""
     words = list(random.choice(sentences))
     at = random.randrange(len(words) + 1)
     words[at : at + random.randint(0, 1)] = random.choices(
-        spoken.language.words, k=random.randint(0, 1)
+        task_language.language.words, k=random.randint(0, 1)
     )
     return tuple(w for n, w in enumerate(words) if n == 0 or w != words[n - 1])
 
 
 def check_broken(
-    spoken: TaskLanguage, words: tuple[str, ...], groups: dict[tuple[str, ...], set[Plan]]
+    task_language: TaskLanguage, words: tuple[str, ...], groups: dict[tuple[str, ...], set[Plan]]
 ) -> None:
     if not words or words in groups:
         return
     with pytest.raises(NoPlanFits) as refused:
-        understand(spoken, spoken.words_of(words))
+        OpenPlans.of(task_language, task_language.words_of(words))
     longest = max(k for k in range(len(words) + 1) if any(said[:k] == words[:k] for said in groups))
-    assert refused.value.fitting == spoken.words_of(words)[:longest]
+    assert refused.value.fitting == task_language.words_of(words)[:longest]
     following = {
         said[longest] if len(said) > longest else None
         for said in groups
         if said[:longest] == words[:longest]
     }
     assert {
-        spoken.language.words[w] if w is not None else None for w in refused.value.next_words
+        task_language.language.words[w] if w is not None else None for w in refused.value.next_words
     } == following
 
 
@@ -99,27 +104,27 @@ def test_every_sentence_of_a_shipped_domain(name: str) -> None:
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 10**6))
 def test_every_sentence_of_a_random_model(robots: int, seed: int) -> None:
-    check(random_spoken(seed, robots)[1], seed)
+    check(random_task_language(seed, robots)[1], seed)
 
 
 # -- drawing
 # -------------------------------------------------------------------------------------------------------
 
 
-def largest(name: str) -> Dag:
+def largest(name: str) -> PlanDag:
     """The DAG of the sentence that leaves most plans open."""
-    spoken = shipped(name)[1]
-    words = max(by_sentence(spoken).items(), key=lambda item: len(item[1]))[0]
-    return dag(understand(spoken, spoken.words_of(words)))
+    task_language = shipped(name)[1]
+    words = max(by_sentence(task_language).items(), key=lambda item: len(item[1]))[0]
+    return plan_dag(OpenPlans.of(task_language, task_language.words_of(words)))
 
 
 @pytest.mark.parametrize("most", [1, 7, 12, 20, 10_000])
 @pytest.mark.parametrize("name", ["grid/corners-4x4", "two-arms/pass-on", "grid/three-robots-3x3"])
 def test_a_cut_dag_says_what_is_missing(name: str, most: int) -> None:
-    spoken = shipped(name)[1]
-    words = max(by_sentence(spoken).items(), key=lambda item: len(item[1]))[0]
+    task_language = shipped(name)[1]
+    words = max(by_sentence(task_language).items(), key=lambda item: len(item[1]))[0]
     whole = largest(name)
-    small = dag(understand(spoken, spoken.words_of(words)), most)
+    small = plan_dag(OpenPlans.of(task_language, task_language.words_of(words)), most)
     per_step = Counter(node.step for node in small.nodes)
     assert len(small.nodes) <= max(most, 2 * len(per_step))
     assert (
@@ -324,10 +329,10 @@ def test_options_that_do_not_go_together(coordlang: Command, files: tuple[Path, 
 
 def test_json_of_a_plan_file_and_more() -> None:
     """The JSON form is a plan file; a cut DAG says so node by node."""
-    spoken = shipped("grid/corners-4x4")[1]
-    words = max(by_sentence(spoken).items(), key=lambda item: len(item[1]))[0]
-    understood = understand(spoken, spoken.words_of(words))
-    data = understood_data(understood, [], dag(understood, 10))
+    task_language = shipped("grid/corners-4x4")[1]
+    words = max(by_sentence(task_language).items(), key=lambda item: len(item[1]))[0]
+    understood = OpenPlans.of(task_language, task_language.words_of(words))
+    data = open_plans_data(understood, [], plan_dag(understood, 10))
     assert data["count"] == 16
-    assert sum(node.get("merged", 0) for node in data["nodes"]) == dag(understood, 10).cut > 0
+    assert sum(node.get("merged", 0) for node in data["nodes"]) == plan_dag(understood, 10).cut > 0
     assert all(("state" in node) != ("merged" in node) for node in data["nodes"])

@@ -12,38 +12,42 @@ from hypothesis import strategies as st
 
 from coordlang.tasks.candidates import Candidates
 from coordlang.tasks.task_file import ground_tasks
-from coordlang.use.sentence.astar import ExpandedStates, astar, plan_under_sentence
 from coordlang.use.sentence.fitting_plans import NoPlanFits
+from coordlang.use.sentence.guided_search import ExpandedStates, a_star, plan_under_sentence
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.check.validate import validate
 from planners.errors import UsageError
 from planners.search.bounds import heuristic
 from planners.search.plan_file import read_plans, texts
 from tests.conftest import DOMAINS, Command
-from tests.use.naive_sentences import SHIPPED, by_sentence, random_spoken, shipped
+from tests.use.naive_sentences import SHIPPED, by_sentence, random_task_language, shipped
 
 
-def check(candidates: Candidates, spoken: TaskLanguage, names: tuple[str, ...]) -> int:
+def check(candidates: Candidates, task_language: TaskLanguage, names: tuple[str, ...]) -> int:
     """The searches made; every sentence of the task with every heuristic."""
-    loaded, groups = candidates.loaded, by_sentence(spoken)
+    loaded, groups = candidates.loaded, by_sentence(task_language)
     problem = loaded.problems[0]
     [(init, goal)] = ground_tasks(loaded.domain, problem, candidates.listed)
-    terrain, searches = ExpandedStates(spoken.model, spoken.table), 0
+    terrain, searches = ExpandedStates(task_language.model, task_language.table), 0
     for name in names:
-        without = plan_under_sentence(spoken, None, name, terrain)
-        assert without.cost == spoken.space.cost_of(0)
+        without = plan_under_sentence(task_language, None, name, terrain)
+        assert without.cost == task_language.space.cost_of(0)
         assert any(without.plan in plans for plans in groups.values())
         for words, plans in list(groups.items())[:25]:
             for count_words in (True, False):
                 found = plan_under_sentence(
-                    spoken, spoken.words_of(words), name, terrain, count_words=count_words
+                    task_language,
+                    task_language.words_of(words),
+                    name,
+                    terrain,
+                    count_words=count_words,
                 )
                 assert found.plan in plans
-                assert found.words == spoken.words_of(words)
+                assert found.words == task_language.words_of(words)
                 assert found.cost == without.cost
                 assert found.states <= found.expanded < found.generated + 1
                 searches += 1
-            said, idle = texts(spoken.model, found.plan), spoken.model.keeps_idle
+            said, idle = texts(task_language.model, found.plan), task_language.model.keeps_idle
             verdict = validate(
                 loaded.domain, problem, loaded.team, said, init=init, goal=goal, allow_idle=idle
             )
@@ -53,20 +57,20 @@ def check(candidates: Candidates, spoken: TaskLanguage, names: tuple[str, ...]) 
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_shipped_domains(name: str) -> None:
-    candidates, spoken = shipped(name)
+    candidates, task_language = shipped(name)
     try:
-        heuristic("manhattan", spoken.model, spoken.space.goals[0])
+        heuristic("manhattan", task_language.model, task_language.space.goals[0])
         names = ("blind", "relaxed", "manhattan")
     except UsageError:
         names = ("blind", "relaxed")
-    assert check(candidates, spoken, names) > 1
+    assert check(candidates, task_language, names) > 1
 
 
 @pytest.mark.parametrize("robots", [2, 3])
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 10**6))
 def test_random_models(robots: int, seed: int) -> None:
-    check(*random_spoken(seed, robots), ("blind", "relaxed"))
+    check(*random_task_language(seed, robots), ("blind", "relaxed"))
 
 
 @settings(max_examples=40, deadline=None, derandomize=True)
@@ -75,14 +79,14 @@ def test_a_state_is_looked_at_once(seed: int, robots: int) -> None:
     """By breadth every state is expanded once, whatever the sentence, and none that is farther than
     the goal.
     """
-    _, spoken = random_spoken(seed, robots)
-    space, model = spoken.space, spoken.model
+    _, task_language = random_task_language(seed, robots)
+    space, model = task_language.space, task_language.model
     assume(model.cost == "makespan")
-    terrain = ExpandedStates(model, spoken.table)
-    most = _expandable(terrain, space.rows[space.state[spoken.start]], space.cost_of(0)[0])
-    for words in list(by_sentence(spoken))[:10]:
+    terrain = ExpandedStates(model, task_language.table)
+    most = _expandable(terrain, space.rows[space.state[task_language.start]], space.cost_of(0)[0])
+    for words in list(by_sentence(task_language))[:10]:
         found = plan_under_sentence(
-            spoken, spoken.words_of(words), "blind", terrain, count_words=False
+            task_language, task_language.words_of(words), "blind", terrain, count_words=False
         )
         assert found.states == found.expanded <= most
 
@@ -98,17 +102,17 @@ def _expandable(terrain: ExpandedStates, init: object, makespan: int) -> int:
 
 
 def test_a_sentence_of_longer_plans_only_is_no_sentence() -> None:
-    """A* alone may find a longer plan with the sentence; `guided` knows that it is not optimal."""
-    spoken = shipped("t-map/problem")[1]
-    space = spoken.space
-    sentences = [spoken.words_of(words) for words in by_sentence(spoken)]
-    terrain = ExpandedStates(spoken.model, spoken.table)
-    goal, init = space.goals[0], space.rows[space.state[spoken.start]]
-    bound = heuristic("relaxed", spoken.model, goal)
+    """A* alone may find a longer plan with the sentence; `plan_under_sentence` knows that it is not optimal."""
+    task_language = shipped("t-map/problem")[1]
+    space = task_language.space
+    sentences = [task_language.words_of(words) for words in by_sentence(task_language)]
+    terrain = ExpandedStates(task_language.model, task_language.table)
+    goal, init = space.goals[0], space.rows[space.state[task_language.start]]
+    bound = heuristic("relaxed", task_language.model, goal)
     found = {}
     for words in chain.from_iterable(product(range(3), repeat=length) for length in range(1, 6)):
         if words not in sentences and all(a != b for a, b in pairwise(words)):
-            result = astar(terrain, init, goal, bound, words)
+            result = a_star(terrain, init, goal, bound, words)
             if result is not None:
                 found[words] = result
     assert found
@@ -116,7 +120,7 @@ def test_a_sentence_of_longer_plans_only_is_no_sentence() -> None:
         assert result.cost > space.cost_of(0)
         assert result.words == words
         with pytest.raises(NoPlanFits):
-            plan_under_sentence(spoken, words)
+            plan_under_sentence(task_language, words)
 
 
 # -- the command
@@ -156,8 +160,8 @@ def test_json(coordlang: Command, files: tuple[Path, ...], tmp_path: Path) -> No
     assert search["expanded"] == 4 < search["without_sentence"]["expanded"]
     path = tmp_path / "plan.json"
     path.write_text(outcome.out)
-    spoken = shipped("t-map/problem")[1]
-    assert len(read_plans(path, spoken.model)) == 1
+    task_language = shipped("t-map/problem")[1]
+    assert len(read_plans(path, task_language.model)) == 1
 
 
 def test_usage(coordlang: Command, files: tuple[Path, ...]) -> None:

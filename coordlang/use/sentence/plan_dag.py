@@ -1,51 +1,18 @@
-"""Sentence -> the plans it leaves open, as data: counted, listed, and as a DAG that can be drawn."""
+"""The plans that a sentence leaves open as a layered graph that can be drawn."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING
 
 from coordlang.tasks.candidates import describe
-from coordlang.use.sentence.fitting_plans import fitting
-from coordlang.use.sentence.task_language import TaskLanguage
-from planners.search.plan_file import json_count, to_json
 from planners.search.plan_space import PlanSpace
-from planners.search.plans import Plan, Plans, counts
+from planners.search.plans import counts
 
-
-@dataclass(frozen=True, slots=True)
-class Understood:
-    """A sentence in one task.
-
-    ``fits`` are the optimal plans that have it, ``plans`` the same counted and listed.
-
-    In ``fits`` a node is a joint state and how many words have been said; every node is on some
-    plan.
-    """
-
-    spoken: TaskLanguage
-    words: tuple[int, ...]
-    fits: PlanSpace
-    plans: Plans
-
-    @property
-    def count(self) -> int:
-        """How many plans the sentence leaves open."""
-        return self.plans.count
-
-
-def understand(spoken: TaskLanguage, words: Sequence[int]) -> Understood:
-    """The optimal plans of the task with the sentence ``words``.
-
-    Word numbers, see `TaskLanguage.words_of`.
-
-    O(plan-space edges * words), however many plans there are.  Raises `NoPlanFits`, which says
-    where the sentence first breaks.
-    """
-    fits = fitting(spoken, words)
-    return Understood(spoken, tuple(words), fits, Plans.of(fits))
+if TYPE_CHECKING:
+    from coordlang.use.sentence.open_plans import OpenPlans
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,9 +33,8 @@ class DagNode:
 
 @dataclass(frozen=True, slots=True)
 class DagEdge:
-    """The joint actions from one node (number in `Dag.nodes`) to another.
-
-    Each one a text or None (idle) per robot.
+    """The joint actions from one node (number in `PlanDag.nodes`) to another: each one a text or None
+    (idle) per robot.
     """
 
     source: int
@@ -77,7 +43,7 @@ class DagEdge:
 
 
 @dataclass(frozen=True, slots=True)
-class Dag:
+class PlanDag:
     """The plans that a sentence leaves open, as the paths of a layered graph.
 
     ``nodes`` are sorted by step, the most plans first.  ``cut`` is how many nodes were merged; 0:
@@ -103,19 +69,19 @@ class Dag:
         return [range(a, b) for a, b in pairwise([*bounds, len(self.nodes)])]
 
 
-def dag(understood: Understood, most: int | None = None) -> Dag:
+def plan_dag(open_plans: OpenPlans, most: int | None = None) -> PlanDag:
     """The fitting plans as a DAG of at most about ``most`` nodes (None: all).
 
     A larger one is cut in its breadth: every step keeps the nodes that most plans pass through, at
     least one, and the others of a step are merged into one.
     """
-    spoken, space = understood.spoken, understood.fits
+    task_language, space = open_plans.task_language, open_plans.fits
     through = _plans_through(space)
     width = _width(space, most)
-    said, word = _said(understood)
+    said, word = _said(open_plans)
     nodes: list[DagNode] = []
     number: dict[int, int] = {}
-    codec = spoken.model.codec
+    codec = task_language.model.codec
     for step, span in enumerate(reversed(space.layers)):
         here = sorted(range(span.start, span.stop), key=lambda n: (-through[n], n))
         kept = here if len(here) <= width else here[: max(1, width - 1)]
@@ -123,55 +89,19 @@ def dag(understood: Understood, most: int | None = None) -> Dag:
             number[node] = len(nodes)
             key = codec.key(space.rows[space.state[node]])
             nodes.append(
-                DagNode(step, key, spoken.table.words[word[node]], said[node], through[node])
+                DagNode(step, key, task_language.table.words[word[node]], said[node], through[node])
             )
         others = here[len(kept) :]
         if others:
             number.update(dict.fromkeys(others, len(nodes)))
             nodes.append(DagNode(step, "", "", 0, sum(through[n] for n in others), len(others)))
     cut = sum(node.merged for node in nodes)
-    task = describe(spoken.space, spoken.task)
-    sentence = tuple(spoken.table.words[w] for w in understood.words)
+    task = describe(task_language.space, task_language.task)
+    sentence = tuple(task_language.table.words[w] for w in open_plans.words)
     edges = _edges(space, number, nodes)
-    return Dag(sentence, task, spoken.model.robots, understood.count, tuple(nodes), edges, cut)
-
-
-def understood_data(
-    understood: Understood, listed: Sequence[Plan], graph: Dag | None
-) -> dict[str, Any]:
-    """The JSON form: a plan file with the sentence, the guarantee and the DAG.
-
-    See docs/formats.md; the DAG is there if it was given.
-    """
-    spoken = understood.spoken
-    data = {
-        "sentence": spoken.text(understood.words),
-        "covered": spoken.covered,
-        "task": describe(spoken.space, spoken.task),
-        **to_json(understood.plans, listed),
-    }
-    if graph is not None:
-        data["nodes"] = [
-            {"merged": node.merged, "step": node.step, "plans": json_count(node.plans)}
-            if node.merged
-            else {
-                "state": node.key,
-                "word": node.word,
-                "said": node.said,
-                "step": node.step,
-                "plans": json_count(node.plans),
-            }
-            for node in graph.nodes
-        ]
-        data["edges"] = [
-            {
-                "from": edge.source,
-                "to": edge.target,
-                "actions": [list(action) for action in edge.actions],
-            }
-            for edge in graph.edges
-        ]
-    return data
+    return PlanDag(
+        sentence, task, task_language.model.robots, open_plans.count, tuple(nodes), edges, cut
+    )
 
 
 def _plans_through(space: PlanSpace) -> list[int]:
@@ -198,10 +128,10 @@ def _width(space: PlanSpace, most: int | None) -> int:
     return width
 
 
-def _said(understood: Understood) -> tuple[dict[int, int], dict[int, int]]:
+def _said(open_plans: OpenPlans) -> tuple[dict[int, int], dict[int, int]]:
     """For each node how many words have been said, and the word it is in."""
-    space, words = understood.fits, understood.words
-    word = dict(enumerate(understood.spoken.table.of_rows(space.rows)[space.state].tolist()))
+    space, words = open_plans.fits, open_plans.words
+    word = dict(enumerate(open_plans.task_language.table.of_rows(space.rows)[space.state].tolist()))
     said = {int(space.starts[0]): 1}
     first, target = space.first.tolist(), space.target.tolist()
     for span in reversed(space.layers):

@@ -9,7 +9,6 @@ from heapq import heappop, heappush
 import numpy as np
 
 from coordlang.language.words import WordTable, sentence
-from coordlang.use.sentence.fitting_plans import fitting
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.joint.model import Goal, JointModel
 from planners.joint.states import bits
@@ -19,7 +18,7 @@ from planners.tables import Rows
 
 
 @dataclass(frozen=True, slots=True)
-class Search:
+class GuidedPlan:
     """What an A* search found, and its work.
 
     ``cost`` is (makespan, second component); ``words`` the plan's sentence.  ``expanded`` counts
@@ -73,31 +72,31 @@ class ExpandedStates:
 
 
 def plan_under_sentence(
-    spoken: TaskLanguage,
+    task_language: TaskLanguage,
     words: Sequence[int] | None,
     name: str = "relaxed",
     terrain: ExpandedStates | None = None,
     *,
     count_words: bool = True,
-) -> Search:
+) -> GuidedPlan:
     """An optimal plan of the task with the sentence ``words``; any optimal plan for None.
 
-    ``name`` is the heuristic (`planners.search.bounds.HEURISTICS`); see `astar` for the rest.
+    ``name`` is the heuristic (`planners.search.bounds.HEURISTICS`); see `a_star` for the rest.
     Raises `NoPlanFits` when no optimal plan has the sentence.
     """
-    space = spoken.space
-    terrain = terrain or ExpandedStates(spoken.model, spoken.table)
-    goal = space.goals[space.goal[spoken.start]]
-    init = space.rows[space.state[spoken.start]]
-    bound = heuristic(name, spoken.model, goal)
-    found = astar(terrain, init, goal, bound, words, count_words=count_words)
-    if found is None or found.cost != space.cost_of(spoken.task):
-        fitting(spoken, words or ())  # says where the sentence first breaks
+    space = task_language.space
+    terrain = terrain or ExpandedStates(task_language.model, task_language.table)
+    goal = space.goals[space.goal[task_language.start]]
+    init = space.rows[space.state[task_language.start]]
+    bound = heuristic(name, task_language.model, goal)
+    found = a_star(terrain, init, goal, bound, words, count_words=count_words)
+    if found is None or found.cost != space.cost_of(task_language.task):
+        task_language.plans_with(words or ())  # says where the sentence first breaks
         raise AssertionError("A* missed an optimal plan")
     return found
 
 
-def astar(
+def a_star(
     terrain: ExpandedStates,
     init: Rows,
     goal: Goal,
@@ -105,10 +104,9 @@ def astar(
     words: Sequence[int] | None = None,
     *,
     count_words: bool = True,
-) -> Search | None:
-    """An optimal plan with the sentence ``words``, if it is the sentence of an optimal plan.
-
-    Any optimal plan without one.
+) -> GuidedPlan | None:
+    """An optimal plan with the sentence ``words``, if it is the sentence of an optimal plan; any
+    optimal plan without one.
 
     For another sentence it may find a longer plan or none.
 
@@ -150,7 +148,7 @@ def astar(
         if known.reached[state] and here >> last & 1:
             plan, states = _way(before, (state, last))
             said = sentence(terrain.word[s] for s in states)
-            return Search(plan, said, best[state], expanded, len(looked), generated)
+            return GuidedPlan(plan, said, best[state], expanded, len(looked), generated)
         expanded += 1
         looked.add(state)
         steps = terrain.steps(state)

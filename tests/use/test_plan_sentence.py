@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from coordlang.tasks.candidates import Candidates
 from coordlang.tasks.task_file import ground_tasks
-from coordlang.use.sentence.saying import NotAPlan, NotOptimal, say
+from coordlang.use.sentence.plan_sentence import NotAPlan, NotOptimal, sentence_of_plan
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.check.validate import validate
 from planners.errors import BadInput, Position, ProvedImpossible
@@ -25,13 +25,15 @@ from planners.search.optimal_plans import search
 from planners.search.plan_file import Texts, only_one_plan, texts
 from planners.search.plans import Plan, Plans
 from tests.conftest import Command
-from tests.use.naive_sentences import SHIPPED, by_sentence, random_spoken, shipped
+from tests.use.naive_sentences import SHIPPED, by_sentence, random_task_language, shipped
 
 
-def check_said(spoken: TaskLanguage) -> None:
-    for words, plans in by_sentence(spoken).items():
+def check_said(task_language: TaskLanguage) -> None:
+    for words, plans in by_sentence(task_language).items():
         for plan in sorted(plans)[:40]:
-            assert spoken.text(say(spoken, texts(spoken.model, plan))) == " ".join(words)
+            assert task_language.text(
+                sentence_of_plan(task_language, texts(task_language.model, plan))
+            ) == " ".join(words)
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -43,16 +45,22 @@ def test_every_plan_says_its_sentence(name: str) -> None:
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 10**6))
 def test_every_plan_of_a_random_model(robots: int, seed: int) -> None:
-    check_said(random_spoken(seed, robots)[1])
+    check_said(random_task_language(seed, robots)[1])
 
 
-def changed(spoken: TaskLanguage, random: Random) -> Plan:
+def changed(task_language: TaskLanguage, random: Random) -> Plan:
     """A sequence of label tuples near an optimal plan, or a detour that ends in the goal."""
-    model = spoken.model
-    plan = list(Plans.of(spoken.space).unrank(random.randrange(Plans.of(spoken.space).count)))
+    model = task_language.model
+    plan = list(
+        Plans.of(task_language.space).unrank(random.randrange(Plans.of(task_language.space).count))
+    )
     kind = random.choice(["swap", "drop", "insert", "label", "detour", "detour", "detour"])
     if kind == "detour":
-        return busy(spoken, random) if model.cost != "makespan" else detour(spoken, random)
+        return (
+            busy(task_language, random)
+            if model.cost != "makespan"
+            else detour(task_language, random)
+        )
     if not plan:
         return tuple(
             tuple(random.randrange(len(own)) for own in model.labels)
@@ -74,10 +82,10 @@ def changed(spoken: TaskLanguage, random: Random) -> Plan:
     return tuple(plan)
 
 
-def busy(spoken: TaskLanguage, random: Random) -> Plan:
+def busy(task_language: TaskLanguage, random: Random) -> Plan:
     """A plan of least makespan, whatever its second cost is."""
-    model, space = spoken.model, spoken.space
-    row, plan = space.rows[space.state[spoken.start]], []
+    model, space = task_language.model, task_language.space
+    row, plan = space.rows[space.state[task_language.start]], []
     for left in range(space.cost_of(0)[0], 0, -1):
         steps = model.successors(row[None, :])
         order = list(range(len(steps)))
@@ -87,7 +95,7 @@ def busy(spoken: TaskLanguage, random: Random) -> Plan:
                 rest = search(
                     model,
                     PlanningTask(
-                        "rest", steps.result[chosen], space.goals[space.goal[spoken.start]]
+                        "rest", steps.result[chosen], space.goals[space.goal[task_language.start]]
                     ),
                 )
             except ProvedImpossible:
@@ -99,10 +107,10 @@ def busy(spoken: TaskLanguage, random: Random) -> Plan:
     return tuple(plan)
 
 
-def detour(spoken: TaskLanguage, random: Random) -> Plan:
+def detour(task_language: TaskLanguage, random: Random) -> Plan:
     """Some random joint steps, then an optimal plan from there."""
-    model, space = spoken.model, spoken.space
-    row = space.rows[space.state[spoken.start]]
+    model, space = task_language.model, task_language.space
+    row = space.rows[space.state[task_language.start]]
     plan: list[tuple[int, ...]] = []
     for _ in range(random.randint(0, 3)):
         steps = model.successors(row[None, :])
@@ -111,13 +119,17 @@ def detour(spoken: TaskLanguage, random: Random) -> Plan:
             plan.append(tuple(steps.labels[chosen].tolist()))
             row = steps.result[chosen]
     try:
-        rest = search(model, PlanningTask("rest", row, space.goals[space.goal[spoken.start]]))
+        rest = search(
+            model, PlanningTask("rest", row, space.goals[space.goal[task_language.start]])
+        )
     except ProvedImpossible:
         return tuple(plan)
     return (*plan, *Plans.of(rest).unrank(random.randrange(Plans.of(rest).count)))
 
 
-def judged(candidates: Candidates, spoken: TaskLanguage, plan: Plan, optimal: set[Plan]) -> str:
+def judged(
+    candidates: Candidates, task_language: TaskLanguage, plan: Plan, optimal: set[Plan]
+) -> str:
     """What `say` does with a sequence of steps, compared with the plan checker and the list of
     optimal plans.
     """
@@ -130,14 +142,14 @@ def judged(candidates: Candidates, spoken: TaskLanguage, plan: Plan, optimal: se
     )
     if not verdict.valid:
         with pytest.raises(NotAPlan) as wrong:
-            say(spoken, said)
+            sentence_of_plan(task_language, said)
         assert wrong.value.step == verdict.step
         return "goal" if verdict.step == len(plan) else "no plan"
     if plan in optimal:
-        say(spoken, said)
+        sentence_of_plan(task_language, said)
         return "optimal"
     with pytest.raises(NotOptimal) as worse:
-        say(spoken, said)
+        sentence_of_plan(task_language, said)
     agree = max(k for k in range(len(plan) + 1) if any(plan[:k] == other[:k] for other in optimal))
     assert worse.value.step == agree
     assert worse.value.excess[0] == len(plan) - len(next(iter(optimal)))
@@ -151,11 +163,11 @@ def test_wrong_plans_of_random_models() -> None:
     @settings(max_examples=80, deadline=None, derandomize=True)
     @given(seed=st.integers(0, 10**6), robots=st.sampled_from([2, 3]))
     def compare(seed: int, robots: int) -> None:
-        candidates, spoken = random_spoken(seed, robots)
-        optimal = {plan for plans in by_sentence(spoken).values() for plan in plans}
+        candidates, task_language = random_task_language(seed, robots)
+        optimal = {plan for plans in by_sentence(task_language).values() for plan in plans}
         random = Random(seed)
         for _ in range(6):
-            seen[judged(candidates, spoken, changed(spoken, random), optimal)] += 1
+            seen[judged(candidates, task_language, changed(task_language, random), optimal)] += 1
 
     compare()
     assert min(seen[kind] for kind in ("goal", "no plan", "optimal", "longer", "dearer")) > 5, seen
@@ -172,11 +184,17 @@ def test_wrong_plans_of_random_models() -> None:
     ],
 )
 def test_wrong_plans_of_shipped_domains(name: str) -> None:
-    candidates, spoken = shipped(name)
-    optimal = {plan for plans in by_sentence(spoken).values() for plan in plans}
+    candidates, task_language = shipped(name)
+    optimal = {plan for plans in by_sentence(task_language).values() for plan in plans}
     random = Random(name)
     assert (
-        len({judged(candidates, spoken, changed(spoken, random), optimal) for _ in range(25)}) > 1
+        len(
+            {
+                judged(candidates, task_language, changed(task_language, random), optimal)
+                for _ in range(25)
+            }
+        )
+        > 1
     )
 
 
@@ -368,17 +386,17 @@ def test_a_task_that_is_not_covered(
 
 def test_the_plan_with_an_initial_goal_state() -> None:
     """The empty plan has one word."""
-    candidates, spoken = shipped("three-cells/problem")
-    space = spoken.space
+    candidates, task_language = shipped("three-cells/problem")
+    space = task_language.space
     goal_node = int(np.flatnonzero(space.layer == 0)[0])
     there = TaskLanguage(
-        spoken.language,
-        spoken.table,
+        task_language.language,
+        task_language.table,
         replace(space, starts=np.array([goal_node])),
         0,
-        spoken.word,
+        task_language.word,
         True,
     )
-    assert say(there, ()) == (int(spoken.word[goal_node]),)
+    assert sentence_of_plan(there, ()) == (int(task_language.word[goal_node]),)
     with pytest.raises(NotOptimal):
-        say(there, [(None,) * len(candidates.model.robots)])
+        sentence_of_plan(there, [(None,) * len(candidates.model.robots)])

@@ -44,36 +44,36 @@ class NotOptimal(Refuted):
         self.excess = excess
 
 
-def say(spoken: TaskLanguage, plan: Sequence[Texts]) -> tuple[int, ...]:
-    """The sentence of an optimal plan (the paper's TSC), as word numbers.
-
-    `TaskLanguage.text` writes it.
+def sentence_of_plan(task_language: TaskLanguage, plan: Sequence[Texts]) -> tuple[int, ...]:
+    """The sentence of an optimal plan (the paper's TSC), as word numbers; `TaskLanguage.text`
+    writes it.
 
     ``plan[k][i]`` is the subaction of robot i in step k as text, None if it idles (as
     `planners.search.plan_file.read_plans` gives it).  O(steps) expansions.  Raises `NotAPlan` or
     `NotOptimal` with the first step that breaks.
     """
-    numbers, rows, second = follow(spoken, plan)
-    space, node = spoken.space, spoken.start
-    words = [int(spoken.word[node])]
-    makespan, optimal = space.cost_of(spoken.task)
+    numbers, rows, second = follow(task_language, plan)
+    space, node = task_language.space, task_language.start
+    words = [int(task_language.word[node])]
+    makespan, optimal = space.cost_of(task_language.task)
     for step, labels in enumerate(numbers):
-        edge = _edge(spoken, node, labels)
+        edge = _edge(task_language, node, labels)
         if edge is None:
             excess = len(plan) - makespan, second - optimal
-            raise NotOptimal(step, excess, _leaves(spoken, plan[step], rows[step], step, excess))
+            raise NotOptimal(
+                step, excess, _leaves(task_language, plan[step], rows[step], step, excess)
+            )
         node = int(space.target[edge])
-        words.append(int(spoken.word[node]))
+        words.append(int(task_language.word[node]))
     return sentence(words)
 
 
-def follow(spoken: TaskLanguage, plan: Sequence[Texts]) -> tuple[Plan, list[Rows], int]:
-    """The label numbers, the states and the second cost of a plan, optimal or not.
-
-    Raises `NotAPlan`.
+def follow(task_language: TaskLanguage, plan: Sequence[Texts]) -> tuple[Plan, list[Rows], int]:
+    """The label numbers, the states and the second cost of a plan, optimal or not.  Raises
+    `NotAPlan`.
     """
-    model, space = spoken.model, spoken.space
-    row = space.rows[space.state[spoken.start]]
+    model, space = task_language.model, task_language.space
+    row = space.rows[space.state[task_language.start]]
     rows, second, numbers = [row], 0, []
     for number, step in enumerate(plan):
         labels = _numbers(model, step, number)
@@ -88,8 +88,8 @@ def follow(spoken: TaskLanguage, plan: Sequence[Texts]) -> tuple[Plan, list[Rows
         rows.append(steps.result[found[0]])
         second += int(steps.cost[found[0]])
         numbers.append(labels)
-    if not model.holds(space.goals[space.goal[spoken.start]], rows[-1][None, :])[0]:
-        raise NotAPlan(len(plan), f"after {_steps(len(plan))} {_missing(spoken, rows[-1])}")
+    if not model.holds(space.goals[space.goal[task_language.start]], rows[-1][None, :])[0]:
+        raise NotAPlan(len(plan), f"after {_steps(len(plan))} {_missing(task_language, rows[-1])}")
     return tuple(numbers), rows, second
 
 
@@ -132,10 +132,10 @@ def _numbers(model: JointModel, step: Texts, number: int) -> tuple[int, ...]:
     return found
 
 
-def _missing(spoken: TaskLanguage, row: Rows) -> str:
+def _missing(task_language: TaskLanguage, row: Rows) -> str:
     """The first part of the goal that does not hold."""
-    model, space = spoken.model, spoken.space
-    goal = space.goals[space.goal[spoken.start]]
+    model, space = task_language.model, task_language.space
+    goal = space.goals[space.goal[task_language.start]]
     if isinstance(goal, FullState):
         return "the state is not the goal state"
     parts = goal.parts if isinstance(goal, And) else (goal,)
@@ -143,19 +143,19 @@ def _missing(spoken: TaskLanguage, row: Rows) -> str:
     return f"the goal is not reached: {formula_text(part)} does not hold"
 
 
-def _edge(spoken: TaskLanguage, node: int, labels: Sequence[int]) -> int | None:
-    space = spoken.space
+def _edge(task_language: TaskLanguage, node: int, labels: Sequence[int]) -> int | None:
+    space = task_language.space
     first = int(space.first[node])
     found = (space.labels[first : int(space.first[node + 1])] == labels).all(axis=1).nonzero()[0]
     return first + int(found[0]) if len(found) else None
 
 
 def _leaves(
-    spoken: TaskLanguage, step: Texts, row: Rows, number: int, excess: tuple[int, int]
+    task_language: TaskLanguage, step: Texts, row: Rows, number: int, excess: tuple[int, int]
 ) -> str:
     """How much too costly a plan is, and where it leaves all optimal plans."""
-    model, space = spoken.model, spoken.space
-    makespan, second = space.cost_of(spoken.task)
+    model, space = task_language.model, task_language.space
+    makespan, second = space.cost_of(task_language.task)
     more, dearer = excess
     if more:
         wrong = f"it takes {_steps(makespan + more)}, and {makespan} {'is' if makespan == 1 else 'are'} enough"

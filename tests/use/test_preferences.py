@@ -21,29 +21,29 @@ from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
 from tests.conftest import DOMAINS, Command
 from tests.coordlang.naive import sentence
-from tests.use.naive_sentences import SHIPPED, by_sentence, random_spoken, shipped
+from tests.use.naive_sentences import SHIPPED, by_sentence, random_task_language, shipped
 
 #: The value of a wish, for the sentence and its plans; smaller is better.
 Value = Callable[[tuple[str, ...], set[Plan]], object]
 
 
-def naive_value(spoken: TaskLanguage, text: str) -> Value:
+def naive_value(task_language: TaskLanguage, text: str) -> Value:
     kind, _, argument = text.partition(":")
     if kind == "shortest":
         return lambda words, _: len(words)
     if kind == "most-plans":
         return lambda _, plans: -len(plans)
     grade = (
-        (lambda p: goes_first(spoken, p, argument))
+        (lambda p: goes_first(task_language, p, argument))
         if kind == "first"
-        else (lambda p: passes(spoken, p, argument))
+        else (lambda p: passes(task_language, p, argument))
     )
     return lambda _, plans: (max(map(grade, plans)), min(map(grade, plans)))
 
 
-def goes_first(spoken: TaskLanguage, plan: Plan, robot: str) -> int:
+def goes_first(task_language: TaskLanguage, plan: Plan, robot: str) -> int:
     """2 if somebody goes before the robot, 0 if the robot goes before everybody, else 1."""
-    model = spoken.model
+    model = task_language.model
     me = model.robots.index(robot)
     nothing = {a.label for a in model.actions if a.does_nothing and not a.parts}
     active = [
@@ -62,23 +62,23 @@ def goes_first(spoken: TaskLanguage, plan: Plan, robot: str) -> int:
     return 2 if "other" in orders else 1 if "nobody" in orders else 0
 
 
-def passes(spoken: TaskLanguage, plan: Plan, atoms: str) -> int:
-    space = spoken.space
+def passes(task_language: TaskLanguage, plan: Plan, atoms: str) -> int:
+    space = task_language.space
     wanted = {f"({part}" for part in atoms.split("(")[1:]}
     wanted = {part.strip() for part in wanted}
     keys = [
         set(space.model.codec.decode(space.rows[s]))
-        for s in Plans(space, spoken.start, []).states(plan)
+        for s in Plans(space, task_language.start, []).states(plan)
     ]
     return int(any(wanted <= key for key in keys))
 
 
-def wishes_for(spoken: TaskLanguage, random: Random) -> list[str]:
-    space = spoken.space
+def wishes_for(task_language: TaskLanguage, random: Random) -> list[str]:
+    space = task_language.space
     row = space.rows[int(random.choice(space.state.tolist()))]
-    atoms = spoken.model.codec.decode(row)
+    atoms = task_language.model.codec.decode(row)
     atoms = [a for a in atoms if not a.startswith("(last ")]
-    some = ["shortest", "most-plans", f"first:{random.choice(spoken.model.robots)}"]
+    some = ["shortest", "most-plans", f"first:{random.choice(task_language.model.robots)}"]
     if atoms:
         some.append(
             "avoid:" + " ".join(sorted(random.sample(atoms, random.randint(1, len(atoms)))))
@@ -87,18 +87,18 @@ def wishes_for(spoken: TaskLanguage, random: Random) -> list[str]:
     return random.sample(some, random.randint(1, 3))
 
 
-def check(spoken: TaskLanguage, texts: list[str]) -> Counter[str]:
-    groups = by_sentence(spoken)
-    number = {word: n for n, word in enumerate(spoken.language.words)}
-    values = [naive_value(spoken, text) for text in texts]
+def check(task_language: TaskLanguage, texts: list[str]) -> Counter[str]:
+    groups = by_sentence(task_language)
+    number = {word: n for n, word in enumerate(task_language.language.words)}
+    values = [naive_value(task_language, text) for text in texts]
 
     def key(item: tuple[tuple[str, ...], set[Plan]]) -> tuple[object, ...]:
         words, plans = item
         return (*(value(words, plans) for value in values), len(words), [number[w] for w in words])
 
     words, plans = min(groups.items(), key=key)
-    found = best_sentence(spoken, [read_preference(spoken, text) for text in texts])
-    assert found.words == spoken.words_of(words)
+    found = best_sentence(task_language, [read_preference(task_language, text) for text in texts])
+    assert found.words == task_language.words_of(words)
     assert found.plans == len(plans)
     expected = [abs(v) if isinstance(v := value(words, plans), int) else v for value in values]
     assert list(found.values) == expected
@@ -115,10 +115,14 @@ def check(spoken: TaskLanguage, texts: list[str]) -> Counter[str]:
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_shipped_domains(name: str) -> None:
-    spoken = shipped(name)[1]
+    task_language = shipped(name)[1]
     random = Random(name)
-    for texts in [["shortest"], ["most-plans"], *(wishes_for(spoken, random) for _ in range(5))]:
-        check(spoken, texts)
+    for texts in [
+        ["shortest"],
+        ["most-plans"],
+        *(wishes_for(task_language, random) for _ in range(5)),
+    ]:
+        check(task_language, texts)
 
 
 def test_random_models() -> None:
@@ -127,10 +131,10 @@ def test_random_models() -> None:
     @settings(max_examples=120, deadline=None, derandomize=True)
     @given(seed=st.integers(0, 10**6), robots=st.sampled_from([2, 3]))
     def compare(seed: int, robots: int) -> None:
-        _, spoken = random_spoken(seed, robots)
+        _, task_language = random_task_language(seed, robots)
         random = Random(seed)
         for _ in range(4):
-            seen.update(check(spoken, wishes_for(spoken, random)))
+            seen.update(check(task_language, wishes_for(task_language, random)))
 
     compare()
     kinds = [
@@ -204,17 +208,19 @@ def test_random_graphs() -> None:
     seen: Counter[int] = Counter()
     for seed in [*range(200), *DECIDED_BY_COUNTS]:
         random = Random(seed)
-        spoken = random_graph(random)
-        space = spoken.space
+        task_language = random_graph(random)
+        space = task_language.space
         grade_of = [
             int(random.random() < 0.15) + int(random.random() < 0.05) for _ in range(len(space))
         ]
         groups: dict[tuple[int, ...], list[int]] = {}
-        stack = [((spoken.start,), grade_of[spoken.start])]
+        stack = [((task_language.start,), grade_of[task_language.start])]
         while stack:
             path, grade = stack.pop()
             if space.layer[path[-1]] == 0:
-                groups.setdefault(sentence([int(spoken.word[n]) for n in path]), []).append(grade)
+                groups.setdefault(sentence([int(task_language.word[n]) for n in path]), []).append(
+                    grade
+                )
             after = space.target[space.first[path[-1]] : space.first[path[-1] + 1]].tolist()
             stack += [((*path, target), max(grade, grade_of[target])) for target in after]
         wishes = random.sample(
@@ -237,7 +243,7 @@ def test_random_graphs() -> None:
                 words,
             ),
         )
-        found = best_sentence(spoken, wishes)
+        found = best_sentence(task_language, wishes)
         assert found.words == best, seed
         assert found.plans == len(groups[best])
         seen[min(len(groups), 8)] += 1
@@ -246,24 +252,27 @@ def test_random_graphs() -> None:
 
 def test_wishes_of_one_robot_are_against_those_of_the_other() -> None:
     """On the T-map the two sentences say who goes first."""
-    spoken = shipped("t-map/problem")[1]
+    task_language = shipped("t-map/problem")[1]
     one, other = (
-        best_sentence(spoken, [read_preference(spoken, f"first:{r}")]) for r in ("r1", "r2")
+        best_sentence(task_language, [read_preference(task_language, f"first:{r}")])
+        for r in ("r1", "r2")
     )
     assert one.values == other.values == ((0, 0),)
     assert one.words != other.words
     assert (
         goes_first(
-            spoken, next(iter(by_sentence(spoken)[tuple(spoken.text(one.words).split())])), "r1"
+            task_language,
+            next(iter(by_sentence(task_language)[tuple(task_language.text(one.words).split())])),
+            "r1",
         )
         == 0
     )
 
 
 def test_a_search_that_is_too_large_says_so() -> None:
-    spoken = shipped("grid/corners-4x4")[1]
+    task_language = shipped("grid/corners-4x4")[1]
     with pytest.raises(OutOfMemory, match="not decided yet"):
-        best_sentence(spoken, [read_preference(spoken, "most-plans")], most=2)
+        best_sentence(task_language, [read_preference(task_language, "most-plans")], most=2)
 
 
 @pytest.mark.parametrize(
@@ -286,10 +295,10 @@ def test_wishes_that_are_none(text: str) -> None:
 
 
 def test_spelling_of_wishes() -> None:
-    spoken = shipped("t-map/problem")[1]
-    assert read_preference(spoken, " shortest ") == "shortest"
-    assert read_preference(spoken, "first: R2 ").text == "first:r2"  # type: ignore[union-attr]
-    assert read_preference(spoken, "avoid: ( AT r1  c1-1 )").text == "avoid:(at r1 c1-1)"  # type: ignore[union-attr]
+    task_language = shipped("t-map/problem")[1]
+    assert read_preference(task_language, " shortest ") == "shortest"
+    assert read_preference(task_language, "first: R2 ").text == "first:r2"  # type: ignore[union-attr]
+    assert read_preference(task_language, "avoid: ( AT r1  c1-1 )").text == "avoid:(at r1 c1-1)"  # type: ignore[union-attr]
 
 
 # -- the command

@@ -14,7 +14,6 @@ from coordlang.explanation import word_formulas
 from coordlang.explanation.demands import SentenceDemands, sentence_demands
 from coordlang.explanation.text import demands_text
 from coordlang.tasks.candidates import all_pairs, from_problems
-from coordlang.use.sentence.fitting_plans import fitting
 from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 from planners.errors import ProvedImpossible
 from planners.pddl import read_domain, read_problem
@@ -26,24 +25,26 @@ from tests.coordlang.test_minimal import shipped
 from tests.explain.test_formulas import language_of, random_language
 
 
-def by_sentence(spoken: TaskLanguage, most: int) -> dict[tuple[int, ...], list[Plan]]:
-    word = spoken.table.of_rows(spoken.space.rows)
+def by_sentence(task_language: TaskLanguage, most: int) -> dict[tuple[int, ...], list[Plan]]:
+    word = task_language.table.of_rows(task_language.space.rows)
     groups: dict[tuple[int, ...], list[Plan]] = {}
-    for plan in naive.listed(spoken.space, spoken.task, most):
-        said = naive.sentence([int(word[s]) for s in naive.states(spoken.space, spoken.task, plan)])
+    for plan in naive.listed(task_language.space, task_language.task, most):
+        said = naive.sentence(
+            [int(word[s]) for s in naive.states(task_language.space, task_language.task, plan)]
+        )
         groups.setdefault(said, []).append(plan)
     return groups
 
 
 def check(
-    spoken: TaskLanguage,
+    task_language: TaskLanguage,
     words: tuple[int, ...],
     plans: list[Plan],
     found: SentenceDemands,
     few: int,
 ) -> None:
-    model = spoken.model
-    assert found.sentence == tuple(spoken.table.words[w] for w in words)
+    model = task_language.model
+    assert found.sentence == tuple(task_language.table.words[w] for w in words)
     assert (found.plans, found.steps) == (len(plans), len(plans[0]))
     for robot, part in enumerate(found.parts):
         texts = {
@@ -59,11 +60,11 @@ def check(
     assert [(c.before, c.after) for c in found.changes] == list(
         zip(found.sentence, found.sentence[1:], strict=False)
     )
-    space = spoken.space
-    word = spoken.table.of_rows(space.rows)
+    space = task_language.space
+    word = task_language.table.of_rows(space.rows)
     steps: list[set[int]] = [set() for _ in found.changes]
     for plan in plans:
-        said = [int(word[s]) for s in naive.states(space, spoken.task, plan)]
+        said = [int(word[s]) for s in naive.states(space, task_language.task, plan)]
         for number, step in enumerate(k for k in range(1, len(said)) if said[k] != said[k - 1]):
             steps[number].add(step)
     assert [(c.earliest, c.latest) for c in found.changes] == [(min(s), max(s)) for s in steps]
@@ -89,15 +90,17 @@ def test_against_listed_plans(robots: int) -> None:
             Random(seed), candidates
         )  # RC or not: what is asked is about listed plans
         formulas = word_formulas(language, candidates.model)
-        for spoken in list(languages_in_tasks(language, candidates))[:8]:
+        for task_language in list(languages_in_tasks(language, candidates))[:8]:
             try:
-                groups = by_sentence(spoken, 60)
+                groups = by_sentence(task_language, 60)
             except naive.TooLarge:
                 continue
             for words, plans in groups.items():
                 few = 2
-                found = sentence_demands(fitting(spoken, words), spoken.table, formulas, few)
-                check(spoken, words, plans, found, few)
+                found = sentence_demands(
+                    task_language.plans_with(words), task_language.table, formulas, few
+                )
+                check(task_language, words, plans, found, few)
                 assert demands_text(found)
                 seen["changes"] += len(found.changes) > 0
                 seen["many subplans"] += any((p.subplans or 0) > few for p in found.parts)
@@ -118,11 +121,11 @@ def test_changes_that_may_come_sooner_or_later() -> None:
     words = {key: f"w{min(2, int(key.split('(at r1 c')[1][0]))}" for key in keys}
     language = language_of(words, ("w0", "w1", "w2"))
     formulas = word_formulas(language, candidates.model)
-    (spoken,) = languages_in_tasks(language, candidates)
+    (task_language,) = languages_in_tasks(language, candidates)
     several = 0
-    for said, plans in by_sentence(spoken, 10_000).items():
-        found = sentence_demands(fitting(spoken, said), spoken.table, formulas, 3)
-        check(spoken, said, plans, found, 3)
+    for said, plans in by_sentence(task_language, 10_000).items():
+        found = sentence_demands(task_language.plans_with(said), task_language.table, formulas, 3)
+        check(task_language, said, plans, found, 3)
         assert all(change.robots == ("r1",) for change in found.changes)
         several += sum(change.earliest < change.latest for change in found.changes)
     assert several
@@ -139,29 +142,32 @@ def test_who_decides_a_change(folder: str, stem: str, every: int) -> None:
     language = build_language(candidates, "greedy").language
     formulas = word_formulas(language, candidates.model)
     sizes: Counter[int] = Counter()
-    for spoken in list(languages_in_tasks(language, candidates))[::every]:
-        for words in by_sentence(spoken, 1000):
-            fits = fitting(spoken, words)
-            found = sentence_demands(fits, spoken.table, formulas)
+    for task_language in list(languages_in_tasks(language, candidates))[::every]:
+        for words in by_sentence(task_language, 1000):
+            fits = task_language.plans_with(words)
+            found = sentence_demands(fits, task_language.table, formulas)
             for number, change in enumerate(found.changes):
-                before = states_before(fits, spoken, number)
-                robots = [spoken.model.robots.index(r) for r in change.robots]
-                assert settled(spoken, before, words[number + 1], robots)
+                before = states_before(fits, task_language, number)
+                robots = [task_language.model.robots.index(r) for r in change.robots]
+                assert settled(task_language, before, words[number + 1], robots)
                 for left_out in robots:
                     assert not settled(
-                        spoken, before, words[number + 1], [r for r in robots if r != left_out]
+                        task_language,
+                        before,
+                        words[number + 1],
+                        [r for r in robots if r != left_out],
                     )
                 sizes[len(robots)] += 1
     assert sizes[1], sizes
     assert sizes[2], sizes
 
 
-def states_before(fits: object, spoken: TaskLanguage, number: int) -> set[int]:
+def states_before(fits: object, task_language: TaskLanguage, number: int) -> set[int]:
     """The states in which a plan is just before its change of word ``number``, by following all
     plans.
     """
     found = set()
-    word = spoken.table.of_rows(spoken.space.rows)
+    word = task_language.table.of_rows(task_language.space.rows)
     plans = Plans.of(fits)  # type: ignore[arg-type]
     for plan in plans:
         states = plans.states(plan)
@@ -170,16 +176,16 @@ def states_before(fits: object, spoken: TaskLanguage, number: int) -> set[int]:
     return found
 
 
-def settled(spoken: TaskLanguage, states: set[int], after: int, robots: list[int]) -> bool:
-    mapped = set(spoken.language.states)
+def settled(task_language: TaskLanguage, states: set[int], after: int, robots: list[int]) -> bool:
+    mapped = set(task_language.language.states)
     for state in states:
         answer: dict[tuple[int, ...], bool] = {}
-        steps = spoken.model.successors(spoken.space.rows[[state]])
+        steps = task_language.model.successors(task_language.space.rows[[state]])
         for labels, result in zip(steps.labels.tolist(), steps.result, strict=True):
-            if spoken.model.codec.key(result) not in mapped:
+            if task_language.model.codec.key(result) not in mapped:
                 continue
             own = tuple(labels[r] for r in robots)
-            makes = int(spoken.table.of_rows(np.array([result]))[0]) == after
+            makes = int(task_language.table.of_rows(np.array([result]))[0]) == after
             if answer.setdefault(own, makes) != makes:
                 return False
     return True
@@ -192,8 +198,10 @@ def test_the_running_example_in_plain_sentences() -> None:
     )
     language = build_language(candidates, "greedy").language
     formulas = word_formulas(language, candidates.model)
-    (spoken,) = languages_in_tasks(language, candidates)
-    found = sentence_demands(fitting(spoken, spoken.words_of("w1 w0")), spoken.table, formulas)
+    (task_language,) = languages_in_tasks(language, candidates)
+    found = sentence_demands(
+        task_language.plans_with(task_language.words_of("w1 w0")), task_language.table, formulas
+    )
     assert demands_text(found).splitlines() == [
         '"w1 w0" leaves 2 plans open.',
         "  r1: move a c, move c b.",

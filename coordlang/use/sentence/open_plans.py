@@ -1,0 +1,100 @@
+"""The plans that a sentence leaves open: counted, listed, and as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from coordlang.tasks.candidates import describe
+from coordlang.use.sentence.plan_dag import PlanDag
+from coordlang.use.sentence.task_language import TaskLanguage
+from planners.search.plan_file import json_count, to_json
+from planners.search.plan_space import PlanSpace
+from planners.search.plans import Plan, Plans
+
+
+@dataclass(frozen=True, slots=True)
+class OpenPlans:
+    """The plans that a sentence leaves open in one task.
+
+    Parameters
+    ----------
+    task_language
+        The language and the task.
+    words
+        The word numbers of the sentence.
+    fits
+        The optimal plans with this sentence as a plan space of one task.  A node is a joint state
+        and the number of words passed; every node is on some plan.
+    plans
+        The same plans, counted and ranked.
+    """
+
+    task_language: TaskLanguage
+    words: tuple[int, ...]
+    fits: PlanSpace
+    plans: Plans
+
+    @classmethod
+    def of(cls, task_language: TaskLanguage, words: Sequence[int]) -> OpenPlans:
+        """Find the optimal plans of the task with a sentence.
+
+        O(plan-space edges * words), however many plans there are.
+
+        Parameters
+        ----------
+        task_language
+            The language and the task.
+        words
+            Word numbers (`TaskLanguage.words_of`).
+
+        Raises
+        ------
+        NoPlanFits
+            If there is none; it says how far plans follow the sentence.
+        """
+        fits = task_language.plans_with(words)
+        return cls(task_language, tuple(words), fits, Plans.of(fits))
+
+    @property
+    def count(self) -> int:
+        """The number of plans that the sentence leaves open."""
+        return self.plans.count
+
+
+def open_plans_data(
+    open_plans: OpenPlans, listed: Sequence[Plan], graph: PlanDag | None
+) -> dict[str, Any]:
+    """The JSON form: a plan file (docs/formats.md) with the sentence, the guarantee and, if given,
+    the DAG.
+    """
+    task_language = open_plans.task_language
+    data = {
+        "sentence": task_language.text(open_plans.words),
+        "covered": task_language.covered,
+        "task": describe(task_language.space, task_language.task),
+        **to_json(open_plans.plans, listed),
+    }
+    if graph is not None:
+        data["nodes"] = [
+            {"merged": node.merged, "step": node.step, "plans": json_count(node.plans)}
+            if node.merged
+            else {
+                "state": node.key,
+                "word": node.word,
+                "said": node.said,
+                "step": node.step,
+                "plans": json_count(node.plans),
+            }
+            for node in graph.nodes
+        ]
+        data["edges"] = [
+            {
+                "from": edge.source,
+                "to": edge.target,
+                "actions": [list(action) for action in edge.actions],
+            }
+            for edge in graph.edges
+        ]
+    return data
