@@ -99,7 +99,7 @@ def command(
         click.echo("coordlang: what is done is kept; the same command goes on from there", err=True)
         raise
     clear_progress()
-    written = write_page(kept, Path(page) if page else folder / "evaluation.md")
+    written = write_page(RECIPES, kept, Path(page) if page else folder / "evaluation.md")
     seconds = perf_counter() - begin
     if as_json:
         click.echo(
@@ -115,7 +115,7 @@ def command(
             )
         )
     else:
-        for name, section in sections(found).items():
+        for name, section in sections(RECIPES, found).items():
             click.echo(f"# {RECIPES[name].title}\n")
             click.echo(as_text(section))
     unfinished = [

@@ -1,4 +1,5 @@
-"""The paper's tables and figures as recipes.
+"""The paper's evaluation, reproduced: each experiment is a recipe that is run, kept and rendered.
 
-Run, kept as data, drawn, and set beside the paper's own values.
+`experiments` holds one file an experiment, `lab` the machinery that runs them and renders their
+results, `material` what several experiments share.
 """

@@ -11,9 +11,9 @@ import pytest
 
 from coordlang.evaluation.experiments import communication, flexibility
 from coordlang.evaluation.experiments.table1 import brute_force, pairs_of_plans
-from coordlang.evaluation.lab.interval import mean_interval, wilson
-from coordlang.evaluation.material.orders import NATURAL, greedy_in_orders, natural_orders
+from coordlang.evaluation.lab.statistics import mean_interval, wilson
 from coordlang.evaluation.material.sentence_counts import SentenceCounts, said, sentence_counts
+from coordlang.evaluation.material.state_orders import NATURAL, greedy_in_orders, natural_orders
 from coordlang.language.flexibility import flexibility as measured
 from coordlang.language.words import WordTable
 from coordlang.required.divergences import states_on_plans

@@ -26,9 +26,13 @@ def all_lines() -> dict[str, list[Line]]:
 
 def test_the_page_is_what_the_results_say() -> None:
     lines = all_lines()
-    told = sections({name: [record_of(line) for line in found] for name, found in lines.items()})
-    assert set(told) == set(RECIPES)
-    text = page_text([line for found in lines.values() for line in found], told, "evaluation")
+    rendered = sections(
+        RECIPES, {name: [record_of(line) for line in found] for name, found in lines.items()}
+    )
+    assert set(rendered) == set(RECIPES)
+    text = page_text(
+        RECIPES, [line for found in lines.values() for line in found], rendered, "evaluation"
+    )
     assert PAGE.read_text() == text, (
         "run: coordlang evaluate all --results docs/evaluation --page docs/evaluation.md"
     )
@@ -105,10 +109,13 @@ def test_table_1_has_the_papers_tasks_and_states() -> None:
 def test_a_page_of_nothing_much(tmp_path: Path) -> None:
     """No results, no sections; a figure is drawn for those there are."""
     page = tmp_path / "page.md"
-    assert write_page(Results(tmp_path), page) == (page,)
+    assert write_page(RECIPES, Results(tmp_path), page) == (page,)
     assert "##" not in page.read_text()
     (tmp_path / "game.jsonl").write_bytes((FOLDER / "game.jsonl").read_bytes())
-    assert [path.name for path in write_page(Results(tmp_path), page)] == ["page.md", "game.svg"]
+    assert [path.name for path in write_page(RECIPES, Results(tmp_path), page)] == [
+        "page.md",
+        "game.svg",
+    ]
     first = (tmp_path / "game.svg").read_bytes()
-    write_page(Results(tmp_path), page)
+    write_page(RECIPES, Results(tmp_path), page)
     assert (tmp_path / "game.svg").read_bytes() == first  # the same results, the same bytes

@@ -11,8 +11,8 @@ from coordlang.evaluation.experiments import planning_cost, scenario, table1
 from coordlang.evaluation.experiments.registry import RECIPES
 from coordlang.evaluation.lab.recipe import Record, Settings, Unit, table
 from coordlang.evaluation.lab.results import name_of
+from coordlang.evaluation.material.grid_drawing import place_of, position
 from coordlang.evaluation.material.languages import language_for
-from coordlang.evaluation.material.maps import place_of, position
 from coordlang.evaluation.material.paper import (
     DIFFERING,
     OPEN_ALL,

@@ -18,16 +18,16 @@ from coordlang.evaluation.lab.recipe import (
     percent,
     table,
 )
-from coordlang.evaluation.material.compared import Compared, compared_units
+from coordlang.evaluation.lab.statistics import rounded_mean
 from coordlang.evaluation.material.languages import TITLES, language_for
-from coordlang.evaluation.material.orders import NATURAL, greedy_in_orders
+from coordlang.evaluation.material.method_comparison import Compared, compared_units
 from coordlang.evaluation.material.paper import DIFFERING, SAVING_ALL, SAVING_DIFFERING
 from coordlang.evaluation.material.sentence_counts import (
     MOST_LISTED,
     SentenceCounts,
-    mean,
     sentence_counts_in,
 )
+from coordlang.evaluation.material.state_orders import NATURAL, greedy_in_orders
 from coordlang.evaluation.material.suite import ROW, WORLDS
 from coordlang.language.flexibility import flexibility
 
@@ -72,12 +72,12 @@ def measures(tasks: Sequence[SentenceCounts]) -> Result:
     return {
         "tasks": len(tasks),
         "differing": len(shorter),
-        "saving_differing": mean(shorter, 6),
-        "saving": mean(first, 6),
-        "saving_last": mean([task.saving(len(task.last)) for task in tasks], 6),
-        "saving_expected": mean([task.saving(task.expected_words) for task in tasks], 6),
-        "saving_most": mean([task.saving(task.fewest_words) for task in tasks], 6),
-        "saving_of_actions": mean(
+        "saving_differing": rounded_mean(shorter, 6),
+        "saving": rounded_mean(first, 6),
+        "saving_last": rounded_mean([task.saving(len(task.last)) for task in tasks], 6),
+        "saving_expected": rounded_mean([task.saving(task.expected_words) for task in tasks], 6),
+        "saving_most": rounded_mean([task.saving(task.fewest_words) for task in tasks], 6),
+        "saving_of_actions": rounded_mean(
             [1 - len(task.first) / task.steps for task in tasks if task.steps], 6
         ),
         "states": [task.steps + 1 for task in tasks][:MOST_LISTED],

@@ -17,16 +17,16 @@ from coordlang.evaluation.lab.recipe import (
     Unit,
     table,
 )
-from coordlang.evaluation.material.compared import Compared, compared_units
+from coordlang.evaluation.lab.statistics import rounded_mean
 from coordlang.evaluation.material.languages import TITLES, language_for
-from coordlang.evaluation.material.orders import NATURAL, greedy_in_orders
+from coordlang.evaluation.material.method_comparison import Compared, compared_units
 from coordlang.evaluation.material.paper import OPEN_ALL, OPEN_SEVERAL, SEVERAL
 from coordlang.evaluation.material.sentence_counts import (
     MOST_LISTED,
     SentenceCounts,
-    mean,
     sentence_counts_in,
 )
+from coordlang.evaluation.material.state_orders import NATURAL, greedy_in_orders
 from coordlang.evaluation.material.suite import ROW, WORLDS
 from coordlang.language.flexibility import flexibility
 
@@ -69,12 +69,12 @@ def measures(tasks: Sequence[SentenceCounts]) -> Result:
     several = [number for number in first if number > 1]
     return {
         "tasks": len(tasks),
-        "plans": mean([task.count for task in tasks], 4),
-        "open": mean(first, 4),
+        "plans": rounded_mean([task.count for task in tasks], 4),
+        "open": rounded_mean(first, 4),
         "several": len(several),
-        "open_several": mean(several, 4),
-        "open_last": mean([task.plans[task.last] for task in tasks], 4),
-        "expected": mean([float(task.expected_open) for task in tasks], 4),
+        "open_several": rounded_mean(several, 4),
+        "open_last": rounded_mean([task.plans[task.last] for task in tasks], 4),
+        "expected": rounded_mean([float(task.expected_open) for task in tasks], 4),
         "first": first[:MOST_LISTED],
     }
 

@@ -18,7 +18,6 @@ from random import Random
 from statistics import fmean
 from typing import Any
 
-from coordlang.evaluation.lab.interval import mean_interval
 from coordlang.evaluation.lab.plots import Series, lines
 from coordlang.evaluation.lab.recipe import (
     Figure,
@@ -31,6 +30,7 @@ from coordlang.evaluation.lab.recipe import (
     done,
     table,
 )
+from coordlang.evaluation.lab.statistics import mean_interval
 from coordlang.evaluation.material.languages import TITLES, language_for
 from coordlang.evaluation.material.sentence_counts import sentence_counts_in
 from coordlang.evaluation.material.suite import OTHERS, WORLDS

@@ -13,7 +13,6 @@ from functools import partial
 from random import Random
 from typing import Any
 
-from coordlang.evaluation.lab.interval import wilson
 from coordlang.evaluation.lab.plots import Series, by_category
 from coordlang.evaluation.lab.recipe import (
     Figure,
@@ -27,9 +26,10 @@ from coordlang.evaluation.lab.recipe import (
     percent,
     table,
 )
+from coordlang.evaluation.lab.statistics import wilson
+from coordlang.evaluation.material.disruption_trials import subaction_trials, warehouse_trials
 from coordlang.evaluation.material.languages import TITLES, language_for
 from coordlang.evaluation.material.suite import OTHERS, WORLDS
-from coordlang.evaluation.material.trials import subaction_trials, warehouse_trials
 from coordlang.evaluation.material.warehouse import LAYOUTS, WAREHOUSES, deliveries, listed_tasks
 
 METHODS = ("greedy", "separating", "minimal")

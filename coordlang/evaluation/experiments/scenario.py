@@ -15,7 +15,7 @@ from itertools import product
 from random import Random
 from typing import Any
 
-from coordlang.evaluation.lab.plots import drawing
+from coordlang.evaluation.lab.figure_style import drawing
 from coordlang.evaluation.lab.recipe import (
     Figure,
     Recipe,
@@ -28,9 +28,9 @@ from coordlang.evaluation.lab.recipe import (
     percent,
     table,
 )
-from coordlang.evaluation.material.hazards import Sayings, own_choices
+from coordlang.evaluation.material.disruptions import Sayings, own_choices
+from coordlang.evaluation.material.grid_drawing import Path, draw_map, place_of
 from coordlang.evaluation.material.languages import TITLES, language_for
-from coordlang.evaluation.material.maps import Path, draw_map, place_of
 from coordlang.evaluation.material.suite import OTHERS, WORLDS, World
 from coordlang.tasks.task_file import ListedTask
 from coordlang.use.choices.automaton import Automaton

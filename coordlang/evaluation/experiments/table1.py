@@ -19,8 +19,8 @@ from coordlang.evaluation.lab.recipe import (
     done,
     table,
 )
-from coordlang.evaluation.material.orders import ORDERS, greedy_in_orders
 from coordlang.evaluation.material.paper import TABLE_1
+from coordlang.evaluation.material.state_orders import ORDERS, greedy_in_orders
 from coordlang.evaluation.material.suite import OTHERS, ROWS, WORLDS
 from coordlang.tasks.candidates import Candidates
 from planners.errors import OutOfTime

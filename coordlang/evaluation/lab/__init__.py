@@ -1,1 +1,1 @@
-"""Experiments as recipes: run, kept, drawn, told on a page."""
+"""The machinery of experiments: recipes, runs, results on disk, figures and the page."""

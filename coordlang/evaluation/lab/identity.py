@@ -1,7 +1,4 @@
-"""What a result depends on, as hashes.
-
-Results of other code, files or parameters are not taken for these.
-"""
+"""Hashes of what a result depends on: code, input files, parameters, versions."""
 
 from __future__ import annotations
 
@@ -16,12 +13,13 @@ from coordlang.evaluation.lab.recipe import Settings, Unit
 
 #: Packages whose versions are recorded with each result.
 _PACKAGES = ("coordlang", "numpy", "python-sat", "tarski")
-#: Below `coordlang`: what only renders, and changes no result.
+#: Below `coordlang`: what only renders results.
 _RENDERING = (
     "cli",
     "report",
     "explanation",
     "certificate",
+    "evaluation/lab/figure_style.py",
     "evaluation/lab/plots.py",
     "evaluation/lab/page.py",
 )
@@ -29,13 +27,13 @@ _RENDERING = (
 
 @cache
 def file_hash(path: Path) -> str:
-    """The SHA-256 of a file."""
+    """Return the SHA-256 of a file."""
     return sha256(path.read_bytes()).hexdigest()
 
 
 @cache
 def code_hash() -> str:
-    """The SHA-256 of all source files of both packages that results can depend on."""
+    """Return the SHA-256 of all source files of both packages that results can depend on."""
     root = Path(__file__).resolve().parents[3]
     digest = sha256()
     for package in ("planners", "coordlang"):
@@ -48,7 +46,7 @@ def code_hash() -> str:
 
 @cache
 def versions() -> dict[str, str]:
-    """The versions of Python and of the packages that compute."""
+    """Return the versions of Python and of the packages that compute."""
     found = {"python": platform.python_version()}
     for package in _PACKAGES:
         try:
@@ -59,12 +57,12 @@ def versions() -> dict[str, str]:
 
 
 def inputs(unit: Unit, settings: Settings) -> dict[str, str]:
-    """The hashes of the files that a unit reads."""
+    """Return the SHA-256 of each of the files that a unit reads."""
     return {name: file_hash(settings.domains / name) for name in unit.files}
 
 
 def identity(unit: Unit, settings: Settings) -> str:
-    """The hash of everything that a unit's result depends on."""
+    """Return the hash of everything that a unit's result depends on."""
     parts = {
         "experiment": unit.experiment,
         "key": unit.key,

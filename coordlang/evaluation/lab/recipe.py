@@ -1,4 +1,4 @@
-"""An experiment as a recipe: pieces of work, what each of them does, and how the results are told."""
+"""An experiment as a recipe: its work units, what each does, and how the results are rendered."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
-#: What a piece of work found: JSON data, the same for the same seed.
+#: What a work unit found: JSON data, the same for the same seed.
 Result = dict[str, Any]
 
 Status = Literal["done", "out of time", "out of memory"]
@@ -21,10 +21,20 @@ Status = Literal["done", "out of time", "out of memory"]
 class Settings:
     """How experiments are run.
 
-    ``samples`` is the number of random runs (the paper: 100); where intervals are wanted, a hundred
-    times as many are made.  ``quick``: the smallest rows and sizes only.  ``unit_limit``: seconds
-    for one piece of work.  ``domains``: the folder of the shipped domains.  ``cache``: where
-    languages are kept between pieces of work.
+    Attributes
+    ----------
+    domains
+        The folder of the shipped domains.
+    cache
+        The folder in which languages are stored between work units.
+    seed
+        Of all random choices.
+    samples
+        Random runs (the paper: 100).
+    quick
+        Only the smallest rows and sizes.
+    unit_limit
+        Seconds for one work unit.
     """
 
     domains: Path
@@ -36,17 +46,24 @@ class Settings:
 
     @property
     def many(self) -> int:
-        """Runs where intervals are wanted."""
+        """Random runs where confidence intervals are computed: a hundred times ``samples``."""
         return 100 * self.samples
 
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """A piece of work of an experiment.
+    """A work unit of an experiment.
 
-    ``key`` names it among the others; ``parameters`` (JSON data) say what is to be done, ``files``
-    (below the folder of the domains) what is read.  ``effort`` is a guess of its seconds: long ones
-    are started first.
+    Attributes
+    ----------
+    experiment, key
+        The experiment, and the unit's name among its units.
+    parameters
+        What is to be done, as JSON data.
+    files
+        What is read, relative to the folder of the domains.
+    effort
+        Estimated seconds: long units are started first.
     """
 
     experiment: str
@@ -56,16 +73,15 @@ class Unit:
     effort: float = 1.0
 
     def random(self, seed: int) -> Random:
-        """Random numbers of this unit alone: the same in whatever order and process it is run."""
+        """Return the unit's own random numbers, independent of order and process."""
         return Random(f"{seed} {self.experiment} {self.key}")
 
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What became of a unit; ``result`` is empty unless it is done.
+    """The outcome of a unit; ``result`` is empty unless its status is ``"done"``.
 
-    ``seconds`` is wall time, ``cpu`` the processor's seconds, which depend less on what else the
-    machine does.
+    ``seconds`` is wall time; ``cpu``, seconds of processor time, depends less on the load.
     """
 
     unit: Unit
@@ -73,6 +89,11 @@ class Record:
     result: Result
     seconds: float
     cpu: float = 0.0
+
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """The parameters of the unit."""
+        return self.unit.parameters
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,17 +105,14 @@ class Figure:
     draw: Callable[[], Drawing]
 
 
-#: A line of the first table of the page: what was measured, the paper's value, ours with greedy and
-#: with minimal words.
+#: A line of the first table of the page: the measure, the paper's value, ours with a greedy and with
+#: a minimal language.
 Headline = tuple[str, str, str, str]
 
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """An experiment told.
-
-    Markdown blocks and figures in their order, and what differs from the paper, with the reason.
-    """
+    """An experiment rendered: Markdown and figures, and what differs from the paper and why."""
 
     blocks: tuple[str | Figure, ...]
     differences: tuple[str, ...] = ()
@@ -102,16 +120,24 @@ class Section:
 
     @property
     def figures(self) -> tuple[Figure, ...]:
+        """The figures among the blocks."""
         return tuple(block for block in self.blocks if isinstance(block, Figure))
 
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """An experiment as a recipe.
+    """An experiment.
 
-    ``units`` lists its pieces of work, ``run`` does one, ``section`` tells their results.
-
-    ``section`` gets the records of all units, in the order of ``units``.
+    Attributes
+    ----------
+    name, title
+        Its name on the command line, and its title on the page.
+    units
+        Lists the work units.
+    run
+        Does one unit; a function of a module, since it is sent to other processes by name.
+    section
+        Renders the records of all units, given in the order of ``units``.
     """
 
     name: str
@@ -122,19 +148,19 @@ class Recipe:
 
 
 def done(records: Sequence[Record]) -> list[Record]:
-    """The records of the units that came to their end."""
+    """Return the records of the units that ended without meeting a limit."""
     return [record for record in records if record.status == "done"]
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    """A Markdown table; the first column is text, numbers stand on the right."""
+    """Return a Markdown table; the first column is aligned left, the others right."""
     rule = ["---"] + ["--:"] * (len(head) - 1)
     lines = [head, rule, *([cell(value) for value in row] for row in rows)]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 def cell(value: object) -> str:
-    """A value as a table shows it: thousands apart, nothing as a dash."""
+    """Return a value as a table shows it: thousands separated, None as a dash."""
     if value is None:
         return "–"
     if isinstance(value, int):
@@ -143,5 +169,5 @@ def cell(value: object) -> str:
 
 
 def percent(share: float) -> str:
-    """A share as ``27.3 %``."""
+    """Return a share as ``27.3 %``."""
     return f"{100 * share:.1f} %"

@@ -1,7 +1,4 @@
-"""Results on disk, one JSON line for each piece of work.
-
-A line is appended as soon as its work is done, so that a killed run can go on.
-"""
+"""Results on disk: one JSON line for each work unit, appended as soon as it is done."""
 
 from __future__ import annotations
 
@@ -28,6 +25,11 @@ class Results:
     A line holds ``id`` (the hash of all that the result depends on), ``experiment``, ``key``,
     ``parameters``, ``status``, ``result``, ``seconds`` (wall), ``cpu``, ``seed``, ``unit_limit``,
     ``inputs`` (file -> SHA-256), ``versions`` and ``code`` (SHA-256 of the source).
+
+    Raises
+    ------
+    UsageError
+        If the folder cannot be made.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -38,13 +40,17 @@ class Results:
             raise UsageError(f"{folder} cannot be made: {error.strerror}") from None
 
     def path(self, experiment: str) -> Path:
+        """Return the file of an experiment."""
         return self.folder / f"{experiment}.jsonl"
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Raise `UsageError` if another process writes here.
+        """Keep other processes from writing here; the system unlocks when a process dies.
 
-        The system unlocks when a process dies.
+        Raises
+        ------
+        UsageError
+            If another process has locked the folder.
         """
         lock = self.folder / ".lock"
         with open(lock, "w") as file:
@@ -60,9 +66,12 @@ class Results:
             lock.unlink()
 
     def lines(self, experiment: str) -> dict[str, Line]:
-        """The lines of an experiment by ``id``; a last line that was cut off by a kill is left out.
+        """Return the lines of an experiment by ``id``, without a last line that was cut off.
 
-        Raises `BadInput` for what is no results file.
+        Raises
+        ------
+        BadInput
+            If the file is not a results file.
         """
         path = self.path(experiment)
         if not path.exists():
@@ -79,14 +88,14 @@ class Results:
                 raise BadInput(
                     "this line is no result",
                     position=Position(str(path), number),
-                    remedy="Remove the line; its piece of work is then done again.",
+                    remedy="Remove the line; its work unit is then run again.",
                 ) from None
         return found
 
     def known(self, units: Sequence[Unit], settings: Settings) -> dict[str, Record]:
-        """The units (by experiment/key) that need not be run again.
+        """Return the records (by experiment/key) of the units that need not be run again.
 
-        One that ran out of time under a smaller limit than ``settings.unit_limit`` is run again,
+        A unit that ran out of time under a smaller limit than ``settings.unit_limit`` is run again,
         and so is one that ran out of memory.
         """
         lines = {name: self.lines(name) for name in sorted({unit.experiment for unit in units})}
@@ -103,19 +112,19 @@ class Results:
         return found
 
     def start(self, experiment: str) -> None:
-        """Make an experiment's file ready for `append`: whole lines only."""
+        """Prepare an experiment's file for `append`: whole lines only."""
         if self.path(experiment).exists():
             self._write(experiment, list(self.lines(experiment).values()))
 
     def append(self, record: Record, settings: Settings) -> None:
-        """Write a record's line and make sure that it is on the disk."""
+        """Append a record's line and flush it to the disk."""
         with open(self.path(record.unit.experiment), "ab") as file:
             file.write(_text(_line(record, settings)))
             file.flush()
             os.fsync(file.fileno())
 
     def finish(self, experiment: str, records: Sequence[Record], settings: Settings) -> None:
-        """The final file: exactly these records, in this order, whatever order they came in."""
+        """Write the final file: exactly these records, in this order."""
         self._write(experiment, [_line(record, settings) for record in records])
 
     def _write(self, experiment: str, lines: Sequence[Line]) -> None:
@@ -123,12 +132,12 @@ class Results:
 
 
 def name_of(unit: Unit) -> str:
-    """``experiment/key``: the name of a unit among all."""
+    """Return ``experiment/key``, the unit's name among all units."""
     return f"{unit.experiment}/{unit.key}"
 
 
 def record_of(line: Mapping[str, Any]) -> Record:
-    """A line read without its recipe, for telling results that are not to be run again."""
+    """Return the record of a line, for rendering results without running anything."""
     unit = Unit(line["experiment"], line["key"], line["parameters"], tuple(line["inputs"]))
     return Record(unit, line["status"], line["result"], line["seconds"], line["cpu"])
 

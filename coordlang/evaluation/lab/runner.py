@@ -1,7 +1,4 @@
-"""Pieces of work run in processes of their own, every result kept at once.
-
-What is known already is left out.
-"""
+"""Runs work units in processes of their own, stores each result at once, and skips known ones."""
 
 from __future__ import annotations
 
@@ -9,26 +6,38 @@ import json
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from time import perf_counter, process_time
 
-from coordlang.evaluation.lab.recipe import Recipe, Record, Settings, Status, Unit
+from coordlang.evaluation.lab.recipe import Recipe, Record, Result, Settings, Status, Unit
 from coordlang.evaluation.lab.results import Results, name_of
 from planners.errors import CoordlangError, OutOfMemory, OutOfTime
 from planners.limits import time_limit
 
-#: Seconds after its limit at which a piece of work that does not stop by itself is killed.
+#: Seconds after its limit at which a work unit that does not stop by itself is killed.
 _GRACE = 30.0
+
+#: What does a unit of each experiment.  The functions are sent to worker processes by name.
+_Runs = Mapping[str, Callable[[Unit, Settings], Result]]
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a run is: units done of all, how many of them were known before, and those under way."""
+    """How far a run is.
+
+    Attributes
+    ----------
+    done, all
+        Units that have ended, of all.
+    known
+        How many of them had a result before the run.
+    running
+        The units under way.
+    """
 
     done: int
     all: int
@@ -37,10 +46,7 @@ class Progress:
 
 
 class UnitFailed(CoordlangError):
-    """A piece of work ended with an error that is no limit.
-
-    A bug, or a file that is not as it should be.
-    """
+    """A work unit ended with an error that is no limit: a bug, or an invalid input file."""
 
 
 def run(
@@ -50,32 +56,42 @@ def run(
     jobs: int = 1,
     progress: Callable[[Progress], None] = lambda _: None,
 ) -> dict[str, list[Record]]:
-    """Run experiments; the records of each, in the order of its units.
+    """Run experiments in at most ``jobs`` processes.
 
     What ``results`` holds already is not run again.  Every record is on the disk before the next
-    piece of work starts in its process: a run that is killed at any moment goes on from there.  The
+    unit starts in its process, so a run that is killed at any moment continues from there.  The
     records do not depend on ``jobs``.
+
+    Returns
+    -------
+    dict
+        The records of each experiment, in the order of its units.
+
+    Raises
+    ------
+    UnitFailed
+        If a unit ends with an error; what the others did is kept.
     """
     units = [unit for recipe in recipes for unit in recipe.units(settings)]
     with results.locked():
-        known = results.known(units, settings)
+        records = results.known(units, settings)
+        before = len(records)
+
+        def report(running: tuple[Unit, ...]) -> None:
+            progress(Progress(len(records), len(units), before, running))
+
         for recipe in recipes:
             results.start(recipe.name)
-        todo = sorted((u for u in units if name_of(u) not in known), key=lambda u: -u.effort)
-        before = len(known)
-        progress(Progress(before, len(units), before, ()))
-        with _workers(min(jobs, len(todo)), settings) as workers:
-            for record in _records(
-                workers,
-                todo,
-                settings,
-                lambda r: progress(Progress(len(known), len(units), before, r)),
-            ):
+        todo = sorted((u for u in units if name_of(u) not in records), key=lambda u: -u.effort)
+        report(())
+        runs = {recipe.name: recipe.run for recipe in recipes}
+        with _Pool(min(jobs, len(todo)), runs, settings) as pool:
+            for record in pool.records(todo, report):
                 results.append(record, settings)
-                known[name_of(record.unit)] = record
+                records[name_of(record.unit)] = record
         found: dict[str, list[Record]] = {recipe.name: [] for recipe in recipes}
         for unit in units:
-            found[unit.experiment].append(known[name_of(unit)])
+            found[unit.experiment].append(records[name_of(unit)])
         for recipe in recipes:
             results.finish(recipe.name, found[recipe.name], settings)
     return found
@@ -84,33 +100,46 @@ def run(
 class _Worker:
     """A process that does one unit after another."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, runs: _Runs, settings: Settings) -> None:
         context = get_context("spawn")
         self.connection, theirs = context.Pipe()
         self._process: BaseProcess = context.Process(
-            target=_work, args=(theirs, settings, os.getpid()), daemon=True
+            target=_work, args=(theirs, runs, settings, os.getpid()), daemon=True
         )
         self._process.start()
         theirs.close()
         self.unit: Unit | None = None
-        self.since = 0.0
+        self._since = 0.0
 
     def begin(self, unit: Unit) -> None:
-        self.unit, self.since = unit, perf_counter()
+        self.unit, self._since = unit, perf_counter()
         self.connection.send(unit)
 
-    def receive(self) -> Record:
-        """What became of the unit.
+    def ended(self, ready: bool, limit: float) -> Record | None:
+        """Return the record of the unit; None while it is under way.
 
-        A process that died had no memory left (the system kills those first).
+        ``ready``: the process has sent something, or died.  A unit that exceeds its ``limit`` by
+        far is killed with its process.
         """
-        assert self.unit is not None
-        unit, self.unit = self.unit, None
+        if self.unit is None:
+            return None
+        if ready:
+            record = self._receive(self.unit)
+        elif perf_counter() - self._since > limit + _GRACE:
+            self.kill()
+            record = Record(self.unit, "out of time", {}, perf_counter() - self._since)
+        else:
+            return None
+        self.unit = None
+        return record
+
+    def _receive(self, unit: Unit) -> Record:
+        """Read the answer; a process that died ran out of memory (the system kills those first)."""
         try:
             answer = self.connection.recv()
         except (EOFError, ConnectionError):
             self.kill()
-            return Record(unit, "out of memory", {}, perf_counter() - self.since)
+            return Record(unit, "out of memory", {}, perf_counter() - self._since)
         if isinstance(answer, str):
             raise UnitFailed(f"{name_of(unit)}: {answer}")
         record: Record = answer
@@ -120,58 +149,59 @@ class _Worker:
     def alive(self) -> bool:
         return self._process.is_alive()
 
-    def overdue(self, limit: float) -> bool:
-        return self.unit is not None and perf_counter() - self.since > limit + _GRACE
-
     def kill(self) -> None:
         self._process.kill()
         self._process.join()
         self.connection.close()
 
 
-@contextmanager
-def _workers(number: int, settings: Settings) -> Iterator[list[_Worker]]:
-    workers: list[_Worker] = []
-    try:
-        workers.extend(_Worker(settings) for _ in range(number))
-        yield workers
-    finally:
-        for worker in workers:
+class _Pool:
+    """Worker processes, of which those that died are replaced."""
+
+    def __init__(self, size: int, runs: _Runs, settings: Settings) -> None:
+        self._size = size
+        self._runs = runs
+        self._settings = settings
+        self._workers: list[_Worker] = []
+
+    def __enter__(self) -> _Pool:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for worker in self._workers:
             worker.kill()
 
+    def records(
+        self, todo: Sequence[Unit], report: Callable[[tuple[Unit, ...]], None]
+    ) -> Iterator[Record]:
+        """Yield the records of units as they end; ``report`` is called with the units under way."""
+        waiting = list(reversed(todo))
+        for _ in range(self._size):
+            self._workers.append(_Worker(self._runs, self._settings))
+            self._workers[-1].begin(waiting.pop())
+        while running := tuple(w.unit for w in self._workers if w.unit is not None):
+            report(running)
+            busy = [worker for worker in self._workers if worker.unit is not None]
+            ready = wait([worker.connection for worker in busy], timeout=1.0)
+            for worker in busy:
+                record = worker.ended(worker.connection in ready, self._settings.unit_limit)
+                if record is not None:
+                    yield record
+                    self._next(worker, waiting)
 
-def _records(
-    workers: list[_Worker],
-    todo: Sequence[Unit],
-    settings: Settings,
-    progress: Callable[[tuple[Unit, ...]], None],
-) -> Iterator[Record]:
-    """The records of units as they are done."""
-    waiting = list(reversed(todo))
-    for worker in workers:
-        worker.begin(waiting.pop())
-    while busy := [worker for worker in workers if worker.unit is not None]:
-        progress(tuple(worker.unit for worker in busy if worker.unit is not None))
-        ready = wait([worker.connection for worker in busy], timeout=1.0)
-        for worker in busy:
-            if worker.connection in ready:
-                yield worker.receive()
-            elif worker.overdue(settings.unit_limit):
-                assert worker.unit is not None
-                yield Record(worker.unit, "out of time", {}, perf_counter() - worker.since)
-                worker.kill()
-            else:
-                continue
-            if not worker.alive:
-                workers[workers.index(worker)] = worker = _Worker(settings)
-            worker.unit = None
-            if waiting:
-                worker.begin(waiting.pop())
+    def _next(self, worker: _Worker, waiting: list[Unit]) -> None:
+        """Give a worker that is done, or its replacement, the next unit."""
+        if not worker.alive:
+            fresh = _Worker(self._runs, self._settings)
+            self._workers[self._workers.index(worker)] = fresh
+            worker = fresh
+        if waiting:
+            worker.begin(waiting.pop())
 
 
-def _work(connection: Connection, settings: Settings, parent: int) -> None:
-    """The life of a worker process."""
-    # A Ctrl-C goes to all processes of the terminal; the parent saves and ends us.
+def _work(connection: Connection, runs: _Runs, settings: Settings, parent: int) -> None:
+    """Do units until the connection is closed: the life of a worker process."""
+    # A Ctrl-C goes to all processes of the terminal; the parent stores results and ends us.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     while True:
@@ -179,7 +209,7 @@ def _work(connection: Connection, settings: Settings, parent: int) -> None:
             unit = connection.recv()
         except EOFError:
             return
-        connection.send(_attempt(unit, settings))
+        connection.send(_attempt(runs[unit.experiment], unit, settings))
 
 
 def _end_with(parent: int) -> None:
@@ -190,22 +220,23 @@ def _end_with(parent: int) -> None:
     os._exit(1)
 
 
-def _attempt(unit: Unit, settings: Settings) -> Record | str:
-    from coordlang.evaluation.experiments.registry import RECIPES
-
+def _attempt(
+    run_unit: Callable[[Unit, Settings], Result], unit: Unit, settings: Settings
+) -> Record | str:
+    """Do one unit; the text of its error if there is one."""
     status: Status = "done"
     since, busy = perf_counter(), process_time()
     try:
         with time_limit(settings.unit_limit):
-            # As it will be read again: a run that goes on tells the same as one that was never
-            # stopped.
-            result = json.loads(json.dumps(RECIPES[unit.experiment].run(unit, settings)))
+            # As it will be read again: a run that was continued has the same results as one that
+            # was never stopped.
+            result = json.loads(json.dumps(run_unit(unit, settings)))
     except OutOfTime:
         status, result = "out of time", {}
     except (OutOfMemory, MemoryError):
         status, result = "out of memory", {}
     except CoordlangError as error:
         return str(error)
-    except Exception as error:  # a bug: told by the parent, which can still save what others did
+    except Exception as error:  # a bug: raised by the parent, which first stores what others did
         return f"{type(error).__name__}: {error}"
     return Record(unit, status, result, perf_counter() - since, process_time() - busy)

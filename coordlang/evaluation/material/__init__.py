@@ -1,1 +1,1 @@
-"""What experiments share: worlds, languages, trials, the values of the paper."""
+"""What experiments share: domains, languages, measures, and the values that the paper reports."""

@@ -6,10 +6,9 @@ Its sentences, and how many plans each of them has.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from statistics import fmean
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,8 +136,3 @@ def _ends(space: PlanSpace, word: Ints, which: int) -> list[Words]:
 
 def _in_front(word: int, rest: Words) -> Words:
     return rest if rest[0] == word else (word, *rest)
-
-
-def mean(values: Sequence[float], digits: int) -> float:
-    """The mean as it is written into results; 0 of nothing."""
-    return round(fmean(values), digits) if values else 0.0

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import permutations, product
 
-from coordlang.evaluation.material.hazards import Hazard
+from coordlang.evaluation.material.disruptions import Hazard
 from coordlang.evaluation.material.suite import World
 from coordlang.tasks.task_file import ListedTask
 from planners.joint.model import JointModel

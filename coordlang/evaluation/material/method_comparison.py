@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from coordlang.evaluation.lab.recipe import Record, Result, Settings, Unit, done
 from coordlang.evaluation.material.languages import COMPARED
-from coordlang.evaluation.material.orders import ORDERS
+from coordlang.evaluation.material.state_orders import ORDERS
 from coordlang.evaluation.material.suite import OTHERS, QUICK_ROW, ROW, WORLDS
 
 

@@ -1,18 +1,24 @@
-"""How sure a proportion is that was found by sampling."""
+"""Means, shares and their confidence intervals."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import sqrt
+from statistics import fmean
 
 #: The two-sided 95 % quantile of the normal distribution.
 _Z = 1.959963984540054
 
 
 def wilson(successes: int, runs: int) -> tuple[float, float]:
-    """The 95 % confidence interval of a proportion, by Wilson's score (1927).
+    """Return the 95 % confidence interval of a proportion, by Wilson's score (1927).
 
-    It stays within 0 .. 1 and says something even where all runs or none succeed.  Raises
-    `ValueError` without runs.
+    It stays within 0 .. 1 and is not degenerate where all runs or none succeed.
+
+    Raises
+    ------
+    ValueError
+        Without runs, or if there are not between 0 and ``runs`` successes.
     """
     if runs < 1 or not 0 <= successes <= runs:
         raise ValueError(f"{successes} successes in {runs} runs")
@@ -25,10 +31,10 @@ def wilson(successes: int, runs: int) -> tuple[float, float]:
     return low, high
 
 
-def mean_interval(values: list[float]) -> tuple[float, float]:
-    """The 95 % confidence interval of a mean, by the normal approximation.
+def mean_interval(values: Sequence[float]) -> tuple[float, float]:
+    """Return the 95 % confidence interval of a mean, by the normal approximation.
 
-    The mean itself for a single value.
+    For a single value both ends are that value.
     """
     number = len(values)
     mean = sum(values) / number
@@ -36,3 +42,8 @@ def mean_interval(values: list[float]) -> tuple[float, float]:
         return mean, mean
     spread = sqrt(sum((v - mean) ** 2 for v in values) / (number - 1) / number)
     return mean - _Z * spread, mean + _Z * spread
+
+
+def rounded_mean(values: Sequence[float], digits: int) -> float:
+    """Return the mean as it is written into results; 0 of no values."""
+    return round(fmean(values), digits) if values else 0.0

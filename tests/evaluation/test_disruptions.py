@@ -7,11 +7,16 @@ from random import Random
 import pytest
 
 from coordlang.evaluation.experiments.scenario import subplans
-from coordlang.evaluation.lab.interval import wilson
 from coordlang.evaluation.lab.recipe import Settings
-from coordlang.evaluation.material.hazards import Hazard, Sayings, exact_odds, own_choices
+from coordlang.evaluation.lab.statistics import wilson
+from coordlang.evaluation.material.disruption_trials import (
+    Trial,
+    Trials,
+    subaction_trials,
+    warehouse_trials,
+)
+from coordlang.evaluation.material.disruptions import Hazard, Sayings, exact_odds, own_choices
 from coordlang.evaluation.material.languages import language_for
-from coordlang.evaluation.material.trials import Trial, Trials, subaction_trials, warehouse_trials
 from coordlang.evaluation.material.warehouse import (
     LAYOUTS,
     WAREHOUSES,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from random import Random
 from statistics import fmean
 
-from coordlang.evaluation.material.hazards import Hazard, Sayings, exact_odds
+from coordlang.evaluation.material.disruptions import Hazard, Sayings, exact_odds
 from coordlang.evaluation.material.warehouse import Corners, Delivery, human_in
 from coordlang.language.words import Language
 from coordlang.tasks.candidates import Candidates
