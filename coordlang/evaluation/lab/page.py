@@ -1,4 +1,4 @@
-"""The page of an evaluation: every experiment's tables and figures, and what differs from the paper."""
+"""The page of an evaluation: every experiment's results, and what differs from the paper."""
 
 from __future__ import annotations
 
