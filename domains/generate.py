@@ -142,12 +142,11 @@ def tasks_text(task: Scenario, at_least: int) -> str:
 
 def reachable_states(task: Scenario) -> set[tuple[str, ...]]:
     """The reachable joint states, each as the robots' cells, found with the grid domain itself."""
-    from planners.model import build
-    from planners.space import explore
-    from planners.states import split_atoms
-
+    from planners.joint.states import split_atoms
+    from planners.loading import build
     from planners.pddl import parse_problem, read_domain
     from planners.pddl.sexpr import Source
+    from planners.search.reachable import explore
 
     domain = read_domain(HERE / "grid" / "domain.pddl")
     loaded = build(

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from planners.errors import BadInput, Place
+from planners.errors import BadInput, Position
 
 #: The characters of a movingai map: ground, ground, swamp | out of bounds, out of bounds, trees,
 #: water.
 PASSABLE = ".GS"
 BLOCKED = "@OTW"
 
-Position = tuple[int, int]
+Cell = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class GridMap:
     a wall is then between them.
     """
 
-    cells: dict[str, Position]
+    cells: dict[str, Cell]
     edges: tuple[tuple[str, str], ...]
 
     @property
@@ -46,9 +46,9 @@ class GridMap:
         return abs(row - other_row) + abs(col - other_col)
 
 
-def cell_name(position: Position) -> str:
+def cell_name(cell: Cell) -> str:
     """``c0-2``: the cell in the top row, third from the left."""
-    return "c{}-{}".format(*position)
+    return "c{}-{}".format(*cell)
 
 
 def open_grid(rows: int, columns: int) -> GridMap:
@@ -81,7 +81,7 @@ def read_map(path: Path) -> GridMap:
     try:
         lines = path.read_text(encoding="ascii").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(f"cannot read this map ({error})", place=Place(str(path))) from error
+        raise BadInput(f"cannot read this map ({error})", position=Position(str(path))) from error
     rows, first = _map_rows(path, lines)
     passable = set()
     for row, text in enumerate(rows):
@@ -91,11 +91,11 @@ def read_map(path: Path) -> GridMap:
             elif character not in BLOCKED:
                 raise BadInput(
                     f"unknown character {character!r} in the map",
-                    place=Place(str(path), first + row, col + 1),
+                    position=Position(str(path), first + row, col + 1),
                     remedy=f"Passable: {' '.join(PASSABLE)}; blocked: {' '.join(BLOCKED)}.",
                 )
     if not passable:
-        raise BadInput("this map has no passable cell", place=Place(str(path)))
+        raise BadInput("this map has no passable cell", position=Position(str(path)))
     return _of(passable)
 
 
@@ -118,10 +118,12 @@ def _map_rows(path: Path, lines: list[str]) -> tuple[list[str], int]:
             case _:
                 raise BadInput(
                     f"unexpected {line!r} in the header of a map",
-                    place=Place(str(path), number, 1),
+                    position=Position(str(path), number, 1),
                     remedy="Expected 'height N' and 'width N' (once each, N from 1), then 'map'.",
                 )
-    raise BadInput("this file has no line 'map'", place=Place(str(path), max(1, len(lines)), 1))
+    raise BadInput(
+        "this file has no line 'map'", position=Position(str(path), max(1, len(lines)), 1)
+    )
 
 
 def _checked_rows(path: Path, lines: list[str], header: int, height: int, width: int) -> list[str]:
@@ -132,15 +134,17 @@ def _checked_rows(path: Path, lines: list[str], header: int, height: int, width:
         if len(row) != width:
             raise BadInput(
                 f"this row has {len(row)} cells where the header says {width}",
-                place=Place(str(path), number, 1),
+                position=Position(str(path), number, 1),
             )
     if len(rows) != height:
-        place = Place(str(path), header + 1 + min(len(rows), height), 1)
-        raise BadInput(f"the map has {len(rows)} rows where the header says {height}", place=place)
+        position = Position(str(path), header + 1 + min(len(rows), height), 1)
+        raise BadInput(
+            f"the map has {len(rows)} rows where the header says {height}", position=position
+        )
     return rows
 
 
-def _clockwise(rows: int, columns: int) -> list[Position]:
+def _clockwise(rows: int, columns: int) -> list[Cell]:
     """The border of a rectangle, once around from the top left cell."""
     top = [(0, col) for col in range(columns)]
     right = [(row, columns - 1) for row in range(1, rows)]
@@ -149,7 +153,7 @@ def _clockwise(rows: int, columns: int) -> list[Position]:
     return [*top, *right, *bottom, *left]
 
 
-def _of(passable: set[Position], edges: set[tuple[Position, Position]] | None = None) -> GridMap:
+def _of(passable: set[Cell], edges: set[tuple[Cell, Cell]] | None = None) -> GridMap:
     """The map of these cells in row-major order; without ``edges`` all cells that touch are
     adjacent.
     """
@@ -159,6 +163,6 @@ def _of(passable: set[Position], edges: set[tuple[Position, Position]] | None = 
         ]
         edges = {(a, b) for a, b in steps if b in passable}
     return GridMap(
-        {cell_name(position): position for position in sorted(passable)},
+        {cell_name(cell): cell for cell in sorted(passable)},
         tuple((cell_name(a), cell_name(b)) for a, b in sorted(edges)),
     )

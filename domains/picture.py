@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from xml.sax.saxutils import escape
 
-from gridmap import GridMap, Position
+from gridmap import GridMap, Cell
 
 #: Okabe and Ito's palette: told apart with any kind of colour vision, and in grey.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
@@ -33,7 +33,7 @@ def draw(grid: GridMap, title: str, starts: dict[str, str], goals: dict[str, str
         f"<desc>{escape(told)}.</desc>",
         f'<rect width="{width}" height="{height}" rx="6" fill="{BLOCK}"/>',
         *_passages(grid),
-        *(_floor(name, position) for name, position in grid.cells.items()),
+        *(_floor(name, cell) for name, cell in grid.cells.items()),
         *_walls(grid),
         *(_goal(robot, grid.cells[cell], colour[robot]) for robot, cell in goals.items()),
         *(_robot(robot, grid.cells[cell], colour[robot]) for robot, cell in starts.items()),
@@ -42,13 +42,13 @@ def draw(grid: GridMap, title: str, starts: dict[str, str], goals: dict[str, str
     return "\n".join(shapes) + "\n"
 
 
-def _corner(position: Position) -> tuple[int, int]:
-    row, column = position
+def _corner(cell: Cell) -> tuple[int, int]:
+    row, column = cell
     return MARGIN + column * CELL, MARGIN + row * CELL
 
 
-def _centre(position: Position) -> tuple[int, int]:
-    x, y = _corner(position)
+def _centre(cell: Cell) -> tuple[int, int]:
+    x, y = _corner(cell)
     return x + CELL // 2, y + CELL // 2
 
 
@@ -56,8 +56,8 @@ def _touch(grid: GridMap, a: str, b: str) -> bool:
     return grid.distance(a, b) == 1
 
 
-def _floor(name: str, position: Position) -> str:
-    x, y = _corner(position)
+def _floor(name: str, cell: Cell) -> str:
+    x, y = _corner(cell)
     return (
         f'<rect x="{x}" y="{y}" width="{CELL}" height="{CELL}" fill="{FLOOR}" stroke="{LINE}"/>'
         f'<text x="{x + 4}" y="{y + 12}" font-size="10" text-anchor="start" fill="{FAINT}">{escape(name)}</text>'
@@ -92,8 +92,8 @@ def _line(a: tuple[int, int], b: tuple[int, int], colour: str, thickness: int) -
     )
 
 
-def _goal(robot: str, position: Position, colour: str) -> str:
-    x, y = _centre(position)
+def _goal(robot: str, cell: Cell, colour: str) -> str:
+    x, y = _centre(cell)
     return (
         f'<circle cx="{x}" cy="{y}" r="20" fill="none" stroke="{colour}" stroke-width="3" stroke-dasharray="6 4"/>'
         f'<text x="{x + CELL // 2 - 4}" y="{y + CELL // 2 - 4}" font-size="11" font-weight="bold" text-anchor="end" '
@@ -101,8 +101,8 @@ def _goal(robot: str, position: Position, colour: str) -> str:
     )
 
 
-def _robot(robot: str, position: Position, colour: str) -> str:
-    x, y = _centre(position)
+def _robot(robot: str, cell: Cell, colour: str) -> str:
+    x, y = _centre(cell)
     return (
         f'<circle cx="{x}" cy="{y}" r="15" fill="{colour}"/>'
         f'<text x="{x}" y="{y + 5}" font-size="13" font-weight="bold" fill="#ffffff">{escape(robot)}</text>'
