@@ -67,8 +67,8 @@ def opening(path: Path) -> str:
 
 
 def imported(path: Path, package: str) -> Iterator[str]:
-    """The modules that a module imports from its own room."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    """The modules of its own room that a module imports when it is imported."""
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
         if isinstance(node, ast.ImportFrom) and node.module is not None:
             if node.module == package:
                 yield from (alias.name for alias in node.names)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from xml.sax.saxutils import escape
 
-from gridmap import GridMap, Cell
+from gridmap import Cell, GridMap
 
 #: Okabe and Ito's palette: told apart with any kind of colour vision, and in grey.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
