@@ -130,7 +130,7 @@ def _refuse(model: JointModel, key: str) -> NoReturn:
 def sentence(words: Iterable[int]) -> tuple[int, ...]:
     """The words of a state sequence, repeated neighbours collapsed.
 
-    The paper's task state compression (TSC).
+    The paper's temporal-state constraint (TSC) of a plan.
     """
     result: list[int] = []
     for word in words:

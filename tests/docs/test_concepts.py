@@ -1,7 +1,8 @@
-"""The examples of docs/concepts.md that are told in words, as models."""
+"""The examples of docs/concepts.md that it gives in words, as models, and its table of names."""
 
 from __future__ import annotations
 
+import pkgutil
 from itertools import product
 
 from coordlang.required.miscoordination import inseparable, miscoordination
@@ -11,6 +12,7 @@ from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
+from tests.docs.pages import DOCS, code, rows, sections
 
 
 def joint_space(
@@ -119,3 +121,12 @@ def test_greedy_depends_on_the_order() -> None:
     apart = {frozenset({1, 2}), frozenset({2, 3}), frozenset({3, 4})}
     assert first_fit([1, 2, 3, 4], apart) == [{1, 3}, {2, 4}]
     assert first_fit([1, 4, 2, 3], apart) == [{1, 4}, {2}, {3}]
+
+
+def test_names_of_the_table_exist() -> None:
+    """Every name of code in the table of the paper's symbols can be imported."""
+    table = rows(sections(DOCS / "concepts.md")["Symbols and names"])
+    names = [name for cells in table for name in code(cells[-1]) if "." in name]
+    assert len(names) >= len(table)
+    for name in names:
+        assert pkgutil.resolve_name(name)

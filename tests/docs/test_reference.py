@@ -155,6 +155,16 @@ def test_files_that_extending_names_exist() -> None:
     assert [path for path in named if "NAME" not in path and not (ROOT / path).exists()] == []
 
 
+def test_every_folder_of_tests_has_its_row() -> None:
+    listed = {code(cells[0])[0] for cells in rows(sections(DOCS / "extending.md")["Tests"])}
+    real = {
+        f"tests/{path.name}"
+        for path in (ROOT / "tests").iterdir()
+        if path.is_dir() and any(path.rglob("test_*.py"))
+    }
+    assert listed == real
+
+
 @pytest.mark.parametrize("page", [p for p in PAGES if p.parent == DOCS], ids=lambda p: p.stem)
 def test_no_path_of_a_machine(page: Path) -> None:
     assert not re.search(r"(?<![\w.~])/(?:work|home|root|tmp|Users)/", page.read_text())
