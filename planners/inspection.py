@@ -82,7 +82,7 @@ def inspect(loaded: PlanningInstance) -> Inspection:
     """
     model, domain = loaded.model, loaded.domain
     start = model.codec.decode(loaded.tasks[0].init)
-    possible = {fact[1:-1].split(" ")[0] for fact in model.codec.facts} | {
+    possible = {fact.predicate for fact in model.codec.facts} | {
         a.predicate for a in model.statics
     }
     return Inspection(
@@ -105,7 +105,7 @@ def inspect(loaded: PlanningInstance) -> Inspection:
         costs=_costs(domain, model.cost),
         interfering=_interfering(model),
         example=_example(model, loaded.tasks[0].init),
-        fluents=_counted(fact[1:-1].split(" ")[0] for fact in model.codec.facts),
+        fluents=_counted(fact.predicate for fact in model.codec.facts),
         start=_counted(fact[1:-1].split(" ")[0] for fact in start if not fact.startswith("(last ")),
         statics=_counted(a.predicate for a in model.statics),
         never=tuple(sorted(set(domain.predicates) - possible)),

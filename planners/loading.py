@@ -11,6 +11,7 @@ from planners.grounding import FEWER, GroundAction, ground_actions, ground_goal
 from planners.grounding.networks import apply_network
 from planners.joint.composition import ComposingStepper
 from planners.joint.conditions import Evaluator
+from planners.joint.facts import FactTable
 from planners.joint.joint_actions import JointActionStepper
 from planners.joint.model import IDLE, Cost, Goal, JointModel, show
 from planners.joint.states import StateCodec
@@ -150,8 +151,7 @@ def _joint_model(
     fluents = fluent_predicates(domain)
     possible = {atom for start in starts for atom in start if atom.predicate in fluents}
     possible |= {e.atom for action in actions for e in action.effects if e.adds}
-    by_text = {show(atom): atom for atom in possible}
-    texts = tuple(sorted(by_text))
+    facts = FactTable.of(possible)
     robots = team.robots
     subactions = [[a for a in actions if i in a.owners] for i in range(len(robots))]
     labels: tuple[tuple[str, ...], ...]
@@ -161,9 +161,9 @@ def _joint_model(
     else:
         labels = tuple((IDLE, *(a.label for a in own)) for own in subactions)
     memory = labels if options.remember_actions else None
-    codec = StateCodec(texts, robots, memory)
+    codec = StateCodec(facts, robots, memory)
     evaluator = Evaluator(
-        {by_text[text]: n for n, text in enumerate(texts)},
+        facts,
         {}
         if domain.is_joint_action
         else {

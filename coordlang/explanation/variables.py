@@ -96,7 +96,7 @@ def truth(model: JointModel, rows: Rows) -> tuple[tuple[str, ...], NDArray[np.bo
     (atoms, (states, atoms)).
     """
     codec = model.codec
-    atoms = list(codec.facts)
+    atoms = list(codec.facts.texts)
     holds = [codec.truth(rows)]
     if codec.memory is not None:
         for robot, labels, last in zip(

@@ -65,7 +65,7 @@ def keys_of(codec: StateCodec, rows: Rows) -> list[str]:
     """The keys of states: `StateCodec.key` of each row."""
     atoms, place, value = _atoms(codec)
     number = {atom: n for n, atom in enumerate(atoms)}
-    fact_number = np.array([number[fact] for fact in codec.facts], np.int64)
+    fact_number = np.array([number[fact] for fact in codec.facts.texts], np.int64)
     keys: list[str] = []
     for start in range(0, len(rows), _BLOCK):
         block = rows[start : start + _BLOCK]
@@ -96,7 +96,7 @@ def _atoms(codec: StateCodec) -> tuple[tuple[str, ...], Ints, Rows]:
 
     For each its word in a row, and its bit or value there.
     """
-    listed = [(fact, n // 64, 1 << n % 64) for n, fact in enumerate(codec.facts)]
+    listed = [(fact, n // 64, 1 << n % 64) for n, fact in enumerate(codec.facts.texts)]
     for robot, (name, labels) in enumerate(
         zip(codec.robots, codec.memory or (), strict=codec.memory is not None)
     ):

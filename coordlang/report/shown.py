@@ -15,7 +15,7 @@ from coordlang.required.miscoordination import Miscoordination, miscoordination
 from coordlang.tasks.task_file import goal_text, ground_tasks
 from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
 from planners.errors import OutOfMemory, Position, ProvedImpossible, UsageError
-from planners.joint.model import FullState, Goal
+from planners.joint.model import Goal
 from planners.loading import ModelOptions, PlanningTask
 from planners.pddl.lifted import Domain, Problem
 from planners.search.optimal_plans import search
@@ -155,13 +155,13 @@ def _pairs(first: TaskLanguage, random: Random) -> Iterator[tuple[Rows, Goal]]:
 
     Under ``--tasks all`` every state of a candidate task is mapped.
     """
-    codec = first.model.codec
+    model = first.model
     rows = first.table.rows
-    rows = rows[(rows[:, codec.fact_blocks :] == 0).all(axis=1)]
+    rows = rows[(model.codec.last_labels(rows) < 0).all(axis=1)]
     number = len(rows)
     total = number * (number - 1)
     order = random.sample(range(total), min(total, 100_000))
     for code in order:
         a, b = divmod(code, number - 1)
         b += b >= a
-        yield rows[a], FullState(tuple(int(w) for w in rows[b][: codec.fact_blocks]))
+        yield rows[a], model.full_state(rows[b])

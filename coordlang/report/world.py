@@ -126,7 +126,7 @@ def find_world(model: JointModel, states: Sequence[Sequence[str]]) -> World:
 
 def _fluents(model: JointModel) -> Iterator[Atom]:
     """All atoms that a state can have, with those of remembered actions left out."""
-    for text in model.codec.facts:
+    for text in model.codec.facts.texts:
         predicate, *args = text.strip("()").split()
         yield Atom(predicate, tuple(args))
 

@@ -131,7 +131,7 @@ def _all_pairs_remembering(loaded: PlanningInstance, inits: Rows) -> Candidates:
 
 
 def _full_states(model: JointModel, rows: Rows) -> list[Goal]:
-    return [FullState(tuple(int(w) for w in row[: model.codec.fact_blocks])) for row in rows]
+    return [model.full_state(row) for row in rows]
 
 
 def from_listed(

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from planners.errors import BadInput, Position
 from planners.grounding import ground_goal
 from planners.joint.model import FullState, Goal, JointModel, show
@@ -99,10 +97,7 @@ def ground_tasks(
 def goal_text(model: JointModel, goal: Goal) -> str:
     """A goal as PDDL text."""
     if isinstance(goal, FullState):
-        row = np.zeros(model.codec.width, np.uint64)
-        row[: model.codec.fact_blocks] = goal.words
-        atoms = model.codec.decode(row)
-        return " ".join(a for a in atoms if not (model.remembers and a.startswith("(last ")))
+        return " ".join(model.codec.facts.texts[fact] for fact in goal.facts)
     return " ".join(
         formula_text(part) for part in (goal.parts if isinstance(goal, And) else (goal,))
     )

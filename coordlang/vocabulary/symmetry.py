@@ -103,7 +103,7 @@ def closed(permutations: Sequence[Ints]) -> bool:
 def _used(model: JointModel) -> set[str]:
     """The objects of ground actions and facts: what happens to the others changes nothing."""
     named = {arg for action in model.actions for arg in action.args} | set(model.robots)
-    return named | {arg for fact in model.codec.facts for arg in fact[1:-1].split(" ")[1:]}
+    return named | {arg for fact in model.codec.facts for arg in fact.args}
 
 
 def _renamings(domain: Domain, problem: Problem, used: set[str]) -> Iterator[Renaming]:
@@ -236,14 +236,12 @@ def _keeps_actions(model: JointModel, renaming: Renaming) -> bool:
 def _of_states(candidates: Candidates, renaming: Renaming) -> Ints | None:
     """Where the states go, or None if one goes outside the table."""
     codec = candidates.model.codec
-    renamed = [_rename_text(fact, renaming) for fact in codec.facts]
-    if any(fact not in codec.index for fact in renamed):
-        return None
     image = np.zeros_like(candidates.rows)
-    for number, fact in enumerate(renamed):
-        bit = candidates.rows[:, number // 64] >> np.uint64(number % 64) & np.uint64(1)
-        to = codec.index[fact]
-        image[:, to // 64] |= bit << np.uint64(to % 64)
+    for number, fact in enumerate(codec.facts):
+        to = Atom(fact.predicate, tuple(renaming.get(arg, arg) for arg in fact.args))
+        if to not in codec.facts:
+            return None
+        codec.set(image, codec.column(candidates.rows, number), [codec.facts.index[to]])
     permutation = find_rows(candidates.rows, image)
     if (permutation < 0).any() or len(np.unique(permutation)) != len(permutation):
         return None
@@ -281,9 +279,9 @@ def _keeps_tasks(
 
 
 def _image_of_full(goal: FullState, renaming: Renaming, model: JointModel) -> object:
-    atoms = model.codec.decode(np.array(goal.words, np.uint64))
-    row = model.codec.encode(_rename_text(atom, renaming) for atom in atoms)
-    return FullState(tuple(int(word) for word in row))
+    facts = model.codec.facts
+    renamed = (_rename_text(facts.texts[fact], renaming) for fact in goal.facts)
+    return model.full_state(model.codec.encode(renamed))
 
 
 def _canonical(goal: Goal, renaming: Renaming) -> object:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable
 
 from planners.classical.formulas import Leaf, literals_of, negated, put
 from planners.classical.task import ClassicalAction, Condition, Known
@@ -127,23 +127,23 @@ def own_fact(kind: str, *args: str) -> Atom:
 
 
 def fact_atoms(model: JointModel) -> list[Atom]:
-    numbers = model.evaluator.facts
+    numbers = model.codec.facts.index
     return sorted(numbers, key=numbers.__getitem__)
 
 
-def state_literals(model: JointModel, words: Sequence[int]) -> dict[Atom, bool]:
-    """The value of each fact in a row of the model; remembered actions are left out."""
-    return {atom: bool(words[n // 64] >> n % 64 & 1) for n, atom in enumerate(fact_atoms(model))}
+def state_literals(model: JointModel, true: Collection[int]) -> dict[Atom, bool]:
+    """The value of each fact in the state in which just these facts are true."""
+    return {atom: number in true for number, atom in enumerate(model.codec.facts)}
 
 
 def goal_formula(model: JointModel, goal: Goal) -> Formula:
     """A goal over facts of the model; a fact that can never be true is replaced by its value."""
     if isinstance(goal, FullState):
-        values = state_literals(model, goal.words)
+        values = state_literals(model, set(goal.facts))
         return And(tuple(atom if value else Not(atom) for atom, value in values.items()))
     return put(goal, state_reader(model))
 
 
 def state_reader(model: JointModel) -> Callable[[Leaf], Formula]:
-    facts = model.evaluator.facts
+    facts = model.codec.facts.index
     return lambda leaf: leaf if leaf in facts else FALSE

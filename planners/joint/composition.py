@@ -168,10 +168,10 @@ class ComposingStepper:
                     fires = there[
                         self._evaluator.holds(effect.condition, rows, source[there], labels[there])
                     ]
-                    number = self._evaluator.facts.get(effect.atom)
+                    number = self._evaluator.facts.index.get(effect.atom)
                     if number is not None:
                         into = adds if effect.adds else deletes
-                        into[fires, number // 64] |= np.uint64(1 << number % 64)
+                        self._codec.set(into, fires, [number])
         return (rows[source] & ~deletes) | adds, cost
 
 
@@ -203,7 +203,7 @@ class _Subactions:
                 kind.setdefault(number, []).append(formula)
             for into, adding in ((self.adds, True), (self.deletes, False)):
                 into[number + 1] = codec.mask(
-                    evaluator.facts[e.atom]
+                    evaluator.facts.index[e.atom]
                     for e in action.effects
                     if e.adds == adding and e.condition == TRUE and e.atom in evaluator.facts
                 )
@@ -256,7 +256,7 @@ def split(
         if isinstance(inner, StepAtom) and not positive:
             continue
         if isinstance(inner, Atom) and inner in evaluator.facts:
-            literals.append((evaluator.facts[inner], positive))
+            literals.append((evaluator.facts.index[inner], positive))
         elif isinstance(inner, Atom) and not positive:
             continue
         elif part != TRUE:

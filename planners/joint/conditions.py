@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from planners.joint.facts import FactTable
 from planners.joint.states import test_bits
 from planners.pddl.lifted import And, Atom, Formula, Not, Or, StepAtom, Truth
 from planners.tables import Ints, Rows
@@ -21,7 +22,7 @@ class Evaluator:
     A fact that is not listed can never be true; a subaction that is not listed is never done.
     """
 
-    facts: dict[Atom, int]
+    facts: FactTable
     subactions: dict[StepAtom, tuple[int, int]]
 
     def holds(
@@ -35,7 +36,7 @@ class Evaluator:
             case Truth(value):
                 return np.full(len(which), value)
             case Atom():
-                number = self.facts.get(formula)
+                number = self.facts.index.get(formula)
                 if number is None:
                     return np.zeros(len(which), np.bool_)
                 return test_bits(rows, which, np.full(len(which), number))

@@ -53,7 +53,7 @@ class JointActionStepper:
                 self._formulas[n] = rest
             for into, adding in ((self._adds, True), (self._deletes, False)):
                 into[n] = codec.mask(
-                    evaluator.facts[e.atom]
+                    evaluator.facts.index[e.atom]
                     for e in action.effects
                     if e.adds == adding and e.condition == TRUE and e.atom in evaluator.facts
                 )
@@ -134,13 +134,12 @@ class JointActionStepper:
         there = np.flatnonzero(operator == number)
         for adding in (False, True):
             for effect in effects:
-                fact = self._evaluator.facts.get(effect.atom)
+                fact = self._evaluator.facts.index.get(effect.atom)
                 if effect.adds != adding or fact is None:
                     continue
                 fires = there[self._evaluator.holds(effect.condition, rows, row[there])]
-                bit = np.uint64(1 << fact % 64)
                 if adding:
-                    result[fires, fact // 64] |= bit
-                elif not int(self._adds[number, fact // 64]) & int(bit):
-                    result[fires, fact // 64] &= ~bit
+                    self._codec.set(result, fires, [fact])
+                elif not self._codec.column(self._adds[[number]], fact)[0]:
+                    self._codec.clear(result, fires, [fact])
         return result

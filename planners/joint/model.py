@@ -12,13 +12,12 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planners.grounding import GroundAction, label
 from planners.joint.conditions import Evaluator, Labels
 from planners.joint.states import StateCodec
 from planners.pddl.lifted import Atom, Formula, StepAtom
-from planners.tables import Ints, Rows
+from planners.tables import Bools, Ints, Rows
 
 Cost = Literal["makespan", "makespan+actions", "makespan+cost"]
 
@@ -30,12 +29,9 @@ NO_FACT = "(no fact holds)"
 
 @dataclass(frozen=True, slots=True)
 class FullState:
-    """A goal that is one state.
+    """A goal that is one state: just these facts are true, by number, in order."""
 
-    Every fluent as in the row (given as a tuple of words, so that it can be hashed).
-    """
-
-    words: tuple[int, ...]
+    facts: tuple[int, ...]
 
 
 #: What a task asks for: a ground formula, or one full state.
@@ -98,15 +94,15 @@ class JointModel:
         """All joint steps from a table of states (see `Steps`)."""
         if not self.remembers:
             return self.stepper.steps(rows)
-        base = self.stepper.steps(np.ascontiguousarray(rows[:, : self.codec.fact_blocks]))
-        last = (base.labels + 1).astype(np.uint64)
-        return Steps(base.source, base.labels, np.hstack((base.result, last)), base.cost)
+        base = self.stepper.steps(self.codec.facts_part(rows))
+        result = self.codec.remembering(base.result, base.labels)
+        return Steps(base.source, base.labels, result, base.cost)
 
-    def holds(self, goal: Goal, rows: Rows) -> NDArray[np.bool_]:
+    def holds(self, goal: Goal, rows: Rows) -> Bools:
         """Which states of a table satisfy a goal.  Remembered actions never count."""
         if isinstance(goal, FullState):
-            wanted = np.array(goal.words, np.uint64)
-            same: NDArray[np.bool_] = (rows[:, : self.codec.fact_blocks] == wanted).all(axis=1)
+            wanted = self.codec.mask(goal.facts)
+            same: Bools = (self.codec.facts_part(rows) == wanted).all(axis=1)
             return same
         return self.evaluator.holds(goal, rows, np.arange(len(rows)))
 
@@ -117,11 +113,30 @@ class JointModel:
 
     def why_not(self, row: Rows, labels: Sequence[int]) -> str:
         """Why these labels are no joint step in a state, in words."""
-        return self.stepper.why_not(row[: self.codec.fact_blocks], labels)
+        return self.stepper.why_not(self.codec.facts_part(row), labels)
 
     def state_text(self, row: Rows) -> str:
         """A state for people: its key, if it is not empty."""
         return self.codec.key(row) or NO_FACT
+
+    def full_state(self, row: Rows) -> FullState:
+        """The goal that is this state; what it remembers is left out."""
+        return FullState(tuple(self.codec.true_facts(row)))
+
+    def robot_number(self, name: str) -> int | None:
+        """The number of a robot, None if there is no such robot."""
+        return self.robots.index(name) if name in self.robots else None
+
+    def label_text(self, robot: int, label: int) -> str | None:
+        """The text of a robot's label; None is idling."""
+        return self.labels[robot][label] if label else None
+
+    def label_number(self, robot: int, text: str | None) -> int | None:
+        """The number of a robot's label with this text (None: idling), None if there is none."""
+        if text is None:
+            return 0
+        own = self.labels[robot]
+        return own.index(text) if text in own[1:] else None
 
     def texts(self, labels: Sequence[int]) -> tuple[str | None, ...]:
         """Label numbers as text; None is idling."""

@@ -1,53 +1,51 @@
-"""Joint states as rows of bits: encoding, keys, and fast look-up of rows."""
+"""Joint states as rows of bits: encoding, keys, and what is true in them."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planners.errors import BadInput
-from planners.tables import Rows
+from planners.joint.facts import FactTable
+from planners.tables import Bools, Ints, Rows
 
-_WORD_BITS = 64
+_BLOCK_BITS = 64
 
 
 @dataclass(frozen=True, slots=True)
 class StateCodec:
-    """Joint states <-> rows of ``width`` 64-bit words.
+    """Joint states <-> rows of ``width`` 64-bit blocks.
 
-    Bit ``i % 64`` of word ``i // 64`` says whether ``facts[i]`` is true.  If ``memory`` is not None
-    the row ends with one word per robot: 0 before its first subaction, else 1 + the number of its
-    last label in ``memory`` (``--remember-actions``).
-
-    ``facts`` are PDDL atoms in lower case, sorted as strings; they are the *key* of a state in this
-    order.
+    The first ``fact_blocks`` blocks have a bit for each of ``facts``.  If ``memory`` is not None the
+    row ends with one block per robot: 0 before its first subaction, else 1 + the number of its last
+    label in ``memory`` (``--remember-actions``).  Nothing but this class knows where a fact's bit is.
     """
 
-    facts: tuple[str, ...]
+    facts: FactTable
     robots: tuple[str, ...] = ()
     memory: tuple[tuple[str, ...], ...] | None = None
-    index: dict[str, int] = field(init=False, compare=False, repr=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "index", {fact: number for number, fact in enumerate(self.facts)})
 
     @property
     def fact_blocks(self) -> int:
-        return max(1, -(-len(self.facts) // _WORD_BITS))
+        """The number of blocks that hold facts, at least 1."""
+        return max(1, -(-len(self.facts) // _BLOCK_BITS))
 
     @property
     def width(self) -> int:
+        """The number of blocks of a row."""
         return self.fact_blocks + (len(self.robots) if self.memory is not None else 0)
 
+    # ---- one state
+
     def mask(self, facts: Iterable[int]) -> Rows:
-        """A row of the fact words with the bits of these facts set."""
+        """The fact blocks of a row in which just these facts are true."""
         row = np.zeros(self.fact_blocks, np.uint64)
         for number in facts:
-            row[number // _WORD_BITS] |= np.uint64(1 << number % _WORD_BITS)
+            row[number // _BLOCK_BITS] |= np.uint64(1 << number % _BLOCK_BITS)
         return row
 
     def encode(self, atoms: Iterable[str]) -> Rows:
@@ -56,26 +54,32 @@ class StateCodec:
         Raises `BadInput` for an atom that is no fact of the model.
         """
         row = np.zeros(self.width, np.uint64)
+        facts: list[int] = []
         for atom in atoms:
             if self.memory is not None and atom.startswith("(last "):
                 self._encode_last(row, atom)
                 continue
-            number = self.index.get(atom)
+            number = self.facts.number_of(atom)
             if number is None:
                 raise BadInput(
                     f"{atom} can never be true in this model",
                     remedy="A state lists true fluents: atoms of this problem that some action can change.",
                 )
-            row[number // _WORD_BITS] |= np.uint64(1 << number % _WORD_BITS)
+            facts.append(number)
+        row[: self.fact_blocks] = self.mask(facts)
         return row
 
-    def decode(self, row: Rows) -> list[str]:
-        """The true atoms of a state, sorted."""
-        atoms = [
-            self.facts[word * _WORD_BITS + bit]
-            for word in range(self.fact_blocks)
-            for bit in bits(int(row[word]))
+    def true_facts(self, row: Rows) -> list[int]:
+        """The numbers of the facts that are true in a state, in order."""
+        return [
+            block * _BLOCK_BITS + bit
+            for block in range(self.fact_blocks)
+            for bit in bits(int(row[block]))
         ]
+
+    def decode(self, row: Rows) -> list[str]:
+        """The texts of the true atoms of a state, remembered subactions too, sorted."""
+        atoms = [self.facts.texts[number] for number in self.true_facts(row)]
         if self.memory is not None:
             for robot, labels, last in zip(
                 self.robots, self.memory, row[self.fact_blocks :], strict=True
@@ -85,11 +89,51 @@ class StateCodec:
             atoms.sort()
         return atoms
 
-    def truth(self, rows: Rows) -> NDArray[np.bool_]:
+    # ---- tables of states
+
+    def truth(self, rows: Rows) -> Bools:
         """A table of states as truth values, (states, facts); remembered actions are left out."""
-        words = np.ascontiguousarray(rows[:, : self.fact_blocks], "<u8")
-        true = np.unpackbits(words.view(np.uint8), axis=1, bitorder="little")
+        blocks = np.ascontiguousarray(rows[:, : self.fact_blocks], "<u8")
+        true = np.unpackbits(blocks.view(np.uint8), axis=1, bitorder="little")
         return true[:, : len(self.facts)].astype(np.bool_)
+
+    def column(self, rows: Rows, fact: int) -> Bools:
+        """In which states of a table a fact is true."""
+        return test_bits(rows, np.arange(len(rows)), np.full(len(rows), fact))
+
+    def set(self, rows: Rows, which: Ints | Bools | slice, facts: Iterable[int]) -> None:
+        """Make facts true in some states of a table (by number or mask), in place."""
+        for fact in facts:
+            rows[which, fact // _BLOCK_BITS] |= np.uint64(1 << fact % _BLOCK_BITS)
+
+    def clear(self, rows: Rows, which: Ints | Bools | slice, facts: Iterable[int]) -> None:
+        """Make facts false in some states of a table (by number or mask), in place."""
+        for fact in facts:
+            rows[which, fact // _BLOCK_BITS] &= ~np.uint64(1 << fact % _BLOCK_BITS)
+
+    def rows_of(self, states: Sequence[Iterable[int]]) -> Rows:
+        """A table of states given by the numbers of their true facts, nothing remembered."""
+        rows = np.zeros((len(states), self.width), np.uint64)
+        for number, facts in enumerate(states):
+            rows[number, : self.fact_blocks] = self.mask(facts)
+        return rows
+
+    def facts_part(self, rows: Rows) -> Rows:
+        """One state or a table of states without remembered actions."""
+        return np.ascontiguousarray(rows[..., : self.fact_blocks])
+
+    def last_labels(self, rows: Rows) -> Ints:
+        """What the robots did last, (.., robots): label numbers, -1 for nothing yet.
+
+        Without ``memory`` there are no columns.
+        """
+        return rows[..., self.fact_blocks :].astype(np.int64) - 1
+
+    def remembering(self, rows: Rows, labels: Ints | NDArray[np.int32]) -> Rows:
+        """States (fact blocks only) extended by the robots' last labels, -1 for nothing yet."""
+        return np.hstack((rows, (labels.astype(np.int64) + 1).astype(np.uint64)))
+
+    # ---- keys
 
     def key(self, row: Rows) -> str:
         """The state's key in a language file: its true fluents, sorted, joined by one space."""
@@ -149,12 +193,7 @@ def bits(number: int) -> Iterator[int]:
         number ^= low
 
 
-def test_bits(rows: Rows, which: NDArray[np.int64], facts: NDArray[np.int64]) -> NDArray[np.bool_]:
+def test_bits(rows: Rows, which: Ints, facts: Ints) -> Bools:
     """Whether fact ``facts[k]`` is true in ``rows[which[k]]``."""
-    words = rows[which, facts // _WORD_BITS]
-    return (words >> (facts % _WORD_BITS).astype(np.uint64) & np.uint64(1)).astype(np.bool_)
-
-
-def stack(rows: Sequence[Rows], width: int) -> Rows:
-    """Rows one below the other; an empty table keeps its width."""
-    return np.array(rows, np.uint64).reshape(len(rows), width)
+    blocks = rows[which, facts // _BLOCK_BITS]
+    return (blocks >> (facts % _BLOCK_BITS).astype(np.uint64) & np.uint64(1)).astype(np.bool_)

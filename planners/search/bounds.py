@@ -93,7 +93,7 @@ def manhattan(model: JointModel, goal: Goal) -> Heuristic:
 
     Raises `UsageError` if no atom of the goal has a place.
     """
-    facts = {fact: _thing(text) for fact, text in enumerate(model.codec.facts)}
+    facts = {fact: _thing(text) for fact, text in enumerate(model.codec.facts.texts)}
     things: dict[_Thing, dict[int, _Place]] = {}
     for fact, found in facts.items():
         if found is not None:
@@ -180,7 +180,7 @@ def _ways(model: JointModel) -> Iterator[tuple[frozenset[int], int]]:
 
     Negative literals are left out.
     """
-    known = model.evaluator.facts
+    known = model.codec.facts.index
     for action in model.actions:
         needs = _positive(model, action.precondition)
         for effect in action.effects:
@@ -196,9 +196,9 @@ def _positive(model: JointModel, formula: Formula) -> set[int]:
 def _goal_facts(model: JointModel, goal: Goal) -> set[int]:
     """The facts that must be true in every goal state, as far as single literals say."""
     if isinstance(goal, FullState):
-        row = np.array([goal.words], np.uint64)
-        return set(np.flatnonzero(model.codec.truth(row)[0]).tolist())
-    return {model.evaluator.facts[atom] for atom in _atoms(goal) if atom in model.evaluator.facts}
+        return set(goal.facts)
+    index = model.codec.facts.index
+    return {index[atom] for atom in _atoms(goal) if atom in index}
 
 
 def _atoms(goal: Formula) -> Iterable[Atom]:

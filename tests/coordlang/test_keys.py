@@ -11,15 +11,16 @@ import pytest
 from coordlang.language import keys
 from coordlang.language.keys import keys_of, read_keys
 from planners.errors import BadInput
+from planners.joint.facts import FactTable
 from planners.joint.states import StateCodec
+from planners.pddl.lifted import Atom
 from planners.tables import Rows
 
 
 def random_codec(random: Random) -> StateCodec:
-    facts = tuple(
-        sorted(
-            f"(p{random.randint(0, 9)} {n})" for n in range(random.choice([0, 3, 63, 64, 65, 200]))
-        )
+    facts = FactTable.of(
+        Atom(f"p{random.randint(0, 9)}", (f"{n}",))
+        for n in range(random.choice([0, 3, 63, 64, 65, 200]))
     )
     robots = tuple(f"r{n}" for n in range(random.randint(1, 3)))
     labels = tuple(
@@ -99,7 +100,7 @@ def test_both_ways(block: int, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_no_keys() -> None:
-    codec = StateCodec(("(p)",))
+    codec = StateCodec(FactTable.of([Atom("p", ())]))
     assert keys_of(codec, np.zeros((0, 1), np.uint64)) == []
     rows, wrong = read_keys(codec, [])
     assert rows.shape == (0, 1)

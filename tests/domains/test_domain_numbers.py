@@ -16,7 +16,6 @@ from generate import Scenario, problem_text
 from gridmap import GridMap, open_grid, ring, three_cells
 
 from planners.joint.interference import conjuncts
-from planners.joint.model import FullState
 from planners.loading import build
 from planners.pddl import parse_problem, read_domain
 from planners.pddl.sexpr import Source
@@ -49,7 +48,7 @@ STYLES = ("grid", "grid-joint")
 
 def to_every_state(space: Space) -> PlanSpace:
     """The optimal plans between all pairs of different states."""
-    groups = [TaskGroup(FullState(tuple(int(word) for word in row))) for row in space.rows]
+    groups = [TaskGroup(space.model.full_state(row)) for row in space.rows]
     (plans,) = plan_spaces(space, groups)
     return plans
 

@@ -16,7 +16,7 @@ from random_pddl import KINDS, Kind, random_model
 from planners import classical as plain_module
 from planners.classical import ClassicalTask, compile_classical, to_pddl
 from planners.errors import BadInput, ProvedImpossible
-from planners.joint.model import Cost, FullState, JointModel
+from planners.joint.model import Cost, JointModel
 from planners.loading import ModelOptions, PlanningInstance, PlanningTask, build
 from planners.pddl.domain import parse_domain
 from planners.pddl.problem import parse_problem
@@ -262,9 +262,9 @@ def test_a_goal_that_is_a_full_state(form: str) -> None:
     model, task = loaded.model, loaded.tasks[0]
     space = search(model, task)
     last = space.rows[space.state[0]]
-    full = replace(task, goal=FullState(tuple(int(w) for w in last)))
+    full = replace(task, goal=model.full_state(last))
     assert solved(compile_classical(model, full, FORMS[form])) == ours(model, full)
-    back = replace(task, init=last, goal=FullState(tuple(int(w) for w in task.init)))
+    back = replace(task, init=last, goal=model.full_state(task.init))
     assert solved(compile_classical(model, back, FORMS[form])) == ours(model, back)
 
 
@@ -430,5 +430,5 @@ def random_state(loaded: PlanningInstance, seed: int) -> Rows:
     if seed % 4 == 0:
         return loaded.tasks[0].init
     return loaded.model.codec.encode(
-        fact for fact in loaded.model.codec.facts if rng.random() < 0.6
+        fact for fact in loaded.model.codec.facts.texts if rng.random() < 0.6
     )

@@ -13,7 +13,7 @@ from test_plain import COSTS, FORMS, MODELS, random_state, read
 
 from planners.classical import compile_classical
 from planners.errors import BadInput
-from planners.joint.model import Cost, FullState
+from planners.joint.model import Cost
 from planners.loading import PlanningInstance
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
@@ -85,7 +85,7 @@ def test_every_plan_of_random_models_once(seed: int, kind: Kind, cost: Cost) -> 
         space = explore(loaded.model, random_state(loaded, seed)[None, :])
     except BadInput:  # one label tuple, two results
         reject()
-    last = FullState(tuple(int(w) for w in space.rows[seed % len(space)]))
+    last = space.model.full_state(space.rows[seed % len(space)])
     task = replace(loaded.tasks[0], init=random_state(loaded, seed), goal=last)
     expected = Plans.of(search(loaded.model, task)).count
     event(f"plans: {expected if expected < 3 else 'many'}")

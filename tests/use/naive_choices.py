@@ -73,7 +73,7 @@ class Listed:
         plans = Plans(space, self.task_language.start, [])
         return {
             chosen: [
-                frozenset(codec.decode(space.rows[s])) & set(codec.facts)
+                frozenset(codec.decode(space.rows[s])) & set(codec.facts.texts)
                 for s in plans.states(plan)
             ]
             for chosen, plan in self.mixed.items()
@@ -81,7 +81,7 @@ class Listed:
 
     def knows(self, robot: int) -> dict[Own, Known]:
         """Own beginning -> what has one value after it, whatever the others chose."""
-        everything = frozenset(self.task_language.model.codec.facts)
+        everything = frozenset(self.task_language.model.codec.facts.texts)
         found: dict[Own, Known] = {}
         for chosen, along in self.facts.items():
             for step, here in enumerate(along):

@@ -117,7 +117,7 @@ def long_task(
         farthest.append((depth, start, layer))
     _, start, layer = max(farthest)
     true = set(codec.decode(space.rows[random.choice(layer)]))
-    literals = [fact if fact in true else f"(not {fact})" for fact in codec.facts]
+    literals = [fact if fact in true else f"(not {fact})" for fact in codec.facts.texts]
     if random.random() < 0.3:
         literals = random.sample(literals, random.randint(1, len(literals)))
     return ListedTask(tuple(codec.decode(space.rows[start])), tuple(literals))

@@ -150,7 +150,7 @@ def check_automata(found: Choices, twin: Listed) -> None:
     """Each automaton accepts exactly the robot's own parts, is deterministic, and the least that
     knows what it knows.
     """
-    facts = found.task_language.model.codec.facts
+    facts = found.task_language.model.codec.facts.texts
     for own, parts in zip(found.robots, twin.own, strict=True):
         automaton = own.automaton
         assert accepted(moves(automaton)) == parts
@@ -287,7 +287,7 @@ def check_own_atoms(
 ) -> None:
     known = twin.knows(own.robot)
     mask = OwnFacts.of(task_language.model, own.robot).mask
-    facts = task_language.model.codec.facts
+    facts = task_language.model.codec.facts.texts
     for part in twin.own[own.robot]:
         state = 0
         for step, label in enumerate((*part, None)):

@@ -78,9 +78,9 @@ def random_detour(
         return set().union(*along(own, 0))
 
     def avoided(own: Own) -> set[str]:
-        return set(task_language.model.codec.facts).intersection(*along(own, 1))
+        return set(task_language.model.codec.facts.texts).intersection(*along(own, 1))
 
-    anything = set(task_language.model.codec.facts)
+    anything = set(task_language.model.codec.facts.texts)
     if random.random() < 0.3:  # also what is never known
         return Detour(some(anything, set()), some(anything, set()))
     return Detour(
@@ -144,7 +144,7 @@ def check_detours(
             at.did(task_language.model.labels[robot][label] if label else None)
         here = stop
         left = {own for own in left if own[:here] == chosen[:here]}
-        for number, fact in enumerate(task_language.model.codec.facts):
+        for number, fact in enumerate(task_language.model.codec.facts.texts):
             true, false = known[chosen[:here]]
             assert at.known(fact) == (True if fact in true else False if fact in false else None), (
                 number

@@ -95,7 +95,7 @@ def warehouse_trials(
     model = candidates.model
     corners = {cell for delivery in every for cell in delivery.start}
     cells = sorted(
-        {cell for fact in model.codec.facts for cell in [fact.strip("()").split()[2]]} - corners
+        {fact.args[1] for fact in model.codec.facts} - corners
     )
     hazards = tuple(human_in(model, cell) for cell in cells)
     number = _task_numbers(sayings.spoken)

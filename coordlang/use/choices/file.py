@@ -54,7 +54,7 @@ def _robot(choices: Choices, own: RobotChoices) -> dict[str, Any]:
     ever = 0
     for true, possible in automaton.known:
         ever |= true | ~possible
-    facts = {bit: text for bit, text in enumerate(model.codec.facts) if ever >> bit & 1}
+    facts = {bit: text for bit, text in enumerate(model.codec.facts.texts) if ever >> bit & 1}
     number = {bit: n for n, bit in enumerate(facts)}
     steps = [step for step, states in enumerate(automaton.layers) for _ in states]
     return {
@@ -63,7 +63,7 @@ def _robot(choices: Choices, own: RobotChoices) -> dict[str, Any]:
         "subplans": json_count(automaton.count),
         "atoms": own.atoms,
         "facts": list(facts.values()),
-        "others": [text for bit, text in enumerate(model.codec.facts) if bit not in facts],
+        "others": [text for bit, text in enumerate(model.codec.facts.texts) if bit not in facts],
         "states": [
             {
                 "step": steps[state],

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from coordlang.use.choices.automaton import Automaton, Knowledge, minimised
 from planners.grounding import GroundEffect
-from planners.joint.model import JointModel, show
+from planners.joint.model import JointModel
 from planners.pddl.lifted import TRUE
 
 #: What a subaction does to an atom, certainly: True adds it, False deletes it, None leaves it as it
@@ -95,7 +95,7 @@ def _changes(model: JointModel, effects: Sequence[GroundEffect]) -> tuple[dict[i
     done: dict[int, Change] = {}
     unsure = 0
     for effect in effects:
-        fact = model.codec.index.get(show(effect.atom))
+        fact = model.codec.facts.index.get(effect.atom)
         if fact is None:
             continue
         if effect.condition != TRUE:

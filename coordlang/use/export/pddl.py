@@ -39,7 +39,7 @@ from planners.classical import (
 )
 from planners.classical.task import Condition
 from planners.errors import BadInput
-from planners.joint.model import IDLE, JointModel, show
+from planners.joint.model import IDLE, JointModel
 from planners.loading import PlanningTask
 from planners.search.plans import Plan
 
@@ -175,7 +175,7 @@ class _Naming:
             task_language.table.words,
         )
         self.facts, self.init = list(plain.facts), set[int]()
-        self.known = {show(atom): number for atom, number in self.model.evaluator.facts.items()}
+        self.known = {text: n for n, text in enumerate(self.model.codec.facts.texts)}
         self.remembered = sorted(
             {a for terms in tests.terms for t in terms for a in t if a.startswith("(last ")}
         )
@@ -186,7 +186,7 @@ class _Naming:
             for atom in self.remembered:
                 self.known[atom] = self.fact(atom)
             self.init |= {self.known[atom] for atom in key if atom in self.remembered}
-        self.own = len(self.model.evaluator.facts)  # from here on, facts of the compilation
+        self.own = len(self.model.codec.facts)  # from here on, facts of the compilation
         between = [number for number in plain.init if number >= self.own]
         self.explicit = not between
         #: Between two joint steps: select-then-apply has a fact for this already.

@@ -100,7 +100,7 @@ def language_in_task(
     # possible here.
     inits = [init for init, _ in recorded]
     loaded = build(domain, [problem], options, inits=inits)
-    unknown = _atoms(language) - loaded.model.codec.index.keys()
+    unknown = _atoms(language) - set(loaded.model.codec.facts.texts)
     if unknown:
         (extra, _), *_ = ground_tasks(
             domain, problem, [ListedTask(tuple(sorted(unknown)), ())], position
