@@ -37,11 +37,7 @@ def distinguishing(choices: Choices, own: RobotChoices, states: range) -> list[l
     """
     known = own.automaton.known[states.start : states.stop]
     everywhere = reduce(and_, (true for true, _ in known))
-<<<<<<< HEAD
-    facts = choices.task_language.model.codec.facts
-=======
-    facts = choices.spoken.model.codec.facts.texts
->>>>>>> 4eda732 (joint: one table of facts turns atoms into text and back; states are asked through the codec, and only it knows where a bit is)
+    facts = choices.task_language.model.codec.facts.texts
     return [
         [text for bit, text in enumerate(facts) if (true & ~everywhere) >> bit & 1]
         for true, _ in known
