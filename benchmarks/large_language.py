@@ -147,7 +147,10 @@ def name(cell: tuple[int, int]) -> str:
 def placements(model: JointModel, number: int) -> Rows:
     """The first states with all robots on different cells."""
     cells = range(HEIGHT * WIDTH)
-    bit = [[model.codec.facts.number_of(f"(at {r} {name(divmod(c, WIDTH))})") for c in cells] for r in ROBOTS]
+    bit = [
+        [model.codec.facts.number_of(f"(at {r} {name(divmod(c, WIDTH))})") for c in cells]
+        for r in ROBOTS
+    ]
 
     def chosen() -> Iterator[tuple[int, int, int]]:
         for a in cells:

@@ -82,9 +82,7 @@ def inspect(loaded: PlanningInstance) -> Inspection:
     """
     model, domain = loaded.model, loaded.domain
     start = model.codec.decode(loaded.tasks[0].init)
-    possible = {fact.predicate for fact in model.codec.facts} | {
-        a.predicate for a in model.statics
-    }
+    possible = {fact.predicate for fact in model.codec.facts} | {a.predicate for a in model.statics}
     return Inspection(
         domain=domain.name,
         problem=loaded.problems[0].name,

@@ -42,7 +42,9 @@ def varied_tasks(
     facts = model.codec.truth(space.rows)
     here = _starts(space, facts, loaded.tasks[0].init, starts)
     wanted = _goals(space, facts, goals) if goals else []
-    keys = [tuple(model.codec.facts.texts[f] for f in np.flatnonzero(facts[state])) for state in here]
+    keys = [
+        tuple(model.codec.facts.texts[f] for f in np.flatnonzero(facts[state])) for state in here
+    ]
     if goals:
         texts = [tuple(model.codec.facts.texts[f] for f in goal) for goal in wanted]
         reached = [facts[:, list(goal)].all(axis=1) for goal in wanted]
@@ -97,7 +99,9 @@ def _matching(space: Space, pattern: str) -> list[int]:
     wanted = " ".join(pattern.lower().replace("(", " ( ").replace(")", " ) ").split())
     wanted = wanted.replace("( ", "(").replace(" )", ")")
     expression = re.escape(wanted).replace(r"\?", r"[^ ()]+")
-    found = [n for n, fact in enumerate(space.model.codec.facts.texts) if re.fullmatch(expression, fact)]
+    found = [
+        n for n, fact in enumerate(space.model.codec.facts.texts) if re.fullmatch(expression, fact)
+    ]
     if not found:
         raise UsageError(
             f"no fluent of this problem matches {pattern}",

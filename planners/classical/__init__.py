@@ -58,9 +58,7 @@ def compile_classical(
     step_cost = team.highest_cost * longest + 1
     out, form = _written(team, model, task.goal, step_cost, limit)
     true_at_first = set(model.codec.true_facts(task.init))
-    true = {
-        out.fact(atom) for atom, holds in state_literals(model, true_at_first).items() if holds
-    }
+    true = {out.fact(atom) for atom, holds in state_literals(model, true_at_first).items() if holds}
     return ClassicalTask(
         name=task.name,
         form=form,

@@ -94,9 +94,7 @@ def warehouse_trials(
     sayings = _only(candidates, language)
     model = candidates.model
     corners = {cell for delivery in every for cell in delivery.start}
-    cells = sorted(
-        {fact.args[1] for fact in model.codec.facts} - corners
-    )
+    cells = sorted({fact.args[1] for fact in model.codec.facts} - corners)
     hazards = tuple(human_in(model, cell) for cell in cells)
     number = _task_numbers(sayings.spoken)
     trials = [
