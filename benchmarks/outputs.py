@@ -1,0 +1,450 @@
+"""What the program prints and writes on the shipped domains, for comparing two versions of it.
+
+    python benchmarks/outputs.py FOLDER [--program PATH] [--only PATTERN] [--jobs N]
+
+Runs a fixed list of commands in the current directory, a checkout, each as a process of its own.
+``FOLDER/WORLD/COMMAND.txt`` holds the exit code and stdout of a command, beside it lie the files
+that it wrote. Versions behave alike if and only if ``diff -r`` of their folders is empty. What
+differs from run to run is left out: seconds, the ``producer`` of a file and the place of FOLDER.
+Messages on stderr are not compared, and of commands with bad input only the exit codes are.
+
+``--only`` runs the commands whose ``WORLD/COMMAND`` contains a match of the regular expression,
+and those that write the files that they read.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+
+DOMAINS = Path("domains")
+
+#: World -> the problems that every general command is run on.
+PROBLEMS = {
+    "charger": "in-turn queue three-robots",
+    "corridor": "problem",
+    "elevator": "one-robot same-floor two-calls",
+    "flags": "parade two-up",
+    "grid": "corners-3x3 corners-4x4 gw1-2x2 gw2-2x3 gwb1-2x4 gwb5-3x3 three-robots-3x3",
+    "grid-joint": "corners-3x3 gw1-2x2 gwb1-2x4 t-map three-cells",
+    "handover": "exchange one-door three-rooms two-doors",
+    "lock": "both-in let-in three-robots",
+    "push-box": "around next-door three-robots",
+    "t-map": "problem",
+    "three-cells": "problem",
+    "tray": "in-hand serve three-robots",
+    "two-arms": "exchange own-sides pass-on",
+    "vans": "alone one-van two-each two-vans",
+}
+
+#: Run on every problem ``P``.
+ON_EVERY_PROBLEM = """
+inspect D P --json
+plans D P --max 3 --format ipc
+plans D P --max 3 --format json
+coordination D P --json
+"""
+
+#: World -> further commands. ``D`` is the world's domain, ``@name`` a file in FOLDER; other names
+#: of files are looked up in the world's directory.
+COMMANDS = {
+    "three-cells": """
+        inspect D problem.pddl --states
+        plans D problem.pddl --count
+        plans D problem.pddl --sample 3 --seed 1
+        plans D problem.pddl --cost makespan+actions --json
+        coordination D problem.pddl
+        check D problem.pddl --json
+        tasks D problem.pddl --start "(at r1 ?)" --goal "(at r2 ?)" -o @some.tasks.json --json
+        build D problem.pddl --tasks @some.tasks.json --method minimal -o @some.json --json
+        build D problem.pddl -o @one.json
+        build D problem.pddl --tasks all -o @greedy.json --json
+        build D problem.pddl --tasks all --method separating -o @separating.json
+        build D problem.pddl --tasks all --method separating --alpha-only -o @alpha.json
+        build D problem.pddl --tasks all --method exhaustive -o @exhaustive.json --json
+        build D problem.pddl --tasks all --method minimal --certificate @proof.json -o @minimal.json
+        build D problem.pddl --tasks all --method minimal --prefer flexible -o @flexible.json --json
+        build D problem.pddl --tasks all --method minimal --overlap -o @overlap.json --json
+        build D problem.pddl --tasks all --method minimal -o -
+        verify @minimal.json D problem.pddl --lower-bound @proof.json --dimacs @proof.cnf
+        verify @overlap.json D problem.pddl --json
+        verify @one.json D problem.pddl
+        verify @one.json D problem.pddl --tasks all
+        verify @one.json D problem.pddl --tasks all --json
+        explain @one.json D problem.pddl
+        explain @one.json D problem.pddl --task
+        explain @one.json D problem.pddl --task --json
+        explain @minimal.json D problem.pddl --each
+        explain @overlap.json D problem.pddl --json
+        understand @one.json D problem.pddl "w1 w2 w0" --json -o @plans.json
+        understand @one.json D problem.pddl "w1 w2 w0"
+        understand @one.json D problem.pddl "w1 w2 w0" --count
+        understand @one.json D problem.pddl "w1 w2 w0" --sample 3 --seed 1
+        understand @one.json D problem.pddl "w1 w2 w0" --format dot
+        understand @one.json D problem.pddl "w1 w2 w0" --format svg -o @one.svg
+        understand @one.json D problem.pddl "w1 w2"
+        say @one.json D problem.pddl @plans.json
+        say @one.json D problem.pddl @plans.json --json
+        plan @one.json D problem.pddl "w1 w0"
+        plan @one.json D problem.pddl --wish first:r2 --wish most-plans --json
+        plan @one.json D problem.pddl --wish shortest --wish "avoid:(at r1 c)"
+        choices @one.json D problem.pddl "w1 w0" --check
+        choices @one.json D problem.pddl "w1 w0" --format json -o @choices.json
+        choices @one.json D problem.pddl "w1 w0" --format dot
+        choices @one.json D problem.pddl "w1 w0" --robot r2 --visit "(at r2 c)"
+        choices @one.json D problem.pddl "w1 w0" --robot r2 --did idle --visit "(at r2 a)" --json
+        export @one.json D problem.pddl "w1 w0"
+        export @one.json D problem.pddl "w1 w0" --json
+        export @one.json D problem.pddl "w1 w0" --limit 0
+        export @one.json D problem.pddl "w1 w0" --to ltlf
+        export @one.json D problem.pddl "w1 w0" --to ltlf --json
+        report @one.json D problem.pddl -o @one.html
+        schema
+        """,
+    "t-map": """
+        plans D problem.pddl --sample 3 --seed 1 --json
+        coordination D problem.pddl
+        check D problem.pddl --json
+        build D problem.pddl --tasks all -o @greedy.json
+        build D problem.pddl --tasks all --method separating -o @separating.json --json
+        build D problem.pddl --tasks all --method minimal --certificate @proof.json -o @minimal.json
+        build D problem.pddl --tasks all --method minimal --prefer flexible -o @flexible.json --json
+        build D problem.pddl --tasks all --overlap -o @overlap.json --json
+        verify @minimal.json D problem.pddl --lower-bound @proof.json --json
+        verify @minimal.json D problem.pddl --dimacs @proof.cnf --lower-bound @proof.json
+        verify @overlap.json D problem.pddl
+        explain @minimal.json D problem.pddl
+        explain @minimal.json D problem.pddl --json
+        explain @minimal.json D problem.pddl --task
+        explain @greedy.json D problem.pddl --task --json
+        plan @minimal.json D problem.pddl --wish first:r1 --json
+        plan @greedy.json D problem.pddl --wish shortest --heuristic blind
+        understand @minimal.json D problem.pddl "w0 w2 w1 w0"
+        understand @minimal.json D problem.pddl "w0" --json
+        choices @minimal.json D problem.pddl "w0 w2 w1 w0"
+        export @minimal.json D problem.pddl "w0"
+        export @minimal.json D problem.pddl "w0" --to ltlf
+        report @minimal.json D problem.pddl -o @minimal.html
+        """,
+    "charger": """
+        coordination D queue.pddl in-turn.pddl
+        build D queue.pddl --tasks queue.tasks.json --method minimal -o @queue.json --json
+        build D queue.pddl --tasks queue.tasks.json -o @greedy.json
+        build D three-robots.pddl --method minimal -o @three.json
+        build D three-robots.pddl --method separating -o @separating.json
+        verify @queue.json D queue.pddl --json
+        explain @queue.json D queue.pddl --task
+        explain @three.json D three-robots.pddl --task --json
+        plan @three.json D three-robots.pddl --wish most-plans --json
+        plan @queue.json D queue.pddl --wish shortest
+        report @three.json D three-robots.pddl -o @three.html
+        """,
+    "corridor": """
+        coordination D problem.pddl
+        build D problem.pddl --tasks rooms.tasks.json -o @greedy.json --json
+        build D problem.pddl --method minimal -o @minimal.json
+        tasks D problem.pddl --start "(at r1 ?)" --goal "(at r1 c0-8)" --goal "(at r2 ?)" -o @t.json
+        explain @minimal.json D problem.pddl --task
+        explain @greedy.json D problem.pddl --json
+        plan @minimal.json D problem.pddl --wish most-plans --json
+        plan @minimal.json D problem.pddl --wish most-plans --heuristic manhattan
+        report @minimal.json D problem.pddl -o @minimal.html
+        """,
+    "elevator": """
+        coordination D two-calls.pddl
+        check D one-robot.pddl --json
+        build D two-calls.pddl --tasks all --method minimal -o @minimal.json
+        build D two-calls.pddl --tasks all -o @greedy.json --json
+        verify @minimal.json D two-calls.pddl
+        explain @minimal.json D two-calls.pddl --task
+        plan @minimal.json D two-calls.pddl --wish shortest --json
+        report @greedy.json D two-calls.pddl -o @greedy.html
+        """,
+    "flags": """
+        coordination D parade.pddl
+        plans D parade.pddl --sample 3 --seed 1
+        build D parade.pddl --method minimal -o @minimal.json --certificate @proof.json
+        build D parade.pddl --method separating -o @separating.json --json
+        build D parade.pddl --method greedy --overlap -o @overlap.json
+        verify @minimal.json D parade.pddl --lower-bound @proof.json
+        explain @minimal.json D parade.pddl --task
+        plan @minimal.json D parade.pddl --wish most-plans --json
+        report @minimal.json D parade.pddl -o @minimal.html
+        """,
+    "grid": """
+        inspect D gw3-2x4.pddl --states
+        plans D corners-10x10.pddl --count
+        plans D corners-8x8.pddl --sample 3 --seed 1
+        plans D corners-8x8.pddl --count --json --cost makespan+actions
+        coordination D corners-6x6.pddl
+        build D gw1-2x2.pddl --tasks all -o @gw1-greedy.json --json
+        build D gw1-2x2.pddl --tasks all --method minimal -o @gw1.json --certificate @gw1.proof.json
+        build D gw2-2x3.pddl --tasks all --method minimal -o @gw2.json --json
+        build D gw2-2x3.pddl --tasks all --method separating --alpha-only -o @gw2-alpha.json
+        build D gw3-2x4.pddl --tasks all -o @gw3.json.gz
+        build D gwb1-2x4.pddl --tasks all --method minimal -o @gwb1.json --prefer flexible
+        build D gwb5-3x3.pddl --tasks gwb5-3x3.tasks.json --method minimal -o @gwb5.json
+        build D corners-4x4.pddl --method minimal -o @corners.json --json
+        build D corners-4x4.pddl --cost makespan+actions --method minimal -o @few-actions.json
+        build D corners-3x3.pddl gw4-3x3.pddl --method separating -o @two-problems.json --json
+        build D three-robots-3x3.pddl --method minimal -o @three.json --json
+        build D three-robots-3x3.pddl -o @three-greedy.json
+        verify @gw1.json D gw1-2x2.pddl --lower-bound @gw1.proof.json --json
+        verify @three.json D three-robots-3x3.pddl
+        verify @two-problems.json D corners-3x3.pddl gw4-3x3.pddl --json
+        explain @gw2.json D gw2-2x3.pddl
+        explain @gwb5.json D gwb5-3x3.pddl --task --json
+        explain @corners.json D corners-4x4.pddl --task
+        plan @corners.json D corners-4x4.pddl --wish most-plans --json
+        plan @few-actions.json D corners-4x4.pddl --wish shortest
+        plan @three.json D three-robots-3x3.pddl --wish first:r3 --json
+        report @corners.json D corners-4x4.pddl -o @corners.html
+        report @gwb5.json D gwb5-3x3.pddl --tasks-shown 5 --seed 3 -o @gwb5.html
+        """,
+    "grid-joint": """
+        coordination D t-map.pddl
+        check D three-cells.pddl
+        build D gw1-2x2.pddl --tasks all --method minimal -o @gw1.json --json
+        build D corners-3x3.pddl --method minimal -o @corners.json
+        explain @corners.json D corners-3x3.pddl --task
+        plan @corners.json D corners-3x3.pddl --wish most-plans
+        """,
+    "handover": """
+        coordination D two-doors.pddl
+        build D two-doors.pddl --tasks all -o @greedy.json --json
+        build D two-doors.pddl --method minimal -o @minimal.json --json
+        build D three-rooms.pddl --method minimal -o @three.json
+        explain @minimal.json D two-doors.pddl --task
+        plan @minimal.json D two-doors.pddl --wish most-plans --json
+        plan @three.json D three-rooms.pddl --wish shortest
+        report @minimal.json D two-doors.pddl -o @minimal.html
+        """,
+    "lock": """
+        coordination D both-in.pddl
+        build D three-robots.pddl -o @inseparable.json
+        build D three-robots.pddl --remember-actions --method minimal -o @remember.json --json
+        build D three-robots.pddl --remember-actions --cost makespan+actions -o @remember-cost.json
+        build D both-in.pddl --tasks all --method minimal -o @minimal.json --certificate @proof.json
+        verify @remember.json D three-robots.pddl
+        verify @minimal.json D both-in.pddl --lower-bound @proof.json --json
+        explain @remember.json D three-robots.pddl --task
+        explain @minimal.json D both-in.pddl --task --json
+        plan @remember.json D three-robots.pddl --wish most-plans --json
+        plan @minimal.json D both-in.pddl --wish first:r2
+        report @remember.json D three-robots.pddl -o @remember.html
+        """,
+    "push-box": """
+        coordination D around.pddl
+        build D around.pddl --tasks all -o @greedy.json --json
+        build D three-robots.pddl --method separating -o @three.json
+        build D around.pddl --method minimal -o @minimal.json
+        explain @greedy.json D around.pddl --task
+        plan @three.json D three-robots.pddl --wish shortest --json
+        report @minimal.json D around.pddl -o @minimal.html
+        """,
+    "tray": """
+        coordination D serve.pddl
+        build D serve.pddl --tasks all --method minimal -o @minimal.json --json
+        build D three-robots.pddl --method minimal -o @three.json
+        verify @minimal.json D serve.pddl
+        explain @minimal.json D serve.pddl
+        explain @three.json D three-robots.pddl --task
+        plan @three.json D three-robots.pddl --wish most-plans --json
+        report @minimal.json D serve.pddl -o @minimal.html
+        """,
+    "two-arms": """
+        coordination D exchange.pddl
+        build D exchange.pddl --tasks exchange.tasks.json -o @greedy.json --json
+        build D exchange.pddl --method minimal -o @minimal.json
+        explain @minimal.json D exchange.pddl --task --json
+        plan @minimal.json D exchange.pddl --wish shortest --json
+        report @minimal.json D exchange.pddl -o @minimal.html
+        """,
+    "vans": """
+        coordination D two-each.pddl
+        plans D alone.pddl --cost makespan+cost --json
+        build D one-van.pddl --tasks one-van.tasks.json --method minimal -o @minimal.json --json
+        build D two-vans.pddl --cost makespan+cost --method minimal -o @cost.json
+        verify @minimal.json D one-van.pddl
+        explain @minimal.json D one-van.pddl --task
+        plan @minimal.json D one-van.pddl --wish most-plans --json
+        report @minimal.json D one-van.pddl -o @minimal.html
+        """,
+}
+
+#: Bad input, run in ``t-map``: only the exit code is compared.
+BAD = """
+sing D problem.pddl
+plans D nowhere.pddl
+plans problem.pddl D
+plans D problem.pddl --max minus
+plans D problem.pddl --count --max 3
+plans D problem.pddl --robots r1,r7
+plans D problem.pddl --memory-limit 3X
+plans D ../lock/both-in.pddl
+build D problem.pddl --method best -o @bad.json
+build D problem.pddl
+build D problem.pddl -o nowhere/bad.json
+build D problem.pddl --tasks problem.pddl -o @bad.json
+build D problem.pddl --tasks all --method exhaustive --time-limit 0.01 -o @bad.json
+verify problem.pddl D problem.pddl
+verify @minimal.json D problem.pddl --cost makespan+actions
+verify @minimal.json ../lock/domain.pddl ../lock/both-in.pddl
+say @minimal.json D problem.pddl D
+understand @minimal.json D problem.pddl "w0 w9"
+plan @minimal.json D problem.pddl --wish anything
+choices @minimal.json D problem.pddl "w0" --robot r9
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One command, as it is written above, of one world."""
+
+    world: str
+    line: str
+    bad: bool = False
+
+    @property
+    def name(self) -> str:
+        """``WORLD/COMMAND`` with a file name made of the line."""
+        words = re.sub(r"[^\w@.+=:-]+", "_", self.line).strip("_")
+        return f"{self.world}/{'bad_' if self.bad else ''}{words.replace('@', '')}"
+
+    @property
+    def files(self) -> list[str]:
+        """The files in FOLDER that it names."""
+        return re.findall(r"@(\S+)", self.line)
+
+    @property
+    def writes(self) -> list[str]:
+        """Those of them that it writes."""
+        return re.findall(r"(?:-o|--output|--certificate|--dimacs) @(\S+)", self.line)
+
+    def arguments(self, folder: Path) -> list[str]:
+        """The command line, with names of files in full."""
+        here = DOMAINS / self.world
+        words = [quoted or bare for quoted, bare in re.findall(r'"([^"]*)"|(\S+)', self.line)]
+        return [self._argument(word, here, folder) for word in words]
+
+    def _argument(self, word: str, here: Path, folder: Path) -> str:
+        if word == "D":
+            return str(here / "domain.pddl")
+        if word.startswith("@"):
+            return str(folder / self.world / word[1:])
+        return str(here / word) if word.endswith((".pddl", ".tasks.json")) else word
+
+
+def commands() -> list[Command]:
+    """All commands, each after those that write what it reads."""
+    found: list[Command] = []
+    for world, problems in PROBLEMS.items():
+        found += (
+            Command(world, line.replace(" P ", f" {problem}.pddl "))
+            for problem in problems.split()
+            for line in ON_EVERY_PROBLEM.strip().splitlines()
+        )
+        found += (Command(world, line.strip()) for line in COMMANDS[world].strip().splitlines())
+        if world == "t-map":
+            found += (Command(world, line, bad=True) for line in BAD.strip().splitlines())
+    return found
+
+
+def selected(listed: list[Command], pattern: str) -> list[Command]:
+    """The commands that match, and those that write what these read, in order."""
+    needed: set[tuple[str, str]] = set()
+    kept: list[Command] = []
+    for command in reversed(listed):
+        written = {(command.world, file) for file in command.writes}
+        if re.search(pattern, command.name) or (written & needed and not command.bad):
+            kept.append(command)
+            needed |= {(command.world, file) for file in command.files}
+    return kept[::-1]
+
+
+def without_times(text: str, folder: Path) -> str:
+    """The text without what differs from run to run."""
+    text = text.replace(str(folder), "FOLDER")
+    text = re.sub(r"\b\d+(\.\d+)? s\b", "# s", text)
+    return re.sub(r'"seconds": (\{[^{}]*\}|[\d.e+-]+)', '"seconds": 0', text)
+
+
+def run(program: str, command: Command, folder: Path) -> None:
+    """Run one command; write its exit code and its stdout."""
+    ended = subprocess.run(
+        [program, *command.arguments(folder)],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    shown = "" if command.bad else without_times(ended.stdout, folder)
+    place = folder / command.world / f"{command.name.split('/', 1)[1][:180]}.txt"
+    place.write_text(f"exit code {ended.returncode}\n{shown}")
+
+
+def settle(path: Path, folder: Path) -> None:
+    """Take out of a written file what differs from run to run."""
+    if path.suffix == ".json":
+        record = json.loads(path.read_text())
+        record.pop("producer", None)
+        path.write_text(json.dumps(record, indent=1, ensure_ascii=False) + "\n")
+    elif path.suffix == ".html":
+        path.write_text(without_times(path.read_text(), folder))
+    elif path.suffix == ".gz":
+        text = subprocess.run(["gzip", "-dc", path], capture_output=True, text=True, check=True)
+        plain = path.with_suffix("")
+        plain.write_text(text.stdout)
+        path.unlink()
+        settle(plain, folder)
+
+
+def worlds(listed: list[Command]) -> Iterator[list[Command]]:
+    """The commands of one world after the other."""
+    for world in PROBLEMS:
+        here = [command for command in listed if command.world == world]
+        if here:
+            yield here
+
+
+def run_world(program: str, listed: list[Command], folder: Path) -> None:
+    """Run the commands of one world in their order."""
+    place = folder / listed[0].world
+    place.mkdir(parents=True)
+    for command in listed:
+        run(program, command, folder)
+    for path in sorted(place.iterdir()):
+        settle(path, folder)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path, help="where the outputs go; emptied before")
+    parser.add_argument("--program", default="coordlang", help="the executable of the version")
+    parser.add_argument("--only", default="", metavar="PATTERN", help="only matching commands")
+    parser.add_argument("--jobs", type=int, default=1, help="worlds at the same time (default: 1)")
+    options = parser.parse_args()
+    folder = options.folder.resolve()
+    listed = selected(commands(), options.only)
+    shutil.rmtree(folder, ignore_errors=True)
+    begin = perf_counter()
+    with ThreadPoolExecutor(options.jobs) as pool:
+        for done in [
+            pool.submit(run_world, options.program, here, folder) for here in worlds(listed)
+        ]:
+            done.result()
+    print(f"{len(listed)} commands in {perf_counter() - begin:.0f} s: {folder}", file=sys.stderr)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
