@@ -31,8 +31,8 @@ class Writer:
         self, name: str, known: Known, adds: Iterable[Atom], deletes: Iterable[Atom], cost: int = 0
     ) -> None:
         """An action; an atom that it both adds and deletes is added."""
-        plus = {self.fact(atom) for atom in adds}
-        minus = {self.fact(atom) for atom in deletes} - plus
+        plus = {self.fact(atom) for atom in _ordered(adds)}
+        minus = {self.fact(atom) for atom in _ordered(deletes)} - plus
         new = ClassicalAction(
             name, self.conditions(known), tuple(sorted(plus)), tuple(sorted(minus)), cost
         )
@@ -115,6 +115,11 @@ class Writer:
         ):
             return
         self.action(name, {**known, **found[0], start: True}, gain, (start,))
+
+
+def _ordered(atoms: Iterable[Atom]) -> list[Atom]:
+    """Ground atoms in an order that does not depend on hashes: new facts get their numbers in it."""
+    return sorted(atoms, key=lambda atom: (atom.predicate, atom.args))
 
 
 def own_fact(kind: str, *args: str) -> Atom:
