@@ -35,7 +35,7 @@ def main(name: str = "gwb7-3x5") -> None:
     states: list[int] = []
     subplans: list[int] = []
     for spoken in languages_in_tasks(language, candidates):
-        for sentence in task_sentences(spoken.space, spoken.task, spoken.table):
+        for sentence in task_sentences(spoken.space, spoken.task, spoken.partition):
             words = spoken.words_of(sentence.words)
             start = process_time()
             found = choices(spoken, words, index[id(spoken.space)])

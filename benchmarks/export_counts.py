@@ -26,8 +26,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from coordlang.building import build_language
-from coordlang.language.sentences import task_sentences
-from coordlang.language.words import sentence
+from coordlang.language.sentences import sentence, task_sentences
 from coordlang.required.miscoordination import Inseparable
 from coordlang.tasks.candidates import from_problems
 from coordlang.use.export.pddl import PddlExport, export_pddl
@@ -108,11 +107,11 @@ def two_sentences(spoken: TaskLanguage) -> list[tuple[int, ...]]:
     too many to compare.
     """
     try:
-        listed = task_sentences(spoken.space, spoken.task, spoken.table)
+        listed = task_sentences(spoken.space, spoken.task, spoken.partition)
         found = [spoken.words_of(s.words) for s in (listed[0], listed[-1])]
     except OutOfMemory:
         plans = Plans.of(spoken.space, spoken.task)
-        word = spoken.table.of_rows(spoken.space.rows)
+        word = spoken.partition.word_of(spoken.space.rows)
         chosen = [plans.unrank(rank) for rank in (0, plans.count - 1)]
         found = [sentence(word[plans.states(plan)].tolist()) for plan in chosen]
     return list(dict.fromkeys(found))
@@ -161,7 +160,7 @@ def by_listing(spoken: TaskLanguage, plans: Plans, words: tuple[int, ...]) -> in
     """
     if plans.count > 40 * MOST:
         return None
-    word = spoken.table.of_rows(plans.space.rows).tolist()
+    word = spoken.partition.word_of(plans.space.rows).tolist()
     return sum(sentence(word[state] for state in plans.states(plan)) == words for plan in plans)
 
 

@@ -25,7 +25,6 @@ from table1 import ROWS, candidates_of
 
 from coordlang.building import Built, build_language
 from coordlang.language.flexibility import flexibility
-from coordlang.language.words import WordTable
 from coordlang.required.composition_walk import walk
 from coordlang.tasks.candidates import Candidates
 from coordlang.vocabulary.flexibility_bound import flexibility_bounds
@@ -62,9 +61,9 @@ def line(cells: tuple[str, ...]) -> str:
 
 def measures(candidates: Candidates, built: Built) -> tuple[str, ...]:
     """The columns from "open" to "shorter", without the bound."""
-    table = WordTable.of(built.language, candidates.model)
+    table = built.language.partition(candidates.model)
     found = flexibility(
-        candidates.spaces, [table.of_rows(space.rows)[space.state] for space in candidates.spaces]
+        candidates.spaces, [table.word_of(space.rows)[space.state] for space in candidates.spaces]
     )
     several = found.first > 1.5
     shorter = found.first_saving > 1e-9

@@ -62,7 +62,7 @@ def run(
     """One task; the number of searches."""
     without = plan_under_sentence(spoken, None, heuristic, terrain)
     nodes = {}
-    said = task_sentences(spoken.space, spoken.task, spoken.table)
+    said = task_sentences(spoken.space, spoken.task, spoken.partition)
     sentences = {spoken.words_of(sentence.words): sentence.plans for sentence in said}
     for words in sentences:
         found = plan_under_sentence(spoken, words, heuristic, terrain, count_words=count_words)
@@ -110,7 +110,7 @@ def main() -> int:
         for method in arguments.method or ["greedy", "minimal"]:
             language = build_language(candidates, method).language
             spoken = list(languages_in_tasks(language, candidates))
-            terrain = ExpandedStates(candidates.model, spoken[0].table)
+            terrain = ExpandedStates(candidates.model, spoken[0].partition)
             for heuristic in arguments.heuristic or ["manhattan", "blind", "relaxed"]:
                 for count_words in (False, True):
                     start, sums = perf_counter(), Sums()

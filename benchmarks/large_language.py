@@ -22,7 +22,9 @@ from time import process_time
 import numpy as np
 
 from coordlang.language.file import read_language, write_language
-from coordlang.language.words import Guarantee, Language, WordTable, name_words
+from coordlang.language.partition import Partition
+from coordlang.language.provenance import Provenance
+from coordlang.language.words import Language
 from planners.joint.model import JointModel
 from planners.loading import build
 from planners.pddl import parse_problem, read_domain
@@ -89,10 +91,10 @@ def run(step: str, path: Path, states: int, words: int) -> None:
         return
     model, language = grid(), read_language(path)
     with measured(step, path):
-        table = WordTable.of(language, model)
+        table = language.partition(model)
     again = np.random.default_rng(2).integers(0, len(table.rows), LOOKED_UP)
     start = process_time()
-    words_found = table.of_rows(table.rows[again])
+    words_found = table.word_of(table.rows[again])
     assert (words_found == table.word[again]).all()
     show((f"{LOOKED_UP:,} look-ups", path.suffix[1:], "", f"{process_time() - start:.1f}", "", ""))
 
@@ -169,19 +171,13 @@ def placements(model: JointModel, number: int) -> Rows:
 
 
 def language_of(model: JointModel, rows: Rows, word: np.ndarray) -> Language:
-    words, states, default = name_words(model, rows, dict(enumerate(word.tolist())))
-    guarantee = Guarantee("random", len(words), 1, len(words) == 1)
-    return Language(
-        words,
-        states,
-        default,
+    provenance = Provenance(
         ROBOTS,
-        guarantee,
-        {"name": "grid"},
-        {"cost": "makespan"},
-        {"kind": "all", "count": len(rows)},
-        {},
+        domain={"name": "grid"},
+        model={"cost": "makespan"},
+        tasks={"kind": "all", "count": len(rows)},
     )
+    return Language.of(Partition.of_states(rows, dict(enumerate(word.tolist()))), model, provenance)
 
 
 def show(cells: tuple[object, ...]) -> None:

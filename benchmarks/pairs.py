@@ -17,7 +17,7 @@ from time import perf_counter
 import numpy as np
 
 from coordlang.building import build_language
-from coordlang.language.words import WordTable
+from coordlang.language.partition import Partition
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary.pairwise import pair_languages, together
@@ -51,7 +51,7 @@ def is_language(candidates: Candidates, words: dict[int, int]) -> bool:
     rows, place = unique_rows(candidates.rows)
     ordered = np.zeros(len(rows), np.int64)
     ordered[place[list(words)]] = list(words.values())
-    table = WordTable(tuple(map(str, range(max(words.values()) + 1))), rows, ordered, 0)
+    table = Partition(tuple(map(str, range(max(words.values()) + 1))), rows, ordered, 0)
     return verify(table, candidates.spaces).holds
 
 

@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 
-from coordlang.language.words import Language, WordTable, sentence
+from coordlang.language.sentences import sentence
+from coordlang.language.words import Language
 from coordlang.required.composition_walk import walk
 from coordlang.tasks.candidates import Candidates
 from planners.search.plans import Plans
@@ -71,10 +72,10 @@ def said(
     on it ("told"); have plans with different ``left`` ("open"), and in which some sentence has
     plans that disagree about it ("left").
     """
-    table_of_words = WordTable.of(language, candidates.model)
+    table_of_words = language.partition(candidates.model)
     figures = dict.fromkeys(("different", "told", "open", "left"), 0)
     for space in candidates.spaces:
-        word = table_of_words.of_rows(space.rows).tolist()
+        word = table_of_words.word_of(space.rows).tolist()
         requires = walk(space).requires[space.starts]
         for task in requires.nonzero()[0].tolist():
             plans = Plans.of(space, task)

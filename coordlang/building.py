@@ -8,9 +8,10 @@ from time import perf_counter
 from typing import Literal
 
 from coordlang.certificate import Certificate, certify
-from coordlang.language.file import with_provenance
+from coordlang.language.partition import Partition
+from coordlang.language.provenance import Guarantee, provenance_of
 from coordlang.language.warping import Clause
-from coordlang.language.words import Guarantee, Language, WordTable, name_words, words_of_states
+from coordlang.language.words import Language
 from coordlang.required.composition_walk import walk
 from coordlang.required.divergences import FirstDifferences, first_differences, states_on_plans
 from coordlang.required.miscoordination import Inseparable, inseparable
@@ -20,7 +21,7 @@ from coordlang.verification.overlapping import verify_overlapping
 from coordlang.vocabulary import METHODS, Job, Outcome, greedy
 from coordlang.vocabulary.enlarging import enlarge
 from coordlang.vocabulary.flexible import flexible
-from coordlang.vocabulary.job import Evidence, Partition
+from coordlang.vocabulary.job import Assignment, Evidence
 from coordlang.vocabulary.minimal import refute
 from planners.limits import STOPPING, stop_clock
 
@@ -77,8 +78,8 @@ def build_language(
     clock.note("coordination")
     checked: list[_Checked] = []
 
-    def check(partition: Partition) -> None:
-        checked.append(_verified(candidates, partition))
+    def check(assignment: Assignment) -> None:
+        checked.append(_verified(candidates, assignment))
 
     states = tuple(states_on_plans(candidates.spaces).tolist())
     job = Job(candidates, states, found, None, seed, alpha_only, progress, check)
@@ -96,29 +97,29 @@ def build_language(
         if prefer == "flexible" and outcome.stopped is None:
             outcome = flexible(job, outcome)
             clock.note("flexible")
-        if not any(known.partition is outcome.partition for known in checked):
+        if not any(known.assignment is outcome.partition for known in checked):
             progress("verifying by definition")
             check(outcome.partition)
     except STOPPING as error:
         stop_clock()
         if not checked:
             raise
-        outcome = Outcome(checked[-1].partition, job.lower_bound, {}, error.with_traceback(None))
-    best = next(known for known in checked if known.partition is outcome.partition)
+        outcome = Outcome(checked[-1].assignment, job.lower_bound, {}, error.with_traceback(None))
+    best = next(known for known in checked if known.assignment is outcome.partition)
     clock.note("verify")
-    size = len(best.language.words)
-    guarantee = Guarantee(method, size, outcome.lower_bound, size == outcome.lower_bound)
-    language = with_provenance(
-        replace(best.language, guarantee=guarantee), candidates, {"program": "coordlang"}
-    )
+    partition = best.partition
     if overlap and outcome.stopped is None:
         progress("enlarging words")
         try:
-            language, outcome = _overlapping(candidates, language, outcome)
+            partition, outcome = _overlapping(candidates, partition, outcome)
         except STOPPING as error:
             stop_clock()  # the words as they were are a verified language
             outcome = replace(outcome, stopped=error.with_traceback(None))
         clock.note("overlap")
+    size = len(partition.words)
+    guarantee = Guarantee(method, size, outcome.lower_bound, size == outcome.lower_bound)
+    provenance = provenance_of(candidates, guarantee, {"program": "coordlang"})
+    language = Language.of(partition, candidates.model, provenance)
     return Built(
         language,
         found,
@@ -133,27 +134,18 @@ def build_language(
 
 
 def _overlapping(
-    candidates: Candidates, language: Language, outcome: Outcome
-) -> tuple[Language, Outcome]:
-    """The language with further words of its states, verified by definition."""
-    model, spaces = candidates.model, candidates.spaces
-    word = WordTable.of(language, model).of_rows(candidates.rows)
+    candidates: Candidates, partition: Partition, outcome: Outcome
+) -> tuple[Partition, Outcome]:
+    """The partition with further words of its states, verified by definition."""
+    spaces = candidates.spaces
+    word = partition.word_of(candidates.rows)
     enlarged = enlarge(
         spaces,
         [walk(space).requires for space in spaces],
         {state: int(word[state]) for state in outcome.partition},
     )
-    also = {
-        model.codec.key(candidates.rows[state]): tuple(
-            language.words[w] for w in sorted(words - {int(word[state])})
-        )
-        for state, words in enlarged.words.items()
-        if len(words) > 1
-    }
-    language = replace(language, also=dict(sorted(also.items())))
-    verdict = verify_overlapping(
-        language.words, words_of_states(language, model, candidates.rows), spaces
-    )
+    partition = partition.enlarged(candidates.rows, enlarged.words)
+    verdict = verify_overlapping(partition, spaces)
     if not verdict.holds:
         raise AssertionError(f"the enlarged words are no coordination language: {verdict.witness}")
     figures = {
@@ -162,7 +154,7 @@ def _overlapping(
         "overlapping_flexibility": float(enlarged.expected.mean()),
         "partition_flexibility": float(enlarged.before.mean()),
     }
-    return language, replace(outcome, figures=figures, stopped=enlarged.stopped)
+    return partition, replace(outcome, figures=figures, stopped=enlarged.stopped)
 
 
 def certificate_of(built: Built) -> Certificate:
@@ -180,23 +172,21 @@ def certificate_of(built: Built) -> Certificate:
 
 @dataclass(frozen=True, slots=True)
 class _Checked:
-    """A partition with its words named and its verdict, which is that it holds."""
+    """What a method returned, as a partition, and the verdict that it is a language."""
 
+    assignment: Assignment
     partition: Partition
-    language: Language
     verdict: Verdict
 
 
-def _verified(candidates: Candidates, partition: Partition) -> _Checked:
-    words, mapping, default = name_words(candidates.model, candidates.rows, partition)
-    unknown = Guarantee("", len(words), 1, False)
-    language = Language(words, mapping, default, candidates.model.robots, unknown, {}, {}, {}, {})
-    verdict = verify(WordTable.of(language, candidates.model), candidates.spaces)
+def _verified(candidates: Candidates, assignment: Assignment) -> _Checked:
+    partition = Partition.of_states(candidates.rows, assignment)
+    verdict = verify(partition, candidates.spaces)
     if not verdict.holds:
         raise AssertionError(
             f"a method returned what is no coordination language: {verdict.witness}"
         )
-    return _Checked(partition, language, verdict)
+    return _Checked(assignment, partition, verdict)
 
 
 class _Clock:

@@ -210,7 +210,7 @@ class GivenOptions:
 
     def for_language(self, language: Any) -> ModelOptions:
         """The language's own options; `UsageError` where the user's contradict them."""
-        from coordlang.language.file import options_of
+        from coordlang.language.recorded import options_of
 
         if self.robot_type:
             raise click.UsageError("--robot-type: a language file names its robots already")

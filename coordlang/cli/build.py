@@ -165,7 +165,8 @@ def command(
         "solver": f"python-sat {version('python-sat')}",
         "seconds": {name: round(value, 3) for name, value in seconds.items()},
     }
-    language = replace(built.language, producer=producer)
+    provenance = replace(built.language.provenance, producer=producer)
+    language = replace(built.language, provenance=provenance)
     if output == "-":
         click.echo(to_bytes(language).decode(), nl=False)
     else:

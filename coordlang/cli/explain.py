@@ -79,7 +79,7 @@ def command(
         click.echo(
             _words(spoken, mapped, told) + "\n"
         )  # first: a task may have too many sentences to list
-    every = task_sentences(spoken.space, spoken.task, spoken.table)
+    every = task_sentences(spoken.space, spoken.task, spoken.partition)
     sentences = every if sentence is None else _only(spoken, every, sentence)
     asks = (
         [
@@ -105,7 +105,7 @@ def command(
 def _only(spoken: TaskLanguage, sentences: list[TaskSentence], sentence: str) -> list[TaskSentence]:
 
     words = spoken.words_of(sentence)
-    said = [s for s in sentences if s.words == tuple(spoken.table.words[w] for w in words)]
+    said = [s for s in sentences if s.words == tuple(spoken.partition.words[w] for w in words)]
     if not said:
         spoken.plans_with(words)  # raises, and says where no plan fits any more
     return said
@@ -117,7 +117,7 @@ def _asked(
     from coordlang.explanation.demands import sentence_demands
 
     return sentence_demands(
-        spoken.plans_with(spoken.words_of(sentence.words)), spoken.table, formulas
+        spoken.plans_with(spoken.words_of(sentence.words)), spoken.partition, formulas
     )
 
 
@@ -170,7 +170,9 @@ def _words(spoken: TaskLanguage, mapped: MappedStates, told: WordDescriptions) -
     g = language.guarantee
     proof = "proved minimal" if g.proved_minimal else f"at least {g.lower_bound} needed"
     tasks = (
-        counted(language.tasks["count"], "task") if language.tasks["count"] else "no recorded task"
+        counted(number, "task")
+        if (number := language.provenance.tasks["count"])
+        else "no recorded task"
     )
     lines = [
         f"{counted(len(language.words), 'word')} ({g.method}, {proof}) for {tasks} of {', '.join(spoken.model.robots)}."

@@ -73,7 +73,7 @@ def command(
     read = [read_preference(spoken, wish) for wish in wishes]
     best = best_sentence(spoken, read) if read else None
     words = best.words if best else spoken.words_of(sentence or "")
-    terrain = ExpandedStates(spoken.model, spoken.table)
+    terrain = ExpandedStates(spoken.model, spoken.partition)
     found = plan_under_sentence(spoken, words, heuristic, terrain)
     without = plan_under_sentence(spoken, None, heuristic, terrain)
     understood = OpenPlans.of(spoken, words)

@@ -58,7 +58,8 @@ def command(
     """Write a self-contained HTML page that shows LANGUAGE: its words, and its sentences and plans
     in the tasks of PROBLEM.. and in some of its candidate tasks.
     """
-    from coordlang.language.file import check_source, read_language, write_atomically
+    from coordlang.language.file import read_language, write_atomically
+    from coordlang.language.recorded import check_source
     from coordlang.report.page import make_report
     from planners.errors import Position
 

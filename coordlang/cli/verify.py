@@ -60,13 +60,8 @@ def command(
     """
     from coordlang.certificate import check, read_certificate
     from coordlang.cli.miscoordination import show, witness_data
-    from coordlang.language.file import (
-        check_source,
-        read_language,
-        recorded_candidates,
-        write_atomically,
-    )
-    from coordlang.language.words import WordTable, words_of_states
+    from coordlang.language.file import read_language, write_atomically
+    from coordlang.language.recorded import check_source, recorded_candidates
     from coordlang.verification.by_definition import verify
     from coordlang.verification.overlapping import verify_overlapping
     from planners.errors import Position, Refuted
@@ -85,10 +80,10 @@ def command(
         candidates = recorded_candidates(spoken, lifted, read, options, Position(language))
     else:
         candidates = make_candidates(lifted, read, tasks, options)
-    verdict = verify(WordTable.of(spoken, candidates.model), candidates.spaces)
+    partition = spoken.partition(candidates.model)
+    verdict = verify(partition, candidates.spaces)
     if spoken.also and verdict.holds:
-        words = words_of_states(spoken, candidates.model, candidates.rows)
-        verdict = verify_overlapping(spoken.words, words, candidates.spaces)
+        verdict = verify_overlapping(partition, candidates.spaces)
     bound = check(proof, candidates, progress) if proof and verdict.holds else None
     clear_progress()
     if as_json:

@@ -10,7 +10,7 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from coordlang.explanation.cover import Cover
-from coordlang.language.words import WordTable
+from coordlang.language.partition import Partition
 from planners.joint.model import own_text
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
@@ -74,7 +74,7 @@ class SentenceDemands:
 
 
 def sentence_demands(
-    fitting: PlanSpace, table: WordTable, formulas: Mapping[str, Cover], few: int = 4
+    fitting: PlanSpace, table: Partition, formulas: Mapping[str, Cover], few: int = 4
 ) -> SentenceDemands:
     """What a sentence asks, from the plan space of the plans that fit it (one task, one sentence).
 
@@ -82,7 +82,7 @@ def sentence_demands(
     word, those that the formula of the next word speaks of are named.  ``few``: up to so many
     subplans of a robot are listed.
     """
-    word = table.of_rows(fitting.rows)[fitting.state]
+    word = table.word_of(fitting.rows)[fitting.state]
     place = _places(fitting, word)
     start = int(fitting.starts[0])
     sentence = [int(word[start])]
@@ -185,7 +185,7 @@ def _spoken_of(space: PlanSpace, formula: Cover) -> list[int]:
 
 def _change(
     space: PlanSpace,
-    table: WordTable,
+    table: Partition,
     place: Ints,
     number: int,
     pair: tuple[int, int],
@@ -217,7 +217,7 @@ def _change(
 
 
 def _deciding(
-    space: PlanSpace, table: WordTable, states: Ints, after: int, order: Sequence[int]
+    space: PlanSpace, table: Partition, states: Ints, after: int, order: Sequence[int]
 ) -> tuple[int, ...]:
     """The fewest robots whose subactions decide whether the next word is ``after``.
 
@@ -227,7 +227,7 @@ def _deciding(
     steps = space.model.successors(rows)
     mapped = find_rows(table.rows, steps.result) >= 0
     source, labels = steps.source[mapped], steps.labels[mapped]
-    changes = table.of_rows(steps.result[mapped]) == after
+    changes = table.word_of(steps.result[mapped]) == after
     for size in range(len(order)):
         for some in combinations(order, size):
             seen = np.column_stack((source, labels[:, list(some)]))

@@ -11,7 +11,7 @@ from coordlang.explanation.boxes import Bits, Points
 from coordlang.explanation.cover import Cover, Literal, Term
 from coordlang.explanation.minimise import minimise
 from coordlang.explanation.variables import Valuation, valuation
-from coordlang.language.words import Language, WordTable
+from coordlang.language.words import Language
 from planners.joint.model import JointModel
 from planners.tables import Ints, Rows, find_rows, unique_rows
 
@@ -35,7 +35,7 @@ class MappedStates:
 
 def mapped_states(language: Language, model: JointModel, also: Rows | None = None) -> MappedStates:
     """The states that a language maps (and ``also`` these, which have their word by its default)."""
-    table = WordTable.of(language, model)
+    table = language.partition(model)
     rows, word = table.rows, table.word
     if also is not None:
         more, _ = unique_rows(also)

@@ -3,15 +3,27 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from coordlang.language.words import WordTable
+from coordlang.language.partition import Partition
 from planners.errors import OutOfMemory
 from planners.search.plan_space import PlanSpace
 
 #: More sentences than this are not listed for one task.
 _MOST = 100_000
+
+
+def sentence(words: Iterable[int]) -> tuple[int, ...]:
+    """The words of a state sequence, repeated neighbours collapsed.
+
+    The TSC of a plan, in the paper's terms.
+    """
+    result: list[int] = []
+    for word in words:
+        if not result or result[-1] != word:
+            result.append(word)
+    return tuple(result)
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,17 +39,19 @@ class TaskSentence:
     choices: tuple[tuple[tuple[str | None, ...], ...], ...]
 
 
-def task_sentences(space: PlanSpace, task: int, table: WordTable) -> list[TaskSentence]:
+def task_sentences(space: PlanSpace, task: int, partition: Partition) -> list[TaskSentence]:
     """All sentences of a task, those that leave most plans open first.
 
     O(edges * sentences).  Raises `OutOfMemory` beyond 100,000 sentences.
     """
-    word = table.of_rows(space.rows)[space.state].tolist()
+    word = partition.word_of(space.rows)[space.state].tolist()
     start = int(space.starts[task])
     below = sentence_counts(space, start, word, _MOST)
     result = [
         TaskSentence(
-            tuple(table.words[w] for w in words), plans, _choices(space, start, word, below, words)
+            tuple(partition.words[w] for w in words),
+            plans,
+            _choices(space, start, word, below, words),
         )
         for words, plans in below[start].items()
     ]

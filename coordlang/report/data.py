@@ -52,7 +52,7 @@ def page_data(
     """
     first = parts[0].shown.spoken
     model = first.model
-    tables = Tables(model, first.table)
+    tables = Tables(model, first.partition)
     mapped = _listed_states(language, tables)
     tasks = [task_data(part, tables) for part in parts]
     world = find_world(model, [split_atoms(key) for key in tables.states])
@@ -79,7 +79,7 @@ def page_data(
         "state_graph": _state_graph(first) if 1 < len(language.states) <= _STATES_DRAWN else None,
         "tasks": tasks,
         "candidates": {
-            "count": str(language.tasks.get("count", 0)),
+            "count": str(language.provenance.tasks.get("count", 0)),
             "looked": selection.looked,
             "requiring": selection.requiring,
             "complete": selection.complete and len(parts) == len(selection.tasks),
@@ -191,7 +191,7 @@ def _state_graph(spoken: TaskLanguage) -> dict[str, Any] | None:
 
     The steps are taken either way.
     """
-    model, table = spoken.model, spoken.table
+    model, table = spoken.model, spoken.partition
     keys = [model.codec.key(row) for row in table.rows]
     place = np.argsort(np.array(keys, object), kind="stable")
     rank = np.empty(len(keys), np.int64)

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coordlang.language.sentences import sentence_counts
-from coordlang.language.words import sentence
+from coordlang.language.sentences import sentence, sentence_counts
 from coordlang.report.layout import layer_orders
 from coordlang.use.choices.automaton import determinise
 from coordlang.use.sentence.task_language import TaskLanguage

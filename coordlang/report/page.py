@@ -59,7 +59,7 @@ def make_report(
         data = page_data(language, selection, parts, coordinates)
         html = _render(language, domain, problems, data, seed)
         if len(html) <= LARGEST:
-            return Report(html, len(parts), int(language.tasks.get("count", 0)))
+            return Report(html, len(parts), int(language.provenance.tasks.get("count", 0)))
         if len(parts) == 1:
             raise OutOfMemory(
                 f"the page of one task would have {len(html):,} bytes, more than {LARGEST:,}",
@@ -109,10 +109,10 @@ def _render(
         version=version("coordlang"),
         domain=domain.name,
         subtitle=problems[0].name if len(problems) == 1 and problems[0].name != domain.name else "",
-        robots=_listed(language.robots),
+        robots=_listed(language.provenance.robots),
         words=words,
         in_order=data["told"]["in_order"],
-        all_listed=language.tasks.get("kind") == "all",
+        all_listed=language.provenance.tasks.get("kind") == "all",
         terms_open=_TERMS_OPEN if len(words) <= _FEW_WORDS else 1,
         figures=_figures(language),
         about=_about(language, domain, problems, data, seed),
@@ -142,8 +142,8 @@ def _figures(language: Language) -> list[tuple[str, str, str]]:
         ),
         (
             "Tasks",
-            _number(int(language.tasks.get("count", 0))),
-            kind.get(str(language.tasks.get("kind")), ""),
+            _number(int(language.provenance.tasks.get("count", 0))),
+            kind.get(str(language.provenance.tasks.get("kind")), ""),
         ),
         ("States", _number(len(language.states)), "on optimal plans of these tasks"),
         ("Method", g.method, ""),
@@ -157,7 +157,7 @@ def _about(
     data: Mapping[str, Any],
     seed: int,
 ) -> list[tuple[str, str]]:
-    model = language.model
+    model = language.provenance.model
     checked = [task["verified"] for task in data["tasks"]]
     return [
         ("Program", f"coordlang {version('coordlang')}"),

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from random import Random
 
-from coordlang.language.file import recorded_list
+from coordlang.language.recorded import recorded_list
 from coordlang.language.words import Language
 from coordlang.required.miscoordination import Miscoordination, miscoordination
 from coordlang.tasks.task_file import goal_text, ground_tasks
@@ -128,7 +128,7 @@ def _candidates(
     language = first.language
     tasks = (
         _pairs(first, random)
-        if language.tasks.get("kind") == "all"
+        if language.provenance.tasks.get("kind") == "all"
         else _recorded(first, domain, problem, random, position)
     )
     for number, (init, goal) in enumerate(tasks):
@@ -136,7 +136,7 @@ def _candidates(
             space = search(first.model, PlanningTask(f"candidate {number}", init, goal))
         except ProvedImpossible:
             continue  # of two states one need not be reachable from the other
-        word = first.table.of_rows(space.rows)[space.state]
+        word = first.partition.word_of(space.rows)[space.state]
         yield replace(first, space=space, task=0, word=word, covered=True)
 
 
@@ -156,7 +156,7 @@ def _pairs(first: TaskLanguage, random: Random) -> Iterator[tuple[Rows, Goal]]:
     Under ``--tasks all`` every state of a candidate task is mapped.
     """
     model = first.model
-    rows = first.table.rows
+    rows = first.partition.rows
     rows = rows[(model.codec.last_labels(rows) < 0).all(axis=1)]
     number = len(rows)
     total = number * (number - 1)

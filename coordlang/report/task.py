@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from coordlang.language.words import WordTable
+from coordlang.language.partition import Partition
 from coordlang.report.graph import Graph, ShownSentences, plan_graph, shown_sentences
 from coordlang.report.played import Played, play
 from coordlang.report.shown import ShownTask
@@ -64,7 +64,7 @@ def _verified(spoken: TaskLanguage) -> tuple[bool | None, Miscoordination | None
     if len(spoken.space.target) > _VERIFIED:
         return None, None
     try:
-        verdict = verify(spoken.table, [spoken.space])
+        verdict = verify(spoken.partition, [spoken.space])
     except OutOfMemory:
         return None, None
     return verdict.holds, verdict.witness
@@ -76,9 +76,9 @@ class Tables:
     In the order in which they are first mentioned.
     """
 
-    def __init__(self, model: JointModel, table: WordTable) -> None:
+    def __init__(self, model: JointModel, partition: Partition) -> None:
         self.model = model
-        self.table = table
+        self.partition = partition
         self.states: dict[str, int] = {}
         self.words: list[int] = []
         self.labels: list[dict[str | None, int]] = [{None: 0} for _ in model.robots]
@@ -87,7 +87,7 @@ class Tables:
         if key not in self.states:
             self.states[key] = len(self.states)
             row = self.model.codec.parse_key(key)
-            self.words.append(int(self.table.of_rows(row[None, :])[0]))
+            self.words.append(int(self.partition.word_of(row[None, :])[0]))
         return self.states[key]
 
     def label(self, robot: int, text: str | None) -> int:

@@ -15,7 +15,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from coordlang.language.words import WordTable, sentence
+from coordlang.language.partition import Partition
+from coordlang.language.sentences import sentence
 from coordlang.required.miscoordination import Miscoordination, Trail, describe_failure
 from planners.errors import OutOfMemory
 from planners.limits import memory_left, reaching
@@ -40,7 +41,7 @@ class Verdict:
     witness: Miscoordination | None
 
 
-def verify(table: WordTable, spaces: Sequence[PlanSpace]) -> Verdict:
+def verify(partition: Partition, spaces: Sequence[PlanSpace]) -> Verdict:
     """Check a partition against the definition, for all tasks of ``spaces``.
 
     Every plan has a sentence under a partition, so RC-freeness of the plans of each sentence is all
@@ -48,20 +49,22 @@ def verify(table: WordTable, spaces: Sequence[PlanSpace]) -> Verdict:
     """
     nodes = tasks = 0
     for space in spaces:
-        check = _Check(space, table.of_rows(space.rows)[space.state])
+        check = _Check(space, partition.word_of(space.rows)[space.state])
         violation, walked = check.run(np.unique(space.starts))
         nodes += walked
         tasks += len(space.starts)
         if violation is not None:
             trail, walked = check.trace(violation)
-            return Verdict(False, tasks, nodes + walked, _explain(space, table, check, trail))
+            return Verdict(False, tasks, nodes + walked, _explain(space, partition, check, trail))
     return Verdict(True, tasks, nodes, None)
 
 
-def _explain(space: PlanSpace, table: WordTable, check: _Check, trail: Trail) -> Miscoordination:
+def _explain(
+    space: PlanSpace, partition: Partition, check: _Check, trail: Trail
+) -> Miscoordination:
     first_plan = [trail.start, *(int(space.target[step[0]]) for step in trail.edges)]
     words = sentence(int(check.word[node]) for node in first_plan)
-    return describe_failure(space, trail, tuple(table.words[w] for w in words))
+    return describe_failure(space, trail, tuple(partition.words[w] for w in words))
 
 
 def _too_large(what: str) -> OutOfMemory:

@@ -17,13 +17,13 @@ from dataclasses import replace
 import numpy as np
 
 from coordlang.language.overlapping import Sentence
-from coordlang.language.words import WordTable
+from coordlang.language.partition import Partition
 from coordlang.required.composition_walk import walk
 from coordlang.required.miscoordination import Miscoordination, Trail, describe_failure
 from coordlang.verification.by_definition import Verdict, verify
 from planners.errors import OutOfMemory
 from planners.search.plan_space import PlanSpace
-from planners.tables import Bools, Ints, unique_rows
+from planners.tables import Bools, Ints
 
 #: Different sets of sentences, or walk nodes, of one task.
 _MOST = 2_000_000
@@ -36,12 +36,8 @@ _Node = tuple[tuple[int, ...], int, tuple[_Places, ...]]
 _Came = tuple[_Node, tuple[int, ...]]
 
 
-def verify_overlapping(
-    names: Sequence[str], words: Sequence[frozenset[int]], spaces: Sequence[PlanSpace]
-) -> Verdict:
-    """Check overlapping words against the definition.
-
-    ``words`` by the state numbers of ``spaces``, ``names`` of the words.
+def verify_overlapping(partition: Partition, spaces: Sequence[PlanSpace]) -> Verdict:
+    """Check overlapping words against the definition, for all tasks of ``spaces``.
 
     The witness of a violation is a plan without usable sentence (that of the first robot), with one
     of its sentences and plans that have it and miscoordinate.
@@ -49,37 +45,27 @@ def verify_overlapping(
     nodes = tasks = 0
     for space in spaces:
         tasks += len(space.starts)
+        words = partition.words_of(space.rows)
         check = _Check(space, words)
         starts = np.unique(space.starts)
         # A guess at what is left to look at; that the others are RC-free altogether is checked here
         # and now.
         guessed = walk(space).requires[starts]
         together = verify(
-            _table(space, ("",), np.zeros(len(space.rows), np.int64)),
-            [_from(space, starts[~guessed])],
+            Partition(("",), space.rows[:0], starts[:0], 0), [_from(space, starts[~guessed])]
         )
         left = starts if not together.holds else starts[guessed]
         several = _overlap_after(space, np.array([len(own) > 1 for own in words], np.bool_))[left]
-        alone = verify(
-            _table(space, names, np.array([min(own) for own in words])),
-            [_from(space, left[~several])],
-        )
+        alone = verify(partition, [_from(space, left[~several])])
         nodes += together.nodes + alone.nodes
         if not alone.holds:
             return Verdict(False, tasks, nodes, alone.witness)
         for start in left[several].tolist():
-            witness = check.uncovered(start, names)
+            witness = check.uncovered(start, partition.words)
             if witness is not None:
                 return Verdict(False, tasks, nodes + check.nodes, witness)
         nodes += check.nodes
     return Verdict(True, tasks, nodes, None)
-
-
-def _table(space: PlanSpace, names: Sequence[str], word: Ints) -> WordTable:
-    rows, place = unique_rows(space.rows)
-    ordered = np.zeros(len(rows), np.int64)
-    ordered[place] = word
-    return WordTable(tuple(names), rows, ordered, 0)
 
 
 def _from(space: PlanSpace, starts: Ints) -> PlanSpace:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import product
 
-from coordlang.language.words import sentence
+from coordlang.language.sentences import sentence
 from coordlang.vocabulary.job import Job, Outcome
 from planners.search.plans import Plans, counts
 

@@ -21,7 +21,7 @@ from coordlang.language.warping import Clause, pair, separation_clause
 from coordlang.required.composition_walk import walk
 from coordlang.vocabulary.counterexamples import counterexamples
 from coordlang.vocabulary.flexibility_bound import flexibility_bounds
-from coordlang.vocabulary.job import Job, Outcome, Partition
+from coordlang.vocabulary.job import Assignment, Job, Outcome
 from coordlang.vocabulary.objective import Objective
 from coordlang.vocabulary.sat import reduce
 from coordlang.vocabulary.symmetry import state_symmetries
@@ -76,7 +76,7 @@ class _Search:
 
     def __init__(self, job: Job, found: Outcome) -> None:
         self._job, self._found = job, found
-        self.best: Partition = found.partition
+        self.best: Assignment = found.partition
         self._bound: Floats | None = None
         self._moves = self._better = 0
 
@@ -229,7 +229,7 @@ class _Annealing:
     def work(self) -> int:
         return self._objective.edges + _MOVE * self.moves
 
-    def begin(self, partition: Partition) -> None:
+    def begin(self, partition: Assignment) -> None:
         """Start from a language."""
         self._word[list(partition)] = list(partition.values())
         self._of = self._word.tolist()
@@ -347,7 +347,7 @@ class _Annealing:
         return {state: self._of[other], other: self._of[state]}
 
 
-def _measured(job: Job, partition: Partition) -> Flexibility:
+def _measured(job: Job, partition: Assignment) -> Flexibility:
     word = np.zeros(len(job.candidates.rows), np.int64)
     word[list(partition)] = list(partition.values())
     return flexibility(

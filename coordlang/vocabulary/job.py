@@ -12,8 +12,8 @@ from coordlang.vocabulary.counterexamples import Counterexample
 from coordlang.vocabulary.symmetry import Symmetry
 from planners.search.plan_space import PlanSpace
 
-#: State number -> word number.
-Partition = Mapping[int, int]
+#: A partition while it is looked for: state number -> word number.
+Assignment = Mapping[int, int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,11 +31,11 @@ class Job:
     candidates: Candidates
     states: tuple[int, ...]
     first_differences: FirstDifferences
-    incumbent: Partition | None = None
+    incumbent: Assignment | None = None
     seed: int = 0
     alpha_only: bool = False
     progress: Callable[[str], None] = lambda _: None
-    check: Callable[[Partition], None] = lambda _: None
+    check: Callable[[Assignment], None] = lambda _: None
 
     @property
     def lower_bound(self) -> int:
@@ -65,7 +65,7 @@ class Outcome:
     1`` words satisfies all (nothing for methods that meet none).
     """
 
-    partition: Partition
+    partition: Assignment
     lower_bound: int
     figures: Mapping[str, float] = field(default_factory=dict)
     stopped: BaseException | None = None

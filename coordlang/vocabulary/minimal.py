@@ -19,7 +19,7 @@ import numpy as np
 
 from coordlang.language.warping import Clause, pair, separation_clause
 from coordlang.vocabulary.counterexamples import counterexamples
-from coordlang.vocabulary.job import Evidence, Job, Outcome, Partition
+from coordlang.vocabulary.job import Assignment, Evidence, Job, Outcome
 from coordlang.vocabulary.sat import (
     PartitionProblem,
     PartitionProblems,
@@ -101,7 +101,7 @@ class _Search:
     def __init__(self, job: Job) -> None:
         self._job = job
         self.lower = job.lower_bound
-        self.best: Partition | None = job.incumbent
+        self.best: Assignment | None = job.incumbent
         self._rounds = 0
         self._found = 0
         self._clauses: list[Clause] = []
@@ -206,7 +206,7 @@ class _Search:
         for problems in (self._problems, self._led):
             problems.drop(size)
 
-    def _refine(self, size: int, parts: Sequence[_Part], effort: SolverBudget) -> Partition | None:
+    def _refine(self, size: int, parts: Sequence[_Part], effort: SolverBudget) -> Assignment | None:
         """The loop for one number of words: a language, or None if there is none."""
         partition = self._partition(size, effort.conflicts)
         clean = position = rounds = 0

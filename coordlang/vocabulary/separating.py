@@ -17,7 +17,7 @@ from coordlang.language.warping import Pair, pair
 from coordlang.required.divergences import Separation, separations
 from coordlang.required.last_differences import Constraint, SeparationWalk, ordered
 from coordlang.vocabulary.greedy import fill
-from coordlang.vocabulary.job import Job, Outcome, Partition
+from coordlang.vocabulary.job import Assignment, Job, Outcome
 from coordlang.vocabulary.sat import (
     PartitionProblem,
     PartitionProblems,
@@ -88,7 +88,7 @@ class _Search:
     def __init__(self, job: Job) -> None:
         self._job = job
         self.lower = job.lower_bound
-        self.best: Partition | None = job.incumbent
+        self.best: Assignment | None = job.incumbent
         self._constraints: list[Constraint] = []
         self._problems = PartitionProblems(self._start, _require)
         self._rounds = 0
@@ -110,7 +110,7 @@ class _Search:
     def prepare(self) -> None:
         raise NotImplementedError
 
-    def _broken(self, partition: Partition) -> Iterable[Constraint]:
+    def _broken(self, partition: Assignment) -> Iterable[Constraint]:
         """Constraints that a partition breaks, none of them known yet; empty: it is separating."""
         raise NotImplementedError
 
@@ -182,7 +182,7 @@ class _AlphaOnly(_Search):
             self._job.check(coloured)
             self.best = coloured
 
-    def _broken(self, partition: Partition) -> Iterable[Constraint]:
+    def _broken(self, partition: Assignment) -> Iterable[Constraint]:
         return ()
 
 
@@ -219,7 +219,7 @@ class _AlphaOrBeta(_Search):
                 return
             self._constraints += fresh
 
-    def _broken(self, partition: Partition) -> Iterator[Constraint]:
+    def _broken(self, partition: Assignment) -> Iterator[Constraint]:
         word = np.zeros(len(self._job.candidates.rows), np.int64)
         word[list(partition)] = list(partition.values())
         for walk in self._walks:

@@ -81,7 +81,7 @@ print(language.words, dict(language.sizes()))
 
 # %% What can be said, and the plan under a sentence.
 spoken = next(languages_in_tasks(language, candidates))
-for sentence in task_sentences(spoken.space, 0, spoken.table):
+for sentence in task_sentences(spoken.space, 0, spoken.partition):
     text = " ".join(sentence.words)
     with OneshotPlanner(
         name="coordlang", params={"language": language, "sentence": text}

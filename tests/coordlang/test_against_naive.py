@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from coordlang.language.words import WordTable
+from coordlang.language.partition import Partition
 from coordlang.required.divergences import first_differences, separations
 from coordlang.required.miscoordination import inseparable, miscoordination
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
@@ -121,7 +121,7 @@ def test_verify_equals_definition(robots: int, most: int) -> None:
         random = Random(seed)
         size = random.randint(1, 4)
         word = np.array([random.randrange(size) for _ in candidates.rows])
-        table = WordTable(tuple(f"w{n}" for n in range(size)), candidates.rows, word, 0)
+        table = Partition(tuple(f"w{n}" for n in range(size)), candidates.rows, word, 0)
         expected = all(
             naive.is_language(space, dict(enumerate(word.tolist())), most)
             for space in candidates.spaces
@@ -136,7 +136,7 @@ def test_verify_equals_definition(robots: int, most: int) -> None:
     assert min(seen.values()) >= 20
 
 
-def check_witness(candidates: Candidates, table: WordTable, witness: object) -> None:
+def check_witness(candidates: Candidates, table: Partition, witness: object) -> None:
     """The shown plans are optimal, have one sentence, and their mixture is no plan."""
     model = candidates.model
     plans = tuple(tuple(model.numbers(step) for step in plan) for plan in witness.plans)
@@ -145,7 +145,7 @@ def check_witness(candidates: Candidates, table: WordTable, witness: object) -> 
             all_plans = naive.listed(space, task, 10**6)
             if not set(plans) <= set(all_plans) or naive.mixture(plans) in all_plans:
                 continue
-            words = table.of_rows(space.rows)
+            words = table.word_of(space.rows)
             sentences = {
                 naive.sentence([int(words[s]) for s in naive.states(space, task, p)]) for p in plans
             }
@@ -171,7 +171,7 @@ def test_greedy_is_a_language_and_merging_is_judged_right(robots: int, most: int
         partition = fill(range(len(candidates.rows)), separations(found.divergences))
         word = np.array([partition[s] for s in range(len(candidates.rows))])
         names = tuple(f"w{n}" for n in range(int(word.max()) + 1))
-        assert verify(WordTable(names, candidates.rows, word, 0), candidates.spaces).holds
+        assert verify(Partition(names, candidates.rows, word, 0), candidates.spaces).holds
         for a in range(len(names)):
             for b in range(a):
                 merged = np.where(word == a, b, word)
@@ -180,7 +180,7 @@ def test_greedy_is_a_language_and_merging_is_judged_right(robots: int, most: int
                     for space in candidates.spaces
                 )
                 assert (
-                    verify(WordTable(names, candidates.rows, merged, 0), candidates.spaces).holds
+                    verify(Partition(names, candidates.rows, merged, 0), candidates.spaces).holds
                     == expected
                 )
                 seen[expected] += 1

@@ -15,7 +15,7 @@ from coordlang.required.miscoordination import inseparable
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.vocabulary import METHODS, Job, Outcome
 from coordlang.vocabulary import exhaustive as by_brute_force
-from coordlang.vocabulary.job import Partition
+from coordlang.vocabulary.job import Assignment
 from planners.errors import OutOfMemory, OutOfTime, ProvedImpossible
 from tests.coordlang import naive
 from tests.coordlang.random_models import random_model
@@ -87,9 +87,9 @@ def test_stopped_while_it_checks(
 
     candidates = shipped("grid", "gw1-2x2")
     verified = coordlang.building._verified
-    checked: list[Partition] = []
+    checked: list[Assignment] = []
 
-    def late(given: Candidates, partition: Partition) -> object:
+    def late(given: Candidates, partition: Assignment) -> object:
         if checked:
             raise error
         checked.append(partition)

@@ -20,7 +20,7 @@ from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_
 from coordlang.tasks.task_file import ListedTask, read_task_file
 from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from coordlang.vocabulary.flexible import flexible
-from coordlang.vocabulary.job import Outcome, Partition
+from coordlang.vocabulary.job import Assignment, Outcome
 from coordlang.vocabulary.objective import Objective
 from coordlang.vocabulary.pairwise import divided
 from planners.errors import ProvedImpossible
@@ -214,7 +214,7 @@ def all_languages(candidates: Candidates, size: int) -> list[tuple[Fraction, dic
     return found
 
 
-def blocks(partition: Partition) -> set[frozenset[int]]:
+def blocks(partition: Assignment) -> set[frozenset[int]]:
     return {frozenset(s for s in partition if partition[s] == word) for word in partition.values()}
 
 
@@ -254,7 +254,7 @@ def test_flexible_is_best_by_trying_all() -> None:
         languages = all_languages(candidates, built.language.guarantee.size)
         worst, word = min(languages, key=lambda pair: pair[0])
         best = max(value for value, _ in languages)
-        checked: list[Partition] = []
+        checked: list[Assignment] = []
         outcome = flexible(
             replace(built.job, check=checked.append), Outcome(word, len(set(word.values())))
         )

@@ -10,7 +10,7 @@ import pytest
 
 from coordlang.building import build_language
 from coordlang.language.file import read_language, to_bytes, write_atomically
-from coordlang.language.words import WordTable
+from coordlang.language.partition import Partition
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary.symmetry import closed, state_symmetries
@@ -220,14 +220,14 @@ def test_every_single_corruption_that_matters_is_caught(
     """Each state moved to each other word, or to a new one: `verify` says what the definition says."""
     candidates = shipped(folder, stem)
     language = build_language(candidates, method).language
-    table = WordTable.of(language, candidates.model)
-    word = table.of_rows(candidates.rows)
+    table = language.partition(candidates.model)
+    word = table.word_of(candidates.rows)
     verdicts = {True: 0, False: 0}
     for state in range(len(word)):
         for other in range(len(language.words) + 1):
             changed = word.copy()
             changed[state] = other
-            corrupt = WordTable((*language.words, "new"), candidates.rows, changed, 0)
+            corrupt = Partition((*language.words, "new"), candidates.rows, changed, 0)
             expected = all(
                 naive.is_language(space, dict(enumerate(changed.tolist())), 1000)
                 for space in candidates.spaces

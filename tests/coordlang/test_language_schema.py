@@ -47,7 +47,7 @@ def readable(data: object) -> bool:
 
 
 def test_packaged_schema_is_the_printed_one(coordlang: Command) -> None:
-    packaged = Path(coordlang_folder() / "language.schema.json").read_text()
+    packaged = Path(coordlang_folder() / "language" / "language.schema.json").read_text()
     assert packaged == coordlang("schema").out, (
         "coordlang schema > coordlang/language/language.schema.json"
     )

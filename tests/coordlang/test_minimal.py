@@ -10,8 +10,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from coordlang.building import build_language
+from coordlang.language.sentences import sentence
 from coordlang.language.warping import Clause, pair, separation_clause, warping_clause
-from coordlang.language.words import sentence
 from coordlang.required.miscoordination import inseparable
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.vocabulary.sat import PartitionProblem, PartitionProblems, reduce

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
@@ -15,7 +16,7 @@ import pytest
 from coordlang.building import build_language
 from coordlang.language.file import language_from_bytes, read_language, to_bytes, write_language
 from coordlang.language.overlapping import Overlap, Readings, Sentence, readings
-from coordlang.language.words import words_of_states
+from coordlang.language.partition import Partition
 from coordlang.required.composition_walk import walk
 from coordlang.required.miscoordination import inseparable
 from coordlang.tasks.candidates import Candidates
@@ -117,6 +118,12 @@ def test_readings_by_definition() -> None:
         assert readings(states, words) == all_readings(states, words)
 
 
+def overlap(candidates: Candidates, words: Mapping[int, frozenset[int]], number: int) -> Partition:
+    first = np.array([min(words[s]) for s in range(len(candidates.rows))])
+    names = [f"w{n}" for n in range(number)]
+    return Partition.of_table(names, candidates.rows, first).enlarged(candidates.rows, words)
+
+
 def test_verification_against_the_definition() -> None:
     answers = {True: 0, False: 0}
     overlapping = 0
@@ -125,8 +132,7 @@ def test_verification_against_the_definition() -> None:
         for _ in range(8):
             words = random_overlap(candidates, random)
             number = 1 + max(w for own in words.values() for w in own)
-            table = [words[s] for s in range(len(candidates.rows))]
-            verdict = verify_overlapping([f"w{n}" for n in range(number)], table, candidates.spaces)
+            verdict = verify_overlapping(overlap(candidates, words, number), candidates.spaces)
             want = expected(candidates, words)
             assert verdict.holds == (want is not None)
             answers[verdict.holds] += 1
@@ -166,7 +172,7 @@ def test_enlarged_words_are_a_language_and_leave_more_open() -> None:
         partition = (
             {s: n for n, s in enumerate(built.job.states)} if len(built.job.states) < 9 else None
         )
-        word = words_of_states(built.language, candidates.model, candidates.rows)
+        word = built.language.partition(candidates.model).words_of(candidates.rows)
         partition = partition or {s: next(iter(word[s])) for s in built.job.states}
         enlarged = enlarge(candidates.spaces, requires, partition)
         assert enlarged.stopped is None
@@ -202,12 +208,15 @@ def test_built_written_and_read_again(tmp_path: Path) -> None:
     write_language(language, tmp_path / "l.json")
     again = read_language(tmp_path / "l.json")
     assert again.also == language.also
-    words = words_of_states(again, candidates.model, candidates.rows)
-    assert verify_overlapping(again.words, words, candidates.spaces).holds
+    partition = again.partition(candidates.model)
+    words = partition.words_of(candidates.rows)
+    assert verify_overlapping(partition, candidates.spaces).holds
     assert sum(len(own) - 1 for own in words) == built.figures["overlapping_words"]
     # All words for all states: then every sentence says nothing at all.
-    everything = [frozenset(range(len(again.words)))] * len(words)
-    verdict = verify_overlapping(again.words, everything, candidates.spaces)
+    everything = dict.fromkeys(range(len(words)), frozenset(range(len(again.words))))
+    verdict = verify_overlapping(
+        overlap(candidates, everything, len(again.words)), candidates.spaces
+    )
     assert not verdict.holds
     assert verdict.witness is not None
 
@@ -231,14 +240,8 @@ def test_a_bad_also_is_refused() -> None:
 
 
 def test_old_files_have_no_also() -> None:
-    language = build_language(shipped("three-cells"), "minimal").language
+    candidates = shipped("three-cells")
+    language = build_language(candidates, "minimal").language
     assert b'"also"' not in to_bytes(language)
-    assert np.array_equal(
-        [
-            len(w)
-            for w in words_of_states(
-                language, shipped("three-cells").model, shipped("three-cells").rows
-            )
-        ],
-        np.ones(6),
-    )
+    words = language.partition(candidates.model).words_of(candidates.rows)
+    assert [len(own) for own in words] == [1] * 6

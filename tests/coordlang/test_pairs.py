@@ -9,7 +9,7 @@ from random import Random
 import pytest
 
 from coordlang.building import build_language
-from coordlang.language.words import WordTable
+from coordlang.language.partition import Partition
 from coordlang.required.miscoordination import Inseparable, inseparable
 from coordlang.tasks.candidates import Candidates, from_problems
 from coordlang.verification.by_definition import verify
@@ -79,11 +79,11 @@ def flags() -> Candidates:
     return from_problems(domain, [read_problem(DOMAINS / "flags" / "parade.pddl", domain)])
 
 
-def table_of(candidates: Candidates, words: list[int]) -> WordTable:
+def table_of(candidates: Candidates, words: list[int]) -> Partition:
     rows, place = unique_rows(candidates.rows)
     ordered = rows[:, 0].astype("int64") * 0
     ordered[place] = words
-    return WordTable(tuple(f"w{n}" for n in range(max(words) + 1)), rows, ordered, 0)
+    return Partition(tuple(f"w{n}" for n in range(max(words) + 1)), rows, ordered, 0)
 
 
 @pytest.mark.parametrize("robots", [2, 3])

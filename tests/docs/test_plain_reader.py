@@ -11,8 +11,9 @@ from typing import Any
 import pytest
 
 from coordlang.cli import run
-from coordlang.language.file import options_of, read_language
-from coordlang.language.words import WordTable, sentence
+from coordlang.language.file import read_language
+from coordlang.language.recorded import options_of
+from coordlang.language.sentences import sentence
 from coordlang.tasks.candidates import all_pairs
 from coordlang.tasks.task_file import read_task_file
 from planners.pddl import read_domain, read_problem
@@ -50,11 +51,11 @@ def test_reader_says_the_same(
     language = read_language(path)
     domain = read_domain(DOMAIN)
     candidates = all_pairs(domain, [read_problem(PROBLEM, domain)], options_of(language))
-    table = WordTable.of(language, candidates.model)
+    table = language.partition(candidates.model)
     codec = candidates.model.codec
     compared, words = 0, set()
     for space in candidates.spaces:
-        counted, word = counts(space), table.of_rows(space.rows)
+        counted, word = counts(space), table.word_of(space.rows)
         for start in space.starts.tolist():
             for plan in Plans(space, start, counted):
                 states = Plans(space, start, counted).states(plan)

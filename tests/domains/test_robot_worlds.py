@@ -14,7 +14,6 @@ from xml.etree import ElementTree
 import pytest
 
 from coordlang.building import build_language
-from coordlang.language.words import WordTable
 from coordlang.required.miscoordination import Inseparable, miscoordination
 from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
 from coordlang.tasks.task_file import read_task_file
@@ -129,7 +128,7 @@ def test_the_table_of_languages(folder: str, row: Row) -> None:
         assert built.first_differences.requiring == int(row["requiring coordination"])
         assert guarantee.size == int(row[f"{method} words"])
         assert guarantee.proved_minimal or method == "greedy"
-        assert verify(WordTable.of(built.language, tasks.model), tasks.spaces).holds
+        assert verify(built.language.partition(tasks.model), tasks.spaces).holds
 
 
 @by_world

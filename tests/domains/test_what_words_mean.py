@@ -17,7 +17,7 @@ import pytest
 from test_robot_worlds import DOMAINS, ROOT, Row, candidates, tables
 
 from coordlang.building import build_language
-from coordlang.language.words import Guarantee, Language, WordTable
+from coordlang.language.words import Language
 from coordlang.tasks.candidates import Candidates
 from coordlang.verification.by_definition import Verdict, verify
 from planners.joint.states import split_atoms
@@ -171,9 +171,7 @@ def verdict(meaning: Meaning, tasks: Candidates) -> Verdict:
             states[key] = f"w{mine[0]}"
     names = (*(f"w{n}" for n in range(len(meaning.words))), "rest")
     assert set(states.values()) == set(names[:-1]), "no word is empty"
-    unknown = Guarantee("", len(names), 1, False)
-    language = Language(names, states, "rest", tasks.model.robots, unknown, {}, {}, {}, {})
-    return verify(WordTable.of(language, tasks.model), tasks.spaces)
+    return verify(Language(names, states, "rest").partition(tasks.model), tasks.spaces)
 
 
 @pytest.mark.parametrize("meaning", MEANINGS, ids=lambda m: f"{m.folder}-{m.problem}-{m.tasks}")

@@ -156,7 +156,7 @@ def test_a_warehouse_by_enumeration(tmp_path) -> None:
         for task in trial.tasks:
             if task not in said:
                 said[task] = groups(
-                    TaskLanguage(language, base.table, base.space, task, base.word, True)
+                    TaskLanguage(language, base.partition, base.space, task, base.word, True)
                 )
             found = said[task]
             total = sum(map(len, found.values()))

@@ -15,7 +15,7 @@ from coordlang.evaluation.lab.statistics import mean_interval, wilson
 from coordlang.evaluation.material.sentence_counts import SentenceCounts, said, sentence_counts
 from coordlang.evaluation.material.state_orders import NATURAL, greedy_in_orders, natural_orders
 from coordlang.language.flexibility import flexibility as measured
-from coordlang.language.words import WordTable
+from coordlang.language.partition import Partition
 from coordlang.required.divergences import states_on_plans
 from coordlang.verification.by_definition import verify
 from planners.errors import OutOfMemory
@@ -122,7 +122,7 @@ def test_all_orders_make_languages_of_different_sizes() -> None:
     for name, words in greedy_in_orders(candidates, 15, Random(0)):
         sizes[name] = int(words.max()) + 1
         names = tuple(f"w{n}" for n in range(int(words.max()) + 1))
-        table = WordTable(names, candidates.rows, words.astype(np.int64), 0)
+        table = Partition(names, candidates.rows, words.astype(np.int64), 0)
         assert verify(table, candidates.spaces).holds
     assert list(sizes)[:6] == [*NATURAL, "random 1"]
     assert len(set(sizes.values())) > 1

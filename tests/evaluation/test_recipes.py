@@ -23,7 +23,6 @@ from coordlang.evaluation.material.paper import (
     TABLE_1,
 )
 from coordlang.evaluation.material.suite import OTHERS, ROWS, WORLDS, find_domains
-from coordlang.language.words import WordTable
 from coordlang.use.sentence.guided_search import ExpandedStates
 from coordlang.use.sentence.task_language import languages_in_tasks
 from coordlang.vocabulary.sat import PartitionProblem
@@ -76,14 +75,14 @@ def test_expansions_on_three_cells() -> None:
     away, and comes up next.
     """
     one = three_cells()
-    terrain = ExpandedStates(one.model, one.table)
+    terrain = ExpandedStates(one.model, one.partition)
     assert planning_cost.expansions(one, "blind", terrain) == (2, 2, 2)
     assert planning_cost.expansions(one, "relaxed", terrain) == (2, 2, 2)
 
 
 def test_a_sentence_saves_work() -> None:
     tasks = spoken("tray", "serve", "greedy")
-    terrain = ExpandedStates(tasks[0].model, tasks[0].table)
+    terrain = ExpandedStates(tasks[0].model, tasks[0].partition)
     counted = [
         planning_cost.expansions(one, "relaxed", terrain) for one in Random(1).sample(tasks, 40)
     ]
@@ -159,7 +158,7 @@ def test_languages_are_kept_and_unfinished_ones_are_not(
     candidates, again = language_for(world, "minimal", settings)
     assert kept[0].stat().st_mtime_ns == stamp
     assert dict(again.states) == dict(first.states)
-    assert len(WordTable.of(again, candidates.model).words) == 3
+    assert len(again.partition(candidates.model).words) == 3
 
     def late(*_: object) -> bool:
         raise OutOfTime("the time limit is over")

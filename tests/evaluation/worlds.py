@@ -7,7 +7,7 @@ from __future__ import annotations
 from functools import cache
 
 from coordlang.building import build_language
-from coordlang.language.words import Guarantee, Language
+from coordlang.language.words import Language
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 from planners.pddl import read_domain, read_problem
@@ -26,8 +26,7 @@ def where_r2_is(candidates: Candidates) -> Language:
     for row in candidates.rows:
         key = candidates.model.codec.key(row)
         states[key] = f"in-{key.partition('(at r2 ')[2][0]}"
-    guarantee = Guarantee("by hand", 3, 1, False)
-    return Language(words, states, "in-a", candidates.model.robots, guarantee, {}, {}, {}, {})
+    return Language(words, states, "in-a")
 
 
 @cache

@@ -26,7 +26,7 @@ from tests.explain.test_formulas import language_of, random_language
 
 
 def by_sentence(task_language: TaskLanguage, most: int) -> dict[tuple[int, ...], list[Plan]]:
-    word = task_language.table.of_rows(task_language.space.rows)
+    word = task_language.partition.word_of(task_language.space.rows)
     groups: dict[tuple[int, ...], list[Plan]] = {}
     for plan in naive.listed(task_language.space, task_language.task, most):
         said = naive.sentence(
@@ -44,7 +44,7 @@ def check(
     few: int,
 ) -> None:
     model = task_language.model
-    assert found.sentence == tuple(task_language.table.words[w] for w in words)
+    assert found.sentence == tuple(task_language.partition.words[w] for w in words)
     assert (found.plans, found.steps) == (len(plans), len(plans[0]))
     for robot, part in enumerate(found.parts):
         texts = {
@@ -61,7 +61,7 @@ def check(
         zip(found.sentence, found.sentence[1:], strict=False)
     )
     space = task_language.space
-    word = task_language.table.of_rows(space.rows)
+    word = task_language.partition.word_of(space.rows)
     steps: list[set[int]] = [set() for _ in found.changes]
     for plan in plans:
         said = [int(word[s]) for s in naive.states(space, task_language.task, plan)]
@@ -98,7 +98,7 @@ def test_against_listed_plans(robots: int) -> None:
             for words, plans in groups.items():
                 few = 2
                 found = sentence_demands(
-                    task_language.plans_with(words), task_language.table, formulas, few
+                    task_language.plans_with(words), task_language.partition, formulas, few
                 )
                 check(task_language, words, plans, found, few)
                 assert demands_text(found)
@@ -124,7 +124,9 @@ def test_changes_that_may_come_sooner_or_later() -> None:
     (task_language,) = languages_in_tasks(language, candidates)
     several = 0
     for said, plans in by_sentence(task_language, 10_000).items():
-        found = sentence_demands(task_language.plans_with(said), task_language.table, formulas, 3)
+        found = sentence_demands(
+            task_language.plans_with(said), task_language.partition, formulas, 3
+        )
         check(task_language, said, plans, found, 3)
         assert all(change.robots == ("r1",) for change in found.changes)
         several += sum(change.earliest < change.latest for change in found.changes)
@@ -145,7 +147,7 @@ def test_who_decides_a_change(folder: str, stem: str, every: int) -> None:
     for task_language in list(languages_in_tasks(language, candidates))[::every]:
         for words in by_sentence(task_language, 1000):
             fits = task_language.plans_with(words)
-            found = sentence_demands(fits, task_language.table, formulas)
+            found = sentence_demands(fits, task_language.partition, formulas)
             for number, change in enumerate(found.changes):
                 before = states_before(fits, task_language, number)
                 robots = [task_language.model.robots.index(r) for r in change.robots]
@@ -167,7 +169,7 @@ def states_before(fits: object, task_language: TaskLanguage, number: int) -> set
     plans.
     """
     found = set()
-    word = task_language.table.of_rows(task_language.space.rows)
+    word = task_language.partition.word_of(task_language.space.rows)
     plans = Plans.of(fits)  # type: ignore[arg-type]
     for plan in plans:
         states = plans.states(plan)
@@ -185,7 +187,7 @@ def settled(task_language: TaskLanguage, states: set[int], after: int, robots: l
             if task_language.model.codec.key(result) not in mapped:
                 continue
             own = tuple(labels[r] for r in robots)
-            makes = int(task_language.table.of_rows(np.array([result]))[0]) == after
+            makes = int(task_language.partition.word_of(np.array([result]))[0]) == after
             if answer.setdefault(own, makes) != makes:
                 return False
     return True
@@ -200,7 +202,7 @@ def test_the_running_example_in_plain_sentences() -> None:
     formulas = word_formulas(language, candidates.model)
     (task_language,) = languages_in_tasks(language, candidates)
     found = sentence_demands(
-        task_language.plans_with(task_language.words_of("w1 w0")), task_language.table, formulas
+        task_language.plans_with(task_language.words_of("w1 w0")), task_language.partition, formulas
     )
     assert demands_text(found).splitlines() == [
         '"w1 w0" leaves 2 plans open.',

@@ -17,7 +17,7 @@ from coordlang.explanation.minimise import minimise
 from coordlang.explanation.text import literal_text, pddl_condition, shown
 from coordlang.explanation.variables import truth, valuation
 from coordlang.explanation.words import all_covers, mapped_states
-from coordlang.language.words import Guarantee, Language, WordTable
+from coordlang.language.words import Language
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from planners.errors import ProvedImpossible
 from planners.loading import ModelOptions
@@ -29,10 +29,7 @@ from tests.coordlang.test_minimal import shipped
 
 
 def language_of(words: dict[str, str], names: tuple[str, ...]) -> Language:
-    guarantee = Guarantee("by hand", len(names), 1, len(names) == 1)
-    return Language(
-        names, words, names[0], ("r1", "r2"), guarantee, {}, {}, {"kind": "all", "count": 0}, {}
-    )
+    return Language(names, words, names[0])
 
 
 def random_language(random: Random, candidates: Candidates) -> Language:
@@ -346,7 +343,7 @@ def test_remembered_actions_are_one_variable_a_robot() -> None:
     language = build_language(candidates, "greedy").language
     formulas = word_formulas(language, candidates.model)
     check_exact(language, candidates, formulas)
-    table = WordTable.of(language, candidates.model)
+    table = language.partition(candidates.model)
     names = {variable.name for variable in valuation(candidates.model, table.rows).variables}
     assert {"last(r1)", "last(r2)"} <= names
 

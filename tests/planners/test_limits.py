@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coordlang.language.words import WordTable
+from coordlang.language.partition import Partition
 from coordlang.required import composition_walk as coordination
 from coordlang.required.composition_walk import walk
 from coordlang.required.miscoordination import miscoordination
@@ -277,7 +277,7 @@ def test_verification_and_the_search_for_a_break_say_how_far_they_got(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     space = plans("corners-3x3")
-    table = WordTable(
+    table = Partition(
         ("w0",), np.zeros((0, space.rows.shape[1]), np.uint64), np.zeros(0, np.int64), 0
     )
 

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from coordlang.building import build_language
-from coordlang.language.file import with_provenance
 from coordlang.language.words import Language
 from coordlang.report.page import Report, make_report
 from coordlang.tasks.candidates import all_pairs, from_listed, from_problems
@@ -78,7 +77,7 @@ def make_language(
     else:
         candidates = from_listed(lifted, [read], read_task_file(DOMAINS / domain / tasks), options)
     built = build_language(candidates, method)
-    return with_provenance(built.language, candidates, {}), lifted, read
+    return built.language, lifted, read
 
 
 @cache

@@ -11,8 +11,7 @@ from typing import Any
 import pytest
 
 from coordlang.building import build_language
-from coordlang.language.file import with_provenance
-from coordlang.language.words import sentence
+from coordlang.language.sentences import sentence
 from coordlang.report import graph
 from coordlang.report.data import page_data
 from coordlang.report.page import make_report
@@ -129,8 +128,7 @@ def test_random_models() -> None:
             )
             if not candidates.count or candidates.count > 400:
                 continue
-            built = build_language(candidates, "greedy")
-            language = with_provenance(built.language, candidates, {})
+            language = build_language(candidates, "greedy").language
             selection = select_tasks(language, domain, [problem], 4, seed)
         except (Inseparable, ProvedImpossible):
             continue

@@ -25,7 +25,7 @@ Known = tuple[frozenset[str], frozenset[str]]
 def sentences(task_language: TaskLanguage, most: int) -> dict[tuple[int, ...], list[Plan]]:
     """All optimal plans of the task by their sentence; raises `naive.TooLarge`."""
     groups: dict[tuple[int, ...], list[Plan]] = {}
-    word = task_language.table.of_rows(task_language.space.rows)
+    word = task_language.partition.word_of(task_language.space.rows)
     for plan in naive.listed(task_language.space, task_language.task, most):
         said = naive.sentence(
             [int(word[s]) for s in naive.states(task_language.space, task_language.task, plan)]

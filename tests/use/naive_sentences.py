@@ -10,7 +10,8 @@ from random import Random
 from hypothesis import assume
 
 from coordlang.building import build_language
-from coordlang.language.words import Guarantee, Language, WordTable, name_words
+from coordlang.language.partition import Partition
+from coordlang.language.words import Language
 from coordlang.required.miscoordination import Inseparable
 from coordlang.tasks.candidates import Candidates, from_listed, from_problems
 from coordlang.tasks.task_file import ListedTask
@@ -91,9 +92,7 @@ def random_task_language(seed: int, robots: int) -> tuple[Candidates, TaskLangua
     used = sorted(set(candidates.spaces[0].state.tolist()))
     mapped = [n for n in used if random.random() < 0.9] or used[:1]
     partition = {n: random.randrange(size) for n in mapped}
-    words, states, default = name_words(candidates.model, candidates.rows, partition)
-    unknown = Guarantee("random", len(words), 1, False)
-    language = Language(words, states, default, candidates.model.robots, unknown, {}, {}, {}, {})
+    language = Language.of(Partition.of_states(candidates.rows, partition), candidates.model)
     return candidates, spoken_in(candidates, language)
 
 
@@ -124,8 +123,8 @@ def long_task(
 
 
 def spoken_in(candidates: Candidates, language: Language) -> TaskLanguage:
-    space, table = candidates.spaces[0], WordTable.of(language, candidates.model)
-    return TaskLanguage(language, table, space, 0, table.of_rows(space.rows)[space.state], True)
+    space, table = candidates.spaces[0], language.partition(candidates.model)
+    return TaskLanguage(language, table, space, 0, table.word_of(space.rows)[space.state], True)
 
 
 def by_sentence(task_language: TaskLanguage) -> dict[tuple[str, ...], set[Plan]]:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from coordlang.building import build_language
-from coordlang.language.words import WordTable
+from coordlang.language.partition import Partition
 from coordlang.required.miscoordination import Inseparable
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.use.choices.automaton import Automaton, determinise
@@ -92,16 +92,16 @@ def spoken_in(seed: int, robots: int) -> Iterator[TaskLanguage]:
         language = build_language(candidates, method).language
     except Inseparable:
         raise Unsuitable from None
-    table = WordTable.of(language, candidates.model)
+    table = language.partition(candidates.model)
     if seed // 11 % 4:
         table = merged(table, candidates, seed)
     for space, task in tasks_of(candidates, seed):
         yield TaskLanguage(
-            language, table, space, task, table.of_rows(space.rows)[space.state], True
+            language, table, space, task, table.word_of(space.rows)[space.state], True
         )
 
 
-def merged(table: WordTable, candidates: Candidates, seed: int) -> WordTable:
+def merged(table: Partition, candidates: Candidates, seed: int) -> Partition:
     """Words merged at random as long as it stays a language: sentences then leave more open, and
     mix more.
     """
@@ -125,7 +125,7 @@ def at_random(seed: int, robots: int) -> Iterator[TaskLanguage]:
     random = Random(seed)
     size = random.randint(1, 3)
     word = np.array([random.randrange(size) for _ in candidates.rows])
-    table = WordTable(tuple(f"w{n}" for n in range(size)), candidates.rows, word, 0)
+    table = Partition(tuple(f"w{n}" for n in range(size)), candidates.rows, word, 0)
     for space, task in tasks_of(candidates, seed):
         yield TaskLanguage(None, table, space, task, word[space.state], True)  # type: ignore[arg-type]
 
@@ -369,7 +369,10 @@ def test_shipped_domains(folder: str, name: str) -> None:
             plan = next(iter(Plans.of(task_language.space, task_language.task)))
             states = Plans(task_language.space, task_language.start, []).states(plan)
             words = naive.sentence(
-                [int(task_language.table.of_rows(task_language.space.rows[[s]])[0]) for s in states]
+                [
+                    int(task_language.partition.word_of(task_language.space.rows[[s]])[0])
+                    for s in states
+                ]
             )
             assert choices(task_language, words).guaranteed
     assert robots == 3 or not name.startswith("three-robots")
@@ -432,7 +435,7 @@ def test_choices_may_leave_the_sentence(robots: int) -> None:
     ]
     layer = dict(zip(space.state.tolist(), space.layer.tolist(), strict=True))
     word = np.array([1 + len(begun[s]) % 2 if layer[s] == 1 else 0 for s in range(len(space.rows))])
-    table = WordTable(("start", "even", "odd"), space.rows, word, 0)
+    table = Partition(("start", "even", "odd"), space.rows, word, 0)
     assert verify(table, candidates.spaces).holds
     task_language = TaskLanguage(None, table, space, 0, word[space.state], True)  # type: ignore[arg-type]
     for words, twin in listed(task_language, 100, 100):
@@ -466,7 +469,7 @@ def sentence_of(task_language: TaskLanguage) -> str:
     plan = next(iter(Plans.of(task_language.space, task_language.task)))
     states = Plans(task_language.space, task_language.start, []).states(plan)
     return task_language.text(
-        naive.sentence(task_language.table.of_rows(task_language.space.rows[states]).tolist())
+        naive.sentence(task_language.partition.word_of(task_language.space.rows[states]).tolist())
     )
 
 

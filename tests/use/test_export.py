@@ -23,7 +23,8 @@ import numpy as np
 import pytest
 
 from coordlang.building import build_language
-from coordlang.language.words import Guarantee, Language, sentence
+from coordlang.language.sentences import sentence
+from coordlang.language.words import Language
 from coordlang.tasks.candidates import from_problems
 from coordlang.use.export import membership as membership_module
 from coordlang.use.export.ltlf import export_ltlf, symbols_of
@@ -79,9 +80,7 @@ def random_task_language(seed: int) -> TaskLanguage | None:
     else:
         word = [random.choice(words) for _ in keys]
     states = {key: w for key, w in zip(keys, word, strict=True) if random.random() < 0.9}
-    language = Language(
-        words, states, words[-1], model.robots, Guarantee("random", 1, 1, False), {}, {}, {}, {}
-    )
+    language = Language(words, states, words[-1])
     return next(languages_in_tasks(language, candidates))
 
 
@@ -109,7 +108,7 @@ def by_sentence(task_language: TaskLanguage) -> dict[tuple[int, ...], set[Plan]]
         dict[tuple[int, ...], set[Plan]](),
     )
     for plan in plans:
-        words = task_language.table.of_rows(task_language.space.rows[plans.states(plan)])
+        words = task_language.partition.word_of(task_language.space.rows[plans.states(plan)])
         found.setdefault(sentence(words.tolist()), set()).add(plan)
     return found
 
@@ -150,9 +149,9 @@ def test_the_random_tasks_are_worth_it() -> None:
 def test_one_term_in_every_state(lot: str) -> None:
     for task_language in tasks(lot):
         rows = np.concatenate(
-            (task_language.table.rows, task_language.space.rows[task_language.space.state])
+            (task_language.partition.rows, task_language.space.rows[task_language.space.state])
         )
-        words = task_language.table.of_rows(rows).tolist()
+        words = task_language.partition.word_of(rows).tolist()
         states = [frozenset(task_language.model.codec.decode(row)) for row in rows]
         exact, tree = membership(task_language), membership(task_language, states=0)
         for found, most in (

@@ -28,7 +28,7 @@ def check(candidates: Candidates, task_language: TaskLanguage, names: tuple[str,
     loaded, groups = candidates.loaded, by_sentence(task_language)
     problem = loaded.problems[0]
     [(init, goal)] = ground_tasks(loaded.domain, problem, candidates.listed)
-    terrain, searches = ExpandedStates(task_language.model, task_language.table), 0
+    terrain, searches = ExpandedStates(task_language.model, task_language.partition), 0
     for name in names:
         without = plan_under_sentence(task_language, None, name, terrain)
         assert without.cost == task_language.space.cost_of(0)
@@ -82,7 +82,7 @@ def test_a_state_is_looked_at_once(seed: int, robots: int) -> None:
     _, task_language = random_task_language(seed, robots)
     space, model = task_language.space, task_language.model
     assume(model.cost == "makespan")
-    terrain = ExpandedStates(model, task_language.table)
+    terrain = ExpandedStates(model, task_language.partition)
     most = _expandable(terrain, space.rows[space.state[task_language.start]], space.cost_of(0)[0])
     for words in list(by_sentence(task_language))[:10]:
         found = plan_under_sentence(
@@ -106,7 +106,7 @@ def test_a_sentence_of_longer_plans_only_is_no_sentence() -> None:
     task_language = shipped("t-map/problem")[1]
     space = task_language.space
     sentences = [task_language.words_of(words) for words in by_sentence(task_language)]
-    terrain = ExpandedStates(task_language.model, task_language.table)
+    terrain = ExpandedStates(task_language.model, task_language.partition)
     goal, init = space.goals[0], space.rows[space.state[task_language.start]]
     bound = heuristic("relaxed", task_language.model, goal)
     found = {}

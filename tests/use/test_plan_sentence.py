@@ -391,7 +391,7 @@ def test_the_plan_with_an_initial_goal_state() -> None:
     goal_node = int(np.flatnonzero(space.layer == 0)[0])
     there = TaskLanguage(
         task_language.language,
-        task_language.table,
+        task_language.partition,
         replace(space, starts=np.array([goal_node])),
         0,
         task_language.word,

@@ -440,7 +440,7 @@ def test_a_sentence_leaves_exactly_its_plans() -> None:
     task_language = next(languages_in_tasks(language, candidates))
     everything = sorted(str(steps_of(found, plan)) for plan in all_plans(problem))
     listed = []
-    sentences = task_sentences(task_language.space, 0, task_language.table)
+    sentences = task_sentences(task_language.space, 0, task_language.partition)
     assert len(sentences) > 1
     for sentence in sentences:
         text = " ".join(sentence.words)

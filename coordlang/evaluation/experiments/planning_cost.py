@@ -23,7 +23,6 @@ from coordlang.evaluation.lab.recipe import (
 from coordlang.evaluation.material.languages import TITLES, language_for
 from coordlang.evaluation.material.paper import PLANNING_RATIO
 from coordlang.evaluation.material.suite import OTHERS, QUICK_ROW, ROW, WORLDS
-from coordlang.language.words import WordTable
 from coordlang.use.sentence.guided_search import ExpandedStates, plan_under_sentence
 from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 
@@ -55,7 +54,7 @@ def _unit(world: str, heuristic: str, method: str, samples: int | None) -> Unit:
 def run(unit: Unit, settings: Settings) -> Result:
     world = WORLDS[unit.parameters["world"]]
     candidates, language = language_for(world, unit.parameters["method"], settings)
-    terrain = ExpandedStates(candidates.model, WordTable.of(language, candidates.model))
+    terrain = ExpandedStates(candidates.model, language.partition(candidates.model))
     spoken = list(languages_in_tasks(language, candidates))
     samples = unit.parameters["samples"]
     if samples is not None and samples < len(spoken):

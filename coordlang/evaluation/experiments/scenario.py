@@ -143,7 +143,7 @@ def detour(spoken: TaskLanguage) -> Result:
     agreed = tuple(step[0] for step in plan)
     ways = [way for way in subplans(choices) if wanted & set(way)]
     found: Result = {
-        "sentence": [spoken.table.words[w] for w in words],
+        "sentence": [spoken.partition.words[w] for w in words],
         "agreed": [_walk(model, plan, robot) for robot in range(2)],
         "ways": len(ways),
         "detour": None,

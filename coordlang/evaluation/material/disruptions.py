@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coordlang.evaluation.material.sentence_counts import sentence_counts
-from coordlang.language.words import sentence
+from coordlang.language.sentences import sentence
 from coordlang.use.choices.automaton import Automaton, determinise
 from coordlang.use.sentence.fitting_plans import plans_with_sentence
 from coordlang.use.sentence.task_language import TaskLanguage
@@ -115,7 +115,7 @@ class Sayings:
         """What each robot may do under a sentence of a task."""
         if (task, words) not in self._own:
             one = self.spoken
-            fits = plans_with_sentence(one.space, one.word, task, words, one.table.words)
+            fits = plans_with_sentence(one.space, one.word, task, words, one.partition.words)
             self._own[task, words] = [
                 determinise(fits, robot) for robot in range(len(one.model.robots))
             ]

@@ -13,7 +13,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from coordlang.language.words import Language, WordTable
+from coordlang.language.words import Language
 from coordlang.tasks.candidates import Candidates
 from planners.errors import OutOfMemory
 from planners.search.plan_space import PlanSpace
@@ -70,9 +70,9 @@ class SentenceCounts:
 
 def sentence_counts_in(candidates: Candidates, language: Language) -> Iterator[SentenceCounts]:
     """What each candidate task's plans say, task by task."""
-    table = WordTable.of(language, candidates.model)
+    table = language.partition(candidates.model)
     for space in candidates.spaces:
-        yield from said(space, table.of_rows(space.rows)[space.state])
+        yield from said(space, table.word_of(space.rows)[space.state])
 
 
 def said(space: PlanSpace, word: Ints) -> list[SentenceCounts]:

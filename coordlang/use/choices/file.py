@@ -22,7 +22,7 @@ def to_data(choices: Choices, robots: Sequence[int] | None = None) -> dict[str, 
     return {
         "format": FORMAT,
         "version": VERSION,
-        "domain": dict(task_language.language.domain) if task_language.language else {},
+        "domain": dict(task_language.language.provenance.domain) if task_language.language else {},
         "robots": list(task_language.model.robots),
         "task": describe(task_language.space, task_language.task),
         "sentence": task_language.text(choices.words),

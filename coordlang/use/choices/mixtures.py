@@ -182,7 +182,7 @@ def _violation(
     ]
     trail = Trail(task_language.start, tuple(zip(*paths, strict=True)))
     return describe_failure(
-        task_language.space, trail, tuple(task_language.table.words[w] for w in words)
+        task_language.space, trail, tuple(task_language.partition.words[w] for w in words)
     )
 
 

@@ -48,7 +48,7 @@ def export_ltlf(task_language: TaskLanguage, words: Sequence[int]) -> SentenceFo
     atoms = sorted({atom for word in used for term in terms[word] for atom in term})
     symbol = dict(zip(atoms, symbols_of(atoms), strict=True))
     names = dict(
-        zip(used, symbols_of([task_language.table.words[word] for word in used]), strict=True)
+        zip(used, symbols_of([task_language.partition.words[word] for word in used]), strict=True)
     )
     meaning = {word: disjunction(terms[word], symbol) for word in used}
     return SentenceFormula(

@@ -46,7 +46,7 @@ def membership(
     faster, up to twice as many, but never more than states.
     """
     rows = task_language.space.rows[np.unique(task_language.space.state)]
-    rows, _ = unique_rows(np.concatenate((task_language.table.rows, rows)))
+    rows, _ = unique_rows(np.concatenate((task_language.partition.rows, rows)))
     if len(rows) > states:
         return _tree(task_language, rows)
     atoms, holds = truth(task_language.model, rows)
@@ -54,7 +54,7 @@ def membership(
     formulas = word_formulas(task_language.language, task_language.model, rows)
     covers = [
         [_term(literals) for literals in formulas[word].conditions()]
-        for word in task_language.table.words
+        for word in task_language.partition.words
     ]
     return Membership(tuple(tuple(disjoint(facts, cover) if apart else cover) for cover in covers))
 
@@ -116,9 +116,9 @@ def _tree(task_language: TaskLanguage, rows: Rows) -> Membership:
     """A binary decision tree; each test is the one that tells most about the word (least entropy,
     as in ID3).
     """
-    word = task_language.table.of_rows(rows)
+    word = task_language.partition.word_of(rows)
     atoms, values = truth(task_language.model, rows)
-    terms: list[list[Term]] = [[] for _ in task_language.table.words]
+    terms: list[list[Term]] = [[] for _ in task_language.partition.words]
     todo: list[tuple[Ints, Term]] = [(np.arange(len(rows)), {})]
     while todo:
         here, term = todo.pop()

@@ -172,7 +172,7 @@ class _Naming:
             task_language.model,
             words,
             tests,
-            task_language.table.words,
+            task_language.partition.words,
         )
         self.facts, self.init = list(plain.facts), set[int]()
         self.known = {text: n for n, text in enumerate(self.model.codec.facts.texts)}

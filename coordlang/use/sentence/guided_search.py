@@ -8,7 +8,8 @@ from heapq import heappop, heappush
 
 import numpy as np
 
-from coordlang.language.words import WordTable, sentence
+from coordlang.language.partition import Partition
+from coordlang.language.sentences import sentence
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.joint.model import Goal, JointModel
 from planners.joint.states import bits
@@ -45,7 +46,7 @@ class ExpandedStates:
     """
 
     model: JointModel
-    table: WordTable
+    partition: Partition
     rows: list[Rows] = field(default_factory=list)
     word: list[int] = field(default_factory=list)
     _number: dict[bytes, int] = field(default_factory=dict)
@@ -55,7 +56,7 @@ class ExpandedStates:
         """The states of a table."""
         keys = [row.tobytes() for row in np.ascontiguousarray(rows)]
         fresh = list({key: n for n, key in enumerate(keys) if key not in self._number}.values())
-        for n, word in zip(fresh, self.table.of_rows(rows[fresh]).tolist(), strict=True):
+        for n, word in zip(fresh, self.partition.word_of(rows[fresh]).tolist(), strict=True):
             self._number[keys[n]] = len(self.rows)
             self.rows.append(rows[n])
             self.word.append(word)
@@ -85,7 +86,7 @@ def plan_under_sentence(
     Raises `NoPlanFits` when no optimal plan has the sentence.
     """
     space = task_language.space
-    terrain = terrain or ExpandedStates(task_language.model, task_language.table)
+    terrain = terrain or ExpandedStates(task_language.model, task_language.partition)
     goal = space.goals[space.goal[task_language.start]]
     init = space.rows[space.state[task_language.start]]
     bound = heuristic(name, task_language.model, goal)

@@ -89,7 +89,9 @@ def plan_dag(open_plans: OpenPlans, most: int | None = None) -> PlanDag:
             number[node] = len(nodes)
             key = codec.key(space.rows[space.state[node]])
             nodes.append(
-                DagNode(step, key, task_language.table.words[word[node]], said[node], through[node])
+                DagNode(
+                    step, key, task_language.partition.words[word[node]], said[node], through[node]
+                )
             )
         others = here[len(kept) :]
         if others:
@@ -97,7 +99,7 @@ def plan_dag(open_plans: OpenPlans, most: int | None = None) -> PlanDag:
             nodes.append(DagNode(step, "", "", 0, sum(through[n] for n in others), len(others)))
     cut = sum(node.merged for node in nodes)
     task = describe(task_language.space, task_language.task)
-    sentence = tuple(task_language.table.words[w] for w in open_plans.words)
+    sentence = tuple(task_language.partition.words[w] for w in open_plans.words)
     edges = _edges(space, number, nodes)
     return PlanDag(
         sentence, task, task_language.model.robots, open_plans.count, tuple(nodes), edges, cut
@@ -131,7 +133,9 @@ def _width(space: PlanSpace, most: int | None) -> int:
 def _said(open_plans: OpenPlans) -> tuple[dict[int, int], dict[int, int]]:
     """For each node how many words have been said, and the word it is in."""
     space, words = open_plans.fits, open_plans.words
-    word = dict(enumerate(open_plans.task_language.table.of_rows(space.rows)[space.state].tolist()))
+    word = dict(
+        enumerate(open_plans.task_language.partition.word_of(space.rows)[space.state].tolist())
+    )
     said = {int(space.starts[0]): 1}
     first, target = space.first.tolist(), space.target.tolist()
     for span in reversed(space.layers):

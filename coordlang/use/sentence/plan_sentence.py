@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from coordlang.language.words import sentence
+from coordlang.language.sentences import sentence
 from coordlang.tasks.task_file import formula_text
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import BadInput, Position, Refuted

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coordlang.language.file import check_source, options_of, recorded_list
-from coordlang.language.words import Language, WordTable
+from coordlang.language.partition import Partition
+from coordlang.language.recorded import check_source, options_of, recorded_list
+from coordlang.language.words import Language
 from coordlang.tasks.candidates import Candidates
 from coordlang.tasks.task_file import ListedTask, ground_tasks
 from coordlang.use.sentence.fitting_plans import plans_with_sentence
@@ -31,7 +32,7 @@ class TaskLanguage:
     """
 
     language: Language
-    table: WordTable
+    partition: Partition
     space: PlanSpace
     task: int
     word: Ints
@@ -57,12 +58,12 @@ class TaskLanguage:
             raise BadInput(
                 "the sentence is empty", remedy="It begins with the word of the initial state."
             )
-        known = {word: number for number, word in enumerate(self.table.words)}
+        known = {word: number for number, word in enumerate(self.partition.words)}
         for place, word in enumerate(words, 1):
             if word not in known:
                 raise BadInput(
                     f"word {place} of the sentence, {word!r}, is no word of this language",
-                    remedy=f"Its words are {', '.join(self.table.words)}.",
+                    remedy=f"Its words are {', '.join(self.partition.words)}.",
                 )
             if place > 1 and words[place - 2] == word:
                 raise BadInput(
@@ -73,11 +74,11 @@ class TaskLanguage:
 
     def plans_with(self, words: Sequence[int]) -> PlanSpace:
         """The task's optimal plans with the sentence ``words``; see `plans_with_sentence`."""
-        return plans_with_sentence(self.space, self.word, self.task, words, self.table.words)
+        return plans_with_sentence(self.space, self.word, self.task, words, self.partition.words)
 
     def text(self, words: Sequence[int]) -> str:
         """A sentence as it is written."""
-        return " ".join(self.table.words[word] for word in words)
+        return " ".join(self.partition.words[word] for word in words)
 
 
 def language_in_task(
@@ -107,18 +108,20 @@ def language_in_task(
         )
         loaded = build(domain, [problem], options, inits=[*inits, extra])
     space = search(loaded.model, loaded.tasks[0])
-    table = WordTable.of(language, loaded.model)
+    partition = language.partition(loaded.model)
     covered = _covers(language, space, recorded)
-    return TaskLanguage(language, table, space, 0, table.of_rows(space.rows)[space.state], covered)
+    return TaskLanguage(
+        language, partition, space, 0, partition.word_of(space.rows)[space.state], covered
+    )
 
 
 def languages_in_tasks(language: Language, candidates: Candidates) -> Iterator[TaskLanguage]:
     """A language in each of its candidate tasks."""
-    table = WordTable.of(language, candidates.model)
+    partition = language.partition(candidates.model)
     for space in candidates.spaces:
-        word = table.of_rows(space.rows)[space.state]
+        word = partition.word_of(space.rows)[space.state]
         for task in range(len(space.starts)):
-            yield TaskLanguage(language, table, space, task, word, True)
+            yield TaskLanguage(language, partition, space, task, word, True)
 
 
 def _covers(
@@ -131,7 +134,7 @@ def _covers(
     """
     model = space.model
     row = space.rows[space.state[space.starts[0]]]
-    if language.tasks["kind"] == "all":
+    if language.provenance.tasks["kind"] == "all":
         ends = np.unique(space.state[space.layer == 0])
         return len(ends) == 1 and all(
             model.codec.key(state) in language.states for state in (row, space.rows[ends[0]])

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
@@ -36,7 +36,8 @@ from unified_planning.model import ProblemKind
 from unified_planning.model.problem_kind_versioning import LATEST_PROBLEM_KIND_VERSION
 from unified_planning.plans import PlanKind
 
-from coordlang.language.file import options_of, read_language
+from coordlang.language.file import read_language
+from coordlang.language.recorded import options_of
 from coordlang.language.words import Language
 from coordlang.use.sentence.fitting_plans import NoPlanFits
 from coordlang.use.sentence.plan_sentence import NotAPlan, NotOptimal, sentence_of_plan
@@ -268,13 +269,12 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         Texts are not compared, because the problem has none of its own.
         """
         assert self._language is not None
-        domain = {key: value for key, value in self._language.domain.items() if key != "sha256"}
-        model = {
-            k: v
-            for k, v in self._language.model.items()
-            if k not in ("problem_sha256", "world_sha256")
-        }
-        language = replace(self._language, domain=domain, model=model)
+        provenance = replace(
+            self._language.provenance,
+            domain=_without(self._language.provenance.domain, "sha256"),
+            model=_without(self._language.provenance.model, "problem_sha256", "world_sha256"),
+        )
+        language = replace(self._language, provenance=provenance)
         return language_in_task(language, found.domain, found.problem, self._options(found))
 
     def _options(self, found: Translated) -> ModelOptions:
@@ -386,3 +386,7 @@ def _ignored(**given: Any) -> None:
     for name, value in given.items():
         if value is not None:
             warn(f"coordlang ignores {name}", stacklevel=5)
+
+
+def _without(entries: Mapping[str, Any], *keys: str) -> dict[str, Any]:
+    return {key: value for key, value in entries.items() if key not in keys}

@@ -1,0 +1,82 @@
+"""Partitions of a joint model's states into words: what builders make and verifiers check."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from planners.tables import Ints, Rows, find_rows, unique_rows
+
+
+@dataclass(frozen=True, slots=True)
+class Partition:
+    """A partition ``f: states -> words`` of the states of a joint model (the paper, section 4).
+
+    Attributes
+    ----------
+    words
+        The names of the words; a word's number is its position here.
+    rows
+        The states that are listed, a sorted table (states, blocks).
+    word
+        The word number of each listed state.
+    default
+        The word number of every other state.
+    further
+        Number of a listed state -> numbers of its further words, where words overlap
+        (`coordlang.language.overlapping`).  Without them this is a partition.
+    """
+
+    words: tuple[str, ...]
+    rows: Rows
+    word: Ints
+    default: int
+    further: Mapping[int, frozenset[int]] = field(default_factory=dict)
+
+    @classmethod
+    def of_states(cls, rows: Rows, words: Mapping[int, int]) -> Partition:
+        """Name the words of an assignment ``state number in rows -> word number``.
+
+        Words are called ``w0, w1, ..`` in the order of their first state; the default is the word
+        with most states.
+        """
+        order: dict[int, int] = {}
+        states = sorted(words)
+        for state in states:
+            order.setdefault(words[state], len(order))
+        word = np.array([order[words[state]] for state in states], np.int64)
+        names = tuple(f"w{n}" for n in range(max(1, len(order))))
+        most = int(np.bincount(word, minlength=1).argmax())
+        return cls.of_table(names, rows[states], word, most)
+
+    @classmethod
+    def of_table(cls, words: Sequence[str], rows: Rows, word: Ints, default: int = 0) -> Partition:
+        """Give each of different states, in any order, its word number."""
+        table, number = unique_rows(rows)
+        sorted_word = np.zeros(len(table), np.int64)
+        sorted_word[number] = word
+        return cls(tuple(words), table, sorted_word, default)
+
+    def word_of(self, rows: Rows) -> Ints:
+        """Return the word number of each state of a table, without further words."""
+        if not len(self.rows):
+            return np.full(len(rows), self.default, np.int64)
+        found = find_rows(self.rows, rows)
+        return np.where(found >= 0, self.word[np.maximum(found, 0)], self.default)
+
+    def words_of(self, rows: Rows) -> list[frozenset[int]]:
+        """Return all words of each state of a table, further ones included."""
+        words = [frozenset((word,)) for word in self.word_of(rows).tolist()]
+        if self.further:
+            for state, number in enumerate(find_rows(self.rows, rows).tolist()):
+                words[state] |= self.further.get(number, frozenset())
+        return words
+
+    def enlarged(self, rows: Rows, words: Mapping[int, frozenset[int]]) -> Partition:
+        """Add further words: ``words[state]`` are all those of ``rows[state]``, a listed state."""
+        states = sorted(words)
+        number = find_rows(self.rows, rows[states]).tolist()
+        further = {n: words[s] - {int(self.word[n])} for s, n in zip(states, number, strict=True)}
+        return replace(self, further={n: more for n, more in sorted(further.items()) if more})

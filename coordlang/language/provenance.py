@@ -1,0 +1,94 @@
+"""Where a language comes from: the domain, model, tasks and method that its file records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from hashlib import sha256
+from typing import Any
+
+from coordlang.tasks.candidates import Candidates
+from coordlang.tasks.task_file import task_data
+from planners.joint.model import show
+from planners.pddl.lifted import Domain, Problem
+from planners.pddl.robots import static_atoms
+
+
+@dataclass(frozen=True, slots=True)
+class Guarantee:
+    """What is known of a language's number of words.
+
+    Attributes
+    ----------
+    method
+        How the language was made.
+    size
+        Its number of words.
+    lower_bound
+        A proved bound on the number of words of any partition that is a language for its tasks.
+    proved_minimal
+        Whether the size equals that bound.
+    """
+
+    method: str
+    size: int
+    lower_bound: int
+    proved_minimal: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Provenance:
+    """What a language file records besides the states and their words (docs/formats.md).
+
+    Attributes
+    ----------
+    robots
+        The robots, in the order of joint actions.
+    guarantee
+        What is known of the number of words; None where nothing is claimed.
+    domain, model, tasks, producer
+        The entries of these names in a language file.
+    """
+
+    robots: tuple[str, ...] = ()
+    guarantee: Guarantee | None = None
+    domain: Mapping[str, Any] = field(default_factory=dict)
+    model: Mapping[str, Any] = field(default_factory=dict)
+    tasks: Mapping[str, Any] = field(default_factory=dict)
+    producer: Mapping[str, Any] = field(default_factory=dict)
+
+
+def provenance_of(
+    candidates: Candidates, guarantee: Guarantee, producer: Mapping[str, Any]
+) -> Provenance:
+    """The provenance of a language built for candidate tasks."""
+    loaded = candidates.loaded
+    tasks: dict[str, Any] = {"kind": candidates.kind, "count": candidates.count}
+    if candidates.kind != "all":
+        tasks["tasks"] = task_data(candidates.listed)["tasks"]
+    keeps_idle = zip(loaded.model.robots, loaded.model.keeps_idle, strict=True)
+    return Provenance(
+        robots=loaded.model.robots,
+        guarantee=guarantee,
+        domain={"name": loaded.domain.name, "sha256": loaded.domain.source.sha256},
+        model={
+            "cost": loaded.options.cost,
+            "unowned": loaded.options.robots.unowned,
+            "remember_actions": loaded.options.remember_actions,
+            "idle": [robot for robot, keeps in keeps_idle if keeps],
+            "problem_sha256": loaded.problems[0].source.sha256,
+            "world_sha256": world_sha256(loaded.domain, loaded.problems[0]),
+        },
+        tasks=tasks,
+        producer=producer,
+    )
+
+
+def world_sha256(domain: Domain, problem: Problem) -> str:
+    """A hash of what the problems of one language share: objects, static facts, function values."""
+    lines = [
+        f"{name} - {' '.join(sorted(types))}" for name, types in sorted(problem.objects.items())
+    ]
+    lines += sorted(show(atom) for atom in static_atoms(domain, problem))
+    lines += sorted(f"{show(atom)} = {value!r}" for atom, value in problem.values.items())
+    return sha256("\n".join(lines).encode()).hexdigest()

@@ -1,0 +1,134 @@
+"""What follows from a language's provenance: model options, checks of the files, candidate tasks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from coordlang.language.provenance import world_sha256
+from coordlang.language.words import Language
+from coordlang.tasks.candidates import (
+    Candidates,
+    all_pairs,
+    from_listed,
+    from_problems,
+    from_recorded,
+)
+from coordlang.tasks.task_file import ListedTask
+from planners.errors import BadInput, Position, UsageError
+from planners.loading import ModelOptions
+from planners.pddl.lifted import Domain, Problem
+from planners.pddl.robots import ENVIRONMENT, RobotSelection
+
+
+def options_of(
+    language: Language,
+    *,
+    robots: Sequence[str] = (),
+    unowned: str | None = None,
+    cost: str | None = None,
+    remember_actions: bool | None = None,
+) -> ModelOptions:
+    """How the language's model is built.  Raises `UsageError` for a flag that contradicts the file."""
+    model: Mapping[str, Any] = language.provenance.model
+    recorded = {
+        "--cost": model.get("cost", "makespan"),
+        "--unowned": model.get("unowned", "error"),
+        "--remember-actions": model.get("remember_actions", False),
+    }
+    given = {"--cost": cost, "--unowned": unowned, "--remember-actions": remember_actions or None}
+    for flag, value in given.items():
+        if value is not None and value != recorded[flag]:
+            said = flag if value is True else f"{flag} {value}"
+            told = f"without {flag}" if recorded[flag] is False else f"with {flag} {recorded[flag]}"
+            raise UsageError(
+                f"{said} contradicts the language file, which was built {told}",
+                remedy=f"Leave out {flag}.",
+            )
+    own = tuple(
+        r
+        for r in language.provenance.robots or robots
+        if r != ENVIRONMENT or recorded["--unowned"] != "environment"
+    )
+    if robots and set(robots) != set(own):
+        raise UsageError(
+            f"--robots contradicts the language file: its robots are {', '.join(own)}",
+            remedy="Leave out --robots.",
+        )
+    idle = model.get("idle")
+    return ModelOptions(
+        RobotSelection(own, None, recorded["--unowned"]),
+        recorded["--cost"],
+        recorded["--remember-actions"],
+        tuple(idle) if idle is not None else None,
+    )
+
+
+def check_source(
+    language: Language, domain: Domain, problems: list[Problem], position: Position
+) -> None:
+    """Raise `BadInput` when domain or problem are not those that the language was built for."""
+    wanted = language.provenance.domain.get("sha256")
+    if wanted is not None and wanted != domain.source.sha256:
+        raise BadInput(
+            f"this language belongs to another domain ({language.provenance.domain.get('name')!r}): the text of "
+            f"{domain.source.name} has another hash",
+            position=position,
+            remedy="Give the domain file that the language was built from.",
+        )
+    world = language.provenance.model.get("world_sha256")
+    for problem in problems:
+        if world is not None and world != world_sha256(domain, problem):
+            raise BadInput(
+                f"{problem.source.name} has other objects or static facts than the language's problem",
+                position=position,
+                remedy="A language serves the problems of one world: same objects, same static facts.",
+            )
+
+
+def recorded_list(language: Language) -> list[ListedTask]:
+    """The candidate tasks that a language file lists; none under ``--tasks all``."""
+    return [
+        ListedTask(tuple(t["init"]), tuple(t["goal"]))
+        for t in language.provenance.tasks.get("tasks", [])
+    ]
+
+
+def recorded_candidates(
+    language: Language,
+    domain: Domain,
+    problems: list[Problem],
+    options: ModelOptions,
+    position: Position,
+) -> Candidates:
+    """The candidate tasks that a language file records; the problems' own ones if it records none."""
+    kind = language.provenance.tasks["kind"]
+    if kind == "problems" and not language.provenance.tasks["count"]:
+        return from_problems(domain, problems, options)
+    try:
+        if kind == "all":
+            candidates = all_pairs(domain, problems, options)
+            if candidates.count != language.provenance.tasks["count"]:
+                have = (
+                    f"{problems[0].source.name} has"
+                    if len(problems) == 1
+                    else f"these {len(problems)} problems have"
+                )
+                raise BadInput(
+                    f"the language records {language.provenance.tasks['count']:,} tasks, but {have} {candidates.count:,} pairs of "
+                    "reachable states",
+                    remedy="Give the problems that the language was built for, or say --tasks all to check these.",
+                )
+            return candidates
+        listed = recorded_list(language)
+        if not listed or len(listed) != language.provenance.tasks["count"]:
+            raise BadInput(
+                f"the language records {language.provenance.tasks['count']} tasks but lists {len(listed)}",
+                remedy="Say --tasks all or --tasks FILE.",
+            )
+        make = from_listed if kind == "file" else from_recorded
+        return make(domain, problems, listed, options, position)
+    except BadInput as error:
+        if error.position is not None:
+            raise
+        raise BadInput(error.what, position=position, remedy=error.remedy) from None
