@@ -1,4 +1,161 @@
 """Coordination languages.
 
 The fewest words that let robots plan on their own and still act together.
+
+The commands of the command line are functions here, with the options as keywords::
+
+    import coordlang
+
+    built = coordlang.build("domain.pddl", "problem.pddl", tasks="all", method="minimal")
+    built.language.save("language.json")
+    print(coordlang.verify("language.json", "domain.pddl", "problem.pddl").holds)
+
+A domain, problem, language, plan or task list is a path or a parsed object.  Names are imported
+when they are first used: ``import coordlang`` itself loads the standard library only.  See
+docs/library.md.
 """
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import os
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from coordlang.api.coordination_tasks import coordination as coordination
+    from coordlang.api.explaining import explain as explain
+    from coordlang.api.exporting import export as export
+    from coordlang.api.languages import build as build
+    from coordlang.api.languages import load_language as load_language
+    from coordlang.api.languages import verify as verify
+    from coordlang.api.planning import check as check
+    from coordlang.api.planning import inspect as inspect
+    from coordlang.api.planning import load as load
+    from coordlang.api.planning import plans as plans
+    from coordlang.api.robot_choices import choices as choices
+    from coordlang.api.speaking import plan as plan
+    from coordlang.api.speaking import say as say
+    from coordlang.api.speaking import understand as understand
+    from coordlang.language.words import Language as Language
+    from coordlang.required.miscoordination import Inseparable as Inseparable
+    from coordlang.use.choices.monitor import Monitor as Monitor
+    from coordlang.use.choices.monitor import MonitorError as MonitorError
+    from coordlang.use.choices.monitor import NotAllowed as NotAllowed
+    from coordlang.use.choices.monitor import NotPossible as NotPossible
+    from coordlang.use.sentence.fitting_plans import NoPlanFits as NoPlanFits
+    from coordlang.use.sentence.plan_sentence import NotAPlan as NotAPlan
+    from coordlang.use.sentence.plan_sentence import NotOptimal as NotOptimal
+    from planners.errors import BadInput as BadInput
+    from planners.errors import CoordlangError as CoordlangError
+    from planners.errors import OutOfMemory as OutOfMemory
+    from planners.errors import OutOfTime as OutOfTime
+    from planners.errors import ProvedImpossible as ProvedImpossible
+    from planners.errors import Refuted as Refuted
+    from planners.errors import Unsupported as Unsupported
+    from planners.errors import UsageError as UsageError
+    from planners.limits import time_limit as time_limit
+
+__version__ = "0.1.0"
+
+#: Module -> the public names that it defines.
+_DEFINED_IN = {
+    "coordlang.api.planning": ("load", "inspect", "plans", "check"),
+    "coordlang.api.coordination_tasks": ("coordination",),
+    "coordlang.api.languages": ("build", "verify", "load_language"),
+    "coordlang.api.speaking": ("say", "understand", "plan"),
+    "coordlang.api.robot_choices": ("choices",),
+    "coordlang.api.explaining": ("explain",),
+    "coordlang.api.exporting": ("export",),
+    "coordlang.language.words": ("Language",),
+    "coordlang.use.choices.monitor": ("Monitor", "MonitorError", "NotAllowed", "NotPossible"),
+    "coordlang.use.sentence.fitting_plans": ("NoPlanFits",),
+    "coordlang.use.sentence.plan_sentence": ("NotAPlan", "NotOptimal"),
+    "coordlang.required.miscoordination": ("Inseparable",),
+    "planners.errors": (
+        "CoordlangError",
+        "Refuted",
+        "UsageError",
+        "ProvedImpossible",
+        "OutOfMemory",
+        "OutOfTime",
+        "BadInput",
+        "Unsupported",
+    ),
+    "planners.limits": ("time_limit",),
+}
+_MODULE_OF = {name: module for module, names in _DEFINED_IN.items() for name in names}
+
+__all__ = [
+    "BadInput",
+    "CoordlangError",
+    "Inseparable",
+    "Language",
+    "Monitor",
+    "MonitorError",
+    "NoPlanFits",
+    "NotAPlan",
+    "NotAllowed",
+    "NotOptimal",
+    "NotPossible",
+    "OutOfMemory",
+    "OutOfTime",
+    "ProvedImpossible",
+    "Refuted",
+    "Unsupported",
+    "UsageError",
+    "__version__",
+    "build",
+    "check",
+    "choices",
+    "coordination",
+    "explain",
+    "export",
+    "inspect",
+    "load",
+    "load_language",
+    "plan",
+    "plans",
+    "say",
+    "time_limit",
+    "understand",
+    "verify",
+]
+
+
+def __getattr__(name: str) -> object:
+    module = _MODULE_OF.get(name)
+    if module is None:
+        raise AttributeError(f"module 'coordlang' has no attribute {name!r}")
+    value: object = getattr(importlib.import_module(module), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
+
+def _refuse_foreign_planners() -> None:
+    """Raise `ImportError` where another package named ``planners`` hides the one of coordlang."""
+    ours = os.path.join(os.path.dirname(os.path.dirname(os.path.realpath(__file__))), "planners")
+    found = importlib.util.find_spec("planners")
+    if found is None:
+        raise ImportError(
+            f"coordlang needs its package 'planners', and there is none at {ours}: "
+            "install coordlang again",
+            name="planners",
+        )
+    folders = found.submodule_search_locations
+    places = list(folders) if folders else [found.origin or "a module without a file"]
+    if os.path.realpath(places[0]) != ours:
+        raise ImportError(
+            f"coordlang needs its own package 'planners' ({ours}), but Python finds another one "
+            f"first: {os.path.abspath(places[0])}\n"
+            "  Rename that file or folder, or start Python from another directory.",
+            name="planners",
+            path=places[0],
+        )
+
+
+_refuse_foreign_planners()

@@ -44,6 +44,7 @@ ROOMS = (
     "coordlang/evaluation/experiments",
     "coordlang/evaluation/lab",
     "coordlang/evaluation/material",
+    "coordlang/api",
     "coordlang/cli",
 )
 

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import islice
+from os import PathLike, fspath
 from typing import NoReturn
 
 import numpy as np
@@ -18,7 +19,7 @@ from planners.joint.model import JointModel
 from planners.tables import Rows, find_rows
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Language:
     """A partition of states as text, and where it comes from.
 
@@ -73,6 +74,23 @@ class Language:
         """How many of the listed states each word holds."""
         counts = Counter(self.states.values())
         return {word: counts[word] for word in self.words}
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write a language file (gzip for ``.gz``); the file is complete or not there at all.
+
+        Raises `UsageError` where the path cannot be written.
+        """
+        from coordlang.language.file import write_language  # the file format builds on this module
+
+        write_language(self, fspath(path))
+
+    def __repr__(self) -> str:
+        """The words and the guarantee, not the states: there may be millions."""
+        g = self.guarantee
+        return (
+            f"Language(words={len(self.words)}, lower_bound={g.lower_bound}, method={g.method!r}, "
+            f"states={len(self.states)}, robots={self.provenance.robots})"
+        )
 
     def partition(self, model: JointModel) -> Partition:
         """Read the states' keys over a joint model.

@@ -1,0 +1,148 @@
+"""Which tasks require coordination: ``coordination``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Unpack
+
+from coordlang.api.inputs import DomainSource, File, ProblemSource, read_planning
+from coordlang.api.options import GivenOptions, ModelKeywords
+from coordlang.api.presenting import Presented, counted, html_table
+from coordlang.api.witness import witness_data, witness_text
+from coordlang.required.miscoordination import Miscoordination, miscoordination
+from coordlang.tasks.candidates import from_problems
+from planners.search.plan_file import json_count
+from planners.search.plans import counts
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class TaskCoordination(Presented):
+    """Whether one task requires coordination (RC); true iff it does.
+
+    ``witness`` has two optimal plans whose mixture is none, or is None.
+    """
+
+    problem: str
+    makespan: int
+    plans: int
+    witness: Miscoordination | None
+
+    @property
+    def required(self) -> bool:
+        """Whether some optimal plans of the task do not mix."""
+        return self.witness is not None
+
+    def __bool__(self) -> bool:
+        return self.required
+
+    def facts(self) -> Mapping[str, object]:
+        return {
+            "problem": self.problem,
+            "makespan": self.makespan,
+            "plans": self.plans,
+            "required": self.required,
+        }
+
+    def data(self) -> dict[str, Any]:
+        """Return the answer as JSON data."""
+        return {
+            "problem": self.problem,
+            "makespan": self.makespan,
+            "plans": json_count(self.plans),
+            "requires_coordination": self.required,
+            "miscoordination": witness_data(self.witness),
+        }
+
+    def __str__(self) -> str:
+        answer = "is required" if self.required else "is not required"
+        if not self.required and self.plans > 1:
+            answer += ": any mixture of them is optimal"
+        plans = f"{counted(self.plans, 'optimal plan')} of {counted(self.makespan, 'step')}"
+        line = f"{self.problem}: {plans}; coordination {answer}"
+        return f"{line}\n\n{witness_text(self.witness)}" if self.witness else line
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Coordination(Presented):
+    """The tasks of the problems, each with its answer; true iff some task requires coordination."""
+
+    robots: tuple[str, ...]
+    tasks: tuple[TaskCoordination, ...]
+
+    @property
+    def required(self) -> bool:
+        """Whether some task requires coordination."""
+        return any(self.tasks)
+
+    @property
+    def witness(self) -> Miscoordination | None:
+        """The first task's miscoordination that there is, or None."""
+        return next((task.witness for task in self.tasks if task.witness), None)
+
+    def __bool__(self) -> bool:
+        return self.required
+
+    def __iter__(self) -> Iterator[TaskCoordination]:
+        return iter(self.tasks)
+
+    def __len__(self) -> int:
+        return len(self.tasks)
+
+    def __getitem__(self, number: int) -> TaskCoordination:
+        return self.tasks[number]
+
+    def facts(self) -> Mapping[str, object]:
+        requiring = sum(task.required for task in self.tasks)
+        return {"tasks": len(self.tasks), "requiring": requiring}
+
+    def data(self) -> dict[str, Any]:
+        """Return the answers as JSON data."""
+        return {"tasks": [task.data() for task in self.tasks]}
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.tasks))
+
+    def _repr_html_(self) -> str:
+        head = ("problem", "makespan", "plans", "coordination")
+        rows = [
+            (t.problem, str(t.makespan), f"{t.plans:,}", "required" if t else "not required")
+            for t in self.tasks
+        ]
+        return html_table(head, rows)
+
+
+def coordination(
+    domain: DomainSource | None = None,
+    *problems: ProblemSource,
+    factored: File | None = None,
+    **model: Unpack[ModelKeywords],
+) -> Coordination:
+    """Decide which tasks require coordination, and show how robots then miscoordinate.
+
+    A task requires coordination (RC) if some mixture of its optimal plans is no optimal plan.
+
+    Parameters
+    ----------
+    domain, problems, factored, **model
+        As in `load`.
+
+    Raises
+    ------
+    ProvedImpossible
+        For a task without a plan.
+    """
+    files = read_planning(domain, problems, factored, GivenOptions.of(**model))
+    candidates = from_problems(files.domain, files.problems, files.given.options())
+    space = candidates.spaces[0]
+    numbers = counts(space)
+    tasks = tuple(
+        TaskCoordination(
+            problem.source.name,
+            space.cost_of(task)[0],
+            numbers[int(space.starts[task])],
+            miscoordination(space, task),
+        )
+        for task, problem in enumerate(files.problems)
+    )
+    return Coordination(candidates.model.robots, tasks)

@@ -1,0 +1,266 @@
+"""A language as a person reads it: ``explain``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Unpack
+
+from coordlang.api.inputs import DomainSource, LanguageSource, ProblemSource, read_task_language
+from coordlang.api.options import GivenOptions, ModelKeywords
+from coordlang.api.presenting import Presented, counted, html_table
+from coordlang.api.speaking import SentenceSource
+from coordlang.explanation.cover import Cover
+from coordlang.explanation.demands import SentenceDemands, sentence_demands
+from coordlang.explanation.descriptions import WordDescriptions, describe_words
+from coordlang.explanation.text import (
+    cover_data,
+    demands_data,
+    demands_text,
+    descriptions_text,
+    pddl_condition,
+    shown,
+)
+from coordlang.explanation.words import MappedStates, all_covers, mapped_states
+from coordlang.language.sentences import TaskSentence, task_sentences
+from coordlang.tasks.candidates import describe
+from coordlang.use.sentence.task_language import TaskLanguage
+from planners.errors import UsageError
+from planners.search.plan_file import json_count
+from planners.search.plans import Plans
+
+#: Sentences of a task that the text lists.
+SENTENCES_SHOWN = 10
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class WordsExplained(Presented):
+    """Each word as a short formula, exact in every state that the language maps."""
+
+    used: TaskLanguage
+    mapped: MappedStates
+    covers: Mapping[str, Cover]
+    descriptions: WordDescriptions
+
+    @property
+    def formulas(self) -> dict[str, str]:
+        """Word -> its formula as text, exact by itself."""
+        return {word: shown(cover) for word, cover in self.covers.items()}
+
+    @property
+    def pddl(self) -> dict[str, str]:
+        """Word -> its formula as a PDDL condition."""
+        return {word: pddl_condition(cover) for word, cover in self.covers.items()}
+
+    @property
+    def states(self) -> dict[str, int]:
+        """Word -> how many of the mapped states it holds."""
+        return dict(zip(self.mapped.words, self.mapped.states, strict=True))
+
+    def facts(self) -> Mapping[str, object]:
+        return self.formulas
+
+    def data(self) -> dict[str, Any]:
+        """Return words, variables and formulas as JSON data."""
+        variables = self.mapped.valuation.variables
+        return {
+            "words": self.states,
+            "default": self.used.language.default,
+            "variables": [{"name": v.name, "values": list(v.values)} for v in variables],
+            "formulas": {word: cover_data(cover) for word, cover in self.covers.items()},
+            "told": {
+                "in_order": self.descriptions.in_order,
+                "rules": [
+                    {"word": word, "text": shown(cover) if cover else None}
+                    for word, cover in self.descriptions.rules
+                ],
+            },
+        }
+
+    def __str__(self) -> str:
+        lines = [self._head()]
+        if self.descriptions.in_order:
+            lines.append("The first formula that is true in a state gives its word:")
+        lines.append(descriptions_text(self.descriptions, self.mapped))
+        default = self.used.language.default
+        if not self.mapped.word.size:
+            return "\n".join([*lines, f"No state is mapped: the word is always {default}."])
+        lines.append(
+            f"Exact in all {counted(sum(self.mapped.states), 'mapped state')}. No optimal plan of "
+            f"these tasks leaves them; elsewhere the word is {default}."
+        )
+        return "\n".join([*lines, *self._proof()])
+
+    def _head(self) -> str:
+        language = self.used.language
+        g = language.guarantee
+        proof = "proved minimal" if g.proved_minimal else f"at least {g.lower_bound} needed"
+        number = language.provenance.tasks["count"]
+        tasks = counted(number, "task") if number else "no recorded task"
+        words, robots = counted(len(language.words), "word"), ", ".join(self.used.model.robots)
+        return f"{words} ({g.method}, {proof}) for {tasks} of {robots}."
+
+    def _proof(self) -> list[str]:
+        """Return what is proved of the formulas' lengths, in at most one line."""
+        rules = self.descriptions.rules
+        long = [word for word, cover in rules if cover and not cover.fewest]
+        if long:
+            return [
+                f"Fewer terms may suffice for {', '.join(long)}; "
+                "for the others it is proved that they do not."
+            ]
+        if self.descriptions.length > 1:
+            return ["It is proved that no formula can do with fewer terms."]
+        return []
+
+
+@dataclass(frozen=True, repr=False)
+class Explanation(Presented):
+    """The words as formulas, and the sentences of one task, found when they are asked for.
+
+    ``only`` is the one sentence that was asked for (word numbers), or None; ``with_demands``:
+    whether the text and the data say what each sentence asks of each robot.
+    """
+
+    words: WordsExplained
+    only: tuple[int, ...] | None
+    with_demands: bool
+
+    @cached_property
+    def all_sentences(self) -> tuple[TaskSentence, ...]:
+        """All sentences of the task, those that leave most plans open first.
+
+        Raises `OutOfMemory` beyond 100,000 sentences.
+        """
+        used = self.words.used
+        return tuple(task_sentences(used.space, used.task, used.partition))
+
+    @property
+    def sentences(self) -> tuple[TaskSentence, ...]:
+        """The sentences that were asked for: one, or all."""
+        if self.only is None:
+            return self.all_sentences
+        wanted = tuple(self.words.used.partition.words[word] for word in self.only)
+        return tuple(s for s in self.all_sentences if s.words == wanted)
+
+    def demands(self, most: int | None = None) -> list[SentenceDemands]:
+        """Return what the (first) sentences ask of each robot."""
+        used = self.words.used
+        return [
+            sentence_demands(
+                used.plans_with(used.words_of(sentence.words)), used.partition, self.words.covers
+            )
+            for sentence in self.sentences[:most]
+        ]
+
+    @property
+    def formulas(self) -> dict[str, str]:
+        """Word -> its formula as text."""
+        return self.words.formulas
+
+    @property
+    def covered(self) -> bool:
+        """Whether the task is one that the language guarantees."""
+        return self.words.used.covered
+
+    def facts(self) -> Mapping[str, object]:
+        return {"formulas": self.formulas, "covered": self.covered}
+
+    def data(self) -> dict[str, Any]:
+        """Return words and sentences as JSON data."""
+        used = self.words.used
+        listed = [_sentence_data(sentence) for sentence in self.sentences]
+        for entry, asks in zip(listed, self.demands() if self.with_demands else (), strict=False):
+            entry |= demands_data(asks)
+        return {
+            **self.words.data(),
+            "task": describe(used.space, used.task),
+            "covered": used.covered,
+            "sentences": listed,
+        }
+
+    def __str__(self) -> str:
+        return f"{self.words}\n\n{self.task_text()}"
+
+    def _repr_html_(self) -> str:
+        states = self.words.states
+        rows = [(word, f"{states[word]:,}", text) for word, text in self.formulas.items()]
+        return html_table(("word", "states", "formula"), rows)
+
+    def task_text(self) -> str:
+        """Return the task's sentences as text, without the words."""
+        used = self.words.used
+        total = Plans.of(used.space, used.task).count
+        steps = int(used.space.layer[used.start])
+        lines = [
+            f"The task {describe(used.space, used.task)}",
+            f"has {counted(total, 'optimal plan')} of {counted(steps, 'step')} "
+            f"in {counted(len(self.all_sentences), 'sentence')}.",
+        ]
+        if self.with_demands and used.covered:
+            lines.append(
+                "Each robot may choose for itself: whatever the others choose, "
+                "it is an optimal plan."
+            )
+        if self.with_demands:
+            for asks in self.demands(SENTENCES_SHOWN):
+                lines += ["", demands_text(asks)]
+        else:
+            for sentence in self.sentences[:SENTENCES_SHOWN]:
+                plans = counted(sentence.plans, "plan")
+                lines.append(f'  "{" ".join(sentence.words)}" leaves {plans} open.')
+        more = len(self.sentences) - SENTENCES_SHOWN
+        if more > 0:
+            lines.append(f"  .. and {counted(more, 'more sentence')}")
+        return "\n".join(lines)
+
+
+def explain(
+    language: LanguageSource,
+    domain: DomainSource,
+    problem: ProblemSource | None = None,
+    *,
+    task: bool = False,
+    sentence: SentenceSource | None = None,
+    formula_per_word: bool = False,
+    **model: Unpack[ModelKeywords],
+) -> Explanation:
+    """Explain a language: each word as a short formula, and the sentences of a task.
+
+    Parameters
+    ----------
+    language, domain, problem, **model
+        As in `verify`, with one problem.
+    task
+        Whether it is found out what the sentences of the problem's task ask of each robot.
+    sentence
+        With ``task``: this sentence only.
+    formula_per_word
+        Whether every word is described by a formula of its own, also where less would do.
+
+    Raises
+    ------
+    OutOfMemory
+        If the task has more than 100,000 sentences.
+    NoPlanFits
+        If no optimal plan has the sentence.
+    """
+    if sentence is not None and not task:
+        raise UsageError("--sentence: only with --task", remedy="Add --task.")
+    used = read_task_language(language, domain, problem, GivenOptions.of(**model))
+    only = None if sentence is None else used.words_of(sentence)
+    if only is not None:
+        used.plans_with(only)
+    mapped = mapped_states(used.language, used.model)
+    covers = all_covers(mapped)
+    descriptions = describe_words(mapped, covers, formula_per_word)
+    return Explanation(WordsExplained(used, mapped, covers, descriptions), only, task)
+
+
+def _sentence_data(sentence: TaskSentence) -> dict[str, Any]:
+    return {
+        "sentence": " ".join(sentence.words),
+        "plans": json_count(sentence.plans),
+        "choices": [[list(own) for own in step] for step in sentence.choices],
+    }

@@ -1,0 +1,254 @@
+"""A task under a sentence for the programs of others: ``export``."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from os import fspath
+from pathlib import Path
+from typing import Any, Literal, Unpack, overload
+
+from coordlang.api.inputs import (
+    DomainSource,
+    File,
+    LanguageSource,
+    ProblemSource,
+    read_task_language,
+)
+from coordlang.api.optimal_plans import PlanSteps
+from coordlang.api.options import (
+    TARGETS,
+    GivenOptions,
+    ModelKeywords,
+    Target,
+    require_one_of,
+)
+from coordlang.api.presenting import Presented
+from coordlang.api.speaking import SentencePlans, SentenceSource
+from coordlang.language.file import write_atomically
+from coordlang.use.export.ltlf import SentenceFormula, export_ltlf
+from coordlang.use.export.pddl import PddlExport, export_pddl, plan_names
+from coordlang.use.sentence.open_plans import OpenPlans
+from planners.errors import BadInput, Position, Refuted, UsageError
+from planners.joint.model import JointModel
+from planners.search.plan_file import only_one_plan
+
+#: Beyond this many joint actions robots choose one after another in the exported PDDL.
+MAX_ACTIONS = 2000
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class ExportedTask(Presented):
+    """A task under a sentence as plain PDDL, whose optimal plans are exactly the plans that fit.
+
+    ``exported`` has its actions as data.
+    """
+
+    plans_found: OpenPlans
+    exported: PddlExport
+
+    @property
+    def domain(self) -> str:
+        """The text of the PDDL domain."""
+        return self.exported.domain
+
+    @property
+    def problem(self) -> str:
+        """The text of the PDDL problem."""
+        return self.exported.problem
+
+    @property
+    def cost(self) -> int:
+        """The total cost of its optimal plans."""
+        return self.exported.cost
+
+    @property
+    def form(self) -> str:
+        """How joint steps are written: ``explicit`` (one action each) or one robot after another."""
+        return self.exported.plain.form
+
+    @property
+    def actions(self) -> int:
+        """The number of actions."""
+        return len(self.exported.plain.actions)
+
+    @property
+    def terms(self) -> int:
+        """The number of terms that tell which word a state belongs to."""
+        return self.exported.terms
+
+    @property
+    def covered(self) -> bool:
+        """Whether the task is one that the language guarantees."""
+        return self.plans_found.task_language.covered
+
+    @property
+    def open_plans(self) -> SentencePlans:
+        """The plans that fit."""
+        return SentencePlans(self.plans_found)
+
+    def save(self, folder: File) -> None:
+        """Write ``domain.pddl`` and ``problem.pddl`` into a folder, which is made if it is missing.
+
+        Raises
+        ------
+        UsageError
+            If it cannot be written to.
+        """
+        path = fspath(folder)
+        try:
+            Path(path).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise UsageError(f"the folder {path} cannot be made: {error.strerror}") from None
+        for name, text in (("domain.pddl", self.domain), ("problem.pddl", self.problem)):
+            write_atomically(os.path.join(path, name), text.encode())
+
+    def translate_plan(self, actions: Sequence[str]) -> PlanSteps:
+        """Translate a plan of the exported problem, the names of its actions, into joint steps.
+
+        Raises
+        ------
+        BadInput
+            For an action that the exported problem does not have, or a plan that ends in a step.
+        Refuted
+            If it is no optimal plan of the exported problem.
+        """
+        numbers = self.exported.joint_plan(actions)
+        plan = tuple(self.exported.model.texts(step) for step in numbers)
+        if self.open_plans.rank(plan) is None:
+            raise Refuted(
+                "this is no optimal plan of the exported problem",
+                remedy="Ask the planner for an optimal plan: the one of least total-cost.",
+            )
+        return plan
+
+    def translate_text(self, text: str, name: str) -> PlanSteps:
+        """Translate the text of a plan file; ``name`` is what messages call it."""
+        position = Position(name)
+        only_one_plan(text, position)
+        try:
+            return self.translate_plan(plan_names(text))
+        except (BadInput, Refuted) as error:
+            error.position = error.position or position
+            raise
+
+    def facts(self) -> Mapping[str, object]:
+        return {"form": self.form, "actions": self.actions, "cost": self.cost}
+
+    def data(self) -> dict[str, Any]:
+        """Return the PDDL, and what each action stands for, as JSON data."""
+        model = self.exported.model
+        return {
+            "domain": self.domain,
+            "problem": self.problem,
+            "form": self.form,
+            "step_cost": self.exported.plain.step_cost,
+            "optimal_cost": self.cost,
+            "robots": list(model.robots),
+            "actions": {
+                name: {model.robots[r]: _label_text(model, r, label) for r, label in chosen}
+                for name, chosen in self.exported.choices.items()
+            },
+        }
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class ExportedFormula(Presented):
+    """A sentence as an LTLf formula over the states of a plan, the initial state first.
+
+    A plan satisfies ``formula`` exactly if it has the sentence; ``over_words`` is the same with
+    words as symbols, ``words`` has each word's formula, ``symbols`` says which atom each symbol
+    stands for.
+    """
+
+    formula: str
+    over_words: str
+    words: dict[str, str]
+    symbols: dict[str, str]
+    covered: bool
+
+    def facts(self) -> Mapping[str, object]:
+        return {"over_words": self.over_words, "symbols": len(self.symbols)}
+
+    def __str__(self) -> str:
+        return self.formula
+
+    def data(self) -> dict[str, Any]:
+        """Return the formulas as JSON data."""
+        return {
+            "formula": self.formula,
+            "over_words": self.over_words,
+            "words": self.words,
+            "symbols": self.symbols,
+        }
+
+
+@overload
+def export(
+    language: LanguageSource,
+    domain: DomainSource,
+    problem: ProblemSource | None,
+    sentence: SentenceSource,
+    *,
+    to: Literal["pddl"] = "pddl",
+    max_actions: int = MAX_ACTIONS,
+    **model: Unpack[ModelKeywords],
+) -> ExportedTask: ...
+
+
+@overload
+def export(
+    language: LanguageSource,
+    domain: DomainSource,
+    problem: ProblemSource | None,
+    sentence: SentenceSource,
+    *,
+    to: Literal["ltlf"],
+    max_actions: int = MAX_ACTIONS,
+    **model: Unpack[ModelKeywords],
+) -> ExportedFormula: ...
+
+
+def export(
+    language: LanguageSource,
+    domain: DomainSource,
+    problem: ProblemSource | None,
+    sentence: SentenceSource,
+    *,
+    to: Target = "pddl",
+    max_actions: int = MAX_ACTIONS,
+    **model: Unpack[ModelKeywords],
+) -> ExportedTask | ExportedFormula:
+    """Write a task under a sentence for other programs.
+
+    Parameters
+    ----------
+    language, domain, problem, **model
+        As in `verify`, with one problem.
+    sentence
+        ``"w1 w0"`` or ``("w1", "w0")``.
+    to
+        ``"pddl"``: a planning problem whose optimal plans are exactly the plans that fit.
+        ``"ltlf"``: a temporal formula over plans.
+    max_actions
+        Beyond this many joint actions robots choose one after another in the PDDL.
+
+    Raises
+    ------
+    NoPlanFits
+        If no optimal plan has the sentence.
+    """
+    require_one_of("--to", to, TARGETS)
+    used = read_task_language(language, domain, problem, GivenOptions.of(**model))
+    words = used.words_of(sentence)
+    if to == "pddl":
+        return ExportedTask(OpenPlans.of(used, words), export_pddl(used, words, max_actions))
+    found: SentenceFormula = export_ltlf(used, words)
+    return ExportedFormula(
+        found.formula, found.over_words, found.words, found.symbols, used.covered
+    )
+
+
+def _label_text(model: JointModel, robot: int, label: int) -> str | None:
+    return model.labels[robot][label] if label else None

@@ -1,0 +1,177 @@
+"""What the functions read: paths, or objects that were parsed before."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from os import PathLike, fspath
+from typing import Any
+
+from coordlang.api.options import GivenOptions
+from coordlang.language.file import read_language
+from coordlang.language.words import Language
+from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
+from coordlang.tasks.task_file import FORMAT, VERSION, ListedTask, read_task_file, tasks_from_data
+from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
+from planners.errors import Position, UsageError
+from planners.loading import ModelOptions, PlanningInstance, build
+from planners.pddl import read_domain, read_problem
+from planners.pddl.factored import read_factored
+from planners.pddl.lifted import Domain, Problem
+
+File = str | PathLike[str]
+#: A domain file, a parsed domain, or domain and problems together (`coordlang.load`).
+DomainSource = File | Domain | PlanningInstance
+ProblemSource = File | Problem
+LanguageSource = File | Language
+#: ``"all"``, a task file, its data, or tasks: each with ``init`` and ``goal``, lists of PDDL texts.
+TasksSource = File | Mapping[str, Any] | Sequence[ListedTask | Mapping[str, Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class PlanningInput:
+    """A domain, problems, and how they are to be understood."""
+
+    domain: Domain
+    problems: list[Problem]
+    given: GivenOptions
+    is_loaded: bool = False
+
+    def options_of(self, language: Language) -> ModelOptions:
+        """Return the options that a language records; `UsageError` where these contradict them."""
+        given = replace(self.given, robot_type=None) if self.is_loaded else self.given
+        return given.for_language(language)
+
+    def instance(self) -> PlanningInstance:
+        """Return the joint model and the tasks of the problems."""
+        return build(self.domain, self.problems, self.given.options())
+
+    def candidates(
+        self, tasks: TasksSource | None, options: ModelOptions, *, skip_unsolvable: bool = False
+    ) -> Candidates:
+        """Return the candidate tasks that ``tasks`` names; for None the problems' own."""
+        if tasks is None:
+            return from_problems(
+                self.domain, self.problems, options, skip_unsolvable=skip_unsolvable
+            )
+        if tasks == "all":
+            return all_pairs(self.domain, self.problems, options)
+        listed, position = read_tasks(tasks)
+        return from_listed(
+            self.domain, self.problems, listed, options, position, skip_unsolvable=skip_unsolvable
+        )
+
+
+def read_planning(
+    domain: DomainSource | None,
+    problems: Sequence[ProblemSource | None],
+    factored: File | None,
+    given: GivenOptions,
+    *,
+    most: int | None = None,
+) -> PlanningInput:
+    """Read domain and problems, or the files of ``factored`` in their place.
+
+    Parameters
+    ----------
+    domain, problems
+        Paths or parsed objects; None is not given.
+    factored
+        A folder of ``domain-ROBOT.pddl`` and ``problem-ROBOT.pddl`` files.
+    most
+        The greatest number of problems; None: any number.
+
+    Raises
+    ------
+    UsageError
+        For too few or too many of them.
+    """
+    found = [problem for problem in problems if problem is not None]
+    if factored is not None:
+        if domain is not None or found:
+            raise UsageError("--factored names all files", remedy="Leave out domain and problem.")
+        lifted, problem = read_factored(fspath(factored))
+        return PlanningInput(lifted, [problem], given)
+    if isinstance(domain, PlanningInstance):
+        return _from_instance(domain, found, given, most)
+    if domain is None or not found or (most is not None and len(found) > most):
+        wanted = "a problem" if most == 1 else "problems"
+        raise UsageError(f"expected a domain and {wanted}, or --factored without them")
+    lifted = domain if isinstance(domain, Domain) else read_domain(fspath(domain))
+    return PlanningInput(lifted, [_problem(p, lifted) for p in found], given)
+
+
+def read_instance(
+    domain: DomainSource | None,
+    problem: ProblemSource | None,
+    factored: File | None,
+    given: GivenOptions,
+) -> PlanningInstance:
+    """Read the joint model and the task of one problem."""
+    if isinstance(domain, PlanningInstance) and given == GivenOptions() and problem is None:
+        return domain
+    return read_planning(domain, [problem], factored, given, most=1).instance()
+
+
+def read_language_source(language: LanguageSource) -> tuple[Language, Position]:
+    """Read a language, with what messages call it."""
+    if isinstance(language, Language):
+        return language, Position("the language")
+    return read_language(fspath(language)), Position(str(language))
+
+
+def read_task_language(
+    language: LanguageSource,
+    domain: DomainSource,
+    problem: ProblemSource | None,
+    given: GivenOptions,
+) -> TaskLanguage:
+    """Read a language and put it into the task of a problem."""
+    read, position = read_language_source(language)
+    files = read_planning(domain, [problem], None, given, most=1)
+    return language_in_task(read, files.domain, files.problems[0], files.options_of(read), position)
+
+
+def read_tasks(tasks: TasksSource) -> tuple[tuple[ListedTask, ...], Position]:
+    """Read a task list, with what messages call it."""
+    if isinstance(tasks, str | PathLike):
+        return read_task_file(fspath(tasks)), Position(fspath(tasks))
+    position = Position("the tasks")
+    if isinstance(tasks, Mapping):
+        return tasks_from_data(dict(tasks), position), position
+    entries = [
+        {"init": list(task.init), "goal": list(task.goal)}
+        if isinstance(task, ListedTask)
+        else dict(task)
+        for task in tasks
+    ]
+    data = {"format": FORMAT, "version": VERSION, "tasks": entries}
+    return tasks_from_data(data, position), position
+
+
+def _from_instance(
+    loaded: PlanningInstance, problems: list[ProblemSource], given: GivenOptions, most: int | None
+) -> PlanningInput:
+    """Return the files of an instance, and the options that it was loaded with."""
+    if given != GivenOptions():
+        raise UsageError(
+            "the model options of a loaded domain are fixed",
+            remedy="Give them to coordlang.load.",
+        )
+    read = [_problem(p, loaded.domain) for p in problems] or list(loaded.problems)
+    if most is not None and len(read) > most:
+        raise UsageError(f"expected one problem, and {len(read)} are loaded")
+    options = loaded.options
+    chosen = options.robots
+    kept = GivenOptions(
+        chosen.names,
+        chosen.type,
+        chosen.unowned,
+        options.cost,
+        options.remember_actions,
+    )
+    return PlanningInput(loaded.domain, read, kept, is_loaded=True)
+
+
+def _problem(problem: ProblemSource, domain: Domain) -> Problem:
+    return problem if isinstance(problem, Problem) else read_problem(fspath(problem), domain)

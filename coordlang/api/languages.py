@@ -1,0 +1,381 @@
+"""Languages made, checked and read: ``build``, ``verify``, ``load_language``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from os import PathLike, fspath
+from time import perf_counter
+from typing import Any, Unpack
+
+import coordlang
+from coordlang.api.inputs import (
+    DomainSource,
+    File,
+    LanguageSource,
+    PlanningInput,
+    ProblemSource,
+    TasksSource,
+    read_language_source,
+    read_planning,
+)
+from coordlang.api.options import (
+    BUILD_PREFERENCES,
+    METHODS,
+    UNSOLVABLE,
+    BuildPreference,
+    GivenOptions,
+    Method,
+    ModelKeywords,
+    Unsolvable,
+    require_one_of,
+)
+from coordlang.api.presenting import Presented
+from coordlang.api.witness import witness_data
+from coordlang.building import Built, build_language, certificate_of
+from coordlang.certificate import Certificate, Checked, read_certificate
+from coordlang.certificate import check as check_certificate
+from coordlang.language.file import read_language
+from coordlang.language.provenance import Guarantee
+from coordlang.language.recorded import check_source, recorded_candidates
+from coordlang.language.words import Language
+from coordlang.required.miscoordination import Miscoordination
+from coordlang.tasks.candidates import Candidates
+from coordlang.verification.by_definition import Verdict
+from coordlang.verification.by_definition import verify as verify_partition
+from coordlang.verification.overlapping import verify_overlapping
+from planners.errors import ProvedImpossible, UsageError
+
+#: Called with what is being done, now and then.
+Progress = Callable[[str], None]
+
+#: Methods that prove that no language has fewer words.
+EXACT_METHODS = ("minimal", "exhaustive")
+
+
+def load_language(path: File) -> Language:
+    """Read a language file (docs/formats.md).
+
+    Raises
+    ------
+    BadInput
+        For a file that is missing, cut off, no language, or of another version.
+    """
+    return read_language(fspath(path))
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class BuiltLanguage(Presented):
+    """A verified language, and how it was made.
+
+    ``seconds`` are by phase.  ``stopped`` is the error that ended the method before its proof was
+    complete, or None: the language is a verified one all the same.
+    """
+
+    language: Language
+    candidates: Candidates
+    built: Built
+    seconds: Mapping[str, float]
+
+    @property
+    def guarantee(self) -> Guarantee:
+        """The number of words, and the proved lower bound on it."""
+        return self.language.guarantee
+
+    @property
+    def tasks(self) -> int:
+        """The number of candidate tasks."""
+        return self.candidates.count
+
+    @property
+    def skipped(self) -> tuple[str, ...]:
+        """Candidate tasks that were left out because they have no plan."""
+        return self.candidates.skipped
+
+    @property
+    def stopped(self) -> BaseException | None:
+        """What ended the method before its proof was complete, or None."""
+        return self.built.stopped
+
+    def certificate(self) -> Certificate:
+        """Return why fewer words do not suffice, for others to check; as long as that takes."""
+        return certificate_of(self.built)
+
+    def data(self) -> dict[str, Any]:
+        """Return the figures of the making as JSON data."""
+        first, guarantee = self.built.first_differences, self.guarantee
+        return {
+            "tasks": self.candidates.count,
+            "states": self.candidates.states,
+            "states_on_plans": self.built.states,
+            "tasks_requiring_coordination": first.requiring,
+            "divergences": len(first.divergences),
+            "words": guarantee.size,
+            "lower_bound": guarantee.lower_bound,
+            "method": guarantee.method,
+            "walk_nodes": first.nodes,
+            "walk_edges": first.edges,
+            "verify_nodes": self.built.verdict.nodes,
+            "verified": self.built.verdict.holds,
+            "proved_minimal": guarantee.proved_minimal,
+            **self.built.figures,
+            "seconds": {name: round(value, 3) for name, value in self.seconds.items()},
+        }
+
+    def facts(self) -> Mapping[str, object]:
+        return {
+            "words": self.guarantee.size,
+            "lower_bound": self.guarantee.lower_bound,
+            "method": self.guarantee.method,
+            "tasks": self.tasks,
+            "seconds": round(sum(self.seconds.values()), 3),
+        }
+
+
+def build(
+    domain: DomainSource | None = None,
+    *problems: ProblemSource,
+    factored: File | None = None,
+    tasks: TasksSource | None = None,
+    method: Method = "greedy",
+    alpha_only: bool = False,
+    prefer: BuildPreference | None = None,
+    overlap: bool = False,
+    unsolvable: Unsolvable = "fail",
+    seed: int = 0,
+    progress: Progress | None = None,
+    **model: Unpack[ModelKeywords],
+) -> BuiltLanguage:
+    """Build a coordination language for candidate tasks, and verify it by definition.
+
+    Parameters
+    ----------
+    domain, problems, factored, **model
+        As in `load`.
+    tasks
+        The candidate tasks: ``"all"`` (every ordered pair of different reachable states), a task
+        file, or its tasks as objects; None: the problems' own.
+    method
+        ``"greedy"``, ``"separating"``, ``"minimal"`` or ``"exhaustive"`` (docs/concepts.md).
+    alpha_only
+        With ``"separating"``: part plans where they differ first, never where they differ last.
+    prefer
+        ``"flexible"``: of the languages with the fewest words, one whose sentences leave many
+        plans open; with ``"minimal"`` or ``"exhaustive"``.
+    overlap
+        Whether states get further words while that leaves more plans open.
+    unsolvable
+        ``"fail"`` or ``"skip"``: what to do about candidate tasks without plans.
+    seed
+        Of the methods' random choices: same input, same seed, same language.
+    progress
+        Called with a line of text when a phase begins.
+
+    Raises
+    ------
+    Inseparable
+        If plans that do not mix pass through the same states; ``remember_actions`` helps.
+    ProvedImpossible
+        For a candidate task without a plan, unless such tasks are skipped.
+    OutOfTime, OutOfMemory
+        If a limit was hit before there was any verified language; later the language so far is
+        returned, with ``stopped`` set.
+    """
+    _check_build_options(method, alpha_only, prefer, unsolvable)
+    begin = perf_counter()
+    files = read_planning(domain, problems, factored, GivenOptions.of(**model))
+    candidates = _candidates(files, tasks, unsolvable)
+    seconds = {"space": perf_counter() - begin}
+    built = build_language(
+        candidates,
+        method,
+        seed=seed,
+        alpha_only=alpha_only,
+        prefer=prefer,
+        overlap=overlap,
+        progress=progress or _silent,
+    )
+    seconds |= built.seconds
+    producer = {
+        "program": "coordlang",
+        "version": coordlang.__version__,
+        "arguments": _arguments(tasks, method, alpha_only, prefer, overlap),
+        "seed": seed,
+        "solver": f"python-sat {version('python-sat')}",
+        "seconds": {name: round(value, 3) for name, value in seconds.items()},
+    }
+    provenance = replace(built.language.provenance, producer=producer)
+    language = replace(built.language, provenance=provenance)
+    return BuiltLanguage(language, candidates, built, seconds)
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Verification(Presented):
+    """Whether a language is a coordination language for its tasks; true iff it is.
+
+    ``witness`` has plans of one sentence that miscoordinate, or is None.  ``overlapping``: whether
+    states have further words.  ``certificate`` is the checked one, where one was given, and
+    ``claimed`` the lower bound that the language file claims.
+    """
+
+    holds: bool
+    words: int
+    tasks: int
+    nodes: int
+    witness: Miscoordination | None
+    overlapping: bool
+    certificate: Checked | None
+    claimed: int
+
+    def __bool__(self) -> bool:
+        return self.holds and self.proves_claim
+
+    @property
+    def lower_bound(self) -> int | None:
+        """The lower bound that the certificate proves, None without one."""
+        return self.certificate.lower_bound if self.certificate else None
+
+    @property
+    def proves_claim(self) -> bool:
+        """Whether the certificate, if any, proves the lower bound that the language claims."""
+        return self.certificate is None or self.certificate.lower_bound >= self.claimed
+
+    def data(self) -> dict[str, Any]:
+        """Return the answer as JSON data."""
+        return {
+            "holds": self.holds,
+            "tasks": self.tasks,
+            "words": self.words,
+            "nodes": self.nodes,
+            "miscoordination": witness_data(self.witness),
+            "lower_bound": self.lower_bound,
+            "reasons": self.certificate.reasons if self.certificate else None,
+        }
+
+    def facts(self) -> Mapping[str, object]:
+        found: dict[str, object] = {"holds": self.holds, "words": self.words, "tasks": self.tasks}
+        if self.certificate:
+            found["lower_bound"] = self.lower_bound
+        if self.witness:
+            found["sentence"] = " ".join(self.witness.sentence or ())
+            found["reason"] = self.witness.reason
+        return found
+
+
+def verify(
+    language: LanguageSource,
+    domain: DomainSource | None = None,
+    *problems: ProblemSource,
+    factored: File | None = None,
+    tasks: TasksSource | None = None,
+    certificate: File | Certificate | None = None,
+    progress: Progress | None = None,
+    **model: Unpack[ModelKeywords],
+) -> Verification:
+    """Check by definition that a language is a coordination language: all plans of one sentence mix
+    freely.
+
+    Parameters
+    ----------
+    language
+        A language file or a language.
+    domain, problems, factored, **model
+        As in `load`; they must be those that the language was built for.
+    tasks
+        As in `build`; None: the tasks that the language records.
+    certificate
+        Why fewer words do not suffice: a file of ``coordlang build --certificate``, checked too.
+    progress
+        Called with a line of text when a phase begins.
+
+    Raises
+    ------
+    BadInput
+        If the language belongs to another domain or world.
+    Refuted
+        If a reason of the certificate is none.
+    """
+    read, position = read_language_source(language)
+    proof = _certificate(certificate)
+    files = read_planning(domain, problems, factored, GivenOptions.of(**model))
+    check_source(read, files.domain, files.problems, position)
+    options = files.options_of(read)
+    if tasks is None:
+        candidates = recorded_candidates(read, files.domain, files.problems, options, position)
+    else:
+        candidates = files.candidates(tasks, options)
+    verdict = _verdict(read, candidates)
+    checked = None
+    if proof and verdict.holds:
+        checked = check_certificate(proof, candidates, progress or _silent)
+    return Verification(
+        verdict.holds,
+        len(read.words),
+        verdict.tasks,
+        verdict.nodes,
+        verdict.witness,
+        bool(read.also),
+        checked,
+        read.guarantee.lower_bound,
+    )
+
+
+def _verdict(language: Language, candidates: Candidates) -> Verdict:
+    partition = language.partition(candidates.model)
+    verdict = verify_partition(partition, candidates.spaces)
+    if not (language.also and verdict.holds):
+        return verdict
+    return verify_overlapping(partition, candidates.spaces)
+
+
+def _certificate(certificate: File | Certificate | None) -> Certificate | None:
+    if isinstance(certificate, str | PathLike):
+        return read_certificate(fspath(certificate))
+    return certificate
+
+
+def _check_build_options(
+    method: str, alpha_only: bool, prefer: str | None, unsolvable: str
+) -> None:
+    require_one_of("--method", method, METHODS)
+    require_one_of("--prefer", prefer, BUILD_PREFERENCES)
+    require_one_of("--unsolvable", unsolvable, UNSOLVABLE)
+    if alpha_only and method != "separating":
+        raise UsageError(
+            "--alpha-only belongs to --method separating", remedy="Leave out one of the two."
+        )
+    if prefer and method not in EXACT_METHODS:
+        raise UsageError(
+            f"--prefer {prefer} belongs to --method minimal or exhaustive",
+            remedy="Add one of these methods.",
+        )
+
+
+def _candidates(
+    files: PlanningInput, tasks: TasksSource | None, unsolvable: Unsolvable
+) -> Candidates:
+    try:
+        return files.candidates(tasks, files.given.options(), skip_unsolvable=unsolvable == "skip")
+    except ProvedImpossible as error:
+        if unsolvable == "fail":
+            advice = (error.remedy, "--unsolvable skip leaves out such tasks.")
+            error.remedy = "\n  ".join(filter(None, advice))
+        raise
+
+
+def _arguments(
+    tasks: TasksSource | None, method: str, alpha_only: bool, prefer: str | None, overlap: bool
+) -> list[str]:
+    """Return the keywords of a call as a language file records them."""
+    given: dict[str, object] = {"method": method}
+    if isinstance(tasks, str | PathLike):
+        given["tasks"] = fspath(tasks)
+    given |= {"alpha_only": alpha_only} if alpha_only else {}
+    given |= {"prefer": prefer} if prefer else {}
+    given |= {"overlap": overlap} if overlap else {}
+    return [f"{name}={value}" for name, value in given.items()]
+
+
+def _silent(_: str) -> None:
+    """Report nothing."""

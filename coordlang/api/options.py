@@ -1,0 +1,123 @@
+"""The options that functions and commands share: their values, and what contradicts what."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, TypedDict, get_args
+
+if TYPE_CHECKING:
+    from coordlang.language.words import Language
+    from planners.loading import ModelOptions
+
+Cost = Literal["makespan", "makespan+actions", "makespan+cost"]
+Unowned = Literal["error", "environment", "shared"]
+Method = Literal["greedy", "separating", "minimal", "exhaustive"]
+BuildPreference = Literal["flexible"]
+Unsolvable = Literal["fail", "skip"]
+HeuristicName = Literal["relaxed", "manhattan", "blind"]
+Target = Literal["pddl", "ltlf"]
+
+COSTS: tuple[str, ...] = get_args(Cost)
+UNOWNED: tuple[str, ...] = get_args(Unowned)
+METHODS: tuple[str, ...] = get_args(Method)
+BUILD_PREFERENCES: tuple[str, ...] = get_args(BuildPreference)
+UNSOLVABLE: tuple[str, ...] = get_args(Unsolvable)
+HEURISTICS: tuple[str, ...] = get_args(HeuristicName)
+TARGETS: tuple[str, ...] = get_args(Target)
+
+
+class ModelKeywords(TypedDict, total=False):
+    """How the PDDL files are understood (docs/cli.md, model options)."""
+
+    robots: str | Sequence[str] | None
+    robot_type: str | None
+    unowned: Unowned | None
+    cost: Cost | None
+    remember_actions: bool
+
+
+def require_one_of(option: str, value: str | None, known: Sequence[str]) -> None:
+    """Raise `UsageError` for a value that the option does not have; None is not given."""
+    from planners.errors import UsageError
+
+    if value is not None and value not in known:
+        last = f" or {known[-1]}" if len(known) > 1 else known[-1]
+        raise UsageError(
+            f"{option} {value}: there is no such value",
+            remedy=f"Say {', '.join(known[:-1])}{last}.",
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class GivenOptions:
+    """The model options as they were given; None (no robots, False) where they were not."""
+
+    robots: tuple[str, ...] = ()
+    robot_type: str | None = None
+    unowned: Unowned | None = None
+    cost: Cost | None = None
+    remember_actions: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        robots: str | Sequence[str] | None = None,
+        robot_type: str | None = None,
+        unowned: Unowned | None = None,
+        cost: Cost | None = None,
+        remember_actions: bool = False,
+    ) -> GivenOptions:
+        """Check them.
+
+        Raises
+        ------
+        UsageError
+            For a value that an option does not have, and for robots that are named in two ways.
+        """
+        from planners.errors import UsageError
+
+        require_one_of("--unowned", unowned, UNOWNED)
+        require_one_of("--cost", cost, COSTS)
+        names = robots.split(",") if isinstance(robots, str) else list(robots or ())
+        chosen = tuple(name.strip().lower() for name in names if name.strip())
+        if robots is not None and not chosen:
+            raise UsageError("--robots: expected names", remedy="As in --robots r1,r2.")
+        if chosen and robot_type:
+            raise UsageError(
+                "--robots and --robot-type both say who the robots are", remedy="Give one of them."
+            )
+        kind = robot_type.lower() if robot_type else None
+        return cls(chosen, kind, unowned, cost, bool(remember_actions))
+
+    def options(self) -> ModelOptions:
+        """Return the options of a model that no language file describes."""
+        from planners.loading import ModelOptions
+        from planners.pddl.robots import RobotSelection
+
+        selection = RobotSelection(self.robots, self.robot_type, self.unowned or "error")
+        return ModelOptions(selection, self.cost or "makespan", self.remember_actions)
+
+    def for_language(self, language: Language) -> ModelOptions:
+        """Return the options that the language records.
+
+        Raises
+        ------
+        UsageError
+            For a given option that contradicts them.
+        """
+        from coordlang.language.recorded import options_of
+        from planners.errors import UsageError
+
+        if self.robot_type:
+            raise UsageError(
+                "--robot-type: a language file names its robots already",
+                remedy="Leave out --robot-type.",
+            )
+        return options_of(
+            language,
+            robots=self.robots,
+            unowned=self.unowned,
+            cost=self.cost,
+            remember_actions=self.remember_actions,
+        )

@@ -1,0 +1,258 @@
+"""Plans of a task, without any words: ``load``, ``inspect``, ``plans``, ``check``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Unpack
+
+from coordlang.api.inputs import (
+    DomainSource,
+    File,
+    ProblemSource,
+    read_instance,
+    read_planning,
+)
+from coordlang.api.optimal_plans import OptimalPlans
+from coordlang.api.options import GivenOptions, ModelKeywords
+from coordlang.api.presenting import Presented, counted, html_table
+from planners.classical.fast_downward import optimal_cost
+from planners.errors import ProvedImpossible
+from planners.inspection import Inspection
+from planners.inspection import inspect as inspect_instance
+from planners.loading import PlanningInstance
+from planners.search.optimal_plans import search
+from planners.search.plans import Plans
+from planners.search.reachable import count as count_reachable
+
+
+def load(
+    domain: DomainSource | None = None,
+    *problems: ProblemSource,
+    factored: File | None = None,
+    **model: Unpack[ModelKeywords],
+) -> PlanningInstance:
+    """Read a domain and problems, and build their joint model.
+
+    The result stands for the domain and its problems in every other function, which then read and
+    ground nothing again where they can help it.
+
+    Parameters
+    ----------
+    domain, problems
+        PDDL files or parsed objects; problems of one model have the same objects and static facts.
+    factored
+        A folder of factored MA-PDDL files in their place.
+    **model
+        ``robots``, ``robot_type``, ``unowned``, ``cost``, ``remember_actions`` (docs/cli.md).
+
+    Raises
+    ------
+    BadInput, Unsupported
+        With file, line and column.
+    UsageError
+        For options that contradict each other or the files.
+    """
+    return read_planning(domain, problems, factored, GivenOptions.of(**model)).instance()
+
+
+@dataclass(frozen=True, slots=True)
+class ReachableSize:
+    """How large the joint model is: reachable states, and applicable joint steps in them."""
+
+    states: int
+    joint_steps: int
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Inspected(Presented):
+    """What was understood of a domain and problem; ``print`` shows it as `coordlang inspect`.
+
+    ``reachable`` is None where it was not counted.
+    """
+
+    inspection: Inspection
+    reachable: ReachableSize | None = None
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The robots, in the order of joint steps."""
+        return self.inspection.robots
+
+    def data(self) -> dict[str, Any]:
+        """Return everything as JSON data."""
+        return asdict(self.inspection) | (asdict(self.reachable) if self.reachable else {})
+
+    def facts(self) -> Mapping[str, object]:
+        found = self.inspection
+        return {"domain": found.domain, "problem": found.problem, "robots": found.robots}
+
+    def __str__(self) -> str:
+        return "\n".join(f"{name:<14}  {text}" for name, text in self._lines())
+
+    def _repr_html_(self) -> str:
+        return html_table((), self._lines())
+
+    def _lines(self) -> list[tuple[str, str]]:
+        found = self.inspection
+        none_named = {"error": "not allowed (--unowned)"}
+        lines = [
+            ("domain", f"{found.domain}, problem {found.problem}"),
+            ("read as", found.style),
+            ("objects", _counts(found.objects) or "none"),
+            ("robots", f"{', '.join(found.robots)} (by {found.robots_by})"),
+            *(self._subactions(robot) for robot in found.subactions),
+            ("shared", _counts(found.shared) or "none"),
+            ("no robot named", none_named.get(found.unowned, f"--unowned {found.unowned}")),
+            ("step formulas", _counts(found.step_formulas) or "none"),
+            *(("", f"e.g. {example}") for example in found.formulas),
+            ("never possible", ", ".join(found.impossible) or "none"),
+            ("no effects", ", ".join(found.without_effects) or "none"),
+            ("action costs", found.costs),
+            ("interference", counted(found.interfering, "pair") + self._example()),
+            ("fluents", self._fluents()),
+            ("at the start", _counts(found.start) or "none is true"),
+            ("statics", _counts(found.statics) or "none"),
+            ("never true", ", ".join(found.never) or "none"),
+            ("goal", found.goal),
+        ]
+        if self.reachable:
+            states = counted(self.reachable.states, "joint state")
+            steps = counted(self.reachable.joint_steps, "joint step")
+            lines.append(("reachable", f"{states}, {steps}"))
+        return lines
+
+    def _subactions(self, robot: str) -> tuple[str, str]:
+        schemas = self.inspection.subactions[robot]
+        listed = f": {_counts(schemas)}" if schemas else ""
+        number = counted(sum(schemas.values()), "subaction")
+        return f"  {robot}", f"{number}{listed}; {self.inspection.idle[robot]}"
+
+    def _fluents(self) -> str:
+        found = self.inspection
+        if not found.facts:
+            return "none"
+        return f"{counted(found.facts, 'fact')}: {_counts(found.fluents)}"
+
+    def _example(self) -> str:
+        found = self.inspection
+        if found.example:
+            return f", e.g. {found.example}"
+        return ", none of them possible in one state near the start" if found.interfering else ""
+
+
+def inspect(
+    domain: DomainSource | None = None,
+    problem: ProblemSource | None = None,
+    *,
+    factored: File | None = None,
+    states: bool = False,
+    **model: Unpack[ModelKeywords],
+) -> Inspected:
+    """Show what was understood of a domain and problem.
+
+    Parameters
+    ----------
+    domain, problem, factored, **model
+        As in `load`.
+    states
+        Whether the reachable joint states and steps are counted as well.
+    """
+    loaded = read_instance(domain, problem, factored, GivenOptions.of(**model))
+    size = None
+    if states:
+        size = ReachableSize(*count_reachable(loaded.model, loaded.tasks[0].init[None, :]))
+    return Inspected(inspect_instance(loaded), size)
+
+
+def plans(
+    domain: DomainSource | None = None,
+    problem: ProblemSource | None = None,
+    *,
+    factored: File | None = None,
+    **model: Unpack[ModelKeywords],
+) -> OptimalPlans:
+    """Find all optimal plans of a task.
+
+    Parameters
+    ----------
+    domain, problem, factored, **model
+        As in `load`.
+
+    Raises
+    ------
+    ProvedImpossible
+        If there is no plan.
+    OutOfMemory
+        Before the reachable part of the joint model uses up the memory.
+    """
+    loaded = read_instance(domain, problem, factored, GivenOptions.of(**model))
+    return OptimalPlans(Plans.of(search(loaded.model, loaded.tasks[0])))
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class CrossCheck(Presented):
+    """Our optimal cost beside Fast Downward's; true iff they agree.
+
+    A cost is (makespan, second component), None where it is proved that there is no plan.  ``form``
+    is how the joint model was written as plain PDDL, with so many ``actions``.
+    """
+
+    cost: tuple[int, int] | None
+    fast_downward: tuple[int, int] | None
+    form: str
+    actions: int
+
+    @property
+    def agree(self) -> bool:
+        """Whether the costs are equal."""
+        return self.cost == self.fast_downward
+
+    def __bool__(self) -> bool:
+        return self.agree
+
+    def data(self) -> dict[str, Any]:
+        """Return the comparison as JSON data."""
+        return {
+            "coordlang": self.cost,
+            "fast_downward": self.fast_downward,
+            "agree": self.agree,
+            "form": self.form,
+            "actions": self.actions,
+        }
+
+    def facts(self) -> Mapping[str, object]:
+        return {"agree": self.agree, "cost": self.cost, "fast_downward": self.fast_downward}
+
+
+def check(
+    domain: DomainSource | None = None,
+    problem: ProblemSource | None = None,
+    *,
+    factored: File | None = None,
+    **model: Unpack[ModelKeywords],
+) -> CrossCheck:
+    """Compare our optimal cost with Fast Downward's (through unified-planning).
+
+    Parameters
+    ----------
+    domain, problem, factored, **model
+        As in `load`.
+
+    Raises
+    ------
+    CoordlangError
+        If Fast Downward gives no answer.
+    """
+    loaded = read_instance(domain, problem, factored, GivenOptions.of(**model))
+    task = loaded.tasks[0]
+    try:
+        ours: tuple[int, int] | None = search(loaded.model, task).cost_of(0)
+    except ProvedImpossible:
+        ours = None
+    answer = optimal_cost(loaded.model, task)
+    return CrossCheck(ours, answer.cost, answer.form, answer.actions)
+
+
+def _counts(counts: dict[str, int]) -> str:
+    return ", ".join(f"{name} {number:,}" for name, number in counts.items())

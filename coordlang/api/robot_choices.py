@@ -1,0 +1,164 @@
+"""What each robot may do under a sentence: ``choices``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import prod
+from os import fspath
+from typing import Any, Unpack
+
+from coordlang.api.inputs import (
+    DomainSource,
+    File,
+    LanguageSource,
+    ProblemSource,
+    read_task_language,
+)
+from coordlang.api.options import GivenOptions, ModelKeywords
+from coordlang.api.presenting import Presented, html_table
+from coordlang.api.speaking import SentenceSource
+from coordlang.language.file import write_atomically
+from coordlang.required.miscoordination import Miscoordination
+from coordlang.use.choices.choices import MOST, Choices
+from coordlang.use.choices.choices import choices as choices_under
+from coordlang.use.choices.dot import to_dot
+from coordlang.use.choices.file import monitor, to_bytes, to_data
+from coordlang.use.choices.monitor import Monitor
+from planners.errors import UsageError
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class RobotsChoices(Presented):
+    """The subplans that each robot may follow under a sentence, whatever the others choose.
+
+    ``chosen`` are the numbers of the robots that are shown and saved.
+    """
+
+    found: Choices
+    chosen: tuple[int, ...]
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The robots that are shown and saved."""
+        names = self.found.task_language.model.robots
+        return tuple(names[number] for number in self.chosen)
+
+    @property
+    def sentence(self) -> str:
+        """The sentence."""
+        return self.found.task_language.text(self.found.words)
+
+    @property
+    def covered(self) -> bool:
+        """Whether the task is one that the language guarantees."""
+        return self.found.task_language.covered
+
+    @property
+    def guaranteed(self) -> bool:
+        """Whether every combination of choices is an optimal plan."""
+        return self.found.guaranteed
+
+    @property
+    def witness(self) -> Miscoordination | None:
+        """A combination that is no optimal plan, or None."""
+        return self.found.mixtures.violation if self.found.mixtures else None
+
+    @property
+    def subplans(self) -> dict[str, int]:
+        """Robot -> the exact number of its subplans."""
+        counts = (self.found.robots[number].automaton.count for number in self.chosen)
+        return dict(zip(self.robots, counts, strict=True))
+
+    @property
+    def combinations(self) -> int:
+        """The exact number of combinations of one subplan of every robot."""
+        return prod(own.automaton.count for own in self.found.robots)
+
+    def monitor(self, robot: str) -> Monitor:
+        """Return a run-time monitor of one robot.
+
+        Raises
+        ------
+        UsageError
+            For a robot that there is none of.
+        """
+        (number,) = _numbers(self.found.task_language.model.robots, robot)
+        return monitor(self.found, self.found.task_language.model.robots[number])
+
+    def data(self) -> dict[str, Any]:
+        """Return the data of a choices file (docs/formats.md)."""
+        return to_data(self.found, self.chosen)
+
+    def text(self) -> str:
+        """Return the text of a choices file."""
+        return to_bytes(self.found, self.chosen).decode()
+
+    def save(self, path: File) -> None:
+        """Write a choices file, for `Monitor.read` on the robot; complete or not at all."""
+        write_atomically(fspath(path), to_bytes(self.found, self.chosen))
+
+    def dot(self) -> str:
+        """Return the automata in the language of Graphviz."""
+        return to_dot(self.found, self.chosen)
+
+    def facts(self) -> Mapping[str, object]:
+        return {
+            "sentence": self.sentence,
+            "subplans": self.subplans,
+            "guaranteed": self.guaranteed,
+            "covered": self.covered,
+        }
+
+    def _repr_html_(self) -> str:
+        rows = [(robot, f"{number:,}") for robot, number in self.subplans.items()]
+        return html_table(("robot", "subplans"), rows, f'under "{self.sentence}"')
+
+
+def choices(
+    language: LanguageSource,
+    domain: DomainSource,
+    problem: ProblemSource | None,
+    sentence: SentenceSource,
+    *,
+    robot: str | Sequence[str] = (),
+    check: bool = False,
+    **model: Unpack[ModelKeywords],
+) -> RobotsChoices:
+    """Find the subplans that each robot may follow under a sentence, whatever the others choose.
+
+    Parameters
+    ----------
+    language, domain, problem, **model
+        As in `verify`, with one problem.
+    sentence
+        ``"w1 w0"`` or ``("w1", "w0")``.
+    robot
+        Whose choices are shown and saved; none named: all robots'.
+    check
+        Whether every combination of all robots' choices is walked, however many there are.
+
+    Raises
+    ------
+    NoPlanFits
+        If no optimal plan has the sentence.
+    UsageError
+        For a robot that there is none of.
+    OutOfMemory
+        If the automata, or with ``check`` the combinations, do not fit into the memory.
+    """
+    used = read_task_language(language, domain, problem, GivenOptions.of(**model))
+    chosen = _numbers(used.model.robots, robot) or tuple(range(len(used.model.robots)))
+    found = choices_under(used, used.words_of(sentence), most=None if check else MOST)
+    return RobotsChoices(found, chosen)
+
+
+def _numbers(known: tuple[str, ...], whose: str | Sequence[str]) -> tuple[int, ...]:
+    names = [whose] if isinstance(whose, str) else list(whose)
+    for name in names:
+        if name.lower() not in known:
+            raise UsageError(
+                f"--robot {name}: there is no such robot",
+                remedy=f"The robots are {', '.join(known)}.",
+            )
+    return tuple(dict.fromkeys(known.index(name.lower()) for name in names))
