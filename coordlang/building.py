@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Literal
@@ -14,16 +14,17 @@ from coordlang.language.warping import Clause
 from coordlang.language.words import Language
 from coordlang.required.composition_walk import walk
 from coordlang.required.divergences import FirstDifferences, first_differences, states_on_plans
-from coordlang.required.miscoordination import Inseparable, inseparable
+from coordlang.required.miscoordination import require_separable
 from coordlang.tasks.candidates import Candidates, require_solvable
 from coordlang.verification.by_definition import Verdict, verify
 from coordlang.verification.overlapping import verify_overlapping
-from coordlang.vocabulary import METHODS, Job, Outcome, greedy
+from coordlang.vocabulary import EXACT, METHODS, Job, Outcome, greedy
 from coordlang.vocabulary.enlarging import enlarge
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Assignment, Evidence
 from coordlang.vocabulary.minimal import refute
-from planners.limits import STOPPING, stop_clock
+from planners.errors import UsageError
+from planners.limits import run_until_stopped
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +47,57 @@ class Built:
     evidence: Mapping[Clause, Evidence]
 
 
+@dataclass(frozen=True, slots=True)
+class BuildOptions:
+    """How a language is built.
+
+    Attributes
+    ----------
+    method
+        The way to a partition, a key of `coordlang.vocabulary.METHODS`.
+    seed
+        Seed of all random choices.
+    alpha_only
+        For the method "separating": separate plans where they part, never where they meet.
+    prefer
+        "flexible": of the languages with as many words as the method finds, one whose sentences
+        leave many plans open; for the exact methods, "minimal" and "exhaustive".
+    overlap
+        Then give states further words as long as that leaves more plans open
+        (`coordlang.language.overlapping`).
+
+    Raises
+    ------
+    UsageError
+        For a value that there is not, or one that the method does not support.
+    """
+
+    method: str = "greedy"
+    seed: int = 0
+    alpha_only: bool = False
+    prefer: Literal["flexible"] | None = None
+    overlap: bool = False
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise UsageError(
+                f"there is no method {self.method!r}", remedy=f"Methods are {', '.join(METHODS)}."
+            )
+        if self.alpha_only and self.method != "separating":
+            raise UsageError("--alpha-only belongs to --method separating")
+        if self.prefer not in (None, "flexible"):
+            raise UsageError(
+                f"there is no preference {self.prefer!r}", remedy="--prefer takes flexible."
+            )
+        if self.prefer and not self.is_exact:
+            raise UsageError(f"--prefer {self.prefer} belongs to --method minimal or exhaustive")
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the method finds the least number of words."""
+        return self.method in EXACT
+
+
 def build_language(
     candidates: Candidates,
     method: str = "greedy",
@@ -58,82 +110,118 @@ def build_language(
 ) -> Built:
     """Build a coordination language for candidate tasks and verify it by definition.
 
-    ``alpha_only`` is for the method "separating": plans are separated where they part, never where
-    they meet.  ``prefer`` "flexible": of the languages with as many words as the method finds, one
-    whose sentences leave many plans open. ``overlap``: then give states further words as long as
-    that leaves more plans open (`coordlang.language.overlapping`).
+    Parameters
+    ----------
+    candidates
+        The tasks that it must serve.
+    method, seed, alpha_only, prefer, overlap
+        See `BuildOptions`.
+    progress
+        Called with a line of text now and then.
 
-    Raises `Inseparable` (with the two plans) when there is none, `OutOfMemory` before the memory
-    budget is used up.
+    Raises
+    ------
+    Inseparable
+        There is no language over states; the error has two plans that show it.
+    ProvedImpossible
+        There is no candidate task.
+    OutOfMemory
+        Before the memory limit is reached, where there is no language yet to return.
+    UsageError
+        The options contradict each other.
     """
+    options = BuildOptions(method, seed, alpha_only, prefer, overlap)
     require_solvable(candidates)
     clock = _Clock()
     progress("looking for inseparable plans")
-    for space in candidates.spaces:
-        witness = inseparable(space)
-        if witness is not None:
-            raise Inseparable(witness)
+    require_separable(candidates.spaces)
     progress("walking pairs of plans")
-    found = first_differences(candidates.spaces)
+    differences = first_differences(candidates.spaces)
     clock.note("coordination")
-    checked: list[_Checked] = []
-
-    def check(assignment: Assignment) -> None:
-        checked.append(_verified(candidates, assignment))
-
     states = tuple(states_on_plans(candidates.spaces).tolist())
-    job = Job(candidates, states, found, None, seed, alpha_only, progress, check)
+    verified: list[_Verified] = []
+    job = Job(
+        candidates,
+        states,
+        differences,
+        seed=seed,
+        alpha_only=alpha_only,
+        progress=progress,
+        check=lambda assignment: verified.append(_verified(candidates, assignment)),
+    )
     if method != "greedy":
-        # What is left when an anytime method is stopped; verified now, because there is no time
-        # then.
-        first = greedy(job).partition
-        check(first)
-        job = replace(job, incumbent=first)
+        job = _with_incumbent(job)
         clock.note("incumbent")
     progress(f"building words ({method})")
-    try:
-        outcome = METHODS[method](job)
-        clock.note("vocabulary")
-        if prefer == "flexible" and outcome.stopped is None:
-            outcome = flexible(job, outcome)
-            clock.note("flexible")
-        if not any(known.assignment is outcome.partition for known in checked):
-            progress("verifying by definition")
-            check(outcome.partition)
-    except STOPPING as error:
-        stop_clock()
-        if not checked:
-            raise
-        outcome = Outcome(checked[-1].assignment, job.lower_bound, {}, error.with_traceback(None))
-    best = next(known for known in checked if known.assignment is outcome.partition)
+    outcome = _outcome(job, options, verified, clock)
+    best = next(known for known in verified if known.assignment is outcome.partition)
     clock.note("verify")
     partition = best.partition
     if overlap and outcome.stopped is None:
         progress("enlarging words")
-        try:
-            partition, outcome = _overlapping(candidates, partition, outcome)
-        except STOPPING as error:
-            stop_clock()  # the words as they were are a verified language
-            outcome = replace(outcome, stopped=error.with_traceback(None))
+        partition, outcome = _overlapping(candidates, partition, outcome)
         clock.note("overlap")
     size = len(partition.words)
     guarantee = Guarantee(method, size, outcome.lower_bound, size == outcome.lower_bound)
     provenance = provenance_of(candidates, guarantee, {"program": "coordlang"})
-    language = Language.of(partition, candidates.model, provenance)
     return Built(
-        language,
-        found,
-        len(job.states),
-        best.verdict,
-        outcome.figures,
-        clock.seconds,
-        outcome.stopped,
-        job,
-        outcome.evidence,
+        language=Language.of(partition, candidates.model, provenance),
+        first_differences=differences,
+        states=len(states),
+        verdict=best.verdict,
+        figures=outcome.figures,
+        seconds=clock.seconds,
+        stopped=outcome.stopped,
+        job=job,
+        evidence=outcome.evidence,
     )
 
 
+def _with_incumbent(job: Job) -> Job:
+    """Verify a greedy partition, which is what is left when an anytime method is stopped.
+
+    It is verified now because there is no time then.
+    """
+    first = greedy(job).partition
+    job.check(first)
+    return replace(job, incumbent=first)
+
+
+def _outcome(
+    job: Job, options: BuildOptions, verified: Sequence[_Verified], clock: _Clock
+) -> Outcome:
+    """What the method finds; if it is stopped early, the last partition that was verified."""
+    found: list[Outcome] = []
+
+    def run() -> None:
+        outcome = METHODS[options.method](job)
+        clock.note("vocabulary")
+        if options.prefer == "flexible" and outcome.stopped is None:
+            outcome = flexible(job, outcome)
+            clock.note("flexible")
+        if not any(known.assignment is outcome.partition for known in verified):
+            job.progress("verifying by definition")
+            job.check(outcome.partition)
+        found.append(outcome)
+
+    stopped = run_until_stopped(run)
+    if stopped is None:
+        return found[0]
+    if not verified:
+        raise stopped
+    return Outcome(verified[-1].assignment, job.lower_bound, stopped=stopped)
+
+
 def _overlapping(
+    candidates: Candidates, partition: Partition, outcome: Outcome
+) -> tuple[Partition, Outcome]:
+    """Add further words of states; if that is stopped early, the words stay as they are."""
+    found: list[tuple[Partition, Outcome]] = []
+    stopped = run_until_stopped(lambda: found.append(_enlarged(candidates, partition, outcome)))
+    return found[0] if stopped is None else (partition, replace(outcome, stopped=stopped))
+
+
+def _enlarged(
     candidates: Candidates, partition: Partition, outcome: Outcome
 ) -> tuple[Partition, Outcome]:
     """The partition with further words of its states, verified by definition."""
@@ -171,7 +259,7 @@ def certificate_of(built: Built) -> Certificate:
 
 
 @dataclass(frozen=True, slots=True)
-class _Checked:
+class _Verified:
     """What a method returned, as a partition, and the verdict that it is a language."""
 
     assignment: Assignment
@@ -179,14 +267,14 @@ class _Checked:
     verdict: Verdict
 
 
-def _verified(candidates: Candidates, assignment: Assignment) -> _Checked:
+def _verified(candidates: Candidates, assignment: Assignment) -> _Verified:
     partition = Partition.of_states(candidates.rows, assignment)
     verdict = verify(partition, candidates.spaces)
     if not verdict.holds:
         raise AssertionError(
             f"a method returned what is no coordination language: {verdict.witness}"
         )
-    return _Checked(assignment, partition, verdict)
+    return _Verified(assignment, partition, verdict)
 
 
 class _Clock:

@@ -74,6 +74,26 @@ def stop_clock() -> None:
     signal.setitimer(signal.ITIMER_REAL, 0)
 
 
+def run_until_stopped(
+    work: Callable[[], object],
+    *,
+    keep_time_after: type[BaseException] | tuple[type[BaseException], ...] = (),
+) -> BaseException | None:
+    """Do anytime work; return the error that ended it early (one of `STOPPING`), or None.
+
+    The clock is then stopped, so that what the work has left can be saved, except after errors of
+    the types ``keep_time_after``.  The error comes without its traceback, which would hold on to
+    all that the work had in memory.
+    """
+    try:
+        work()
+    except STOPPING as error:
+        if not isinstance(error, keep_time_after):
+            stop_clock()
+        return error.with_traceback(None)
+    return None
+
+
 def time_left() -> float:
     """Seconds until the alarm of a `time_limit` rings; infinite without one."""
     left, _ = signal.getitimer(signal.ITIMER_REAL)

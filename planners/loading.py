@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import get_args
 
 from planners.errors import BadInput, Position, UsageError
 from planners.grounding import FEWER, GroundAction, ground_actions, ground_goal
@@ -21,6 +22,7 @@ from planners.pddl.lifted import TRUE, Atom, Domain, Problem, StepAtom
 from planners.pddl.robots import (
     RobotSelection,
     Team,
+    Unowned,
     find_team,
     fluent_predicates,
     natural,
@@ -34,14 +36,31 @@ from planners.tables import Rows
 class ModelOptions:
     """How the files are to be understood; all of it is recorded in a language file.
 
-    ``idle`` names the robots that may idle without an action of their own; None: found from the
-    model.
+    Attributes
+    ----------
+    robots
+        Which objects are robots, and who owns actions that name none.
+    cost
+        What optimal means.
+    remember_actions
+        Whether a state also holds each robot's last subaction.
+    idle
+        The robots that may idle without an action of their own; None: found from the model.
+
+    Raises
+    ------
+    UsageError
+        For a value that there is not.
     """
 
     robots: RobotSelection = field(default_factory=RobotSelection)
     cost: Cost = "makespan"
     remember_actions: bool = False
     idle: tuple[str, ...] | None = None
+
+    def __post_init__(self) -> None:
+        _require_one_of("cost", self.cost, get_args(Cost))
+        _require_one_of("unowned", self.robots.unowned, get_args(Unowned))
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +139,13 @@ def task_of(model: JointModel, domain: Domain, problem: Problem) -> PlanningTask
     return PlanningTask(
         problem.name, model.state(problem.init), goal, Position(problem.source.name)
     )
+
+
+def _require_one_of(option: str, value: str, values: Sequence[str]) -> None:
+    if value not in values:
+        raise UsageError(
+            f"{value!r} is no value of the option {option}", remedy=f"It is {' or '.join(values)}."
+        )
 
 
 def _check_same_world(domain: Domain, first: Problem, other: Problem) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from dataclasses import replace
+from dataclasses import asdict, replace
 from importlib.metadata import version
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Literal
@@ -107,7 +107,7 @@ def command(
     Exit 0: written, with the proof that the method promises.  3: written without it (a limit was
     hit).
     """
-    from coordlang.building import build_language
+    from coordlang.building import BuildOptions, build_language
     from coordlang.cli.miscoordination import show
     from coordlang.language.file import to_bytes, write_language
     from coordlang.required.miscoordination import Inseparable
@@ -117,11 +117,7 @@ def command(
     never_stdout("--certificate", certificate)
     listed = tasks if tasks != "all" else None
     check_outputs([("-o", output), ("--certificate", certificate)], [*pddl.paths, listed])
-    if alpha_only and method != "separating":
-        raise click.UsageError("--alpha-only belongs to --method separating")
-    exact = method in ("minimal", "exhaustive")
-    if prefer and not exact:
-        raise click.UsageError(f"--prefer {prefer} belongs to --method minimal or exhaustive")
+    options = BuildOptions(method, seed, alpha_only, prefer, overlap)
     start = perf_counter()
     lifted, read = pddl.read()
     try:
@@ -139,15 +135,7 @@ def command(
     note_single_robot(candidates.model.robots)
     seconds = {"space": perf_counter() - start}
     try:
-        built = build_language(
-            candidates,
-            method,
-            seed=seed,
-            alpha_only=alpha_only,
-            prefer=prefer,
-            overlap=overlap,
-            progress=progress,
-        )
+        built = build_language(candidates, **asdict(options), progress=progress)
     except Inseparable as error:
         clear_progress()
         click.echo(show(error.witness), err=True)
@@ -187,9 +175,11 @@ def command(
         return EXIT_INTERRUPTED
     if stopped is not None:
         reason = str(stopped).splitlines()[0] if str(stopped) else "out of memory"
-        short_of = "" if proved and exact else ", without proof"
+        short_of = "" if proved and options.is_exact else ", without proof"
         click.echo(f"coordlang: {reason}; the best language so far is written{short_of}", err=True)
-    unproved = not proved or no_certificate is not None if exact else stopped is not None
+    unproved = stopped is not None
+    if options.is_exact:
+        unproved = not proved or no_certificate is not None
     return EXIT_UNPROVED if unproved else 0
 
 
@@ -197,23 +187,24 @@ def _certify(built: Built, path: str, seconds: float) -> BaseException | None:
     """Write the certificate, within ``seconds``; the error that ended it early, or None."""
     from coordlang.building import certificate_of
     from coordlang.certificate import write_certificate
-    from planners.limits import STOPPING, stop_clock, time_limit
+    from planners.limits import run_until_stopped, stop_clock, time_limit
 
-    try:
+    def write() -> None:
         with time_limit(seconds):
             progress("writing down why fewer words do not suffice")
             proof = certificate_of(built)
             stop_clock()
             clear_progress()
             write_certificate(proof, path)
-    except STOPPING as error:
+
+    stopped = run_until_stopped(write)
+    if stopped is not None:
         clear_progress()
         click.echo(
             "coordlang: no certificate is written: there was no time or memory left for it",
             err=True,
         )
-        return error
-    return None
+    return stopped
 
 
 def _figures(candidates: Candidates, built: Built, seconds: dict[str, float]) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,6 +70,14 @@ def inseparable(space: PlanSpace) -> Miscoordination | None:
     """Plans of some task that pass through the same states and yet introduce RC, or None."""
     trail = _inseparable(space)
     return describe_failure(space, trail) if trail is not None else None
+
+
+def require_separable(spaces: Sequence[PlanSpace]) -> None:
+    """Raise `Inseparable` if plans of some task introduce RC but pass through the same states."""
+    for space in spaces:
+        witness = inseparable(space)
+        if witness is not None:
+            raise Inseparable(witness)
 
 
 def separable(space: PlanSpace) -> bool:

@@ -16,4 +16,7 @@ METHODS: dict[str, Callable[[Job], Outcome]] = {
     "exhaustive": exhaustive,
 }
 
-__all__ = ["METHODS", "Job", "Outcome", "exhaustive", "greedy", "minimal", "separating"]
+#: Those that find the least number of words.
+EXACT = ("minimal", "exhaustive")
+
+__all__ = ["EXACT", "METHODS", "Job", "Outcome", "exhaustive", "greedy", "minimal", "separating"]

@@ -18,7 +18,7 @@ import numpy as np
 from coordlang.language.flexibility import Floats
 from coordlang.language.overlapping import Overlap, Readings, Sentence, TooManySentences, readings
 from coordlang.vocabulary.objective import nodes_above
-from planners.limits import STOPPING, stop_clock
+from planners.limits import run_until_stopped
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans, counts
 from planners.tables import Bools
@@ -60,12 +60,7 @@ def enlarge(
     """
     search = _Search(spaces, requires, partition)
     before = search.expected
-    stopped: BaseException | None = None
-    try:
-        search.run()
-    except STOPPING as error:
-        stop_clock()
-        stopped = error.with_traceback(None)
+    stopped = run_until_stopped(search.run)
     return Enlarged(search.words, search.expected, before, search.tried, stopped)
 
 

@@ -26,7 +26,7 @@ from coordlang.vocabulary.objective import Objective
 from coordlang.vocabulary.sat import reduce
 from coordlang.vocabulary.symmetry import state_symmetries
 from planners.errors import OutOfMemory
-from planners.limits import STOPPING, stop_clock
+from planners.limits import run_until_stopped
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 from planners.tables import Bools, Ints
@@ -62,12 +62,7 @@ def flexible(job: Job, found: Outcome) -> Outcome:
     no language exceeds) and ``communication_saving``.
     """
     search = _Search(job, found)
-    stopped: BaseException | None = None
-    try:
-        search.run()
-    except STOPPING as error:
-        stop_clock()
-        stopped = error.with_traceback(None)
+    stopped = run_until_stopped(search.run)
     return search.outcome(stopped)
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import replace
 from random import Random
 
@@ -33,7 +33,7 @@ from coordlang.vocabulary.sat import (
 from coordlang.vocabulary.separating import quickly as separated
 from coordlang.vocabulary.symmetry import Symmetry, closed, symmetries
 from planners.errors import OutOfMemory
-from planners.limits import STOPPING, stop_clock
+from planners.limits import run_until_stopped
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 from planners.tables import Ints
@@ -61,21 +61,12 @@ def minimal(job: Job) -> Outcome:
     Anytime: out of time or memory, or interrupted, it returns the best language found with the
     lower bound proved so far and says so in ``stopped``.
     """
-    search = _Search(job)
-    try:
-        search.run()
-    except STOPPING as error:
-        stop_clock()
-        if search.best is None:
-            raise
-        # Without its traceback, which holds on to all that the search had in memory.
-        return Outcome(
-            search.best, search.lower, search.figures(), error.with_traceback(None), search.evidence
-        )
-    finally:
-        search.close()
-    assert search.best is not None
-    return Outcome(search.best, search.lower, search.figures(), evidence=search.evidence)
+    with closing(_Search(job)) as search:
+        stopped = run_until_stopped(search.run)
+    if search.best is None:
+        assert stopped is not None
+        raise stopped
+    return Outcome(search.best, search.lower, search.figures(), stopped, search.evidence)
 
 
 def refute(job: Job, size: int) -> Mapping[Clause, Evidence]:
@@ -83,12 +74,9 @@ def refute(job: Job, size: int) -> Mapping[Clause, Evidence]:
 
     Raises `ValueError` if there is a language with so few words.
     """
-    search = _Search(replace(job, incumbent=None))
-    try:
+    with closing(_Search(replace(job, incumbent=None))) as search:
         if not search.exceeds(size):
             raise ValueError(f"there is a language with {size} words")
-    finally:
-        search.close()
     return search.evidence
 
 

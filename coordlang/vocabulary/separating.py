@@ -10,6 +10,7 @@ understood without looking at whole plans.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing
 
 import numpy as np
 
@@ -28,7 +29,7 @@ from coordlang.vocabulary.sat import (
 )
 from coordlang.vocabulary.symmetry import state_symmetries
 from planners.errors import OutOfMemory
-from planners.limits import STOPPING, stop_clock
+from planners.limits import run_until_stopped
 
 #: Partitions filled greedily, for a first upper bound, before SAT takes over.
 _FILLED = 20
@@ -62,20 +63,12 @@ def _short(search: _Search) -> None:
 
 
 def _searched(job: Job, search: _Search, run: Callable[[_Search], None]) -> Outcome:
-    stopped: BaseException | None = None
-    try:
-        run(search)
-    except STOPPING as error:
-        if not isinstance(
-            error, OutOfMemory
-        ):  # a walk was too large to keep: there may be other work to do, in time
-            stop_clock()
-        if search.best is None:
-            raise
-        stopped = error.with_traceback(None)
-    finally:
-        search.close()
-    assert search.best is not None
+    with closing(search):
+        # After a walk that was too large to keep there may be other work to do, in time.
+        stopped = run_until_stopped(lambda: run(search), keep_time_after=OutOfMemory)
+    if search.best is None:
+        assert stopped is not None
+        raise stopped
     return Outcome(search.best, job.lower_bound, search.figures(), stopped)
 
 

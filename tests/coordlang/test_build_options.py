@@ -1,0 +1,45 @@
+"""Options that contradict each other are refused where they are put together, for whoever calls."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from coordlang.building import BuildOptions, build_language
+from planners.errors import UsageError
+from planners.loading import ModelOptions
+from planners.pddl.robots import RobotSelection
+from tests.coordlang.test_minimal import shipped
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"method": "bogus"}, "'bogus'.*greedy, separating, minimal, exhaustive"),
+        ({"method": "minimal", "alpha_only": True}, "--alpha-only belongs to --method separating"),
+        ({"method": "greedy", "prefer": "flexible"}, "--prefer flexible belongs to --method"),
+        ({"method": "separating", "prefer": "flexible"}, "--prefer flexible belongs to --method"),
+        ({"method": "minimal", "prefer": "short"}, "'short'.*flexible"),
+    ],
+)
+def test_bad_build_options(options: dict[str, Any], said: str) -> None:
+    with pytest.raises(UsageError) as raised:
+        BuildOptions(**options)
+    assert raised.match(f"(?s){said}")
+    with pytest.raises(UsageError):
+        build_language(shipped("three-cells"), **options)
+
+
+def test_good_build_options() -> None:
+    BuildOptions("separating", alpha_only=True)
+    assert BuildOptions("exhaustive", prefer="flexible", overlap=True).is_exact
+    assert not BuildOptions().is_exact
+
+
+def test_bad_model_options() -> None:
+    bogus: Any = "bogus"
+    with pytest.raises(UsageError, match=r"(?s)'bogus'.*makespan\+actions"):
+        ModelOptions(cost=bogus)
+    with pytest.raises(UsageError, match="(?s)'bogus'.*environment"):
+        ModelOptions(RobotSelection((), None, bogus))
