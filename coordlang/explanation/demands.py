@@ -1,4 +1,4 @@
-"""What one sentence asks of each robot, and who brings its words about."""
+"""What one sentence demands of each robot, and which robots decide its changes of word."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ import numpy as np
 
 from coordlang.explanation.cover import Cover
 from coordlang.language.partition import Partition
-from planners.joint.model import own_text
+from planners.joint.model import JointModel, own_text
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
-from planners.tables import Ints, find_rows, ranges
+from planners.tables import Bools, Ints, find_rows
 
 #: More sets of plan-space nodes than this in one step, and a robot's subplans are not counted.
 _SETS = 5_000
-#: States at which it is worked out which robots decide the next word.
+#: States at which it is computed which robots decide the next word.
 _STATES = 500
 
 #: A robot's subplan: the text of its subaction in each step, None for idling.
@@ -29,26 +29,41 @@ Subplan = tuple[str | None, ...]
 class RobotPart:
     """What a sentence leaves to one robot.
 
-    ``subplans`` is the number of its different subplans in the plans that fit (None: too many to
-    count); ``listed`` has all of them if they are few, else it is empty.  ``choices[step]`` is what
-    it does in that step in some of them.
+    Parameters
+    ----------
+    robot
+        Its name.
+    subplans
+        The number of its different subplans in the plans with the sentence; None: too many to
+        count.
+    listed
+        All of them if they are few, else empty.
+    by_step
+        For each step the subactions that it does then in some of the plans.
     """
 
     robot: str
     subplans: int | None
     listed: tuple[Subplan, ...]
-    choices: tuple[Subplan, ...]
+    by_step: tuple[Subplan, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class WordChange:
-    """The change from the sentence's word ``before`` to the next one, ``after``.
+    """A change from one word of the sentence to the next one.
 
-    It happens at the end of step ``earliest`` at the soonest and ``latest`` at the latest (from 1).
-    ``robots`` are the fewest robots whose subactions decide it: wherever plans make the change,
-    these robots' subactions settle whether a joint step to a mapped state makes it, whatever the
-    others do.  No robots: every such step makes it.  ``ways`` is what they do, one entry each, and
-    the steps in which plans make the change in this way.
+    Parameters
+    ----------
+    before, after
+        The two words.
+    earliest, latest
+        The first and the last step (from 1) at whose end plans make it.
+    robots
+        The fewest robots whose subactions decide it: wherever plans make the change, these robots'
+        subactions settle whether a joint step to a mapped state makes it, whatever the others do.
+        No robots: every such step makes it.
+    ways
+        What they do, one entry each, and the steps in which plans make the change in this way.
     """
 
     before: str
@@ -61,9 +76,20 @@ class WordChange:
 
 @dataclass(frozen=True, slots=True)
 class SentenceDemands:
-    """One sentence of one task.
+    """What one sentence of one task demands.
 
-    The number of ``plans`` that fit, each robot's part, and the changes of word.
+    Parameters
+    ----------
+    sentence
+        Its words.
+    plans
+        The number of optimal plans with it.
+    steps
+        Their makespan.
+    parts
+        Each robot's part.
+    changes
+        The changes of word, in order.
     """
 
     sentence: tuple[str, ...]
@@ -74,150 +100,155 @@ class SentenceDemands:
 
 
 def sentence_demands(
-    fitting: PlanSpace, table: Partition, formulas: Mapping[str, Cover], few: int = 4
+    space: PlanSpace, partition: Partition, formulas: Mapping[str, Cover], few: int = 4
 ) -> SentenceDemands:
-    """What a sentence asks, from the plan space of the plans that fit it (one task, one sentence).
+    """What a sentence demands of the robots.
 
-    ``formulas``: the words' formulas; where several robots could be said to decide a change of
-    word, those that the formula of the next word speaks of are named.  ``few``: up to so many
-    subplans of a robot are listed.
+    Parameters
+    ----------
+    space
+        The plans with the sentence (one task, one sentence).
+    partition
+        The language as a table of states.
+    formulas
+        The words' formulas.  Where several groups of robots of one size decide a change of word,
+        robots that the formula of the next word names come first.
+    few
+        Up to so many subplans of a robot are listed.
     """
-    word = table.word_of(fitting.rows)[fitting.state]
-    place = _places(fitting, word)
-    start = int(fitting.starts[0])
-    sentence = [int(word[start])]
-    for edges in _edges_by_step(fitting):
-        source, target = fitting.sources[edges], fitting.target[edges]
-        change = (place[target] == len(sentence)) & (place[source] < len(sentence))
-        if change.any():
-            sentence.append(int(word[target[change][0]]))
+    word = partition.word_of(space.rows)[space.state]
+    passed = words_passed(space, word)
+    start = int(space.starts[0])
+    _, first = np.unique(passed, return_index=True)
+    sentence = word[first].tolist()
+    changes = []
+    for number, pair in enumerate(pairwise(sentence), 1):
+        order = _named_first(space.model.robots, formulas[partition.words[pair[1]]])
+        changes.append(_change(space, partition, passed == number, pair, order))
     return SentenceDemands(
-        sentence=tuple(table.words[w] for w in sentence),
-        plans=counts(fitting)[start],
-        steps=int(fitting.layer[start]),
-        parts=tuple(_part(fitting, robot, few) for robot in range(len(fitting.model.robots))),
-        changes=tuple(
-            _change(
-                fitting,
-                table,
-                place,
-                number,
-                pair,
-                _spoken_of(fitting, formulas[table.words[pair[1]]]),
-            )
-            for number, pair in enumerate(pairwise(sentence))
-        ),
+        sentence=tuple(partition.words[w] for w in sentence),
+        plans=counts(space)[start],
+        steps=space.cost_of(0)[0],
+        parts=tuple(_part(space, robot, few) for robot in range(len(space.model.robots))),
+        changes=tuple(changes),
     )
 
 
-def _edges_by_step(space: PlanSpace) -> Iterator[Ints]:
-    """The edges of each joint step, the first step first."""
-    for span in reversed(space.layers[1:]):
-        yield np.arange(space.first[span.start], space.first[span.stop])
+def words_passed(space: PlanSpace, word: Ints) -> Ints:
+    """For each node how many words of the sentence plans have passed there, its own included.
 
-
-def _places(space: PlanSpace, word: Ints) -> Ints:
-    """For each node, how many changes of word lie before it.
-
-    One number, as all plans have one sentence.
+    ``space`` holds one task's plans with one sentence, and each node is on one of them; so it is one
+    number for each node.
     """
-    place = np.zeros(len(space), np.int64)
-    source = space.sources
-    for edges in _edges_by_step(space):
-        place[space.target[edges]] = place[source[edges]] + (
-            word[space.target[edges]] != word[source[edges]]
-        )
-    return place
+    passed = np.ones(len(space), np.int64)
+    for layer in range(space.cost_of(0)[0], 0, -1):
+        edges = space.layer_edges(layer)
+        changes = word[edges.target] != word[edges.source]
+        passed[edges.target] = passed[edges.source] + changes
+    return passed
 
 
 def _part(space: PlanSpace, robot: int, few: int) -> RobotPart:
-    """Walk over the sets of nodes that one sequence of the robot's own subactions leaves possible."""
-    labels = space.model.labels[robot]
-    choices = tuple(
-        tuple(
-            own_text(labels[n], space.model.robots[robot]) if n else None
-            for n in np.unique(space.labels[edges, robot])
-        )
-        for edges in _edges_by_step(space)
+    name = space.model.robots[robot]
+    steps = range(space.cost_of(0)[0], 0, -1)
+    by_step = tuple(
+        _subplan(space.model, robot, np.unique(space.robot_labels(robot, edges)).tolist())
+        for edges in (space.layer_edges(layer).edges for layer in steps)
     )
-    sets: dict[tuple[int, ...], int] = {(int(space.starts[0]),): 1}
-    sequences: dict[tuple[int, ...], list[tuple[int, ...]]] = {(int(space.starts[0]),): [()]}
-    for _ in choices:
+    found = _subplans(space, robot, few)
+    if found is None:
+        return RobotPart(name, None, (), by_step)
+    number, listed = found
+    texts = tuple(_subplan(space.model, robot, labels) for labels in listed)
+    return RobotPart(name, number, texts, by_step)
+
+
+def _subplan(model: JointModel, robot: int, labels: Sequence[int]) -> Subplan:
+    """A robot's labels as text."""
+    return tuple(_own_text(model, robot, label) for label in labels)
+
+
+def _own_text(model: JointModel, robot: int, label: int) -> str | None:
+    text = model.label_text(robot, label)
+    return None if text is None else own_text(text, model.robots[robot])
+
+
+def _subplans(space: PlanSpace, robot: int, few: int) -> tuple[int, list[tuple[int, ...]]] | None:
+    """The number of a robot's subplans, and all of them (labels) if they are at most ``few``.
+
+    Found over the sets of nodes that one sequence of own subactions leaves possible; None if there
+    are too many such sets.
+    """
+    start = (int(space.starts[0]),)
+    sets: dict[tuple[int, ...], int] = {start: 1}
+    sequences: dict[tuple[int, ...], list[tuple[int, ...]]] = {start: [()]}
+    for _ in range(space.cost_of(0)[0]):
         reached: dict[tuple[int, ...], int] = defaultdict(int)
-        written: dict[tuple[int, ...], list[tuple[int, ...]]] = defaultdict(list)
+        longer: dict[tuple[int, ...], list[tuple[int, ...]]] = defaultdict(list)
         for nodes, number in sets.items():
             for label, after in _moves(space, robot, nodes):
                 reached[after] += number
-                written[after] += [(*before, label) for before in sequences[nodes]]
+                longer[after] += [(*before, label) for before in sequences[nodes]]
         if len(reached) > _SETS:
-            return RobotPart(space.model.robots[robot], None, (), choices)
+            return None
         sets = reached
-        sequences = {nodes: texts[: few + 1] for nodes, texts in written.items()}
+        sequences = {nodes: found[: few + 1] for nodes, found in longer.items()}
     total = sum(sets.values())
-    listed = sorted(text for texts in sequences.values() for text in texts) if total <= few else []
-    name = space.model.robots[robot]
-    return RobotPart(
-        name,
-        total,
-        tuple(tuple(own_text(labels[n], name) if n else None for n in s) for s in listed),
-        choices,
-    )
+    if total > few:
+        return total, []
+    return total, sorted(labels for found in sequences.values() for labels in found)
 
 
 def _moves(
     space: PlanSpace, robot: int, nodes: Sequence[int]
 ) -> Iterator[tuple[int, tuple[int, ...]]]:
     """The robot's subactions that lead on from some of the nodes, and where they may lead."""
-    array = np.array(nodes)
-    edges = ranges(space.first[array], space.first[array + 1] - space.first[array])
-    label = space.labels[edges, robot]
-    for own in np.unique(label).tolist():
-        yield own, tuple(np.unique(space.target[edges[label == own]]).tolist())
+    _, edges = space.edges_from(np.array(nodes))
+    labels = space.robot_labels(robot, edges)
+    for label in np.unique(labels).tolist():
+        yield label, tuple(np.unique(space.targets(edges[labels == label])).tolist())
 
 
-def _spoken_of(space: PlanSpace, formula: Cover) -> list[int]:
-    """The robots that a formula names, and then the others."""
+def _named_first(robots: Sequence[str], formula: Cover) -> list[int]:
+    """All robots, those that a formula names first."""
     atoms = [atom for term in formula.terms for literal in term for atom in literal.variable.atoms]
     named = {word for atom in atoms for word in atom.replace("(", " ").replace(")", " ").split()}
-    robots = space.model.robots
-    return sorted(range(len(robots)), key=lambda r: robots[r] not in named)
+    return sorted(range(len(robots)), key=lambda robot: robots[robot] not in named)
 
 
 def _change(
     space: PlanSpace,
-    table: Partition,
-    place: Ints,
-    number: int,
+    partition: Partition,
+    before: Bools,
     pair: tuple[int, int],
     order: Sequence[int],
 ) -> WordChange:
-    source = space.sources
-    edges = np.flatnonzero((place[source] == number) & (place[space.target] == number + 1))
-    step = int(space.layer[space.starts[0]]) - space.layer[source[edges]] + 1
-    robots = _deciding(space, table, np.unique(space.state[source[edges]]), pair[1], order)
+    """The change out of the nodes ``before`` (a mask) into the next word."""
+    source, edges = space.edges_from(np.flatnonzero(before))
+    node = np.flatnonzero(before)[source]
+    makes = ~before[space.targets(edges)]
+    node, edges = node[makes], edges[makes]
+    step = space.cost_of(0)[0] - space.layer[node] + 1
+    robots = _deciding(space, partition, np.unique(space.state[node]), pair[1], order)
     ways: dict[Subplan, set[int]] = defaultdict(set)
-    for when, labels in zip(step.tolist(), space.labels[edges].tolist(), strict=True):
-        model = space.model
-        does = tuple(
-            own_text(model.labels[r][labels[r]], model.robots[r]) if labels[r] else None
-            for r in robots
-        )
-        ways[does].add(when)
+    for when, edge in zip(step.tolist(), edges.tolist(), strict=True):
+        labels = space.labels_of(edge)
+        ways[tuple(_own_text(space.model, robot, labels[robot]) for robot in robots)].add(when)
     return WordChange(
-        before=table.words[pair[0]],
-        after=table.words[pair[1]],
+        before=partition.words[pair[0]],
+        after=partition.words[pair[1]],
         earliest=int(step.min()),
         latest=int(step.max()),
         robots=tuple(space.model.robots[r] for r in robots),
         ways=tuple(
-            (does, tuple(sorted(when)))
-            for does, when in sorted(ways.items(), key=lambda w: (min(w[1]), str(w)))
+            (subactions, tuple(sorted(when)))
+            for subactions, when in sorted(ways.items(), key=lambda w: (min(w[1]), str(w)))
         ),
     )
 
 
 def _deciding(
-    space: PlanSpace, table: Partition, states: Ints, after: int, order: Sequence[int]
+    space: PlanSpace, partition: Partition, states: Ints, after: int, order: Sequence[int]
 ) -> tuple[int, ...]:
     """The fewest robots whose subactions decide whether the next word is ``after``.
 
@@ -225,9 +256,9 @@ def _deciding(
     """
     rows = space.rows[states[:_STATES]]
     steps = space.model.successors(rows)
-    mapped = find_rows(table.rows, steps.result) >= 0
+    mapped = find_rows(partition.rows, steps.result) >= 0
     source, labels = steps.source[mapped], steps.labels[mapped]
-    changes = table.word_of(steps.result[mapped]) == after
+    changes = partition.word_of(steps.result[mapped]) == after
     for size in range(len(order)):
         for some in combinations(order, size):
             seen = np.column_stack((source, labels[:, list(some)]))

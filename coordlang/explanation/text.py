@@ -125,7 +125,7 @@ def _part_lines(part: RobotPart, steps: int) -> list[str]:
         return [f"  {part.robot} has nothing to do."]
     if part.subplans == 1:
         return [
-            f"  {part.robot}: {_sequence(part.listed[0] if part.listed else [own[0] for own in part.choices])}."
+            f"  {part.robot}: {_sequence(part.listed[0] if part.listed else [own[0] for own in part.by_step])}."
         ]
     if part.listed:
         return [
@@ -135,12 +135,12 @@ def _part_lines(part: RobotPart, steps: int) -> list[str]:
     number = f"{part.subplans:,}" if part.subplans is not None else "very many"
     lines = [f"  {part.robot} has {number} ways:"]
     step = 0
-    while step < len(part.choices):
+    while step < len(part.by_step):
         same = step
-        while same + 1 < len(part.choices) and part.choices[same + 1] == part.choices[step]:
+        while same + 1 < len(part.by_step) and part.by_step[same + 1] == part.by_step[step]:
             same += 1
         name = f"step {step + 1}" if same == step else f"steps {step + 1} to {same + 1}"
-        lines.append(f"    {name}: {_alternatives([own or 'wait' for own in part.choices[step]])}")
+        lines.append(f"    {name}: {_alternatives([own or 'wait' for own in part.by_step[step]])}")
         step = same + 1
     return lines
 

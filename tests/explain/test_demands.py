@@ -54,7 +54,7 @@ def check(
         assert len(part.listed) == (len(texts) if len(texts) <= few else 0)
         short = {tuple(t and own_text(t, model.robots[robot]) for t in text) for text in texts}
         assert len(texts) > few or set(part.listed) == short
-        assert [set(own) for own in part.choices] == [
+        assert [set(own) for own in part.by_step] == [
             set(step) for step in zip(*short, strict=True)
         ]
     assert [(c.before, c.after) for c in found.changes] == list(

@@ -60,7 +60,7 @@ def check_dag(task_language: TaskLanguage, graph: PlanDag, plans: set[Plan]) -> 
         assert node.word == task_language.language.states.get(
             node.key, task_language.language.default
         )
-        assert graph.sentence[node.said - 1] == node.word
+        assert graph.sentence[node.words - 1] == node.word
         assert node.plans == through[number]
 
 

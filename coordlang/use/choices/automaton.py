@@ -13,17 +13,14 @@ from functools import reduce
 from itertools import pairwise
 from math import log10
 from operator import and_, or_
+from typing import NamedTuple
 
 import numpy as np
 
 from planners.errors import OutOfMemory
 from planners.limits import memory_left
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints, unique_tuples
-
-#: What the robot knows in a state: (atoms certainly true, atoms possibly true), as sets of bits:
-#: fact k is bit k.
-Knowledge = tuple[int, int]
+from planners.tables import Ints, ranges, unique_tuples
 
 #: Bytes that one member of a subset takes, with its share of everything else.
 _MEMBER_BYTES = 160
@@ -31,16 +28,40 @@ _MEMBER_BYTES = 160
 _SMALL = 1 << 24
 
 
+class Knowledge(NamedTuple):
+    """What a robot knows in a state, whatever the others do.
+
+    ``true`` are the facts that are certainly true, ``possible`` those that are possibly true, as
+    sets of bits: fact k is bit k.
+    """
+
+    true: int
+    possible: int
+
+    @property
+    def unknown(self) -> int:
+        """The facts that may be true or false."""
+        return self.possible & ~self.true
+
+
 @dataclass(frozen=True, slots=True)
 class Automaton:
     """A deterministic automaton over one robot's label numbers (0: idle).
 
-    State 0 is where it starts.
+    State 0 is where it starts.  Nothing but its own module indexes ``first``, ``label`` and
+    ``target``.
 
-    ``layers[k]`` are the states after k steps (joint steps done by all); those of the last layer
-    are final.  The moves of state s are ``label[first[s]:first[s + 1]]`` to ``target[..]``, sorted
-    by label.  ``left[s]`` is the exact number of subplans from s on; every state has some.
-    ``known[s]`` is what the robot knows there; all empty where nothing was asked.
+    Parameters
+    ----------
+    layers
+        ``layers[k]`` are the states after k joint steps; those of the last layer are final.
+    first, label, target
+        The edges out of state s are ``first[s]`` to ``first[s + 1]``, sorted by their label; each
+        has a label and a target.
+    left
+        For each state the exact number of subplans from it on, at least 1.
+    known
+        For each state what the robot knows there; all empty where no knowledge was computed.
     """
 
     layers: tuple[range, ...]
@@ -51,55 +72,94 @@ class Automaton:
     known: tuple[Knowledge, ...]
 
     def __len__(self) -> int:
+        """Count the states."""
         return len(self.left)
 
     @property
     def count(self) -> int:
-        """How many subplans it accepts."""
+        """The number of subplans that it accepts."""
         return self.left[0]
+
+    @property
+    def steps(self) -> int:
+        """The length of its subplans in joint steps."""
+        return len(self.layers) - 1
+
+    @property
+    def out_degrees(self) -> Ints:
+        """The number of edges out of each state."""
+        return np.diff(self.first)
 
     def moves(self, state: int) -> list[tuple[int, int]]:
         """The pairs (label, next state) of a state, sorted."""
-        span = slice(int(self.first[state]), int(self.first[state + 1]))
-        return list(zip(self.label[span].tolist(), self.target[span].tolist(), strict=True))
+        edges = slice(int(self.first[state]), int(self.first[state + 1]))
+        return list(zip(self.label[edges].tolist(), self.target[edges].tolist(), strict=True))
+
+    def edges_from(self, states: Ints) -> tuple[Ints, Ints]:
+        """All edges out of many states: for each its position in ``states``, and its number."""
+        degrees = self.out_degrees[states]
+        return np.repeat(np.arange(len(states)), degrees), ranges(self.first[states], degrees)
+
+    def labels(self, edges: Ints) -> Ints:
+        """The labels of these edges."""
+        found: Ints = self.label[edges]
+        return found
+
+    def targets(self, edges: Ints) -> Ints:
+        """The states that these edges lead to."""
+        found: Ints = self.target[edges]
+        return found
 
     def step_of(self, state: int) -> int:
-        """How many steps are done in a state."""
+        """The number of steps done in a state."""
         return next(step for step, states in enumerate(self.layers) if state in states)
 
 
 def determinise(
     space: PlanSpace, robot: int, truth: Mapping[int, int] | None = None, most: int | None = None
 ) -> Automaton:
-    """The least automaton of robot number ``robot`` over the (one task's) plans of a plan space.
+    """The least automaton of a robot's subplans over the plans of a plan space.
 
     Without ``truth`` it is the minimal deterministic automaton that accepts exactly the robot's
-    subplans.  With ``truth`` (number of a state in ``space.rows`` -> its true facts as bits) it
-    also says in each state what is known there: the facts that have one value in all joint states
-    that plans with the same own beginning can be in.  Then it is the least automaton that accepts
-    the subplans and says this (a Moore machine: states are merged that agree on the knowledge, now
-    and after every continuation).
+    subplans.  With ``truth`` it also gives for each state what is known there: the facts that have
+    one value in all joint states that plans with the same own beginning can be in.  Then it is the
+    least automaton that accepts the subplans and gives this output (a Moore machine: states are
+    merged that agree on the knowledge, now and after every continuation).
 
-    Three passes over the layers: nodes that nothing tells apart are one (upwards), subset
-    construction (downwards), equal futures are one (upwards).  Linear but for the subsets, of which
-    there may be exponentially many: raises `OutOfMemory` with an estimate before they fill the
-    memory, or when they have more than ``most`` members in all.
+    Three passes over the layers: nodes that behave alike are one (upwards), subset construction
+    (downwards), equal futures are one (upwards).  Linear but for the subsets, of which there may be
+    exponentially many.
+
+    Parameters
+    ----------
+    space
+        The plans of one task.
+    robot
+        The robot's number.
+    truth
+        For each state (its number in ``space.rows``) its true facts as bits.
+    most
+        The most members that all subsets together may have; None: as many as the memory holds.
+
+    Raises
+    ------
+    OutOfMemory
+        With an estimate, before the subsets fill the memory or when they have more than ``most``
+        members.
     """
     layers, start = _quotient(space, robot, truth)
     moves: list[list[dict[int, int]]] = []
-    outputs: list[list[Knowledge]] = []
+    known: list[list[Knowledge]] = []
     subsets: list[tuple[int, ...]] = [(start,)]
     members = 0
     for depth, layer in enumerate(reversed(layers)):
-        outputs.append([_knowledge(layer, subset) for subset in subsets])
+        known.append([_knowledge(layer, subset) for subset in subsets])
         following: dict[tuple[int, ...], int] = {}
         here: list[dict[int, int]] = []
         for subset in subsets:
+            after = _after(layer, subset)
             here.append(
-                {
-                    own: following.setdefault(to, len(following))
-                    for own, to in _after(layer, subset).items()
-                }
+                {own: following.setdefault(to, len(following)) for own, to in after.items()}
             )
             members += len(subset)
             if len(here) % 1024 == 0:
@@ -107,7 +167,12 @@ def determinise(
         moves.append(here)
         subsets = list(following)
         _check(space, robot, members, most, depth, len(layers) - 1)
-    return minimised(moves, outputs)
+    return minimised(moves, known)
+
+
+#: A state of an automaton by what it is: what is known there, and its moves to states of the next
+#: layer by their labels.
+_Behaviour = tuple[Knowledge, tuple[tuple[int, int], ...]]
 
 
 def minimised(
@@ -115,45 +180,43 @@ def minimised(
 ) -> Automaton:
     """The least automaton of a deterministic one given in layers.
 
-    States are merged that agree on everything to come.
+    States are merged that agree on what is known now and after every continuation.
 
-    ``moves[k][s]`` leads from state s of layer k by a label to a state of layer k + 1; layer 0 has
-    one state.
+    Parameters
+    ----------
+    moves
+        ``moves[k][s]`` leads from state s of layer k by a label to a state of layer k + 1; layer 0
+        has one state.
+    known
+        ``known[k][s]`` is what is known in state s of layer k.
     """
-    classes: list[list[int]] = []
-    merged: list[list[tuple[Knowledge, tuple[tuple[int, int], ...]]]] = []
-    for here, output in zip(reversed(moves), reversed(known), strict=True):
-        below = classes[-1] if classes else []
-        number: dict[tuple[Knowledge, tuple[tuple[int, int], ...]], int] = {}
-        classes.append(
-            [
-                number.setdefault(
-                    (said, tuple(sorted((own, below[to]) for own, to in move.items()))), len(number)
-                )
-                for said, move in zip(output, here, strict=True)
-            ]
-        )
+    merged: list[list[_Behaviour]] = []
+    class_below: list[int] = []
+    for here, knowledge in zip(reversed(moves), reversed(known), strict=True):
+        number: dict[_Behaviour, int] = {}
+        class_here = []
+        for known_there, move in zip(knowledge, here, strict=True):
+            after = tuple(sorted((own, class_below[to]) for own, to in move.items()))
+            class_here.append(number.setdefault((known_there, after), len(number)))
+        class_below = class_here
         merged.append(list(number))
     merged.reverse()
     return _numbered(merged)
 
 
-def _numbered(
-    merged: Sequence[Sequence[tuple[Knowledge, tuple[tuple[int, int], ...]]]],
-) -> Automaton:
-    """States in the order in which a walk by layers and labels meets them.
+def _numbered(merged: Sequence[Sequence[_Behaviour]]) -> Automaton:
+    """Number the states in the order in which a walk by layers and labels meets them.
 
     The same automaton has the same numbers.
     """
     order = [0]
     bounds, first, label, target, known = [0], [0], [], [], []
     for layer in merged:
-        start = bounds[-1]
-        bounds.append(start + len(order))
+        bounds.append(bounds[-1] + len(order))
         found: dict[int, int] = {}
         for state in order:
-            said, moves = layer[state]
-            known.append(said)
+            knowledge, moves = layer[state]
+            known.append(knowledge)
             for own, to in moves:
                 label.append(own)
                 target.append(bounds[-1] + found.setdefault(to, len(found)))
@@ -191,32 +254,42 @@ def _quotient(
     Merging them changes no set of own continuations (a bisimulation), and makes subsets small.
     """
     layers: list[_Layer] = []
-    place = np.zeros(len(space), np.int64)  # node -> class in its layer
-    for span in space.layers:
-        low, high = int(space.first[span.start]), int(space.first[span.stop])
-        degrees = np.diff(space.first[span.start : span.stop + 1])
-        source = np.repeat(np.arange(span.stop - span.start), degrees)
-        table = np.column_stack(
-            (source, space.labels[low:high, robot], place[space.target[low:high]])
-        )
-        bounds = [int(column.max(initial=0)) + 1 for column in table.T]
-        table, _ = unique_tuples(table.astype(np.int64), bounds)
-        ends = np.searchsorted(table[:, 0], np.arange(span.stop - span.start + 1)).tolist()
-        pairs = np.ascontiguousarray(table[:, 1:])
-        classes: dict[tuple[int, bytes], int] = {}
-        number, moves, facts = [], [], []
-        states = space.state[span].tolist()
-        for node, (a, b) in enumerate(pairwise(ends)):
-            fact = truth[states[node]] if truth is not None else 0
-            key = (fact, pairs[a:b].tobytes())
-            if key not in classes:
-                classes[key] = len(classes)
-                moves.append(_grouped(pairs[a:b].tolist()))
-                facts.append(fact)
-            number.append(classes[key])
-        place[span] = number
-        layers.append(_Layer(moves, facts))
-    return layers, int(place[space.starts[0]])
+    class_of = np.zeros(len(space), np.int64)  # of each node, within its layer
+    for number, span in enumerate(space.layers):
+        edges = space.layer_edges(number)
+        own = space.robot_labels(robot, edges.edges)
+        pairs = _own_moves(edges.source - span.start, own, class_of[edges.target], span)
+        layer, class_of[span] = _classes(pairs, space.state[span].tolist(), truth)
+        layers.append(layer)
+    return layers, int(class_of[space.starts[0]])
+
+
+def _own_moves(source: Ints, label: Ints, target: Ints, nodes: slice) -> list[Ints]:
+    """For each node of a layer the different pairs (own label, class led to), sorted."""
+    table = np.column_stack((source, label, target))
+    bounds = [int(column.max(initial=0)) + 1 for column in table.T]
+    table, _ = unique_tuples(table, bounds)
+    ends = np.searchsorted(table[:, 0], np.arange(nodes.stop - nodes.start + 1)).tolist()
+    moves = np.ascontiguousarray(table[:, 1:])
+    return [moves[a:b] for a, b in pairwise(ends)]
+
+
+def _classes(
+    pairs: Sequence[Ints], states: Sequence[int], truth: Mapping[int, int] | None
+) -> tuple[_Layer, list[int]]:
+    """The classes of one layer, and the number of each node's class."""
+    classes: dict[tuple[int, bytes], int] = {}
+    layer = _Layer([], [])
+    number = []
+    for state, own in zip(states, pairs, strict=True):
+        facts = truth[state] if truth is not None else 0
+        key = (facts, own.tobytes())
+        if key not in classes:
+            classes[key] = len(classes)
+            layer.moves.append(_grouped(own.tolist()))
+            layer.truth.append(facts)
+        number.append(classes[key])
+    return layer, number
 
 
 def _grouped(pairs: list[list[int]]) -> dict[int, tuple[int, ...]]:
@@ -240,7 +313,7 @@ def _after(layer: _Layer, subset: tuple[int, ...]) -> dict[int, tuple[int, ...]]
 
 def _knowledge(layer: _Layer, subset: tuple[int, ...]) -> Knowledge:
     truth = {layer.truth[member] for member in subset}
-    return reduce(and_, truth), reduce(or_, truth)
+    return Knowledge(reduce(and_, truth), reduce(or_, truth))
 
 
 def _check(

@@ -9,7 +9,7 @@ the state of each robot's automaton and the plan-space node that all of them tog
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,8 +20,8 @@ from planners.errors import OutOfMemory
 from planners.joint.conditions import Labels
 from planners.limits import memory_left
 from planners.search.edge_index import EdgeIndex
-from planners.search.plan_space import PlanSpace
-from planners.tables import Ints, ranges, spans, unique_tuples
+from planners.search.plan_space import PlanSpace, UnfoldingStep
+from planners.tables import Ints, spans, unique_tuples
 
 #: Joint moves handled at a time.
 _CHUNK = 1_000_000
@@ -49,16 +49,15 @@ class Mixtures:
 
 
 @dataclass(frozen=True, slots=True)
-class _Step:
+class _JointMoves:
     """The joint moves out of one layer.
 
-    Numbers of nodes in it and in the next one, labels, plan-space edges.
+    ``step`` has them as edges of the unfolded plan space; ``labels`` (moves, robots) are the robots'
+    labels.
     """
 
-    source: Ints
-    target: Ints
+    step: UnfoldingStep
     labels: Labels
-    edge: Ints
 
 
 def walk_mixtures(
@@ -71,56 +70,69 @@ def walk_mixtures(
 ) -> Mixtures:
     """Walk all combinations of the robots' subplans in the task's optimal plans, layer by layer.
 
-    ``fits`` are the plans with the sentence ``words``, ``automata`` each robot's subplans in them;
-    ``index`` is ``EdgeIndex.of(task_language.space)``, to be given when many sentences of one plan space
-    are asked for.
+    At most (product of the automata's layers) * (layer of the plan space) nodes.
 
-    At most (product of the automata's layers) * (layer of the plan space) nodes.  Raises
-    `OutOfMemory` with an estimate before they fill the memory, or beyond ``most`` joint moves.
+    Parameters
+    ----------
+    task_language
+        The language and the task.
+    fits
+        The plans with the sentence.
+    automata
+        Each robot's subplans in them.
+    words
+        The word numbers of the sentence.
+    index
+        ``EdgeIndex.of(task_language.space)``, to be given when many sentences of one plan space are
+        looked at.
+    most
+        The most joint moves to hold; None: as many as the memory holds.
+
+    Raises
+    ------
+    OutOfMemory
+        With an estimate, before the joint moves fill the memory or beyond ``most`` of them.
     """
     space = task_language.space
     index = index or EdgeIndex.of(space)
     robots = len(automata)
     table = np.array([[0] * robots + [task_language.start]])
-    layers = [table]
-    steps: list[_Step] = []
+    layers = [table[:, robots]]
+    steps: list[_JointMoves] = []
     walked, held = 1, 0
-    for step in range(len(automata[0].layers) - 1):
+    for step in range(automata[0].steps):
         _check(automata, table, step, held, most)
         source, labels, after = _moves(automata, table)
         edge = _edges(index, table[source, robots], labels)
         broken = np.flatnonzero(edge < 0)
         if len(broken):
-            found = _violation(
-                task_language,
-                fits,
-                words,
-                steps,
-                int(source[broken[0]]),
-                labels[broken[0]].tolist(),
-            )
-            return Mixtures(None, found, walked)
-        reached = np.column_stack((after, space.target[edge]))
+            last = int(source[broken[0]]), tuple(labels[broken[0]].tolist())
+            paths = _breaking_plans(fits, steps, *last)
+            return Mixtures(None, _violation(task_language, paths, words), walked)
+        reached = np.column_stack((after, space.targets(edge)))
         table, number = unique_tuples(reached, [*(len(a) for a in automata), len(space)])
-        steps.append(_Step(source, number, labels, edge))
-        layers.append(table)
+        steps.append(_JointMoves(UnfoldingStep(source, edge, number), labels))
+        layers.append(table[:, robots])
         walked += len(table)
         held += 40 * len(edge) + table.nbytes
-    return Mixtures(_plan_space(task_language, layers, steps), None, walked)
+    unfolding = [moves.step for moves in steps]
+    found = PlanSpace.from_layers(space, layers, unfolding, task_language.task)
+    return Mixtures(found, None, walked)
 
 
 def _moves(automata: Sequence[Automaton], table: Ints) -> tuple[Ints, Labels, Ints]:
-    """All joint moves: (source, labels, next states of the automata), sorted by source and labels."""
+    """All joint moves: (source, labels, next states of the automata).
+
+    Sorted by source and labels.
+    """
     source = np.arange(len(table))
     labels: list[Ints] = []
     after: list[Ints] = []
     for robot, own in enumerate(automata):
-        at = table[source, robot]
-        counts = own.first[at + 1] - own.first[at]
-        move = ranges(own.first[at], counts)
-        source = np.repeat(source, counts)
-        labels = [np.repeat(old, counts) for old in labels] + [own.label[move]]
-        after = [np.repeat(old, counts) for old in after] + [own.target[move]]
+        earlier, edges = own.edges_from(table[source, robot])
+        source = source[earlier]
+        labels = [*(column[earlier] for column in labels), own.labels(edges)]
+        after = [*(column[earlier] for column in after), own.targets(edges)]
     return source, np.stack(labels, axis=1).astype(np.int32), np.stack(after, axis=1)
 
 
@@ -135,89 +147,52 @@ def _edges(index: EdgeIndex, node: Ints, labels: Labels) -> Ints:
     return np.concatenate(parts)
 
 
-def _plan_space(
-    task_language: TaskLanguage, layers: Sequence[Ints], steps: Sequence[_Step]
-) -> PlanSpace:
-    """The walk as a plan space: nodes numbered from the goal's layer up."""
-    space = task_language.space
-    sizes = [len(table) for table in reversed(layers)]
-    offset = np.cumsum([0, *sizes])
-    node = np.concatenate([table[:, -1] for table in reversed(layers)])
-    none = np.zeros(0, np.int64)
-    up = list(enumerate(reversed(steps)))
-    source = np.concatenate([step.source + offset[k + 1] for k, step in up] or [none])
-    edge = np.concatenate([step.edge for _, step in up] or [none])
-    return replace(
-        space,
-        state=space.state[node],
-        goal=space.goal[node],
-        layer=space.layer[node],
-        first=np.searchsorted(source, np.arange(len(node) + 1)),
-        target=np.concatenate([step.target + offset[k] for k, step in up] or [none]),
-        labels=space.labels[edge],
-        cost=space.cost[edge],
-        starts=np.array([len(node) - 1]),
-        second=space.second[[task_language.task]],
-    )
+def _breaking_plans(
+    fits: PlanSpace, steps: Sequence[_JointMoves], node: int, labels: tuple[int, ...]
+) -> list[list[tuple[int, ...]]]:
+    """For each robot a plan with the sentence, as labels; their mixture breaks.
+
+    ``node`` of the last layer walked is where it does, ``labels`` is the joint step that is none.
+    """
+    done = [labels]
+    for moves in reversed(steps):
+        arrival = int(np.flatnonzero(moves.step.target == node)[0])
+        done.append(tuple(moves.labels[arrival].tolist()))
+        node = int(moves.step.source[arrival])
+    done.reverse()
+    return [
+        _with_beginning(fits, robot, [step[robot] for step in done]) for robot in range(len(labels))
+    ]
 
 
 def _violation(
-    task_language: TaskLanguage,
-    fits: PlanSpace,
-    words: Sequence[int],
-    steps: Sequence[_Step],
-    row: int,
-    labels: list[int],
+    task_language: TaskLanguage, plans: Sequence[list[tuple[int, ...]]], words: Sequence[int]
 ) -> Miscoordination:
-    """The combination that breaks, with a fitting plan for each robot of which it is the own part."""
-    done = [labels]
-    for step in reversed(steps):
-        arrival = int(np.flatnonzero(step.target == row)[0])
-        done.append(step.labels[arrival].tolist())
-        row = int(step.source[arrival])
-    done.reverse()
-    paths = [
-        _with_beginning(task_language, fits, robot, [own[robot] for own in done])
-        for robot in range(len(labels))
-    ]
-    trail = Trail(task_language.start, tuple(zip(*paths, strict=True)))
-    return describe_failure(
-        task_language.space, trail, tuple(task_language.partition.words[w] for w in words)
-    )
+    """Plans whose mixture breaks, described in the task's own plan space."""
+    space, start = task_language.space, task_language.start
+    paths = [space.path_with(start, plan) for plan in plans]
+    edges = tuple(zip(*(path for path in paths if path is not None), strict=True))
+    names = tuple(task_language.partition.words[w] for w in words)
+    return describe_failure(space, Trail(start, edges), names)
 
 
-def _with_beginning(
-    task_language: TaskLanguage, fits: PlanSpace, robot: int, own: Sequence[int]
-) -> list[int]:
-    """A fitting plan in which a robot begins like this, as edges of the task's plan space."""
-    layers = [{int(fits.starts[0]): -1}]  # node -> the edge that led there
-    for label in own:
-        found: dict[int, int] = {}
+def _with_beginning(fits: PlanSpace, robot: int, subplan: Sequence[int]) -> list[tuple[int, ...]]:
+    """A plan, as labels, in which a robot begins with these labels of its own."""
+    layers = [{int(fits.starts[0]): (-1, -1)}]  # node -> the node before it and the edge from there
+    for label in subplan:
+        found: dict[int, tuple[int, int]] = {}
         for node in layers[-1]:
-            for edge in range(int(fits.first[node]), int(fits.first[node + 1])):
-                if int(fits.labels[edge, robot]) == label:
-                    found.setdefault(int(fits.target[edge]), edge)
+            for edge in fits.out_edges(node):
+                if fits.labels_of(edge)[robot] == label:
+                    found.setdefault(fits.target_of(edge), (node, edge))
         layers.append(found)
-    node = next(iter(layers[-1]))
+    end = node = next(iter(layers[-1]))
     path: list[int] = []
-    source = fits.sources
     for layer in reversed(layers[1:]):
-        path.append(layer[node])
-        node = int(source[path[-1]])
+        node, edge = layer[node]
+        path.append(edge)
     path.reverse()
-    while fits.layer[fits.target[path[-1]]] > 0:
-        path.append(int(fits.first[fits.target[path[-1]]]))
-    return _same_edges(task_language, [fits.labels[edge].tolist() for edge in path])
-
-
-def _same_edges(task_language: TaskLanguage, plan: Sequence[Sequence[int]]) -> list[int]:
-    """A plan, given by labels, as edges of the task's plan space."""
-    space, node, path = task_language.space, task_language.start, []
-    for labels in plan:
-        edges = range(int(space.first[node]), int(space.first[node + 1]))
-        path.append(next(edge for edge in edges if space.labels[edge].tolist() == list(labels)))
-        node = int(space.target[path[-1]])
-    return path
+    return [fits.labels_of(edge) for edge in [*path, *fits.first_path(end)]]
 
 
 def _check(
@@ -226,7 +201,7 @@ def _check(
     """Estimate a layer's joint moves before they are made."""
     size = np.ones(len(table))
     for robot, own in enumerate(automata):
-        size *= np.diff(own.first)[table[:, robot]]
+        size *= own.out_degrees[table[:, robot]]
     moves = float(size.sum())
     needed = held + moves * (48 + 24 * len(automata))
     if (most is not None and moves + held / 40 > most) or (

@@ -82,7 +82,7 @@ def with_own_facts(automaton: Automaton, own: OwnFacts, start: int) -> Automaton
                 step[label] = following.setdefault((to, after), len(following))
             here.append(step)
         moves.append(here)
-        known.append([(true, true | own.others) for _, true in layer])
+        known.append([Knowledge(true, true | own.others) for _, true in layer])
         layer = list(following)
     return minimised(moves, known)
 

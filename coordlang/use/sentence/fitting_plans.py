@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planners.errors import Refuted
-from planners.search.plan_space import PlanSpace
-from planners.tables import Ints, ranges
+from planners.search.plan_space import PlanSpace, UnfoldingStep
+from planners.tables import Ints
 
 
 class NoPlanFits(Refuted):
@@ -92,25 +89,23 @@ def plans_with_sentence(
     length = len(sentence)
     if not length or word[start] != sentence[0]:
         raise NoPlanFits(sentence, 0, [int(word[start])], names)
-    said = np.array([*sentence, -1])
+    next_word = np.array([*sentence[1:], -1, -1])
+    #: For each layer the node of ``space`` and the index in the sentence of its word.
     layers: list[tuple[Ints, Ints]] = [(np.array([start]), np.array([0]))]
-    steps: list[tuple[Ints, Ints, Ints]] = []
-    for _ in range(int(space.layer[start])):
-        node, place = layers[-1]
-        counts = space.first[node + 1] - space.first[node]
-        edge = ranges(space.first[node], counts)
-        source = np.repeat(np.arange(len(node)), counts)
-        target, position = space.target[edge], place[source]
-        moves = word[target] != word[node[source]]
-        fits = ~moves | (said[position + 1] == word[target])
-        source, edge, code = source[fits], edge[fits], (target * length + position + moves)[fits]
-        reached, number = np.unique(code, return_inverse=True)
+    steps: list[UnfoldingStep] = []
+    for _ in range(space.cost_of(task)[0]):
+        node, index = layers[-1]
+        source, edge = space.edges_from(node)
+        target, before = space.targets(edge), index[source]
+        changes = word[target] != word[node[source]]
+        fits = ~changes | (next_word[before] == word[target])
+        reached, number = np.unique((target * length + before + changes)[fits], return_inverse=True)
         layers.append((reached // length, reached % length))
-        steps.append((source, edge, number.reshape(-1)))
+        steps.append(UnfoldingStep(source[fits], edge[fits], number.reshape(-1)))
     ends = layers[-1][1] == length - 1
     if not ends.any():
         raise _no_plan(space, word, sentence, layers, names)
-    return _plan_space(space, task, layers, steps, ends)
+    return PlanSpace.from_layers(space, [node for node, _ in layers], steps, task, ends)
 
 
 def _no_plan(
@@ -121,56 +116,13 @@ def _no_plan(
     names: Sequence[str],
 ) -> NoPlanFits:
     """The error that says how far plans follow the sentence, and which words they have then."""
-    furthest = max(int(place.max()) for _, place in layers if len(place))
+    furthest = max(int(index.max()) for _, index in layers if len(index))
     following: set[int | None] = set()
-    for node, place in layers:
-        for here in node[place == furthest].tolist():
-            targets = space.target[space.first[here] : space.first[here + 1]]
-            following |= set(word[targets].tolist()) - {int(word[here])}
-            if space.layer[here] == 0:
+    for nodes, index in layers:
+        for node in nodes[index == furthest].tolist():
+            after = space.successors(node)
+            following |= set(word[after].tolist()) - {int(word[node])}
+            if not after:
                 following.add(None)
     next_words = sorted(following, key=lambda w: (w is None, w))
     return NoPlanFits(sentence, furthest + 1, next_words, names)
-
-
-def _plan_space(
-    space: PlanSpace,
-    task: int,
-    layers: Sequence[tuple[Ints, Ints]],
-    steps: Sequence[tuple[Ints, Ints, Ints]],
-    ends: NDArray[np.bool_],
-) -> PlanSpace:
-    """What leads to the end, numbered from the goal's layer up."""
-    alive = [ends]
-    for source, _, target in reversed(steps):
-        number = len(layers[len(layers) - len(alive) - 1][0])
-        here = np.zeros(number, np.bool_)
-        here[source[alive[-1][target]]] = True
-        alive.append(here)
-    nodes = [node[keep] for (node, _), keep in zip(reversed(layers), alive, strict=True)]
-    offsets = np.cumsum([0, *(len(n) for n in nodes)])
-    numbers = [np.cumsum(keep) - 1 + offset for keep, offset in zip(alive, offsets, strict=False)]
-    sources, targets, edges = [], [], []
-    for (source, edge, target), ((below, low), (above, high)) in zip(
-        reversed(steps), pairwise(zip(alive, numbers, strict=True)), strict=True
-    ):
-        keep = below[target] & above[source]
-        sources.append(high[source[keep]])
-        targets.append(low[target[keep]])
-        edges.append(edge[keep])
-    none = np.zeros(0, np.int64)
-    source = np.concatenate(sources or [none])
-    edge = np.concatenate(edges or [none])
-    node = np.concatenate(nodes)
-    return replace(
-        space,
-        state=space.state[node],
-        goal=space.goal[node],
-        layer=space.layer[node],
-        first=np.searchsorted(source, np.arange(len(node) + 1)),
-        target=np.concatenate(targets or [none]),
-        labels=space.labels[edge],
-        cost=space.cost[edge],
-        starts=np.array([len(node) - 1]),
-        second=space.second[[task]],
-    )

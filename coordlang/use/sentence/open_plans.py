@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from coordlang.tasks.candidates import describe
-from coordlang.use.sentence.plan_dag import PlanDag
+from coordlang.use.sentence.plan_dag import DagNode, PlanDag
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.search.plan_file import json_count, to_json
 from planners.search.plan_space import PlanSpace
@@ -66,8 +66,16 @@ class OpenPlans:
 def open_plans_data(
     open_plans: OpenPlans, listed: Sequence[Plan], graph: PlanDag | None
 ) -> dict[str, Any]:
-    """The JSON form: a plan file (docs/formats.md) with the sentence, the guarantee and, if given,
-    the DAG.
+    """The JSON form: a plan file (docs/formats.md) with the sentence, its guarantee and the DAG.
+
+    Parameters
+    ----------
+    open_plans
+        A sentence and its plans.
+    listed
+        The plans to write out.
+    graph
+        The DAG to write as ``nodes`` and ``edges``, or None.
     """
     task_language = open_plans.task_language
     data = {
@@ -77,24 +85,16 @@ def open_plans_data(
         **to_json(open_plans.plans, listed),
     }
     if graph is not None:
-        data["nodes"] = [
-            {"merged": node.merged, "step": node.step, "plans": json_count(node.plans)}
-            if node.merged
-            else {
-                "state": node.key,
-                "word": node.word,
-                "said": node.said,
-                "step": node.step,
-                "plans": json_count(node.plans),
-            }
-            for node in graph.nodes
-        ]
+        data["nodes"] = [_node_data(node) for node in graph.nodes]
         data["edges"] = [
-            {
-                "from": edge.source,
-                "to": edge.target,
-                "actions": [list(action) for action in edge.actions],
-            }
+            {"from": edge.source, "to": edge.target, "actions": [list(a) for a in edge.actions]}
             for edge in graph.edges
         ]
     return data
+
+
+def _node_data(node: DagNode) -> dict[str, Any]:
+    place = {"step": node.step, "plans": json_count(node.plans)}
+    if node.merged:
+        return {"merged": node.merged, **place}
+    return {"state": node.key, "word": node.word, "said": node.words, **place}

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
+from coordlang.explanation.demands import words_passed
 from coordlang.tasks.candidates import describe
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
@@ -17,24 +18,38 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class DagNode:
-    """A joint state after ``step`` joint steps, with ``said`` words of the sentence.
+    """A joint state on a plan, or several states of one step that are drawn as one.
 
-    ``plans`` is the number of fitting plans through it.  ``key`` is the state; in a DAG that was
-    cut, ``merged`` > 0 nodes of a step that are drawn as one have no key of their own.
+    Parameters
+    ----------
+    step
+        The joint steps done.
+    key
+        The state's key; empty for several states.
+    word
+        The word of the state; empty for several states.
+    words
+        How many words of the sentence the plans have passed, this one included; 0 for several
+        states.
+    plans
+        The number of plans through it.
+    merged
+        The number of states that it stands for, if they are several; else 0.
     """
 
     step: int
     key: str
     word: str
-    said: int
+    words: int
     plans: int
     merged: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class DagEdge:
-    """The joint actions from one node (number in `PlanDag.nodes`) to another: each one a text or None
-    (idle) per robot.
+    """The joint actions from one node to another (numbers in `PlanDag.nodes`).
+
+    ``actions`` has a text or None (idle) for each robot.
     """
 
     source: int
@@ -46,8 +61,22 @@ class DagEdge:
 class PlanDag:
     """The plans that a sentence leaves open, as the paths of a layered graph.
 
-    ``nodes`` are sorted by step, the most plans first.  ``cut`` is how many nodes were merged; 0:
-    nothing is missing.
+    Parameters
+    ----------
+    sentence
+        Its words.
+    task
+        The task in words.
+    robots
+        Their names.
+    count
+        The number of plans.
+    nodes
+        Sorted by step, those on most plans first.
+    edges
+        Sorted by source and target.
+    cut
+        How many states were merged; 0: nothing is missing.
     """
 
     sentence: tuple[str, ...]
@@ -70,15 +99,17 @@ class PlanDag:
 
 
 def plan_dag(open_plans: OpenPlans, most: int | None = None) -> PlanDag:
-    """The fitting plans as a DAG of at most about ``most`` nodes (None: all).
+    """The plans that a sentence leaves open as a DAG of at most about ``most`` nodes (None: all).
 
     A larger one is cut in its breadth: every step keeps the nodes that most plans pass through, at
     least one, and the others of a step are merged into one.
     """
     task_language, space = open_plans.task_language, open_plans.fits
+    names = task_language.partition.words
     through = _plans_through(space)
     width = _width(space, most)
-    said, word = _said(open_plans)
+    word = task_language.partition.of_rows(space.rows)[space.state]
+    passed = words_passed(space, word).tolist()
     nodes: list[DagNode] = []
     number: dict[int, int] = {}
     codec = task_language.model.codec
@@ -88,21 +119,19 @@ def plan_dag(open_plans: OpenPlans, most: int | None = None) -> PlanDag:
         for node in kept:
             number[node] = len(nodes)
             key = codec.key(space.rows[space.state[node]])
-            nodes.append(
-                DagNode(
-                    step, key, task_language.partition.words[word[node]], said[node], through[node]
-                )
-            )
+            nodes.append(DagNode(step, key, names[word[node]], passed[node], through[node]))
         others = here[len(kept) :]
         if others:
             number.update(dict.fromkeys(others, len(nodes)))
             nodes.append(DagNode(step, "", "", 0, sum(through[n] for n in others), len(others)))
-    cut = sum(node.merged for node in nodes)
-    task = describe(task_language.space, task_language.task)
-    sentence = tuple(task_language.partition.words[w] for w in open_plans.words)
-    edges = _edges(space, number, nodes)
     return PlanDag(
-        sentence, task, task_language.model.robots, open_plans.count, tuple(nodes), edges, cut
+        sentence=tuple(names[w] for w in open_plans.words),
+        task=describe(task_language.space, task_language.task),
+        robots=task_language.model.robots,
+        count=open_plans.count,
+        nodes=tuple(nodes),
+        edges=_edges(space, number, nodes),
+        cut=sum(node.merged for node in nodes),
     )
 
 
@@ -111,11 +140,10 @@ def _plans_through(space: PlanSpace) -> list[int]:
     below = counts(space)
     above = [0] * len(space)
     above[int(space.starts[0])] = 1
-    first, target = space.first.tolist(), space.target.tolist()
-    for span in reversed(space.layers):
-        for node in range(span.start, span.stop):
-            for after in target[first[node] : first[node + 1]]:
-                above[after] += above[node]
+    for layer in range(space.cost_of(0)[0], 0, -1):
+        edges = space.layer_edges(layer)
+        for source, target in zip(edges.source.tolist(), edges.target.tolist(), strict=True):
+            above[target] += above[source]
     return [a * b for a, b in zip(above, below, strict=True)]
 
 
@@ -130,32 +158,15 @@ def _width(space: PlanSpace, most: int | None) -> int:
     return width
 
 
-def _said(open_plans: OpenPlans) -> tuple[dict[int, int], dict[int, int]]:
-    """For each node how many words have been said, and the word it is in."""
-    space, words = open_plans.fits, open_plans.words
-    word = dict(
-        enumerate(open_plans.task_language.partition.word_of(space.rows)[space.state].tolist())
-    )
-    said = {int(space.starts[0]): 1}
-    first, target = space.first.tolist(), space.target.tolist()
-    for span in reversed(space.layers):
-        for node in range(span.start, span.stop):
-            for after in target[first[node] : first[node + 1]]:
-                said[after] = said[node] + (word[after] != word[node])
-    assert all(words[said[node] - 1] == word[node] for node in word)
-    return said, word
-
-
 def _edges(
     space: PlanSpace, number: dict[int, int], nodes: Sequence[DagNode]
 ) -> tuple[DagEdge, ...]:
     """Edges by pair of nodes; those from and to merged nodes without their many joint actions."""
     found: dict[tuple[int, int], list[tuple[str | None, ...]]] = {}
-    for source, target, labels in zip(
-        space.sources.tolist(), space.target.tolist(), space.labels.tolist(), strict=True
-    ):
-        ends = number[source], number[target]
-        actions = found.setdefault(ends, [])
-        if not (nodes[ends[0]].merged or nodes[ends[1]].merged):
-            actions.append(space.model.texts(labels))
+    for node in range(len(space)):
+        for edge in space.out_edges(node):
+            ends = number[node], number[space.target_of(edge)]
+            actions = found.setdefault(ends, [])
+            if not (nodes[ends[0]].merged or nodes[ends[1]].merged):
+                actions.append(space.model.texts(space.labels_of(edge)))
     return tuple(DagEdge(a, b, tuple(actions)) for (a, b), actions in sorted(found.items()))

@@ -1,4 +1,4 @@
-"""What a sentence can be wished to be."""
+"""What the sentence for a task should be like: preferences by which the best one is chosen."""
 
 from __future__ import annotations
 
@@ -10,19 +10,28 @@ from planners.errors import BadInput, UsageError
 from planners.joint.model import JointModel
 from planners.joint.states import split_atoms
 
-#: What a wish remembers of a plan's beginning.
+#: What a preference remembers of a plan's beginning.
 Memory = tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class PlanPreference:
-    """A wish about single plans, as a small automaton.
+    """A preference about single plans: an automaton that reads a plan and gives it a grade.
 
-    It reads a plan and gives it a grade, the lower the better.
+    The lower the grade, the better.  A state is given by its number in the plan space's table.
 
-    ``start`` gives the memory in the initial state, ``step`` the memory after a joint step into a
-    state, ``grade`` the grade of a plan by the memory at its end.  A state is given by its number
-    in the plan space's table.
+    Parameters
+    ----------
+    text
+        How it is written on the command line.
+    start
+        Gives the memory in the initial state.
+    step
+        Gives the memory after a joint step (labels) into a state.
+    grade
+        Gives the grade of a plan by the memory at its end.
+    grades
+        What each grade means, in words.
     """
 
     text: str
@@ -32,88 +41,106 @@ class PlanPreference:
     grades: tuple[str, ...]
 
 
-#: ``"shortest"`` and ``"most-plans"`` are wishes about whole sentences.
+#: ``"shortest"`` and ``"most-plans"`` are preferences about whole sentences.
 Preference = str | PlanPreference
 
 
 def read_preference(task_language: TaskLanguage, text: str) -> Preference:
-    """``shortest``, ``most-plans``, ``first:ROBOT`` or ``avoid:ATOMS``.  Raises `UsageError` for
-    anything else.
+    """Read ``shortest``, ``most-plans``, ``first:ROBOT`` or ``avoid:ATOMS``.
+
+    Raises `UsageError` for anything else.
     """
     kind, _, argument = text.strip().partition(":")
     if text.strip() in ("shortest", "most-plans"):
         return text.strip()
     if kind == "first":
-        return first(task_language.model, argument.strip().lower())
+        return goes_first(task_language.model, argument.strip().lower())
     if kind == "avoid":
-        return avoid(task_language, argument)
+        return avoids(task_language, argument)
     raise UsageError(
-        f"--wish {text!r}: there is no such wish",
-        remedy='Say shortest, most-plans, first:ROBOT or avoid:"(ATOM) ..".',
+        f"--prefer {text!r}: there is no such preference",
+        remedy='Use shortest, most-plans, first:ROBOT or avoid:"(ATOM) ..".',
     )
 
 
-def first(model: JointModel, robot: str) -> PlanPreference:
-    """The robot goes first.
+def goes_first(model: JointModel, robot: str) -> PlanPreference:
+    """The preference that a robot goes first.
 
-    A robot *acts* in a step if it neither idles nor does a subaction that is as good as idling.
-    Robot r goes before robot q in a plan if, in the first step in which one of the two acts and the
-    other one does not, it is r that acts. Grades: 0 if r goes before every other robot, 2 if some
-    other robot goes before r, else 1.
+    A robot *acts* in a step if it neither idles nor does a subaction that has the same effect as
+    idling.  Robot r goes before robot q in a plan if, in the first step in which one of the two acts
+    and the other one does not, it is r that acts.  Grades: 0 if r goes before every other robot, 2
+    if some other robot goes before r, else 1.
+
+    Raises `UsageError` for a robot that the model does not have.
     """
-    if robot not in model.robots:
+    own = model.robot_number(robot)
+    if own is None:
         raise UsageError(
-            f"--wish first:{robot}: there is no such robot",
+            f"--prefer first:{robot}: there is no such robot",
             remedy=f"The robots are {', '.join(model.robots)}.",
         )
-    place = model.robots.index(robot)
+    others = tuple(other for other in range(len(model.robots)) if other != own)
+    grades = (
+        f"{robot} goes first",
+        f"no robot goes before {robot}",
+        f"another robot goes before {robot}",
+    )
+    order = _Order(own, _acting(model))
+    return PlanPreference(f"first:{robot}", lambda _: others, order.step, order.grade, grades)
+
+
+def _acting(model: JointModel) -> list[list[bool]]:
+    """For each robot and each of its labels whether the robot acts."""
     nothing = {action.label for action in model.actions if action.does_nothing and not action.parts}
-    acts = [
+    return [
         [label > 0 and text not in nothing for label, text in enumerate(own)]
         for own in model.labels
     ]
-    late = (-1,)
-    others = tuple(other for other in range(len(model.robots)) if other != place)
 
-    def step(memory: Memory, labels: tuple[int, ...], _: int) -> Memory:
-        # The robots that nothing is decided about yet; `late` once somebody went before.
-        if memory == late:
+
+@dataclass(frozen=True, slots=True)
+class _Order:
+    """Who acts before robot number ``robot``; the memory are the robots of which it is still open.
+
+    ``_LATE`` is the memory once one of them has acted before it.
+    """
+
+    robot: int
+    acting: list[list[bool]]
+
+    def step(self, memory: Memory, labels: tuple[int, ...], _state: int) -> Memory:
+        if memory == _LATE:
             return memory
-        mine = acts[place][labels[place]]
-        if not mine and any(acts[other][labels[other]] for other in memory):
-            return late
-        return tuple(other for other in memory if acts[other][labels[other]] == mine)
+        acts = self.acting[self.robot][labels[self.robot]]
+        others = {other: self.acting[other][labels[other]] for other in memory}
+        if not acts and any(others.values()):
+            return _LATE
+        return tuple(other for other in memory if others[other] == acts)
 
-    def grade(memory: Memory) -> int:
-        return 2 if memory == late else 1 if memory else 0
-
-    grades = (
-        f"{robot} goes first",
-        f"nobody goes before {robot}",
-        f"another robot goes before {robot}",
-    )
-    return PlanPreference(f"first:{robot}", lambda _: others, step, grade, grades)
+    def grade(self, memory: Memory) -> int:
+        if memory == _LATE:
+            return 2
+        return 1 if memory else 0
 
 
-def avoid(task_language: TaskLanguage, atoms: str) -> PlanPreference:
-    """No state of the plan, the first and last included, has all of these atoms.  Grades: 0 if so,
-    else 1.
+_LATE = (-1,)
+
+
+def avoids(task_language: TaskLanguage, atoms: str) -> PlanPreference:
+    """The preference that no state of the plan, the first and last included, has all these atoms.
+
+    Grades: 0 if so, else 1.  Raises `UsageError` for text that is not a list of atoms of the model.
     """
     codec = task_language.model.codec
     try:
         wanted = split_atoms(" ".join(atoms.lower().split()).replace("( ", "(").replace(" )", ")"))
-        row = codec.encode(wanted)
+        mask = codec.facts_part(codec.encode(wanted))
     except BadInput as error:
-        raise UsageError(f"--wish avoid:{atoms}: {error.what}", remedy=error.remedy) from None
+        raise UsageError(f"--prefer avoid:{atoms}: {error.what}", remedy=error.remedy) from None
     if not wanted:
-        raise UsageError('--wish avoid: expected atoms, as in avoid:"(at r1 c1-1)"')
-    mask = row[: codec.fact_blocks]
-    hit: list[int] = (
-        ((task_language.space.rows[:, : codec.fact_blocks] & mask) == mask)
-        .all(axis=1)
-        .astype(int)
-        .tolist()
-    )
+        raise UsageError('--prefer avoid: expected atoms, as in avoid:"(at r1 c1-1)"')
+    states = codec.facts_part(task_language.space.rows)
+    hit: list[int] = ((states & mask) == mask).all(axis=1).astype(int).tolist()
     text = " ".join(wanted)
     grades = (f"it keeps away from {text}", f"it passes through {text}")
     return PlanPreference(
