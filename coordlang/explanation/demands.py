@@ -109,7 +109,7 @@ def sentence_demands(
     space
         The plans with the sentence (one task, one sentence).
     partition
-        The language as a table of states.
+        The language as a partition of the states.
     formulas
         The words' formulas.  Where several groups of robots of one size decide a change of word,
         robots that the formula of the next word names come first.

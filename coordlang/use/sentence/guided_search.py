@@ -62,8 +62,8 @@ class ExpandedStates:
     ----------
     model
         The joint model.
-    table
-        The language as a table of states.
+    partition
+        The language as a partition of the states.
     rows, word
         The states met so far and their word numbers, by state number.
     """
