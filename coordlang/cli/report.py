@@ -20,7 +20,7 @@ from coordlang.cli.app import (
 )
 
 if TYPE_CHECKING:
-    from coordlang.report.layout import Point
+    from coordlang.report.places import Point
 
 
 @click.command(name="report")
@@ -95,7 +95,7 @@ def _beside(problem: str) -> Path:
 
 
 def _coordinates(given: str | None, problem: str) -> dict[str, Point] | None:
-    from coordlang.report.layout import read_coordinates
+    from coordlang.report.places import read_coordinates
 
     if given is not None:
         return read_coordinates(given)

@@ -16,7 +16,8 @@ from coordlang.explanation.descriptions import WordDescriptions, describe_words
 from coordlang.explanation.text import term_text
 from coordlang.explanation.words import all_covers, mapped_states
 from coordlang.language.words import Language
-from coordlang.report.layout import Point, graph_layout, place_layout, spread
+from coordlang.report.layout import graph_layout, spread
+from coordlang.report.places import Point, place_layout
 from coordlang.report.shown import Selection
 from coordlang.report.task import Tables, TaskPart, task_data, told
 from coordlang.report.world import World, find_world

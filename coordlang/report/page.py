@@ -12,7 +12,7 @@ from typing import Any
 from coordlang.explanation.text import counted
 from coordlang.language.words import Language
 from coordlang.report.data import page_data
-from coordlang.report.layout import Point
+from coordlang.report.places import Point
 from coordlang.report.shown import select_tasks
 from coordlang.report.task import task_part
 from planners.errors import OutOfMemory, Position

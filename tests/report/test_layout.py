@@ -10,14 +10,8 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.report.layout import (
-    from_names,
-    graph_layout,
-    layer_orders,
-    place_layout,
-    read_coordinates,
-    spread,
-)
+from coordlang.report.layout import graph_layout, layer_orders, spread
+from coordlang.report.places import from_names, place_layout, read_coordinates
 from planners.errors import BadInput
 
 
@@ -57,6 +51,8 @@ def test_a_path_is_laid_out_straight_and_a_ring_round() -> None:
     middle = ring.mean(axis=0)
     away = np.linalg.norm(ring - middle, axis=1)
     assert away.max() < 1.05 * away.min()
+    steps = np.abs(np.roll(ring, -1, axis=0) - ring)
+    assert ((steps < 0.01).any(axis=1)).sum() == 4  # no axis is longer: links lie along x and y
 
 
 def test_a_layout_is_the_same_each_time_and_finite() -> None:

@@ -1,0 +1,121 @@
+"""Coordinates of places: from a file, else from their names, else by graph layout."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from coordlang.report.layout import graph_layout
+from planners.errors import BadInput, Position
+
+Point = tuple[float, float]
+
+#: Coordinates in files are smaller than this.
+_LARGEST = 1e6
+#: Names that hold two numbers, and the text before the first one that says it is the column.
+_PAIR = re.compile(
+    r"(?P<stem>.*?)(?P<first>\d+)(?P<between>[^0-9]+)(?P<second>\d+)(?P<end>[^0-9]*)"
+)
+_COLUMN = re.compile(r"(^|[^a-z])(x|col|column)[-_]?$")
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Points of named places, x to the right and y down, neighbours about 1 apart.
+
+    ``is_grid``: the places are cells of a grid, to be drawn as squares that touch.
+    """
+
+    points: Mapping[str, Point]
+    is_grid: bool
+
+
+def place_layout(
+    names: Sequence[str], links: Sequence[tuple[str, str]], known: Mapping[str, Point] | None = None
+) -> Layout:
+    """Place named places: by ``known`` coordinates of all of them, else by names, else by links."""
+    if known is not None and all(name in known for name in names):
+        points: Mapping[str, Point] | None = known
+    else:
+        points = from_names(names, links)
+    if points is not None:
+        found = {name: points[name] for name in names}
+        return Layout(found, _is_grid(list(found.values())))
+    number = {name: k for k, name in enumerate(names)}
+    table = graph_layout(len(names), [(number[a], number[b]) for a, b in links])
+    return Layout(
+        {name: (float(x), float(y)) for name, (x, y) in zip(names, table, strict=True)}, False
+    )
+
+
+class _CoordinatesFile(msgspec.Struct):
+    coordinates: dict[str, tuple[float, float]]
+
+
+def read_coordinates(path: str | Path) -> dict[str, Point]:
+    """Read a file of coordinates, ``{"coordinates": {"depot": [0, 0], "town": [1, 0]}}``.
+
+    x to the right, y down.  Names are lower case in the result.
+
+    Raises
+    ------
+    BadInput
+        For anything else, and if two places have the same coordinates.
+    """
+    position = Position(str(path))
+    try:
+        text = Path(path).read_text("utf-8-sig")
+        entries = msgspec.json.decode(text, type=_CoordinatesFile).coordinates
+    except OSError as error:
+        raise BadInput(f"cannot be read: {error.strerror}", position=position) from None
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise BadInput(
+            f"this file has no coordinates: {error}",
+            position=position,
+            remedy='Write {"coordinates": {"PLACE": [X, Y], ..}}.',
+        ) from None
+    for name, point in entries.items():
+        if not all(abs(value) < _LARGEST for value in point):
+            raise BadInput(
+                f"{name!r}: the coordinates must be between {-_LARGEST:g} and {_LARGEST:g}",
+                position=position,
+            )
+    points = {name.lower(): point for name, point in entries.items()}
+    if len(set(points.values())) < len(points):
+        raise BadInput("two places have the same coordinates", position=position)
+    return points
+
+
+def from_names(names: Sequence[str], links: Sequence[tuple[str, str]]) -> dict[str, Point] | None:
+    """Read coordinates from names: ``c2-3`` is row 2, column 3; ``loc-x2-y3`` is column 2, row 3.
+
+    None unless all names have one form with two numbers, all points differ, and most links join
+    neighbours on the grid.
+    """
+    matches = [match for match in map(_PAIR.fullmatch, names) if match is not None]
+    if len(names) < 2 or len(matches) < len(names):
+        return None
+    forms = {(m["stem"], m["between"], m["end"]) for m in matches}
+    if len(forms) > 1:
+        return None
+    pairs = [(float(m["first"]), float(m["second"])) for m in matches]
+    if not _COLUMN.search(matches[0]["stem"].lower()):
+        pairs = [(column, row) for row, column in pairs]
+    points = dict(zip(names, pairs, strict=True))
+    near = [math.dist(points[a], points[b]) < 1.5 for a, b in links]
+    if len(set(pairs)) < len(names) or sum(near) < 0.8 * len(near):
+        return None
+    return points
+
+
+def _is_grid(points: Sequence[Point]) -> bool:
+    """Whole numbers, and not so scattered that most of the rectangle would be empty."""
+    if not all(value == int(value) for point in points for value in point):
+        return False
+    width, height = (max(p[k] for p in points) - min(p[k] for p in points) + 1 for k in (0, 1))
+    return width * height <= 6 * len(points) + 12
