@@ -8,13 +8,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import combinations, product
 
 import numpy as np
 
 from planners.grounding import GroundAction
-from planners.joint.composition import ComposingStepper
-from planners.joint.interference import conflict, footprint
+from planners.joint.interference import footprint
 from planners.joint.model import JointModel, show
 from planners.loading import PlanningInstance
 from planners.pddl.lifted import (
@@ -101,7 +99,7 @@ def inspect(loaded: PlanningInstance) -> Inspection:
         formulas=_formulas(model),
         without_effects=tuple(sorted({a.schema for a in model.actions if not a.effects})),
         costs=_costs(domain, model.cost),
-        interfering=_interfering(model),
+        interfering=model.stepper.interfering_pairs(),
         example=_example(model, loaded.tasks[0].init),
         fluents=_counted(fact.predicate for fact in model.codec.facts),
         start=_counted(fact[1:-1].split(" ")[0] for fact in start if not fact.startswith("(last ")),
@@ -184,37 +182,16 @@ def _nobody(atoms: frozenset[StepAtom]) -> str:
     return f"{_some(atoms)}, which nobody can ever do,"
 
 
-def _interfering(model: JointModel) -> int:
-    """Pairs of subactions of different robots that may not share a step."""
-    if not isinstance(model.stepper, ComposingStepper):
-        return 0
-    return sum(int(np.count_nonzero(~table[1:, 1:])) for table in model.stepper.tables.values())
-
-
 def _example(model: JointModel, init: Rows) -> str | None:
     """Why two subactions interfere that are both possible in some state.
 
     Breadth first from the start, some states.
     """
-    stepper = model.stepper
-    if not isinstance(stepper, ComposingStepper):
-        return None
-    own = [[a for a in model.actions if i in a.owners] for i in range(len(model.robots))]
     layer = seen = init[None, :]
     while len(layer) and len(seen) <= _LOOK_AT:
-        choices = stepper.choices(np.ascontiguousarray(layer[:, : model.codec.fact_blocks]))
-        for state, (i, j) in product(range(len(layer)), combinations(range(len(own)), 2)):
-            mine, theirs = (
-                labels[first[state] : first[state + 1]]
-                for first, labels in (choices[i], choices[j])
-            )
-            for a, b in np.argwhere(~stepper.tables[i, j][np.ix_(mine, theirs)]).tolist():
-                if (
-                    mine[a]
-                    and theirs[b]
-                    and (why := conflict(own[i][mine[a] - 1], own[j][theirs[b] - 1]))
-                ):
-                    return why
+        why = model.stepper.conflict_in(model.codec.facts_part(layer))
+        if why:
+            return why
         new, _ = unique_rows(model.successors(layer[:_LOOK_AT]).result)
         layer = new[find_rows(seen, new) < 0]
         seen, _ = unique_rows(np.concatenate((seen, layer)))

@@ -8,24 +8,18 @@ from pathlib import Path
 from typing import get_args
 
 from planners.errors import BadInput, Position, UsageError
-from planners.grounding import FEWER, GroundAction, ground_actions, ground_goal
+from planners.grounding import FEWER, ground_actions, ground_goal
 from planners.grounding.networks import apply_network
-from planners.joint.composition import ComposingStepper
-from planners.joint.conditions import Evaluator
-from planners.joint.facts import FactTable
-from planners.joint.joint_actions import JointActionStepper
-from planners.joint.model import IDLE, Cost, Goal, JointModel, show
-from planners.joint.states import StateCodec
+from planners.joint.assembly import assemble
+from planners.joint.model import Cost, Goal, JointModel, show
 from planners.limits import reaching
 from planners.pddl import read_domain, read_problem
-from planners.pddl.lifted import TRUE, Atom, Domain, Problem, StepAtom
+from planners.pddl.lifted import Atom, Domain, Problem
 from planners.pddl.robots import (
     RobotSelection,
     Team,
     Unowned,
     find_team,
-    fluent_predicates,
-    natural,
     static_atoms,
     without_idle_environment,
 )
@@ -128,7 +122,16 @@ def build(
     ):
         actions = apply_network(domain, first, actions)
         team = without_idle_environment(team, (i for action in actions for i in action.owners))
-        model = _joint_model(domain, problems, team, actions, starts, options)
+        model = assemble(
+            domain,
+            problems[0],
+            team,
+            actions,
+            starts,
+            cost=options.cost,
+            remember_actions=options.remember_actions,
+            idle=options.idle,
+        )
     tasks = tuple(task_of(model, domain, problem) for problem in problems)
     return PlanningInstance(domain, tuple(problems), model, tasks, options, team)
 
@@ -164,114 +167,6 @@ def _check_same_world(domain: Domain, first: Problem, other: Problem) -> None:
         )
     if first.values != other.values:
         raise BadInput("function values differ between the problems", position=init, remedy=remedy)
-
-
-def _joint_model(
-    domain: Domain,
-    problems: Sequence[Problem],
-    team: Team,
-    actions: tuple[GroundAction, ...],
-    starts: Sequence[frozenset[Atom]],
-    options: ModelOptions,
-) -> JointModel:
-    fluents = fluent_predicates(domain)
-    possible = {atom for start in starts for atom in start if atom.predicate in fluents}
-    possible |= {e.atom for action in actions for e in action.effects if e.adds}
-    facts = FactTable.of(possible)
-    robots = team.robots
-    subactions = [[a for a in actions if i in a.owners] for i in range(len(robots))]
-    labels: tuple[tuple[str, ...], ...]
-    if domain.is_joint_action:
-        parts = [{a.parts[i] for a in actions} for i in range(len(robots))]
-        labels = tuple((IDLE, *sorted((p for p in own if p), key=_natural_label)) for own in parts)
-    else:
-        labels = tuple((IDLE, *(a.label for a in own)) for own in subactions)
-    memory = labels if options.remember_actions else None
-    codec = StateCodec(facts, robots, memory)
-    evaluator = Evaluator(
-        facts,
-        {}
-        if domain.is_joint_action
-        else {
-            StepAtom(a.schema, a.args): (i, n + 1)
-            for i, own in reversed([*enumerate(subactions)])
-            for n, a in enumerate(own)
-        },
-    )
-    keeps_idle = tuple(
-        robots[i] in options.idle
-        if options.idle is not None
-        else domain.is_joint_action or not _always_has_nothing_to_do(i, own, actions, starts)
-        for i, own in enumerate(subactions)
-    )
-    stepper: ComposingStepper | JointActionStepper
-    if domain.is_joint_action:
-        positions = {
-            schema.name: domain.source.position(schema.offset) for schema in domain.schemas
-        }
-        stepper = JointActionStepper(
-            codec, evaluator, robots, labels, actions, options.cost, positions
-        )
-    else:
-        stepper = ComposingStepper(codec, evaluator, robots, subactions, keeps_idle, options.cost)
-    return JointModel(
-        name=domain.name,
-        robots=robots,
-        labels=labels,
-        actions=actions,
-        keeps_idle=keeps_idle,
-        codec=codec,
-        stepper=stepper,
-        evaluator=evaluator,
-        cost=options.cost,
-        statics=static_atoms(domain, problems[0]),
-        is_joint_action=domain.is_joint_action,
-    )
-
-
-def _always_has_nothing_to_do(
-    robot: int,
-    subactions: Sequence[GroundAction],
-    actions: Sequence[GroundAction],
-    inits: Sequence[frozenset[Atom]],
-) -> bool:
-    """Whether a do-nothing schema of the robot's own is as good as idling.
-
-    Always possible, and named in no formula.
-
-    Proved for a precondition that is true, or for instances with one positive literal each of which
-    at least one is true at the start, which no action makes false without making another one true,
-    and which no other robot's action makes false at all (it would interfere with the schema, and
-    not with idling).
-    """
-    by_schema: dict[str, list[GroundAction]] = {}
-    for action in subactions:
-        if action.does_nothing and action.owners == (robot,):
-            by_schema.setdefault(action.schema, []).append(action)
-    return any(_one_always_holds(robot, own, actions, inits) for own in by_schema.values())
-
-
-def _one_always_holds(
-    robot: int,
-    candidates: Sequence[GroundAction],
-    actions: Sequence[GroundAction],
-    inits: Sequence[frozenset[Atom]],
-) -> bool:
-    if any(c.precondition == TRUE for c in candidates):
-        return True
-    group = {c.precondition for c in candidates if isinstance(c.precondition, Atom)}
-    if not all(any(atom in group for atom in init) for init in inits):
-        return False
-    for action in actions:
-        added = {e.atom for e in action.effects if e.adds and e.condition == TRUE}
-        deleted = {e.atom for e in action.effects if not e.adds} - added
-        if deleted & group and (not added & group or robot not in action.owners):
-            return False
-    return True
-
-
-def _natural_label(text: str) -> tuple[object, ...]:
-    return tuple(natural(word) for word in text.strip("()").split())
 
 
 __all__ = ["ModelOptions", "PlanningInstance", "PlanningTask", "build", "load", "task_of"]

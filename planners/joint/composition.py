@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations, product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planners.errors import OutOfMemory
-from planners.grounding import GroundAction, GroundEffect
+from planners.grounding import GroundAction
 from planners.joint.conditions import Evaluator, Labels, speaks_of_step
 from planners.joint.interference import compatible, conflict, conjuncts
-from planners.joint.matching import Matcher
 from planners.joint.model import Cost, Steps, show
+from planners.joint.operators import Operators
 from planners.joint.states import StateCodec
 from planners.limits import memory_left
-from planners.pddl.lifted import TRUE, Atom, Formula, Not, StepAtom
-from planners.tables import Ints, Rows, ranges, spans
+from planners.pddl.lifted import Atom, Formula, Not, StepAtom
+from planners.tables import Bools, Ints, Rows, ranges, spans
 
 #: Joint steps composed at a time, before compatibility is looked up.
 _CHUNK = 1_000_000
@@ -83,33 +83,76 @@ class ComposingStepper:
 
     def why_not(self, row: Rows, labels: Sequence[int]) -> str:
         """Why these labels are no joint step in a state: the first rule that they break."""
-        rows = row[None, :]
-        here = np.zeros(1, np.int64)
         chosen = [self._choices[i][label] for i, label in enumerate(labels)]
+        return (
+            self._unmet_in_state(row, chosen)
+            or self._unshared(labels, chosen)
+            or self._interfering(labels, chosen)
+            or self._unmet_in_step(row, labels, chosen)
+            or "this is a joint step"
+        )
+
+    def _unmet_in_state(self, row: Rows, chosen: Sequence[GroundAction | None]) -> str | None:
+        rows, here = row[None, :], np.zeros(1, np.int64)
         for robot, action in zip(self._robots, chosen, strict=True):
             for part in conjuncts(action.precondition) if action else ():
                 if not speaks_of_step(part) and not self._evaluator.holds(part, rows, here)[0]:
                     assert action is not None
                     return f"{robot} cannot {action.label} here: it needs {_text(part)}"
-        for i, label in enumerate(labels):
-            if label == 0 and not self._keeps_idle[i]:
-                return f"{self._robots[i]} has to choose an action of its own"
-            action = chosen[i]
-            for j in action.owners if action else ():
-                if chosen[j] != action:
+        return None
+
+    def _unshared(self, labels: Sequence[int], chosen: Sequence[GroundAction | None]) -> str | None:
+        for robot, (label, action) in enumerate(zip(labels, chosen, strict=True)):
+            if label == 0 and not self._keeps_idle[robot]:
+                return f"{self._robots[robot]} has to choose an action of its own"
+            for owner in action.owners if action else ():
+                if chosen[owner] != action:
                     assert action is not None
-                    return f"{action.label} needs {self._robots[j]} to choose it too"
-        for j, second in enumerate(chosen):
-            for i, first in enumerate(chosen[:j]):
-                if first and second and not self.tables[i, j][labels[i], labels[j]]:
-                    return conflict(first, second) or f"{first.label} and {second.label} interfere"
-        both = np.array([labels], np.int32)
+                    return f"{action.label} needs {self._robots[owner]} to choose it too"
+        return None
+
+    def _interfering(
+        self, labels: Sequence[int], chosen: Sequence[GroundAction | None]
+    ) -> str | None:
+        for j, i in ((j, i) for j in range(len(chosen)) for i in range(j)):
+            first, second = chosen[i], chosen[j]
+            if first and second and not self.tables[i, j][labels[i], labels[j]]:
+                return conflict(first, second) or f"{first.label} and {second.label} interfere"
+        return None
+
+    def _unmet_in_step(
+        self, row: Rows, labels: Sequence[int], chosen: Sequence[GroundAction | None]
+    ) -> str | None:
+        rows, here, together = row[None, :], np.zeros(1, np.int64), np.array([labels], np.int32)
         for action in chosen:
-            if action and not self._evaluator.holds(action.precondition, rows, here, both)[0]:
+            if action and not self._evaluator.holds(action.precondition, rows, here, together)[0]:
                 return (
-                    f"{action.label} needs another subaction in the same step, and nobody does it"
+                    f"{action.label} needs another subaction in the same step, which is not chosen"
                 )
-        return "this is a joint step"
+        return None
+
+    def joint_action(self, row: Rows, labels: Sequence[int]) -> str | None:
+        """None: robots' subactions are actions of their own."""
+        return None
+
+    def interfering_pairs(self) -> int:
+        """Pairs of subactions of different robots that may not share a step."""
+        return sum(int(np.count_nonzero(~table[1:, 1:])) for table in self.tables.values())
+
+    def conflict_in(self, rows: Rows) -> str | None:
+        """Why two subactions interfere that are both possible in one of these states, or None."""
+        options = self.choices(rows)
+        robots = range(len(self._robots))
+        for state, (i, j) in product(range(len(rows)), combinations(robots, 2)):
+            mine, theirs = (
+                labels[first[state] : first[state + 1]]
+                for first, labels in (options[i], options[j])
+            )
+            for a, b in np.argwhere(~self.tables[i, j][np.ix_(mine, theirs)]).tolist():
+                first_one, second_one = self._choices[i][mine[a]], self._choices[j][theirs[b]]
+                if first_one and second_one and (why := conflict(first_one, second_one)):
+                    return why
+        return None
 
     def _options(self, robot: _Subactions, number: int, rows: Rows) -> tuple[Ints, Ints]:
         """CSR of each state's labels for one robot: (first index, labels)."""
@@ -168,7 +211,7 @@ class ComposingStepper:
                     fires = there[
                         self._evaluator.holds(effect.condition, rows, source[there], labels[there])
                     ]
-                    number = self._evaluator.facts.index.get(effect.atom)
+                    number = self._codec.facts.index.get(effect.atom)
                     if number is not None:
                         into = adds if effect.adds else deletes
                         self._codec.set(into, fires, [number])
@@ -176,7 +219,10 @@ class ComposingStepper:
 
 
 class _Subactions:
-    """One robot's subactions as tables; index 0 of ``adds``, ``deletes`` and ``cost`` is idling."""
+    """One robot's subactions as tables; index 0 of ``adds``, ``deletes`` and ``cost`` is idling.
+
+    ``conditional`` has the conditional effects of each label number.
+    """
 
     def __init__(
         self,
@@ -187,81 +233,29 @@ class _Subactions:
         cost: Cost,
     ) -> None:
         self._evaluator = evaluator
-        required, forbidden = [], np.zeros((len(actions), codec.fact_blocks), np.uint64)
-        self._state_formulas: dict[int, list[Formula]] = {}
-        self._step_formulas: dict[int, list[Formula]] = {}
-        self.conditional: dict[int, list[GroundEffect]] = {}
-        self.adds = np.zeros((len(actions) + 1, codec.fact_blocks), np.uint64)
-        self.deletes = np.zeros_like(self.adds)
-        self.cost = np.zeros(len(actions) + 1, np.int64)
-        for number, action in enumerate(actions):
-            literals, rest = split(action.precondition, evaluator)
-            required.append(frozenset(n for n, positive in literals if positive))
-            forbidden[number] = codec.mask(n for n, positive in literals if not positive)
-            for formula in rest:
-                kind = self._step_formulas if speaks_of_step(formula) else self._state_formulas
-                kind.setdefault(number, []).append(formula)
-            for into, adding in ((self.adds, True), (self.deletes, False)):
-                into[number + 1] = codec.mask(
-                    evaluator.facts.index[e.atom]
-                    for e in action.effects
-                    if e.adds == adding and e.condition == TRUE and e.atom in evaluator.facts
-                )
-            conditional = [e for e in action.effects if e.condition != TRUE]
-            if conditional:
-                self.conditional[number + 1] = conditional
-            if action.owners[0] == robot:  # a shared subaction is paid once
-                self.cost[number + 1] = cost_of(action, cost)
-        self._matcher = Matcher(required, forbidden)
+        self._operators = Operators(actions, codec, evaluator)
+        idle = np.zeros((1, codec.fact_blocks), np.uint64)
+        self.adds = np.vstack((idle, self._operators.adds))
+        self.deletes = np.vstack((idle, self._operators.deletes))
+        self.conditional = {n + 1: e for n, e in self._operators.conditional.items()}
+        # A shared subaction is paid once, by the first of its owners.
+        own = [cost_of(a, cost) if a.owners[0] == robot else 0 for a in actions]
+        self.cost = np.array([0, *own], np.int64)
         self._has_step_formula = np.zeros(len(actions) + 1, np.bool_)
-        self._has_step_formula[[n + 1 for n in self._step_formulas]] = True
+        self._has_step_formula[[n + 1 for n in self._operators.step_formulas]] = True
 
     def applicable(self, rows: Rows) -> tuple[Ints, Ints]:
         """Pairs (row, subaction) whose conditions on the state hold, sorted."""
-        row, operator = self._matcher.match(rows)
-        keep = np.ones(len(row), np.bool_)
-        for number, formulas in self._state_formulas.items():
-            there = np.flatnonzero(operator == number)
-            for formula in formulas:
-                keep[there] &= self._evaluator.holds(formula, rows, row[there])
-        return row[keep], operator[keep]
+        return self._operators.applicable(rows)
 
-    def drop_unmet(
-        self, fits: NDArray[np.bool_], robot: int, rows: Rows, source: Ints, labels: Labels
-    ) -> None:
+    def drop_unmet(self, fits: Bools, robot: int, rows: Rows, source: Ints, labels: Labels) -> None:
         """Clear ``fits`` where a formula of this robot's subaction about the joint step is not met."""
         asks = np.flatnonzero(self._has_step_formula[labels[:, robot]])
-        if not len(asks):
-            return
         own = labels[asks, robot]
         for label in np.unique(own):
             there = asks[own == label]
-            for formula in self._step_formulas[int(label) - 1]:
+            for formula in self._operators.step_formulas[int(label) - 1]:
                 fits[there] &= self._evaluator.holds(formula, rows, source[there], labels[there])
-
-
-def split(
-    precondition: Formula, evaluator: Evaluator
-) -> tuple[list[tuple[int, bool]], list[Formula]]:
-    """Literals (fact number, positive) and the rest of a precondition.
-
-    Negative step literals are left out (the compatibility table has them), and negative literals on
-    facts that are never true.
-    """
-    literals: list[tuple[int, bool]] = []
-    rest: list[Formula] = []
-    for part in conjuncts(precondition):
-        positive = not isinstance(part, Not)
-        inner = part.part if isinstance(part, Not) else part
-        if isinstance(inner, StepAtom) and not positive:
-            continue
-        if isinstance(inner, Atom) and inner in evaluator.facts:
-            literals.append((evaluator.facts.index[inner], positive))
-        elif isinstance(inner, Atom) and not positive:
-            continue
-        elif part != TRUE:
-            rest.append(part)
-    return literals, rest
 
 
 def cost_of(action: GroundAction, cost: Cost) -> int:

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.joint.facts import FactTable
+from planners.joint.interference import conjuncts
 from planners.joint.states import test_bits
-from planners.pddl.lifted import And, Atom, Formula, Not, Or, StepAtom, Truth
+from planners.pddl.lifted import TRUE, And, Atom, Formula, Not, Or, StepAtom, Truth
 from planners.tables import Ints, Rows
 
 Labels = NDArray[np.int32]
@@ -75,3 +76,27 @@ def speaks_of_step(formula: Formula) -> bool:
         case And(parts) | Or(parts):
             return any(speaks_of_step(part) for part in parts)
     return False
+
+
+def split_condition(
+    precondition: Formula, evaluator: Evaluator
+) -> tuple[list[tuple[int, bool]], list[Formula]]:
+    """Literals (fact number, positive) and the rest of a precondition.
+
+    Negative step literals are left out (the compatibility table has them), and negative literals on
+    facts that are never true.
+    """
+    literals: list[tuple[int, bool]] = []
+    rest: list[Formula] = []
+    for part in conjuncts(precondition):
+        positive = not isinstance(part, Not)
+        inner = part.part if isinstance(part, Not) else part
+        if isinstance(inner, StepAtom) and not positive:
+            continue
+        if isinstance(inner, Atom) and inner in evaluator.facts:
+            literals.append((evaluator.facts.index[inner], positive))
+        elif isinstance(inner, Atom) and not positive:
+            continue
+        elif part != TRUE:
+            rest.append(part)
+    return literals, rest

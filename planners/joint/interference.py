@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -112,38 +112,38 @@ def compatible(
     A shared subaction of both goes only with itself; one that only names other robots goes with
     idling too. O(pairs that touch one atom) beside the table itself.
     """
-    prints = [[footprint(a) if a else None for a in side] for side in (left, right)]
-    hard, soft = ([("adds", "deletes")], [("requires_true", "deletes"), ("requires_false", "adds")])
-    table = ~_meeting(prints[0], prints[1], soft)
-    numbers = {StepAtom(b.schema, b.args): n for n, b in enumerate(right) if b}
-    rows = {StepAtom(a.schema, a.args): n for n, a in enumerate(left) if a}
-    named = [
-        *(
-            (row, numbers[p])
-            for row, one in enumerate(prints[0])
-            for p in (one.partners if one else ())
-            if p in numbers
-        ),
-        *(
-            (rows[p], column)
-            for column, one in enumerate(prints[1])
-            for p in (one.partners if one else ())
-            if p in rows
-        ),
-    ]
-    for row, column in named:  # linked: meant to be done together
+    mine, theirs = ([footprint(a) if a else None for a in side] for side in (left, right))
+    table = ~_meeting(mine, theirs, [("requires_true", "deletes"), ("requires_false", "adds")])
+    for row, column in _naming("partners", left, right, mine, theirs):  # meant to be done together
         table[row, column] = True
-    table &= ~_meeting(prints[0], prints[1], hard)
-    for row, one in enumerate(prints[0]):
-        for excluded in one.excluded if one else ():
-            if excluded in numbers:
-                table[row, numbers[excluded]] = False
-    for column, one in enumerate(prints[1]):
-        for excluded in one.excluded if one else ():
-            if excluded in rows:
-                table[rows[excluded], column] = False
+    table &= ~_meeting(mine, theirs, [("adds", "deletes")])
+    for row, column in _naming("excluded", left, right, mine, theirs):
+        table[row, column] = False
     _share(table, left, right, i, j)
     return table
+
+
+def _naming(
+    field: str,
+    left: Sequence[GroundAction | None],
+    right: Sequence[GroundAction | None],
+    left_prints: Sequence[Footprint | None],
+    right_prints: Sequence[Footprint | None],
+) -> Iterator[tuple[int, int]]:
+    """Pairs (of the left, of the right) in which one's footprint names the other in this field."""
+    columns, rows = _numbers(right), _numbers(left)
+    for row, one in enumerate(left_prints):
+        for named in getattr(one, field) if one else ():
+            if named in columns:
+                yield row, columns[named]
+    for column, one in enumerate(right_prints):
+        for named in getattr(one, field) if one else ():
+            if named in rows:
+                yield rows[named], column
+
+
+def _numbers(side: Sequence[GroundAction | None]) -> dict[StepAtom, int]:
+    return {StepAtom(a.schema, a.args): number for number, a in enumerate(side) if a}
 
 
 def _meeting(
@@ -166,11 +166,11 @@ def _meeting(
 
 def _where(side: Sequence[Footprint | None], field: str) -> dict[Atom, list[int]]:
     """In which footprints' field each atom stands."""
-    places: dict[Atom, list[int]] = {}
+    found: dict[Atom, list[int]] = {}
     for number, one in enumerate(side):
         for atom in getattr(one, field) if one else ():
-            places.setdefault(atom, []).append(number)
-    return places
+            found.setdefault(atom, []).append(number)
+    return found
 
 
 def _share(

@@ -8,12 +8,11 @@ import numpy as np
 
 from planners.errors import BadInput, Position
 from planners.grounding import GroundAction, GroundEffect
-from planners.joint.composition import cost_of, split
+from planners.joint.composition import cost_of
 from planners.joint.conditions import Evaluator
-from planners.joint.matching import Matcher
 from planners.joint.model import Cost, Steps
+from planners.joint.operators import Operators
 from planners.joint.states import StateCodec
-from planners.pddl.lifted import TRUE, Formula
 from planners.tables import Ints, Rows
 
 
@@ -38,40 +37,18 @@ class JointActionStepper:
         self._positions = positions
         self._codec, self._evaluator, self._robots = codec, evaluator, tuple(robots)
         self._names, self._actions = [tuple(own) for own in labels], tuple(actions)
+        self._operators = Operators(actions, codec, evaluator)
         numbers = [{text: n for n, text in enumerate(own)} for own in labels]
-        required, forbidden = [], np.zeros((len(actions), codec.fact_blocks), np.uint64)
-        self._formulas: dict[int, list[Formula]] = {}
-        self._conditional: dict[int, list[GroundEffect]] = {}
-        self._labels = np.zeros((len(actions), len(robots)), np.int32)
-        self._adds, self._deletes = np.zeros_like(forbidden), np.zeros_like(forbidden)
-        self._cost = np.zeros(len(actions), np.int64)
-        for n, action in enumerate(actions):
-            literals, rest = split(action.precondition, evaluator)
-            required.append(frozenset(fact for fact, positive in literals if positive))
-            forbidden[n] = codec.mask(fact for fact, positive in literals if not positive)
-            if rest:
-                self._formulas[n] = rest
-            for into, adding in ((self._adds, True), (self._deletes, False)):
-                into[n] = codec.mask(
-                    evaluator.facts.index[e.atom]
-                    for e in action.effects
-                    if e.adds == adding and e.condition == TRUE and e.atom in evaluator.facts
-                )
-            conditional = [e for e in action.effects if e.condition != TRUE]
-            if conditional:
-                self._conditional[n] = conditional
-            self._labels[n] = [numbers[i][p] if p else 0 for i, p in enumerate(action.parts)]
-            if cost == "makespan+actions":
-                self._cost[n] = sum(p is not None for p in action.parts)
-            else:
-                self._cost[n] = cost_of(action, cost)
-        self._matcher = Matcher(required, forbidden)
+        self._labels = np.array(
+            [[numbers[i][p] if p else 0 for i, p in enumerate(a.parts)] for a in actions], np.int32
+        ).reshape(len(actions), len(robots))
+        self._cost = np.array([_cost_of(action, cost) for action in actions], np.int64)
 
     def steps(self, rows: Rows) -> Steps:
         """All joint steps applicable in the states of a table, sorted by source and labels."""
-        row, operator = self._applicable(rows)
-        result = (rows[row] & ~self._deletes[operator]) | self._adds[operator]
-        for number, effects in self._conditional.items():
+        row, operator = self._operators.applicable(rows)
+        result = (rows[row] & ~self._operators.deletes[operator]) | self._operators.adds[operator]
+        for number, effects in self._operators.conditional.items():
             result = self._fire(rows, row, operator, number, effects, result)
         labels = self._labels[operator]
         # Of joint actions with the same parts the cheapest comes first, and is kept.
@@ -102,24 +79,15 @@ class JointActionStepper:
             return f"no joint action of the domain lets {parts}"
         return f"the joint action {self._actions[found[0]].label} is not applicable here"
 
-    def name(self, row: Rows, labels: Sequence[int]) -> str:
+    def joint_action(self, row: Rows, labels: Sequence[int]) -> str | None:
         """The ground joint action that these labels are in a state.
 
         The cheapest, as `steps` takes it.
         """
         found = np.flatnonzero((self._labels == np.array(labels)).all(axis=1))
-        _, operators = self._applicable(row[None, :])
+        _, operators = self._operators.applicable(row[None, :])
         here = set(found.tolist()) & set(operators.tolist())
         return self._actions[min(here, key=lambda n: (int(self._cost[n]), n))].label
-
-    def _applicable(self, rows: Rows) -> tuple[Ints, Ints]:
-        row, operator = self._matcher.match(rows)
-        keep = np.ones(len(row), np.bool_)
-        for number, formulas in self._formulas.items():
-            there = np.flatnonzero(operator == number)
-            for formula in formulas:
-                keep[there] &= self._evaluator.holds(formula, rows, row[there])
-        return row[keep], operator[keep]
 
     def _fire(
         self,
@@ -134,12 +102,27 @@ class JointActionStepper:
         there = np.flatnonzero(operator == number)
         for adding in (False, True):
             for effect in effects:
-                fact = self._evaluator.facts.index.get(effect.atom)
+                fact = self._codec.facts.index.get(effect.atom)
                 if effect.adds != adding or fact is None:
                     continue
                 fires = there[self._evaluator.holds(effect.condition, rows, row[there])]
                 if adding:
                     self._codec.set(result, fires, [fact])
-                elif not self._codec.column(self._adds[[number]], fact)[0]:
+                elif not self._codec.column(self._operators.adds[[number]], fact)[0]:
                     self._codec.clear(result, fires, [fact])
         return result
+
+    def interfering_pairs(self) -> int:
+        """None interfere: a joint action is written as a whole."""
+        return 0
+
+    def conflict_in(self, rows: Rows) -> str | None:
+        """None: a joint action is written as a whole."""
+        return None
+
+
+def _cost_of(action: GroundAction, cost: Cost) -> int:
+    """The second component of a joint action's cost: under ``makespan+actions`` its parts."""
+    if cost == "makespan+actions":
+        return sum(part is not None for part in action.parts)
+    return cost_of(action, cost)

@@ -64,6 +64,18 @@ class Stepper(Protocol):
     def why_not(self, row: Rows, labels: Sequence[int]) -> str:
         """Why these labels are no joint step in a state, in words."""
 
+    def joint_action(self, row: Rows, labels: Sequence[int]) -> str | None:
+        """The ground joint action of the domain that these labels are in a state.
+
+        None where robots' subactions are actions of their own.
+        """
+
+    def interfering_pairs(self) -> int:
+        """How many pairs of subactions of different robots may not share a step."""
+
+    def conflict_in(self, rows: Rows) -> str | None:
+        """Why two subactions that are both possible in one of these states interfere, in words."""
+
 
 @dataclass(frozen=True, slots=True)
 class JointModel:
@@ -114,6 +126,13 @@ class JointModel:
     def why_not(self, row: Rows, labels: Sequence[int]) -> str:
         """Why these labels are no joint step in a state, in words."""
         return self.stepper.why_not(self.codec.facts_part(row), labels)
+
+    def joint_action(self, row: Rows, labels: Sequence[int]) -> str | None:
+        """The ground joint action of the domain that these labels are in a state.
+
+        None where robots' subactions are actions of their own.
+        """
+        return self.stepper.joint_action(self.codec.facts_part(row), labels)
 
     def state_text(self, row: Rows) -> str:
         """A state for people: its key, if it is not empty."""

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 import numpy as np
 
 from planners.errors import UsageError
-from planners.joint.composition import split
+from planners.joint.conditions import split_condition
 from planners.joint.model import FullState, Goal, JointModel
 from planners.pddl.lifted import And, Atom, Formula
 from planners.tables import Ints, Rows
@@ -189,7 +189,7 @@ def _ways(model: JointModel) -> Iterator[tuple[frozenset[int], int]]:
 
 
 def _positive(model: JointModel, formula: Formula) -> set[int]:
-    literals, _ = split(formula, model.evaluator)
+    literals, _ = split_condition(formula, model.evaluator)
     return {fact for fact, positive in literals if positive}
 
 

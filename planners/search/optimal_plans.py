@@ -160,28 +160,23 @@ def joined(spaces: Sequence[PlanSpace]) -> PlanSpace:
     if len(spaces) == 1:
         return spaces[0]
     rows, number = unique_rows(np.concatenate([s.rows for s in spaces]))
-    row_offset = np.cumsum([0, *(len(s.rows) for s in spaces)])
-    node_offset = np.cumsum([0, *(len(s) for s in spaces)])
+    row_offset, node_offset, edge_offset = (
+        np.cumsum([0, *sizes])
+        for sizes in zip(*((len(s.rows), len(s), len(s.target)) for s in spaces), strict=True)
+    )
+    parts = list(enumerate(spaces))
     together = PlanSpace(
         model=spaces[0].model,
         rows=rows,
-        state=np.concatenate([number[s.state + row_offset[k]] for k, s in enumerate(spaces)]),
+        state=np.concatenate([number[s.state + row_offset[k]] for k, s in parts]),
         goal=np.repeat(np.arange(len(spaces)), np.diff(node_offset)),
         layer=np.concatenate([s.layer for s in spaces]),
-        first=np.concatenate(
-            [
-                [0],
-                *(
-                    s.first[1:] + sum(len(q.target) for q in spaces[:k])
-                    for k, s in enumerate(spaces)
-                ),
-            ]
-        ),
-        target=np.concatenate([s.target + node_offset[k] for k, s in enumerate(spaces)]),
+        first=np.concatenate([[0], *(s.first[1:] + edge_offset[k] for k, s in parts)]),
+        target=np.concatenate([s.target + node_offset[k] for k, s in parts]),
         labels=np.concatenate([s.labels for s in spaces]),
         cost=np.concatenate([s.cost for s in spaces]),
         goals=tuple(space.goals[0] for space in spaces),
-        starts=np.array([s.starts[0] + node_offset[k] for k, s in enumerate(spaces)]),
+        starts=np.array([s.starts[0] + node_offset[k] for k, s in parts]),
         second=np.concatenate([s.second for s in spaces]),
     )
     return together.reordered(np.lexsort((together.state, together.goal, together.layer)))
@@ -267,24 +262,27 @@ def _batch(space: Space, groups: Sequence[TaskGroup]) -> PlanSpace:
 def distances(space: Space, reached: Bools) -> Ints:
     """Least makespan from every state to every goal, (goals, states), -1 where there is none.
 
-    ``reached`` (goals, states): which states satisfy which goal.  O(goals x joint steps).
+    ``reached`` (goals, states): which states satisfy which goal.  One backward search per goal,
+    O(goals x joint steps), by scipy.
     """
-    order = np.argsort(space.target, kind="stable")
-    source = np.repeat(np.arange(len(space)), np.diff(space.first))[order]
-    into = np.searchsorted(space.target[order], np.arange(len(space) + 1))
-    distance = np.where(reached, 0, -1)
-    goal, state = np.nonzero(reached)
-    steps = 0
-    while len(goal):
-        steps += 1
-        counts = into[state + 1] - into[state]
-        before = source[ranges(into[state], counts)]
-        code = np.unique(np.repeat(goal, counts) * len(space) + before)
-        goal, state = np.divmod(code, len(space))
-        new = distance[goal, state] < 0
-        goal, state = goal[new], state[new]
-        distance[goal, state] = steps
-    return distance
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import dijkstra
+
+    source = np.repeat(np.arange(len(space)), np.diff(space.first))
+    result = np.empty(reached.shape, np.int64)
+    size = max(1, len(space))
+    for start in range(0, len(reached), size):
+        goal, state = np.nonzero(reached[start : start + size])
+        goals = len(reached[start : start + size])
+        # A node for each goal, with an edge to each of its states; all joint steps are reversed.
+        tail = np.concatenate((space.target, goal + len(space)))
+        head = np.concatenate((source, state))
+        nodes = len(space) + goals
+        graph = csr_matrix((np.ones(len(tail), np.int8), (tail, head)), shape=(nodes, nodes))
+        far = dijkstra(graph, unweighted=True, indices=np.arange(len(space), nodes))
+        far = far[:, : len(space)]
+        result[start : start + goals] = np.where(np.isinf(far), 0, far) - 1
+    return result
 
 
 def _second_costs(space: Space, distance: Ints) -> tuple[Ints, PlanSpace]:

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from planners.errors import BadInput, Position
-from planners.joint.joint_actions import JointActionStepper
 from planners.joint.model import JointModel
 from planners.search.plans import Plan, Plans
 
@@ -54,17 +53,15 @@ def to_ipc(plans: Plans, plan: Plan) -> str:
     Joint-action PDDL: one ``(action args)`` a line.  Otherwise one subaction a line with its step,
     ``0: (move r1 a b)``, idling left out, a shared subaction once.  Then ``; makespan = 3``.
     """
-    model = plans.space.model
+    model, rows = plans.space.model, plans.space.rows
     lines: list[str] = []
-    if isinstance(model.stepper, JointActionStepper):
-        states = plans.states(plan)
-        lines += [
-            model.stepper.name(plans.space.rows[state][: model.codec.fact_blocks], labels)
-            for state, labels in zip(states, plan, strict=False)
-        ]
-    else:
-        for number, step in enumerate(texts(model, plan)):
-            lines += [f"{number}: {text}" for text in dict.fromkeys(step) if text is not None]
+    for number, (state, labels) in enumerate(zip(plans.states(plan), plan, strict=False)):
+        whole = model.joint_action(rows[state], labels)
+        if whole is not None:
+            lines.append(whole)
+            continue
+        own = dict.fromkeys(model.texts(labels))
+        lines += [f"{number}: {text}" for text in own if text is not None]
     return "\n".join([*lines, f"; makespan = {len(plan)}"]) + "\n"
 
 
@@ -107,24 +104,44 @@ def only_one_plan(text: str, position: Position) -> None:
     It begins with its comment, after the closing comment of the plan before it, or with step
     numbers that start again.
     """
-    first = last = -1  # step numbers
-    begun = ended = actions = False
+    begun = ended = False
+    steps = _StepNumbers()
     for number, raw in enumerate(text.splitlines(), 1):
         line, _, _ = raw.partition(";")
-        step = re.match(r"\s*(\d{1,8})(?:\.\d+)?\s*:", line)
-        now = int(step[1]) if step else last
-        title = bool(_BEGIN.match(raw))
-        again = bool(line.strip()) and (ended or now == first < last)
-        if again or (title and (begun or actions)):
+        title, action = bool(_BEGIN.match(raw)), bool(line.strip())
+        again = action and (ended or steps.start_again(line))
+        if again or (title and (begun or steps.any)):
             raise BadInput(
                 "this file holds several plans: a second one begins here",
                 position=Position(position.file, number, 1),
                 remedy="Write one plan a file (`coordlang plans --max 1`), or use the JSON form.",
             )
-        begun, ended = begun or title, ended or (actions and bool(_END.match(raw)))
-        if line.strip():
-            actions, last = True, now
-            first = now if first < 0 else first
+        begun, ended = begun or title, ended or (steps.any and bool(_END.match(raw)))
+        if action:
+            steps.enter(line)
+
+
+class _StepNumbers:
+    """The step numbers of a plan, read line by line: they may repeat, but never start again."""
+
+    def __init__(self) -> None:
+        self._first = self._last = -1
+        #: Whether there was any action.
+        self.any = False
+
+    def start_again(self, line: str) -> bool:
+        """Whether the line's number is the first one again, after a later one."""
+        return self._number(line) == self._first < self._last
+
+    def enter(self, line: str) -> None:
+        """Take in the number of the next action."""
+        self.any, self._last = True, self._number(line)
+        if self._first < 0:
+            self._first = self._last
+
+    def _number(self, line: str) -> int:
+        step = re.match(r"\s*(\d{1,8})(?:\.\d+)?\s*:", line)
+        return int(step[1]) if step else self._last
 
 
 def _from_json(text: str, model: JointModel, position: Position) -> list[tuple[Texts, ...]]:

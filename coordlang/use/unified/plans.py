@@ -15,7 +15,6 @@ from fractions import Fraction
 from typing import Any
 
 from coordlang.use.unified.translation import Translated
-from planners.joint.joint_actions import JointActionStepper
 from planners.joint.model import JointModel
 from planners.pddl.robots import Team
 from planners.search.plan_file import Texts
@@ -85,13 +84,13 @@ def label(found: Translated, action: Any) -> str:
 
 def _actions(plans: Plans, plan: Plan) -> list[list[str]]:
     """The ground actions of each step; a shared one once, idling left out."""
-    model, space = plans.space.model, plans.space
-    if isinstance(model.stepper, JointActionStepper):
-        rows = space.rows[plans.states(plan)][:, : model.codec.fact_blocks]
-        return [[model.stepper.name(row, step)] for row, step in zip(rows, plan, strict=False)]
-    return [
-        [text for text in dict.fromkeys(model.texts(step)) if text is not None] for step in plan
-    ]
+    model, rows = plans.space.model, plans.space.rows
+    steps = []
+    for state, labels in zip(plans.states(plan), plan, strict=False):
+        whole = model.joint_action(rows[state], labels)
+        own = dict.fromkeys(model.texts(labels))
+        steps.append([text for text in own if text is not None] if whole is None else [whole])
+    return steps
 
 
 def _instance(found: Translated, text: str) -> Any:

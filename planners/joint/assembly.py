@@ -1,0 +1,120 @@
+"""Ground actions of a team -> the joint model: its facts, labels, rules of idling, and stepper."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from planners.grounding import GroundAction
+from planners.joint.composition import ComposingStepper
+from planners.joint.conditions import Evaluator
+from planners.joint.facts import FactTable
+from planners.joint.idling import always_has_nothing_to_do
+from planners.joint.joint_actions import JointActionStepper
+from planners.joint.model import IDLE, Cost, JointModel, Stepper
+from planners.joint.states import StateCodec
+from planners.pddl.lifted import Atom, Domain, Problem, StepAtom
+from planners.pddl.robots import Team, fluent_predicates, natural, static_atoms
+
+#: The texts of a robot's labels, idling first.
+Labels = tuple[str, ...]
+
+
+def assemble(
+    domain: Domain,
+    problem: Problem,
+    team: Team,
+    actions: tuple[GroundAction, ...],
+    starts: Sequence[frozenset[Atom]],
+    *,
+    cost: Cost,
+    remember_actions: bool,
+    idle: tuple[str, ...] | None,
+) -> JointModel:
+    """The joint model of a team's ground actions.
+
+    Parameters
+    ----------
+    problem
+        Where the static atoms are from.
+    starts
+        The true atoms of all initial states: what can ever be true depends on them.
+    idle
+        The robots that may idle without an action of their own; None: found from the model.
+    """
+    robots = team.robots
+    subactions = [[a for a in actions if robot in a.owners] for robot in range(len(robots))]
+    labels = _labels_of_parts(actions, robots) if domain.is_joint_action else _labels(subactions)
+    codec = StateCodec(
+        _facts(domain, actions, starts), robots, labels if remember_actions else None
+    )
+    keeps_idle = _keeps_idle(domain, robots, subactions, actions, starts, idle)
+    evaluator = Evaluator(codec.facts, {} if domain.is_joint_action else _step_atoms(subactions))
+    stepper: Stepper
+    if domain.is_joint_action:
+        positions = {s.name: domain.source.position(s.offset) for s in domain.schemas}
+        stepper = JointActionStepper(codec, evaluator, robots, labels, actions, cost, positions)
+    else:
+        stepper = ComposingStepper(codec, evaluator, robots, subactions, keeps_idle, cost)
+    return JointModel(
+        name=domain.name,
+        robots=robots,
+        labels=labels,
+        actions=actions,
+        keeps_idle=keeps_idle,
+        codec=codec,
+        stepper=stepper,
+        evaluator=evaluator,
+        cost=cost,
+        statics=static_atoms(domain, problem),
+        is_joint_action=domain.is_joint_action,
+    )
+
+
+def _facts(
+    domain: Domain, actions: Sequence[GroundAction], starts: Sequence[frozenset[Atom]]
+) -> FactTable:
+    """The fluent atoms that some initial state has or some action adds."""
+    fluents = fluent_predicates(domain)
+    possible = {atom for start in starts for atom in start if atom.predicate in fluents}
+    return FactTable.of(possible | {e.atom for a in actions for e in a.effects if e.adds})
+
+
+def _labels(subactions: Sequence[Sequence[GroundAction]]) -> tuple[Labels, ...]:
+    return tuple((IDLE, *(action.label for action in own)) for own in subactions)
+
+
+def _labels_of_parts(actions: Sequence[GroundAction], robots: Sequence[str]) -> tuple[Labels, ...]:
+    """The labels of joint-action PDDL: what the robots' parts are called, in natural order."""
+    parts = [{action.parts[robot] for action in actions} for robot in range(len(robots))]
+    return tuple((IDLE, *sorted((p for p in own if p), key=_natural_label)) for own in parts)
+
+
+def _natural_label(text: str) -> tuple[object, ...]:
+    return tuple(natural(name) for name in text.strip("()").split())
+
+
+def _step_atoms(subactions: Sequence[Sequence[GroundAction]]) -> dict[StepAtom, tuple[int, int]]:
+    """The robot and label that a step atom speaks of: a shared subaction's first owner."""
+    return {
+        StepAtom(action.schema, action.args): (robot, number + 1)
+        for robot, own in reversed([*enumerate(subactions)])
+        for number, action in enumerate(own)
+    }
+
+
+def _keeps_idle(
+    domain: Domain,
+    robots: Sequence[str],
+    subactions: Sequence[Sequence[GroundAction]],
+    actions: Sequence[GroundAction],
+    starts: Sequence[frozenset[Atom]],
+    idle: tuple[str, ...] | None,
+) -> tuple[bool, ...]:
+    if idle is not None:
+        return tuple(robot in idle for robot in robots)
+    if domain.is_joint_action:
+        return (True,) * len(robots)
+    return tuple(
+        not always_has_nothing_to_do(robot, own, actions, starts)
+        for robot, own in enumerate(subactions)
+    )
