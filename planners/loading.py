@@ -11,7 +11,7 @@ from planners.errors import BadInput, Position, UsageError
 from planners.grounding import FEWER, ground_actions, ground_goal
 from planners.grounding.networks import apply_network
 from planners.joint.assembly import assemble
-from planners.joint.model import Cost, Goal, JointModel, show
+from planners.joint.model import Cost, JointModel, PlanningTask, show
 from planners.limits import reaching
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Atom, Domain, Problem
@@ -23,7 +23,6 @@ from planners.pddl.robots import (
     static_atoms,
     without_idle_environment,
 )
-from planners.tables import Rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,19 +54,6 @@ class ModelOptions:
     def __post_init__(self) -> None:
         _require_one_of("cost", self.cost, get_args(Cost))
         _require_one_of("unowned", self.robots.unowned, get_args(Unowned))
-
-
-@dataclass(frozen=True, slots=True)
-class PlanningTask:
-    """A task ``(I, G)`` of a joint model.
-
-    An initial row and a goal; ``position`` is the file that it is from.
-    """
-
-    name: str
-    init: Rows
-    goal: Goal
-    position: Position | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,4 +155,4 @@ def _check_same_world(domain: Domain, first: Problem, other: Problem) -> None:
         raise BadInput("function values differ between the problems", position=init, remedy=remedy)
 
 
-__all__ = ["ModelOptions", "PlanningInstance", "PlanningTask", "build", "load", "task_of"]
+__all__ = ["ModelOptions", "PlanningInstance", "build", "load", "task_of"]

@@ -11,7 +11,8 @@ from coordlang.api.options import GivenOptions
 from coordlang.language.file import read_language
 from coordlang.language.words import Language
 from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
-from coordlang.tasks.task_file import FORMAT, VERSION, ListedTask, read_task_file, tasks_from_data
+from coordlang.tasks.listed import ListedTask
+from coordlang.tasks.task_file import FORMAT, VERSION, read_task_file, tasks_from_data
 from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
 from planners.errors import Position, UsageError
 from planners.loading import ModelOptions, PlanningInstance, build

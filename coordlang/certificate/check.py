@@ -18,7 +18,7 @@ from coordlang.certificate.encoding import Cnf, encode
 from coordlang.certificate.file import Certificate, PlanTexts, Reason
 from coordlang.language.warping import Clause, pair
 from coordlang.tasks.candidates import Candidates
-from coordlang.tasks.task_file import goal_text
+from coordlang.tasks.listed import goal_text
 from planners.errors import BadInput, Refuted
 from planners.joint.model import JointModel
 from planners.joint.states import split_atoms

@@ -10,7 +10,7 @@ from coordlang.certificate.encoding import core
 from coordlang.certificate.file import Certificate, PlanTexts, Reason, WarpingPath
 from coordlang.language.warping import Clause, pair, warping_path
 from coordlang.tasks.candidates import Candidates
-from coordlang.tasks.task_file import goal_text
+from coordlang.tasks.listed import goal_text
 from coordlang.vocabulary.job import Evidence
 from planners.joint.states import split_atoms
 from planners.search.plan_space import PlanSpace

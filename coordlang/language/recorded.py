@@ -14,7 +14,7 @@ from coordlang.tasks.candidates import (
     from_problems,
     from_recorded,
 )
-from coordlang.tasks.task_file import ListedTask
+from coordlang.tasks.listed import ListedTask
 from planners.errors import BadInput, Position, UsageError
 from planners.loading import ModelOptions
 from planners.pddl.lifted import Domain, Problem

@@ -12,14 +12,13 @@ from random import Random
 from coordlang.language.recorded import recorded_list
 from coordlang.language.words import Language
 from coordlang.required.miscoordination import Miscoordination, miscoordination
-from coordlang.tasks.task_file import goal_text, ground_tasks
+from coordlang.tasks.listed import goal_text, planning_task
 from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
 from planners.errors import OutOfMemory, Position, ProvedImpossible, UsageError
-from planners.joint.model import Goal
-from planners.loading import ModelOptions, PlanningTask
+from planners.joint.model import PlanningTask
+from planners.loading import ModelOptions
 from planners.pddl.lifted import Domain, Problem
 from planners.search.optimal_plans import search
-from planners.tables import Rows
 
 #: Tasks looked at for each one shown, so that enough of them require coordination.
 _TRIES = 12
@@ -131,9 +130,9 @@ def _candidates(
         if language.provenance.tasks.get("kind") == "all"
         else _recorded(first, domain, problem, random, position)
     )
-    for number, (init, goal) in enumerate(tasks):
+    for task in tasks:
         try:
-            space = search(first.model, PlanningTask(f"candidate {number}", init, goal))
+            space = search(first.model, task)
         except ProvedImpossible:
             continue  # of two states one need not be reachable from the other
         word = first.partition.word_of(space.rows)[space.state]
@@ -142,15 +141,14 @@ def _candidates(
 
 def _recorded(
     first: TaskLanguage, domain: Domain, problem: Problem, random: Random, position: Position | None
-) -> Iterator[tuple[Rows, Goal]]:
+) -> Iterator[PlanningTask]:
     listed = recorded_list(first.language)
     random.shuffle(listed)
     for one in listed:
-        ((init, goal),) = ground_tasks(domain, problem, [one], position)
-        yield first.model.state(init), goal
+        yield planning_task(first.model, domain, problem, one, position)
 
 
-def _pairs(first: TaskLanguage, random: Random) -> Iterator[tuple[Rows, Goal]]:
+def _pairs(first: TaskLanguage, random: Random) -> Iterator[PlanningTask]:
     """Ordered pairs of different mapped states.
 
     Under ``--tasks all`` every state of a candidate task is mapped.
@@ -164,4 +162,4 @@ def _pairs(first: TaskLanguage, random: Random) -> Iterator[tuple[Rows, Goal]]:
     for code in order:
         a, b = divmod(code, number - 1)
         b += b >= a
-        yield rows[a], model.full_state(rows[b])
+        yield PlanningTask(f"pair {code}", rows[a], model.full_state(rows[b]))

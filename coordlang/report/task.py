@@ -14,7 +14,7 @@ from coordlang.report.played import Played, play
 from coordlang.report.shown import ShownTask
 from coordlang.report.world import World
 from coordlang.required.miscoordination import Miscoordination
-from coordlang.tasks.task_file import goal_text
+from coordlang.tasks.listed import goal_text
 from coordlang.use.sentence.task_language import TaskLanguage
 from coordlang.verification.by_definition import verify
 from planners.errors import OutOfMemory

@@ -10,8 +10,8 @@ import numpy as np
 from coordlang.required.composition_walk import FAILED, INSTEAD, moves
 from coordlang.tasks.candidates import describe
 from planners.errors import ProvedImpossible
+from planners.joint.model import PlanningTask
 from planners.limits import reaching
-from planners.loading import PlanningTask
 from planners.search.edge_index import EdgeIndex
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from typing import Literal
 
 import numpy as np
 
-from coordlang.tasks.task_file import ListedTask, goal_atoms, goal_text, ground_tasks
+from coordlang.tasks.listed import ListedTask, goal_text, listed_task, model_of_listed
 from planners.errors import BadInput, Position, ProvedImpossible
-from planners.joint.model import NO_FACT, FullState, Goal, JointModel, show
-from planners.loading import ModelOptions, PlanningInstance, PlanningTask, build
+from planners.joint.model import NO_FACT, FullState, Goal, JointModel, PlanningTask
+from planners.loading import ModelOptions, PlanningInstance, build
 from planners.pddl.lifted import Domain, Problem
-from planners.pddl.robots import fluent_predicates
 from planners.search.optimal_plans import (
-    TaskGroup,
     joined,
     plan_spaces,
     search,
@@ -85,7 +84,7 @@ def from_problems(
                 raise
             skipped.append(problem.source.name)
             continue
-        listed.append(_as_listed(domain, problem, task))
+        listed.append(listed_task(domain, problem, task))
     return Candidates("problems", loaded, tuple(listed), (joined(spaces),), None, tuple(skipped))
 
 
@@ -101,9 +100,7 @@ def all_pairs(
     if loaded.model.remembers:
         return _all_pairs_remembering(loaded, inits)
     space = explore(loaded.model, inits)
-    spaces = tuple(
-        plan_spaces(space, [TaskGroup(goal) for goal in _full_states(loaded.model, space.rows)])
-    )
+    spaces = tuple(plan_spaces(space, _to_each_state(loaded.model, space.rows)))
     return Candidates("all", loaded, (), spaces, len(space))
 
 
@@ -114,24 +111,23 @@ def _all_pairs_remembering(loaded: PlanningInstance, inits: Rows) -> Candidates:
     """
     model = loaded.model
     forgetting = replace(model, codec=replace(model.codec, memory=None))
-    base = explore(forgetting, inits[:, : model.codec.fact_blocks])
+    base = explore(forgetting, model.codec.facts_part(inits))
     zeros = np.zeros((len(base), len(model.robots)), np.uint64)
     starts = np.hstack((base.rows, zeros))
     groups = []
-    for space in plan_spaces(
-        base, [TaskGroup(goal) for goal in _full_states(forgetting, base.rows)]
-    ):
+    for space in plan_spaces(base, _to_each_state(forgetting, base.rows)):
         goal_of_task, state = space.goal[space.starts], space.state[space.starts]
         for number, goal in enumerate(space.goals):
             mine = state[goal_of_task == number]
             if len(mine):
-                groups.append(TaskGroup(goal, starts[mine]))
+                groups.append((goal, starts[mine]))
     extended = explore(model, starts)
     return Candidates("all", loaded, (), tuple(plan_spaces(extended, groups)), len(base))
 
 
-def _full_states(model: JointModel, rows: Rows) -> list[Goal]:
-    return [model.full_state(row) for row in rows]
+def _to_each_state(model: JointModel, rows: Rows) -> list[tuple[Goal, None]]:
+    """For each state the tasks to get there, from every state that can."""
+    return [(model.full_state(row), None) for row in rows]
 
 
 def from_listed(
@@ -157,55 +153,68 @@ def from_listed(
         raise BadInput(
             "the list of tasks is empty", position=position, remedy="Give at least one task."
         )
-    ground = ground_tasks(domain, problems[0], listed, position)
-    loaded = build(domain, problems, options, inits=[init for init, _ in ground])
+    loaded, tasks = model_of_listed(domain, problems, listed, options, position)
     model = loaded.model
     space = explore(model, np.stack([task.init for task in loaded.tasks]))
-    reached, _ = unique_rows(space.rows[:, : model.codec.fact_blocks])
-    groups: dict[Goal, list[Rows]] = {}
-    for number, (init, goal) in enumerate(ground, 1):
-        row = model.state(init)
-        if find_rows(reached, row[None, : model.codec.fact_blocks])[0] < 0:
-            raise BadInput(
-                f"task {number}: the state {model.state_text(row)} cannot be reached from the initial "
-                f"state of {problems[0].source.name}",
-                position=position,
-                remedy="Is a fluent missing or one too many?  List all fluents that are true.",
-            )
-        groups.setdefault(goal, []).append(row)
+    reached, _ = unique_rows(model.codec.facts_part(space.rows))
+    _require_reached(model, tasks, reached, problems[0], position)
+    by_goal = _by_goal(tasks)
     if model.remembers:  # a task starts with no action to remember: those are states of their own
-        space = explore(model, np.stack([row for rows in groups.values() for row in rows]))
-        states = len(reached)
-    else:
-        states = len(space)
-    grouped = [TaskGroup(goal, np.stack(rows)) for goal, rows in groups.items()]
-
-    def solved(kept: Sequence[TaskGroup]) -> list[bool]:
-        served = {
-            (g.goal, tuple(row.tolist())) for g in kept if g.inits is not None for row in g.inits
-        }
-        return [(goal, tuple(model.state(init).tolist())) in served for init, goal in ground]
-
-    skipped: list[str] = []
-    if skip_unsolvable and (kept := solvable(space, grouped)):
-        good = solved(kept)
-        skipped = [
-            f"task {n} ({_init_text(t)} -> {_goal_text(t)})"
-            for n, (t, ok) in enumerate(zip(listed, good, strict=True), 1)
-            if not ok
-        ]
-        listed = [task for task, ok in zip(listed, good, strict=True) if ok]
-        grouped = kept
+        space = explore(model, np.concatenate([inits for _, inits in by_goal]))
+    kept = solvable(space, by_goal) if skip_unsolvable else []
+    skipped: tuple[str, ...] = ()
+    if kept:
+        served = _served(tasks, kept)
+        skipped = tuple(
+            f"task {number} ({_init_text(task)} -> {_goal_text(task)})"
+            for number, (task, good) in enumerate(zip(listed, served, strict=True), 1)
+            if not good
+        )
+        listed = list(compress(listed, served))
     try:
-        spaces = tuple(plan_spaces(space, grouped))
+        spaces = tuple(plan_spaces(space, kept or by_goal))
     except ProvedImpossible as error:
-        number = solved(solvable(space, grouped)).index(False)
+        number = _served(tasks, solvable(space, by_goal)).index(False)
         raise ProvedImpossible(
-            f"task {number + 1}: the goal {_goal_text(listed[number])} cannot be reached from {_init_text(listed[number])}",
+            f"task {number + 1}: the goal {_goal_text(listed[number])} cannot be reached from "
+            f"{_init_text(listed[number])}",
             position=position,
             remedy=error.remedy,
         ) from None
-    return Candidates("file", loaded, tuple(listed), spaces, states, tuple(skipped))
+    return Candidates("file", loaded, tuple(listed), spaces, len(reached), skipped)
+
+
+def _require_reached(
+    model: JointModel,
+    tasks: Sequence[PlanningTask],
+    reached: Rows,
+    problem: Problem,
+    position: Position | None,
+) -> None:
+    inits = model.codec.facts_part(np.stack([task.init for task in tasks]))
+    unknown = np.flatnonzero(find_rows(reached, inits) < 0)
+    if len(unknown):
+        number = int(unknown[0])
+        raise BadInput(
+            f"task {number + 1}: the state {model.state_text(tasks[number].init)} cannot be reached "
+            f"from the initial state of {problem.source.name}",
+            position=position,
+            remedy="Is a fluent missing or one too many?  List all fluents that are true.",
+        )
+
+
+def _by_goal(tasks: Sequence[PlanningTask]) -> list[tuple[Goal, Rows]]:
+    """Goals, each with the initial states of its tasks."""
+    inits: dict[Goal, list[Rows]] = {}
+    for task in tasks:
+        inits.setdefault(task.goal, []).append(task.init)
+    return [(goal, np.stack(rows)) for goal, rows in inits.items()]
+
+
+def _served(tasks: Sequence[PlanningTask], kept: Sequence[tuple[Goal, Rows]]) -> list[bool]:
+    """Of each task whether it is among goals with initial states."""
+    known = {(goal, init.tobytes()) for goal, inits in kept for init in inits}
+    return [(task.goal, task.init.tobytes()) in known for task in tasks]
 
 
 def _init_text(task: ListedTask) -> str:
@@ -225,14 +234,9 @@ def from_recorded(
 ) -> Candidates:
     """Problems' tasks as a language file records them.
 
-    Searched one by one, without the rest of the space.
+    They are searched one by one, without the rest of the space.
     """
-    ground = ground_tasks(domain, problems[0], listed, position)
-    loaded = build(domain, problems, options, inits=[init for init, _ in ground])
-    tasks = [
-        PlanningTask(f"{n}", loaded.model.state(init), goal)
-        for n, (init, goal) in enumerate(ground, 1)
-    ]
+    loaded, tasks = model_of_listed(domain, problems, listed, options, position)
     return Candidates("problems", loaded, tuple(listed), (search_each(loaded.model, tasks),), None)
 
 
@@ -243,12 +247,6 @@ def describe(space: PlanSpace, task: int) -> str:
     goal = space.goals[space.goal[node]]
     empty = NO_FACT if isinstance(goal, FullState) else "(and)"
     return f"{init} -> {goal_text(space.model, goal) or empty}"
-
-
-def _as_listed(domain: Domain, problem: Problem, task: PlanningTask) -> ListedTask:
-    fluents = fluent_predicates(domain)
-    init = sorted(show(a) for a in problem.init if a.predicate in fluents)
-    return ListedTask(tuple(init), goal_atoms(task.goal))
 
 
 def require_solvable(candidates: Candidates) -> None:

@@ -16,7 +16,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from coordlang.tasks.task_file import ListedTask, goal_atoms
+from coordlang.tasks.listed import ListedTask, goal_atoms
 from planners.errors import ProvedImpossible, UsageError
 from planners.loading import PlanningInstance
 from planners.search.optimal_plans import distances

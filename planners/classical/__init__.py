@@ -24,8 +24,7 @@ from planners.classical.pddl import action_names, to_pddl
 from planners.classical.selection import select_then_apply
 from planners.classical.task import LONGEST, ClassicalAction, ClassicalTask, Condition, Form
 from planners.classical.writer import Writer, state_literals
-from planners.joint.model import Goal, JointModel, show
-from planners.loading import PlanningTask
+from planners.joint.model import Goal, JointModel, PlanningTask, show
 
 __all__ = [
     "LONGEST",

@@ -22,8 +22,7 @@ from typing import Any
 
 from planners.classical import LONGEST, ClassicalTask, Form, compile_classical
 from planners.errors import CoordlangError, OutOfMemory, OutOfTime
-from planners.joint.model import JointModel
-from planners.loading import PlanningTask
+from planners.joint.model import JointModel, PlanningTask
 
 #: Fast Downward adds up costs in 32-bit integers.
 _GREATEST = 2**31 - 1

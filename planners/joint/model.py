@@ -13,6 +13,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from planners.errors import Position
 from planners.grounding import GroundAction, label
 from planners.joint.conditions import Evaluator, Labels
 from planners.joint.states import StateCodec
@@ -36,6 +37,28 @@ class FullState:
 
 #: What a task asks for: a ground formula, or one full state.
 Goal = Formula | FullState
+
+
+@dataclass(frozen=True, slots=True)
+class PlanningTask:
+    """A task ``(I, G)`` of a joint model.
+
+    Attributes
+    ----------
+    name
+        What messages call it.
+    init
+        The initial state, a row (blocks).
+    goal
+        What must hold at the end.
+    position
+        The file that it is from.
+    """
+
+    name: str
+    init: Rows
+    goal: Goal
+    position: Position | None = None
 
 
 @dataclass(frozen=True, slots=True)

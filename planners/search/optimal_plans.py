@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from planners.errors import ProvedImpossible
 from planners.joint.conditions import Labels
-from planners.joint.model import Goal, JointModel, Steps
+from planners.joint.model import Goal, JointModel, PlanningTask, Steps
 from planners.limits import reaching
-from planners.loading import PlanningTask
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import Space, blocks
 from planners.tables import Bools, Ints, Rows, find_rows, ranges, unique_rows
@@ -182,78 +181,74 @@ def joined(spaces: Sequence[PlanSpace]) -> PlanSpace:
     return together.reordered(np.lexsort((together.state, together.goal, together.layer)))
 
 
-@dataclass(frozen=True, slots=True)
-class TaskGroup:
-    """Tasks with one goal.
-
-    ``inits`` is a table of initial states, or None for every other state that can reach it.
-    """
-
-    goal: Goal
-    inits: Rows | None = None
-
-
-def solvable(space: Space, groups: Sequence[TaskGroup]) -> list[TaskGroup]:
-    """The groups without the tasks whose goal cannot be reached."""
+def solvable(space: Space, tasks: Sequence[tuple[Goal, Rows]]) -> list[tuple[Goal, Rows]]:
+    """Leave out the tasks whose goal cannot be reached; goals with tables of initial states."""
     size = max(1, _BATCH // max(1, len(space)))
     kept = []
-    for start in range(0, len(groups), size):
-        batch = groups[start : start + size]
-        far = distances(
-            space, np.stack([space.model.holds(group.goal, space.rows) for group in batch])
-        )
-        for own, group in zip(far, batch, strict=True):
-            inits = (
-                group.inits
-                if group.inits is None
-                else group.inits[own[space.numbers(group.inits)] >= 0]
-            )
-            if inits is None or len(inits):
-                kept.append(replace(group, inits=inits))
+    for start in range(0, len(tasks), size):
+        batch = tasks[start : start + size]
+        far = distances(space, np.stack([space.model.holds(goal, space.rows) for goal, _ in batch]))
+        for own, (goal, inits) in zip(far, batch, strict=True):
+            good = own[space.numbers(inits)] >= 0
+            if good.any():
+                kept.append((goal, inits[good]))
     return kept
 
 
-def plan_spaces(space: Space, groups: Sequence[TaskGroup]) -> Iterator[PlanSpace]:
+def plan_spaces(space: Space, tasks: Sequence[tuple[Goal, Rows | None]]) -> Iterator[PlanSpace]:
     """The optimal plans of many tasks over one explored space, in batches of goals.
 
-    One backward pass per goal serves every initial state.  Raises `ProvedImpossible` for a task
-    whose goal cannot be reached.
+    One backward pass per goal serves every initial state.
+
+    Parameters
+    ----------
+    space
+        The reachable states.
+    tasks
+        Goals with tables of initial states; None: every other state that can reach the goal.
+
+    Raises
+    ------
+    ProvedImpossible
+        For a task whose goal cannot be reached.
     """
     size = max(1, _BATCH // max(1, len(space)))
-    for start in range(0, len(groups), size):
+    for start in range(0, len(tasks), size):
 
         def so_far(done: int = start) -> str:
-            return f"the optimal plans to {done:,} of {len(groups):,} goals, over {len(space):,} states"
+            return (
+                f"the optimal plans to {done:,} of {len(tasks):,} goals, over {len(space):,} states"
+            )
 
         with reaching(so_far, "fewer candidate tasks (a task file)"):
-            batch = _batch(space, groups[start : start + size])
+            batch = _batch(space, tasks[start : start + size])
         yield batch
 
 
-def _batch(space: Space, groups: Sequence[TaskGroup]) -> PlanSpace:
-    reached = np.stack([space.model.holds(group.goal, space.rows) for group in groups])
+def _batch(space: Space, tasks: Sequence[tuple[Goal, Rows | None]]) -> PlanSpace:
+    reached = np.stack([space.model.holds(goal, space.rows) for goal, _ in tasks])
     distance = distances(space, reached)
     states: list[Ints] = []
-    for number, group in enumerate(groups):
-        if group.inits is None:
+    for number, (_, inits) in enumerate(tasks):
+        if inits is None:
             states.append(np.flatnonzero(distance[number] > 0))
             continue
-        found = space.numbers(group.inits)
+        found = space.numbers(inits)
         bad = np.flatnonzero((found < 0) | (distance[number, found] < 0))
         if len(bad):
             raise ProvedImpossible(
-                f"the goal cannot be reached from {space.model.state_text(group.inits[bad[0]])}",
+                f"the goal cannot be reached from {space.model.state_text(inits[bad[0]])}",
                 remedy=_searched(len(space)),
             )
         states.append(found)
     second, graph = _second_costs(space, distance)
     node = np.full(distance.shape, -1)
     node[graph.goal, graph.state] = np.arange(len(graph))
-    goal = np.repeat(np.arange(len(groups)), [len(s) for s in states])
+    goal = np.repeat(np.arange(len(tasks)), [len(s) for s in states])
     state = np.concatenate(states)
     return replace(
         graph,
-        goals=tuple(group.goal for group in groups),
+        goals=tuple(goal for goal, _ in tasks),
         starts=node[goal, state],
         second=second[goal, state],
     ).reduced()

@@ -17,7 +17,8 @@ from coordlang.building import build_language
 from coordlang.language.flexibility import flexibility
 from coordlang.required.composition_walk import walk
 from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
-from coordlang.tasks.task_file import ListedTask, read_task_file
+from coordlang.tasks.listed import ListedTask
+from coordlang.tasks.task_file import read_task_file
 from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Assignment, Outcome

@@ -12,8 +12,9 @@ import pytest
 
 from coordlang.cli import run
 from coordlang.tasks.candidates import from_listed
+from coordlang.tasks.listed import ListedTask
 from coordlang.tasks.patterns import varied_tasks
-from coordlang.tasks.task_file import ListedTask, read_task_file
+from coordlang.tasks.task_file import read_task_file
 from planners.errors import ProvedImpossible, UsageError
 from planners.loading import PlanningInstance, load
 

@@ -19,7 +19,7 @@ from planners.joint.interference import conjuncts
 from planners.loading import build
 from planners.pddl import parse_problem, read_domain
 from planners.pddl.sexpr import Source
-from planners.search.optimal_plans import TaskGroup, plan_spaces
+from planners.search.optimal_plans import plan_spaces
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans, counts
 from planners.search.reachable import Space, explore
@@ -48,7 +48,7 @@ STYLES = ("grid", "grid-joint")
 
 def to_every_state(space: Space) -> PlanSpace:
     """The optimal plans between all pairs of different states."""
-    groups = [TaskGroup(space.model.full_state(row)) for row in space.rows]
+    groups = [(space.model.full_state(row), None) for row in space.rows]
     (plans,) = plan_spaces(space, groups)
     return plans
 

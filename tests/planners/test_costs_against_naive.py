@@ -22,7 +22,7 @@ from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import And, Formula, Not
 from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
-from planners.search.optimal_plans import TaskGroup, plan_spaces, search
+from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plans import Plans
 from planners.search.reachable import explore
 
@@ -118,7 +118,7 @@ def test_the_same_cost_and_the_same_number_of_plans(kind: Kind) -> None:
         space = search(model, task)
         assert (*space.cost_of(0), Plans.of(space).count) == wanted, seed
         init = task.init[None, :]
-        (other,) = plan_spaces(explore(model, init), [TaskGroup(task.goal, init)])
+        (other,) = plan_spaces(explore(model, init), [(task.goal, init)])
         assert (*other.cost_of(0), Plans.of(other).count) == wanted, seed
         seen["costs"] += wanted[1] > 0
         seen["several plans"] += wanted[2] > 1

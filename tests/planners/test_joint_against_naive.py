@@ -24,7 +24,7 @@ from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import And, Atom, Domain, Formula, Not, Problem
 from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
-from planners.search.optimal_plans import TaskGroup, plan_spaces, search
+from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plans import Plans
 from planners.search.reachable import explore
 
@@ -148,9 +148,7 @@ def _check_plans(
     plans = Plans.of(search(model, task))
     assert plans.space.cost_of(0) == (wanted.makespan, wanted.second)
     assert plans.count == wanted.count()
-    (space,) = plan_spaces(
-        explore(model, task.init[None, :]), [TaskGroup(task.goal, task.init[None, :])]
-    )
+    (space,) = plan_spaces(explore(model, task.init[None, :]), [(task.goal, task.init[None, :])])
     assert space.cost_of(0) == plans.space.cost_of(0)
     assert Plans.of(space).count == plans.count
     listed = [tuple(model.texts(step) for step in plan) for plan in islice(plans, _MOST_PLANS)]

@@ -23,7 +23,7 @@ from planners.grounding import instantiate
 from planners.joint.model import Stepper, Steps
 from planners.limits import reaching, time_left, time_limit
 from planners.loading import PlanningInstance, load
-from planners.search.optimal_plans import TaskGroup, plan_spaces, search
+from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import count, explore
 from planners.tables import Rows
@@ -196,7 +196,7 @@ def test_exploring_says_how_far_it_got() -> None:
 def test_the_goals_done_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     loaded = corners()
     space = explore(loaded.model, loaded.tasks[0].init[None, :])
-    groups = [TaskGroup(loaded.tasks[0].goal)] * 3
+    groups = [(loaded.tasks[0].goal, None)] * 3
     monkeypatch.setattr("planners.search.optimal_plans._BATCH", len(space))
     batches = plan_spaces(space, groups)
     next(batches)

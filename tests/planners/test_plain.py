@@ -16,8 +16,8 @@ from random_pddl import KINDS, Kind, random_model
 from planners import classical as plain_module
 from planners.classical import ClassicalTask, compile_classical, to_pddl
 from planners.errors import BadInput, ProvedImpossible
-from planners.joint.model import Cost, JointModel
-from planners.loading import ModelOptions, PlanningInstance, PlanningTask, build
+from planners.joint.model import Cost, JointModel, PlanningTask
+from planners.loading import ModelOptions, PlanningInstance, build
 from planners.pddl.domain import parse_domain
 from planners.pddl.problem import parse_problem
 from planners.pddl.robots import RobotSelection, Unowned

@@ -11,7 +11,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from coordlang.tasks.candidates import Candidates
-from coordlang.tasks.task_file import ground_tasks
+from coordlang.tasks.listed import ground_task
 from coordlang.use.sentence.fitting_plans import NoPlanFits
 from coordlang.use.sentence.guided_search import ExpandedStates, a_star, plan_under_sentence
 from coordlang.use.sentence.task_language import TaskLanguage
@@ -27,7 +27,7 @@ def check(candidates: Candidates, task_language: TaskLanguage, names: tuple[str,
     """The searches made; every sentence of the task with every heuristic."""
     loaded, groups = candidates.loaded, by_sentence(task_language)
     problem = loaded.problems[0]
-    [(init, goal)] = ground_tasks(loaded.domain, problem, candidates.listed)
+    init, goal = ground_task(loaded.domain, problem, candidates.listed[0])
     terrain, searches = ExpandedStates(task_language.model, task_language.partition), 0
     for name in names:
         without = plan_under_sentence(task_language, None, name, terrain)

@@ -15,12 +15,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coordlang.tasks.candidates import Candidates
-from coordlang.tasks.task_file import ground_tasks
+from coordlang.tasks.listed import ground_task
 from coordlang.use.sentence.plan_sentence import NotAPlan, NotOptimal, sentence_of_plan
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.check.validate import validate
 from planners.errors import BadInput, Position, ProvedImpossible
-from planners.loading import PlanningTask
+from planners.joint.model import PlanningTask
 from planners.search.optimal_plans import search
 from planners.search.plan_file import Texts, only_one_plan, texts
 from planners.search.plans import Plan, Plans
@@ -136,7 +136,7 @@ def judged(
     loaded, model = candidates.loaded, candidates.model
     said: tuple[Texts, ...] = texts(model, plan)
     problem = loaded.problems[0]
-    [(init, goal)] = ground_tasks(loaded.domain, problem, candidates.listed)
+    init, goal = ground_task(loaded.domain, problem, candidates.listed[0])
     verdict = validate(
         loaded.domain, problem, loaded.team, said, init=init, goal=goal, allow_idle=model.keeps_idle
     )

@@ -32,7 +32,7 @@ from coordlang.evaluation.material.disruptions import Sayings, own_choices
 from coordlang.evaluation.material.grid_drawing import Path, draw_map, place_of
 from coordlang.evaluation.material.languages import TITLES, language_for
 from coordlang.evaluation.material.suite import OTHERS, WORLDS, World
-from coordlang.tasks.task_file import ListedTask
+from coordlang.tasks.listed import ListedTask
 from coordlang.use.choices.automaton import Automaton
 from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 from planners.joint.model import JointModel

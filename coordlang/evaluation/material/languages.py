@@ -13,7 +13,7 @@ from coordlang.evaluation.material.suite import World
 from coordlang.language.file import read_language, write_language
 from coordlang.language.words import Language
 from coordlang.tasks.candidates import Candidates
-from coordlang.tasks.task_file import ListedTask
+from coordlang.tasks.listed import ListedTask
 
 #: The methods that experiments compare, in the order of tables.
 COMPARED = ("greedy", "separating", "minimal", "flexible")

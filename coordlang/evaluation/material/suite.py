@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
-from coordlang.tasks.task_file import ListedTask, read_task_file
+from coordlang.tasks.listed import ListedTask
+from coordlang.tasks.task_file import read_task_file
 from planners.errors import UsageError
 from planners.pddl import read_domain, read_problem
 

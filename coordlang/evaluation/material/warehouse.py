@@ -14,7 +14,7 @@ from itertools import permutations, product
 
 from coordlang.evaluation.material.disruptions import Hazard
 from coordlang.evaluation.material.suite import World
-from coordlang.tasks.task_file import ListedTask
+from coordlang.tasks.listed import ListedTask
 from planners.joint.model import JointModel
 
 #: Warehouses: open maps and rings (border cells only), with their rows and columns.

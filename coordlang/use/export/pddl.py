@@ -39,8 +39,7 @@ from planners.classical import (
 )
 from planners.classical.task import Condition
 from planners.errors import BadInput
-from planners.joint.model import IDLE, JointModel
-from planners.loading import PlanningTask
+from planners.joint.model import IDLE, JointModel, PlanningTask
 from planners.search.plans import Plan
 
 #: A robot's label in a joint step, by the numbers of both.

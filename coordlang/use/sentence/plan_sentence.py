@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from coordlang.language.sentences import sentence
-from coordlang.tasks.task_file import formula_text
+from coordlang.tasks.listed import formula_text
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import BadInput, Position, Refuted
 from planners.joint.model import IDLE, FullState, Goal, JointModel

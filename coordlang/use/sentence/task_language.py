@@ -11,12 +11,12 @@ from coordlang.language.partition import Partition
 from coordlang.language.recorded import check_source, options_of, recorded_list
 from coordlang.language.words import Language
 from coordlang.tasks.candidates import Candidates
-from coordlang.tasks.task_file import ListedTask, ground_tasks
+from coordlang.tasks.listed import ListedTask, model_of_listed
 from coordlang.use.sentence.fitting_plans import plans_with_sentence
 from planners.errors import BadInput, Position
-from planners.joint.model import Goal, JointModel
-from planners.loading import ModelOptions, build
-from planners.pddl.lifted import TRUE, And, Atom, Domain, Formula, Problem
+from planners.joint.model import Goal, JointModel, PlanningTask
+from planners.loading import ModelOptions
+from planners.pddl.lifted import TRUE, And, Domain, Problem
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.tables import Ints
@@ -95,18 +95,17 @@ def language_in_task(
     """
     position = position or Position("the language file")
     check_source(language, domain, [problem], position)
-    recorded = ground_tasks(domain, problem, recorded_list(language), position)
+    listed = recorded_list(language)
     options = options or options_of(language)
-    # What can be true depends on where tasks start: the states that the language speaks of must be
-    # possible here.
-    inits = [init for init, _ in recorded]
-    loaded = build(domain, [problem], options, inits=inits)
+    loaded, recorded = model_of_listed(domain, [problem], listed, options, position)
     unknown = _atoms(language) - set(loaded.model.codec.facts.texts)
     if unknown:
-        (extra, _), *_ = ground_tasks(
-            domain, problem, [ListedTask(tuple(sorted(unknown)), ())], position
+        # What can be true depends on where tasks start: the states that the language speaks of must
+        # be possible here.
+        all_true = ListedTask(tuple(sorted(unknown)), ())
+        loaded, (*recorded, _) = model_of_listed(
+            domain, [problem], [*listed, all_true], options, position
         )
-        loaded = build(domain, [problem], options, inits=[*inits, extra])
     space = search(loaded.model, loaded.tasks[0])
     partition = language.partition(loaded.model)
     covered = _covers(language, space, recorded)
@@ -124,9 +123,7 @@ def languages_in_tasks(language: Language, candidates: Candidates) -> Iterator[T
             yield TaskLanguage(language, partition, space, task, word, True)
 
 
-def _covers(
-    language: Language, space: PlanSpace, recorded: Sequence[tuple[frozenset[Atom], Formula]]
-) -> bool:
+def _covers(language: Language, space: PlanSpace, recorded: Sequence[PlanningTask]) -> bool:
     """Whether the (one) task of a plan space is a candidate task of the language.
 
     The guarantee is about a task's optimal plans, so a task with the same optimal plans as a
@@ -140,8 +137,8 @@ def _covers(
             model.codec.key(state) in language.states for state in (row, space.rows[ends[0]])
         )
     return any(
-        _literals(goal) == _literals(space.goals[0]) and (model.state(init) == row).all()
-        for init, goal in recorded
+        _literals(task.goal) == _literals(space.goals[0]) and (task.init == row).all()
+        for task in recorded
     )
 
 
