@@ -24,7 +24,7 @@ from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from coordlang.vocabulary.job import Assignment, Job, Outcome
 from coordlang.vocabulary.objective import Objective
 from coordlang.vocabulary.sat import reduce
-from coordlang.vocabulary.symmetry import state_symmetries
+from coordlang.vocabulary.symmetry import symmetry_group
 from planners.errors import OutOfMemory
 from planners.limits import run_until_stopped
 from planners.search.edge_index import EdgeIndex
@@ -151,7 +151,7 @@ class _Clauses:
     """Clauses that every language satisfies, and which of them a partition violates."""
 
     def __init__(self, job: Job, requires: Sequence[Bools]) -> None:
-        self.symmetries = [p.tolist() for p in state_symmetries(job.candidates)]
+        self.symmetries = symmetry_group(job.candidates).permutations
         self._parts = _parts(job.candidates.spaces, requires)
         self._position = 0
         self._known: set[Clause] = set()

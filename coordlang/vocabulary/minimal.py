@@ -31,7 +31,7 @@ from coordlang.vocabulary.sat import (
     reduce,
 )
 from coordlang.vocabulary.separating import quickly as separated
-from coordlang.vocabulary.symmetry import Symmetry, closed, symmetries
+from coordlang.vocabulary.symmetry import SymmetryGroup, symmetry_group
 from planners.errors import OutOfMemory
 from planners.limits import run_until_stopped
 from planners.search.edge_index import EdgeIndex
@@ -98,8 +98,7 @@ class _Search:
         #: harder to find.
         self._led = PartitionProblems(self._start_led, PartitionProblem.add)
         self.evidence: dict[Clause, Evidence] = {}
-        self._symmetries: list[tuple[Symmetry, list[int]]] = []
-        self._group: list[list[int]] = []
+        self._group = SymmetryGroup(())
 
     @property
     def _upper(self) -> int:
@@ -144,11 +143,7 @@ class _Search:
             problems.drop_all()
 
     def _prepare(self) -> list[_Part]:
-        self._symmetries = [(s, s.states.tolist()) for s in symmetries(self._job.candidates)]
-        # A group only: then the clauses, which have all their images, contradict each other without
-        # the preference too, and a certificate can do without it.
-        if closed([s.states for s, _ in self._symmetries]):
-            self._group = [states for _, states in self._symmetries]
+        self._group = symmetry_group(self._job.candidates)
         return _parts(self._job.candidates.spaces, Random(self._job.seed))
 
     def _decide(self, size: int, parts: Sequence[_Part], effort: SolverBudget) -> bool:
@@ -181,7 +176,7 @@ class _Search:
 
     def _start_led(self, size: int, known: Sequence[Clause]) -> PartitionProblem:
         colouring = self._start(size, known, "glucose4")
-        colouring.add_lex_leaders(self._group, most_asked(known, _LEADING))
+        colouring.add_lex_leaders(self._group.permutations, most_asked(known, _LEADING))
         return colouring
 
     def _partition(self, size: int, conflicts: int) -> dict[int, int] | None:
@@ -225,7 +220,7 @@ class _Search:
             "rounds": self._rounds,
             "counterexamples": self._found,
             "clauses": len(self._clauses),
-            "symmetries": len(self._symmetries),
+            "symmetries": len(self._group.symmetries),
         }
 
     def _images(self, found: Mapping[Clause, Evidence]) -> Iterator[Clause]:
@@ -233,7 +228,7 @@ class _Search:
         for clause in reduce(found):
             evidence = found[clause]
             images = [(clause, evidence)]
-            for symmetry, s in self._symmetries:
+            for symmetry, s in zip(self._group.symmetries, self._group.permutations, strict=True):
                 image = frozenset(pair(s[a], s[b]) for a, b in clause)
                 images.append((image, replace(evidence, symmetry=symmetry)))
             for image, why in images:

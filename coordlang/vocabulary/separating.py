@@ -27,7 +27,7 @@ from coordlang.vocabulary.sat import (
     close_bounds,
     most_constrained_first,
 )
-from coordlang.vocabulary.symmetry import state_symmetries
+from coordlang.vocabulary.symmetry import symmetry_group
 from planners.errors import OutOfMemory
 from planners.limits import run_until_stopped
 
@@ -188,7 +188,7 @@ class _AlphaOrBeta(_Search):
     def prepare(self) -> None:
         job = self._job
         self._random = np.random.default_rng(job.seed)
-        self._symmetries = [p.tolist() for p in state_symmetries(job.candidates)]
+        self._symmetries = symmetry_group(job.candidates).permutations
         job.progress("walking to the last differences")
         self._walks = [SeparationWalk(space) for space in job.candidates.spaces]
         every = [walk.every(_WRITTEN) for walk in self._walks]

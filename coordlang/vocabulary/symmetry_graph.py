@@ -1,0 +1,207 @@
+"""A joint model as a coloured graph, whose automorphisms are the symmetries that can be expected.
+
+Vertices are the objects, the static facts about them, the fluent facts, the initial states and the
+goals of the candidate tasks, and the ground actions; the colour of a vertex says what it is.  A
+fact or an action is joined to its arguments by way of one vertex for each object and argument
+position.  Objects that occur in no fact and in no action of the model are left out: what happens to
+them changes nothing.
+
+The generators of the automorphism group are found by nauty (B. D. McKay and A. Piperno, Practical
+graph isomorphism II, 2014).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Mapping, Sequence, Set
+
+import numpy as np
+
+from coordlang.tasks.candidates import Candidates
+from planners.joint.model import FullState, Goal, JointModel
+from planners.pddl.lifted import And, Atom, Domain, Formula, Not, Or, Problem
+from planners.pddl.robots import fluent_predicates, natural
+from planners.search.plan_space import PlanSpace
+
+#: A renaming of objects; names that it does not hold stay.
+Renaming = Mapping[str, str]
+
+#: Vertices up to which nauty, which keeps a bit for every pair of them, takes about a second.
+LARGEST_GRAPH = 4_000
+
+
+def automorphism_generators(candidates: Candidates, largest: int = LARGEST_GRAPH) -> list[Renaming]:
+    """Generators of the automorphisms of the model's graph, as renamings of objects.
+
+    Parameters
+    ----------
+    largest
+        Vertices of the largest graph.  The tasks, or the actions, are left out of one that would
+        have more; some of the generators may then be no symmetries of the model.
+    """
+    model = candidates.model
+    graph = _ModelGraph(candidates.loaded.domain, candidates.loaded.problems[0], model)
+    if len(graph) > largest:
+        return []
+    tasks = sum(len(np.unique(s.state[s.starts])) + len(s.goals) for s in candidates.spaces)
+    if len(graph) + tasks <= largest:
+        graph.add_tasks(candidates.spaces)
+    if len(graph) + len(model.actions) <= largest:
+        graph.add_actions()
+    return graph.renamings()
+
+
+class _ColouredGraph:
+    """An undirected graph whose vertices have colours."""
+
+    def __init__(self) -> None:
+        self._colours: dict[Hashable, set[int]] = {}
+        self._neighbours: list[list[int]] = []
+
+    def __len__(self) -> int:
+        return len(self._neighbours)
+
+    def vertex(self, colour: Hashable, neighbours: Iterable[int] = ()) -> int:
+        """Add a vertex with edges to others; its number."""
+        number = len(self._neighbours)
+        self._neighbours.append(list(neighbours))
+        self._colours.setdefault(colour, set()).add(number)
+        return number
+
+    def generators(self) -> list[list[int]]:
+        """Generators of the automorphism group: where each vertex goes."""
+        import pynauty
+
+        graph = pynauty.Graph(
+            len(self),
+            adjacency_dict=dict(enumerate(self._neighbours)),
+            vertex_coloring=list(self._colours.values()),
+        )
+        found: list[list[int]] = pynauty.autgrp(graph)[0]
+        return found
+
+
+class _ModelGraph:
+    """The graph of a model with its facts; actions and tasks are added on demand."""
+
+    def __init__(self, domain: Domain, problem: Problem, model: JointModel) -> None:
+        self._model = model
+        self._graph = _ColouredGraph()
+        used = _used(model)
+        self._objects = {
+            name: self._graph.vertex(self._look(name, domain, types))
+            for name, types in problem.objects.items()
+            if name in used
+        }
+        self._arguments: dict[tuple[str, int], int] = {}
+        self._formulas: dict[Goal, int] = {}
+        for atom in _static_facts(domain, problem, used):
+            self._instance(("static", atom.predicate), atom.args)
+        self._facts = [self._instance(("fact", a.predicate), a.args) for a in model.codec.facts]
+
+    def __len__(self) -> int:
+        return len(self._graph)
+
+    def _look(self, name: str, domain: Domain, types: Iterable[str]) -> Hashable:
+        """The colour of an object: its types, and what kind of a robot it is, if it is one."""
+        model = self._model
+        robot: Hashable = None
+        if name in model.robots:
+            # Joint actions name their robots in the text of the domain.
+            robot = name if model.is_joint_action else model.keeps_idle[model.robots.index(name)]
+        constant = name if name in domain.constants else ""
+        return ("object", constant, tuple(sorted(types)), robot)
+
+    def _instance(self, colour: tuple[Hashable, ...], args: Sequence[str]) -> int:
+        """A vertex for a predicate or an action schema with its arguments."""
+        unused = tuple((n, arg) for n, arg in enumerate(args) if arg not in self._objects)
+        used = [self._argument(arg, n) for n, arg in enumerate(args) if arg in self._objects]
+        return self._graph.vertex((*colour, len(args), unused), used)
+
+    def _argument(self, name: str, position: int) -> int:
+        if (name, position) not in self._arguments:
+            vertex = self._graph.vertex(("argument", position), [self._objects[name]])
+            self._arguments[name, position] = vertex
+        return self._arguments[name, position]
+
+    def add_actions(self) -> None:
+        """Add a vertex for each ground action."""
+        for action in self._model.actions:
+            self._instance(("action", action.schema, action.cost), action.args)
+
+    def add_tasks(self, spaces: Sequence[PlanSpace]) -> None:
+        """Add the initial states and the goals, joined to each other by the tasks."""
+        goals_of: dict[int, set[int]] = {}
+        for space in spaces:
+            vertices = [self._goal(goal) for goal in space.goals]
+            for node in space.starts.tolist():
+                goals_of.setdefault(int(space.state[node]), set()).add(vertices[space.goal[node]])
+        for state in sorted(goals_of):
+            true = self._model.codec.true_facts(spaces[0].rows[state])
+            facts = [self._facts[fact] for fact in true]
+            self._graph.vertex("initial state", [*facts, *sorted(goals_of[state])])
+
+    def _goal(self, goal: Goal) -> int:
+        if goal not in self._formulas:
+            if isinstance(goal, FullState):
+                true = [self._facts[fact] for fact in goal.facts]
+                vertex = self._graph.vertex("full state", true)
+            else:
+                vertex = self._graph.vertex("goal", [self._formula(goal)])
+            self._formulas[goal] = vertex
+        return self._formulas[goal]
+
+    def _formula(self, formula: Formula) -> int:
+        match formula:
+            case Atom(predicate, args):
+                return self._instance(("atom", predicate), args)
+            case Not(part):
+                return self._graph.vertex("not", [self._formula(part)])
+            case And(parts) | Or(parts):
+                colour = type(formula).__name__
+                return self._graph.vertex(colour, [self._formula(part) for part in parts])
+        return self._graph.vertex(formula)
+
+    def renamings(self) -> list[Renaming]:
+        """Generators of the automorphism group, as renamings of objects; none is the identity."""
+        names = {vertex: name for name, vertex in self._objects.items()}
+        found: list[Renaming] = []
+        for generator in self._graph.generators():
+            renaming = {name: names[generator[vertex]] for vertex, name in names.items()}
+            if any(name != to for name, to in renaming.items()):
+                found.append(renaming)
+        return found
+
+
+def joined_order(candidates: Candidates) -> list[str]:
+    """The objects of the graph, each where possible after one that it shares a static fact with.
+
+    Otherwise in natural order.
+    """
+    domain, problem = candidates.loaded.domain, candidates.loaded.problems[0]
+    used = _used(candidates.model) & problem.objects.keys()
+    near: dict[str, set[str]] = {name: set() for name in used}
+    for fact in _static_facts(domain, problem, used):
+        for arg in fact.args:
+            near[arg].update(fact.args)
+    order: list[str] = []
+    joined: set[str] = set()
+    waiting = sorted(used, key=natural)
+    while waiting:
+        chosen = next((name for name in waiting if name in joined), waiting[0])
+        order.append(chosen)
+        joined |= near[chosen]
+        waiting.remove(chosen)
+    return order
+
+
+def _static_facts(domain: Domain, problem: Problem, used: Set[str]) -> list[Atom]:
+    """The static facts about ``used`` objects alone."""
+    fluents = fluent_predicates(domain)
+    about = [a for a in problem.init if a.predicate not in fluents and used >= set(a.args)]
+    return sorted(about, key=str)
+
+
+def _used(model: JointModel) -> set[str]:
+    """The objects of ground actions and facts, and the robots."""
+    named = {arg for action in model.actions for arg in action.args} | set(model.robots)
+    return named | {arg for fact in model.codec.facts for arg in fact.args}
