@@ -67,7 +67,7 @@ class WordsExplained(Presented):
         return {
             "words": self.states,
             "default": self.used.language.default,
-            "variables": [{"name": v.name, "values": list(v.values)} for v in variables],
+            "variables": [{"name": v.name, "values": list(v.value_texts)} for v in variables],
             "formulas": {word: cover_data(cover) for word, cover in self.covers.items()},
             "told": {
                 "in_order": self.descriptions.in_order,

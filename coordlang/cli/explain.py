@@ -147,7 +147,7 @@ def _data(
         "words": dict(zip(mapped.words, mapped.states, strict=True)),
         "default": spoken.language.default,
         "variables": [
-            {"name": v.name, "values": list(v.values)} for v in mapped.valuation.variables
+            {"name": v.name, "values": list(v.value_texts)} for v in mapped.valuation.variables
         ],
         "formulas": {word: cover_data(formula) for word, formula in formulas.items()},
         "told": {

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from itertools import product
 
 from coordlang.explanation.variables import Variable
+from planners.joint.model import show
+from planners.pddl.lifted import Atom
+
+#: A conjunction of literals: atom -> its truth value.
+Conjunction = dict[Atom, bool]
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,48 +19,45 @@ class Literal:
     """The variable has one of these values (atoms; None: none of the variable's atoms is true)."""
 
     variable: Variable
-    values: frozenset[str | None]
+    values: frozenset[Atom | None]
 
     @property
-    def others(self) -> tuple[str | None, ...]:
+    def others(self) -> tuple[Atom | None, ...]:
         """The variable's other values, in their order."""
         return tuple(value for value in self.variable.values if value not in self.values)
 
     @property
-    def listed(self) -> tuple[str | None, ...]:
+    def listed(self) -> tuple[Atom | None, ...]:
         """The variable's allowed values, in their order."""
         return tuple(value for value in self.variable.values if value in self.values)
 
     @property
     def is_negative(self) -> bool:
-        """Shorter to say which values it excludes."""
+        """Whether it is shorter to list the values that it excludes."""
         return len(self.others) < len(self.values)
 
     @property
     def length(self) -> int:
-        """Values that its text mentions."""
+        """The number of values that its text mentions."""
         return min(len(self.values), len(self.others))
 
-    def holds(self, atoms: frozenset[str]) -> bool:
+    def holds(self, true: Collection[Atom]) -> bool:
         """Whether it is true in a state given by its true atoms."""
-        true = [atom for atom in self.variable.atoms if atom in atoms]
-        return any(atom in self.values for atom in true) if true else None in self.values
+        own = [atom for atom in self.variable.atoms if atom in true]
+        return any(atom in self.values for atom in own) if own else None in self.values
 
-    def conditions(self) -> list[tuple[str, ...]]:
+    def conjunctions(self) -> list[Conjunction]:
         """The same as a disjunction of conjunctions of ground literals.
 
-        One conjunction where one value is allowed, or where excluding the others says it; else one
-        for each atom.
+        One conjunction where one value is allowed, or where excluding the others is the same; else
+        one for each atom.
         """
-        if len(self.values) == 1 and None not in self.values:
-            return [tuple(self.listed_atoms)]
+        allowed = [value for value in self.listed if value is not None]
+        if len(self.values) == 1 and allowed:
+            return [{allowed[0]: True}]
         if None in self.values or None not in self.variable.values:
-            return [tuple(f"(not {atom})" for atom in self.others if atom is not None)]
-        return [(atom,) for atom in self.listed_atoms]
-
-    @property
-    def listed_atoms(self) -> tuple[str, ...]:
-        return tuple(value for value in self.listed if value is not None)
+            return [{atom: False for atom in self.others if atom is not None}]
+        return [{atom: True} for atom in allowed]
 
 
 #: A conjunction.  The empty term is true.
@@ -64,13 +66,21 @@ Term = tuple[Literal, ...]
 
 @dataclass(frozen=True, slots=True)
 class Cover:
-    """A disjunction of terms that is true in exactly the states of one word.
+    """A formula that is true in all states of one word and false in those of all other words.
 
-    It is false in those of all other words.
+    It is a disjunction of terms.
 
-    ``counts[k]`` is the number of the word's states in which ``terms[k]`` is true (one state may
-    satisfy several); ``states`` is the number of the word's states.  ``fewest``: it is proved that
-    no disjunction of fewer terms does it.
+    Parameters
+    ----------
+    terms
+        The terms.
+    counts
+        ``counts[k]`` is the number of the word's states in which ``terms[k]`` is true (one state
+        may satisfy several).
+    states
+        The number of the word's states.
+    fewest
+        Whether it is proved that no disjunction of fewer terms does it.
     """
 
     terms: tuple[Term, ...]
@@ -80,28 +90,36 @@ class Cover:
 
     @property
     def length(self) -> int:
-        """How long the formula is.
+        """The length of the formula.
 
         Values that its text mentions, and one more for each term after the first.
         """
-        return sum(literal.length for term in self.terms for literal in term) + max(
-            0, len(self.terms) - 1
-        )
+        values = sum(literal.length for term in self.terms for literal in term)
+        return values + max(0, len(self.terms) - 1)
 
     def holds(self, atoms: Iterable[str]) -> bool:
-        """Whether it is true in a state given by its true atoms."""
-        true = frozenset(atoms)
+        """Whether it is true in a state given by its true atoms (PDDL text, as in its key)."""
+        texts = frozenset(atoms)
+        variables = {literal.variable for term in self.terms for literal in term}
+        true = {atom for variable in variables for atom in variable.atoms if show(atom) in texts}
         return any(all(literal.holds(true) for literal in term) for term in self.terms)
 
-    def conditions(self) -> list[tuple[str, ...]]:
-        """The same as a disjunction of conjunctions of ground literals, as PDDL text.
+    def conjunctions(self) -> list[Conjunction]:
+        """The same as a disjunction of conjunctions of ground literals.
 
-        ``[()]`` is true, ``[]`` false.  Exact wherever the variables' invariants hold, so in all
+        ``[{}]`` is true, ``[]`` false.  Exact wherever the variables' invariants hold, so in all
         mapped states, and in reachable ones as far as looked at
         (`coordlang.explanation.variables`).
         """
-        found: dict[tuple[str, ...], None] = {}
+        found: dict[tuple[tuple[Atom, bool], ...], None] = {}
         for term in self.terms:
-            for parts in product(*(literal.conditions() for literal in term)):
-                found[tuple(text for part in parts for text in part)] = None
-        return list(found)
+            for parts in product(*(literal.conjunctions() for literal in term)):
+                found[tuple(pair for part in parts for pair in part.items())] = None
+        return [dict(pairs) for pairs in found]
+
+    def conditions(self) -> list[tuple[str, ...]]:
+        """`conjunctions` as PDDL text: ground atoms and negated atoms."""
+        return [
+            tuple(show(atom) if value else f"(not {show(atom)})" for atom, value in pairs.items())
+            for pairs in self.conjunctions()
+        ]

@@ -212,7 +212,7 @@ def _moves(
 def _named_first(robots: Sequence[str], formula: Cover) -> list[int]:
     """All robots, those that a formula names first."""
     atoms = [atom for term in formula.terms for literal in term for atom in literal.variable.atoms]
-    named = {word for atom in atoms for word in atom.replace("(", " ").replace(")", " ").split()}
+    named = {name for atom in atoms for arg in atom.args for name in arg.strip("()").split()}
     return sorted(range(len(robots)), key=lambda robot: robots[robot] not in named)
 
 

@@ -10,6 +10,7 @@ from coordlang.explanation.cover import Cover, Literal, Term
 from coordlang.explanation.demands import RobotPart, SentenceDemands, WordChange
 from coordlang.explanation.descriptions import WordDescriptions
 from coordlang.explanation.words import MappedStates
+from planners.joint.model import show
 
 #: Terms of one formula, and alternatives of one choice, that are written out.
 _TERMS = 12
@@ -75,7 +76,10 @@ def cover_data(cover: Cover) -> dict[str, Any]:
                 "text": term_text(term),
                 "states": count,
                 "literals": [
-                    {"variable": literal.variable.name, "values": list(literal.listed)}
+                    {
+                        "variable": literal.variable.name,
+                        "values": [value and show(value) for value in literal.listed],
+                    }
                     for literal in term
                 ],
             }

@@ -20,8 +20,10 @@ from coordlang.explanation.words import all_covers, mapped_states
 from coordlang.language.words import Language
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from planners.errors import ProvedImpossible
+from planners.joint.model import show
 from planners.loading import ModelOptions
 from planners.pddl import read_domain, read_problem
+from planners.pddl.lifted import Atom
 from planners.search.reachable import explore
 from tests.conftest import DOMAINS
 from tests.coordlang.random_models import random_model
@@ -162,24 +164,24 @@ def test_conditions_of_sets_of_values() -> None:
     """Not excluding the others, where "none of them" is one of the others; and text that says which
     are excluded.
     """
-    atoms = ("(at b x)", "(at b y)", "(at b z)")
+    atoms = tuple(Atom("at", ("b", place)) for place in "xyz")
     places = tuple(("at(b)", place) for place in "xyz")
     carried = Variable("at(b)", (*atoms, None), (*places, ("at(b)", "none")))
     somewhere = Literal(carried, frozenset(atoms[:2]))
-    assert somewhere.conditions() == [("(at b x)",), ("(at b y)",)]
+    assert somewhere.conjunctions() == [{atoms[0]: True}, {atoms[1]: True}]
     assert literal_text(somewhere) == "at(b) in {x, y}"
-    assert Literal(carried, frozenset((atoms[0], None))).conditions() == [
-        ("(not (at b y))", "(not (at b z))")
+    assert Literal(carried, frozenset((atoms[0], None))).conjunctions() == [
+        {atoms[1]: False, atoms[2]: False}
     ]
     assert literal_text(Literal(carried, frozenset(atoms))) == "at(b) != none"
     lying = Variable("at(b)", atoms, places)
-    assert Literal(lying, frozenset(atoms[:2])).conditions() == [("(not (at b z))",)]
+    assert Literal(lying, frozenset(atoms[:2])).conjunctions() == [{atoms[2]: False}]
     both = Variable(
         "free/holds(r)",
-        ("(free r)", "(holds r b)", "(holds r c)"),
+        (Atom("free", ("r",)), Atom("holds", ("r", "b")), Atom("holds", ("r", "c"))),
         (("free(r)", ""), ("holds(r)", "b"), ("holds(r)", "c")),
     )
-    assert literal_text(Literal(both, frozenset(("(free r)",)))) == "free(r)"
+    assert literal_text(Literal(both, frozenset(both.values[:1]))) == "free(r)"
     assert literal_text(Literal(both, frozenset(both.values[1:]))) == "not free(r)"
     for variable in (carried, lying, both):
         for size in range(1, len(variable.values)):
@@ -188,7 +190,10 @@ def test_conditions_of_sets_of_values() -> None:
                 for true in variable.values:
                     state = {true} if true else set()
                     assert literal.holds(frozenset(state)) == (true in values)
-                    assert any(listed(c, state) for c in literal.conditions()) == (true in values)
+                    cover = Cover(((literal,),), (1,), 1, False)
+                    texts = {show(atom) for atom in state}
+                    assert cover.holds(texts) == (true in values)
+                    assert any(listed(c, texts) for c in cover.conditions()) == (true in values)
 
 
 def test_further_states_have_the_default() -> None:

@@ -9,11 +9,14 @@ LTLf: De Giacomo and Vardi, *Linear temporal logic and linear dynamic logic on f
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from coordlang.use.export.membership import Term, membership
+from coordlang.explanation.cover import Conjunction
+from coordlang.use.export.membership import membership
 from coordlang.use.sentence.task_language import TaskLanguage
+from planners.joint.model import show
+from planners.pddl.lifted import Atom
 
 #: What must not begin a symbol: readers take it for a word of their own.
 _TAKEN = re.compile(r"[^a-z]|true|false|last|end|tt|ff")
@@ -42,24 +45,23 @@ def export_ltlf(task_language: TaskLanguage, words: Sequence[int]) -> SentenceFo
     and in wk to the end: ``w0 & (w0 U (w1 & (w1 U .. G(wk))))``.  Raises `NoPlanFits` if no optimal
     plan does.
     """
-    task_language.plans_with(words)
+    task_language.plans_with(words)  # raises where no plan has the sentence
     terms = membership(task_language, apart=False).terms
     used = sorted(set(words))
-    atoms = sorted({atom for word in used for term in terms[word] for atom in term})
-    symbol = dict(zip(atoms, symbols_of(atoms), strict=True))
-    names = dict(
-        zip(used, symbols_of([task_language.partition.words[word] for word in used]), strict=True)
-    )
+    atoms = sorted({atom for word in used for term in terms[word] for atom in term}, key=show)
+    symbol = dict(zip(atoms, symbols_of(map(show, atoms)), strict=True))
+    names = symbols_of(task_language.partition.words[word] for word in used)
+    name_of = dict(zip(used, names, strict=True))
     meaning = {word: disjunction(terms[word], symbol) for word in used}
     return SentenceFormula(
         formula=_in_turn([meaning[word] for word in words]),
-        over_words=_in_turn([names[word] for word in words]),
-        words={names[word]: meaning[word] for word in used},
-        symbols={symbol[atom]: atom for atom in atoms},
+        over_words=_in_turn([name_of[word] for word in words]),
+        words={name_of[word]: meaning[word] for word in used},
+        symbols={symbol[atom]: show(atom) for atom in atoms},
     )
 
 
-def disjunction(terms: Iterable[Term], symbol: dict[str, str]) -> str:
+def disjunction(terms: Iterable[Conjunction], symbol: Mapping[Atom, str]) -> str:
     """Terms as text, in brackets unless it is one symbol."""
     parts = []
     for term in terms:

@@ -6,15 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coordlang.explanation.cover import Conjunction
 from coordlang.explanation.variables import truth
 from coordlang.explanation.words import word_formulas
 from coordlang.use.sentence.task_language import TaskLanguage
-from planners.tables import Ints, Rows, unique_rows
-
-#: A conjunction of literals: atom (as in a state's key) -> its value.
-Term = dict[str, bool]
+from planners.joint.model import JointModel
+from planners.pddl.lifted import Atom
+from planners.tables import Bools, Ints, Rows, unique_rows
 
 #: For more states than this no short formulas are looked for.
 _STATES = 20_000
@@ -28,7 +27,7 @@ class Membership:
     task.  Elsewhere nothing is promised: terms of several words may hold, or none.
     """
 
-    terms: tuple[tuple[Term, ...], ...]
+    terms: tuple[tuple[Conjunction, ...], ...]
 
     @property
     def size(self) -> int:
@@ -49,77 +48,86 @@ def membership(
     rows, _ = unique_rows(np.concatenate((task_language.partition.rows, rows)))
     if len(rows) > states:
         return _tree(task_language, rows)
-    atoms, holds = truth(task_language.model, rows)
-    facts = _Facts({atom: number for number, atom in enumerate(atoms)}, holds)
     formulas = word_formulas(task_language.language, task_language.model, rows)
-    covers = [
-        [_term(literals) for literals in formulas[word].conditions()]
-        for word in task_language.partition.words
-    ]
-    return Membership(tuple(tuple(disjoint(facts, cover) if apart else cover) for cover in covers))
+    terms = [formulas[word].conjunctions() for word in task_language.partition.words]
+    if apart:
+        values = AtomValues.of(task_language.model, rows)
+        terms = [disjoint(values, of_word) for of_word in terms]
+    return Membership(tuple(map(tuple, terms)))
 
 
 @dataclass(frozen=True, slots=True)
-class _Facts:
-    """The values of all atoms in a table of states, (states, atoms)."""
+class AtomValues:
+    """The values of all atoms in a table of states.
 
-    number: dict[str, int]
-    holds: NDArray[np.bool_]
+    ``number`` is the column of each atom in ``holds`` (states, atoms).
+    """
 
-    def where(self, term: Term) -> NDArray[np.bool_]:
+    number: dict[Atom, int]
+    holds: Bools
+
+    @classmethod
+    def of(cls, model: JointModel, rows: Rows) -> AtomValues:
+        """The values of a model's atoms in some states."""
+        atoms, holds = truth(model, rows)
+        return cls({atom: number for number, atom in enumerate(atoms)}, holds)
+
+    def where(self, term: Conjunction) -> Bools:
         """The states in which a term holds."""
         columns = [self.number[atom] for atom in term]
-        same: NDArray[np.bool_] = (self.holds[:, columns] == list(term.values())).all(axis=1)
+        same: Bools = (self.holds[:, columns] == list(term.values())).all(axis=1)
         return same
 
 
-def disjoint(facts: _Facts, terms: Sequence[Term]) -> list[Term]:
+def disjoint(values: AtomValues, terms: Sequence[Conjunction]) -> list[Conjunction]:
     """Terms that hold in the same states, no two in the same state.
 
-    Larger ones first, of others only what is left.
-
-    ``t`` without ``a & b`` is ``t & !a`` or ``t & a & !b`` (the disjoint sharp of two-level
-    minimisation); parts in which there is no state are dropped.
+    Larger ones first, of others only what is left; parts in which there is no state are dropped.
     """
-    found: list[tuple[Term, NDArray[np.bool_]]] = []
-    for term in sorted(terms, key=lambda t: -int(facts.where(t).sum())):
-        parts = [(term, facts.where(term))]
+    found: list[tuple[Conjunction, Bools]] = []
+    for term in sorted(terms, key=lambda t: -int(values.where(t).sum())):
+        parts = [(term, values.where(term))]
         for earlier, taken in found:
             left = []
             for part, states in parts:
-                if not (states & taken).any():
+                if (states & taken).any():
+                    left += _without(values, part, earlier)
+                else:
                     left.append((part, states))
-                    continue
-                rest = dict(part)
-                for atom, value in earlier.items():
-                    if atom not in rest:
-                        outside = {**rest, atom: not value}
-                        there = facts.where(outside)
-                        left += [(outside, there)] if there.any() else []
-                        rest[atom] = value
             parts = left
         found += parts
     return [term for term, states in found if states.any()]
 
 
-def _term(literals: Sequence[str]) -> Term:
-    """``("(at r1 a)", "(not (at r2 b))")`` as a term."""
-    return {
-        text.removeprefix("(not ")[:-1] if text.startswith("(not (") else text: not text.startswith(
-            "(not ("
-        )
-        for text in literals
-    }
+def _without(
+    values: AtomValues, term: Conjunction, other: Conjunction
+) -> list[tuple[Conjunction, Bools]]:
+    """The part of a term outside another one, as terms that exclude each other, with their states.
+
+    ``t`` without ``a & b`` is ``t & !a`` or ``t & a & !b`` (the disjoint sharp of two-level
+    minimisation).
+    """
+    found = []
+    inside = dict(term)
+    for atom, value in other.items():
+        if atom not in inside:
+            outside = {**inside, atom: not value}
+            states = values.where(outside)
+            if states.any():
+                found.append((outside, states))
+            inside[atom] = value
+    return found
 
 
 def _tree(task_language: TaskLanguage, rows: Rows) -> Membership:
-    """A binary decision tree; each test is the one that tells most about the word (least entropy,
-    as in ID3).
+    """The leaves of a binary decision tree.
+
+    Each test is the one that gives most information about the word (least entropy, as in ID3).
     """
     word = task_language.partition.word_of(rows)
     atoms, values = truth(task_language.model, rows)
-    terms: list[list[Term]] = [[] for _ in task_language.partition.words]
-    todo: list[tuple[Ints, Term]] = [(np.arange(len(rows)), {})]
+    terms: list[list[Conjunction]] = [[] for _ in task_language.partition.words]
+    todo: list[tuple[Ints, Conjunction]] = [(np.arange(len(rows)), {})]
     while todo:
         here, term = todo.pop()
         if (word[here] == word[here[0]]).all():
@@ -132,7 +140,7 @@ def _tree(task_language: TaskLanguage, rows: Rows) -> Membership:
     return Membership(tuple(map(tuple, terms)))
 
 
-def _best_test(values: NDArray[np.bool_], word: Ints, words: int) -> int:
+def _best_test(values: Bools, word: Ints, words: int) -> int:
     """The atom that leaves least entropy of the word; each side of its test has a state."""
     of_word = np.eye(words)[word]
     true = values.T.astype(np.float64) @ of_word
