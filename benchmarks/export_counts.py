@@ -95,11 +95,11 @@ def problem_rows(
         last = None
         for limit in (2000, 0):
             exported = export_pddl(spoken, words, limit)
-            if exported.plain.form != last:
+            if exported.classical.form != last:
                 yield row(
                     f"{path.parent.name}/{path.stem}", spoken, words, exported, seconds, other=other
                 )
-            last = exported.plain.form
+            last = exported.classical.form
 
 
 def two_sentences(spoken: TaskLanguage) -> list[tuple[int, ...]]:
@@ -142,8 +142,8 @@ def row(
     return Row(
         name,
         spoken.text(words),
-        exported.plain.form,
-        len(exported.plain.actions),
+        exported.classical.form,
+        len(exported.classical.actions),
         plans.count,
         fits,
         by_listing(spoken, plans, words),
@@ -225,7 +225,7 @@ def by_fast_downward(exported: PddlExport, seconds: float) -> int | None:
     from planners.classical.fast_downward import total_cost
 
     try:
-        return total_cost(exported.plain, time_limit=seconds)
+        return total_cost(exported.classical, time_limit=seconds)
     except CoordlangError:
         return None
 

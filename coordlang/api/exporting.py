@@ -66,12 +66,12 @@ class ExportedTask(Presented):
     @property
     def form(self) -> str:
         """How joint steps are written: ``explicit`` (one action each) or one robot after another."""
-        return self.exported.plain.form
+        return self.exported.classical.form
 
     @property
     def actions(self) -> int:
         """The number of actions."""
-        return len(self.exported.plain.actions)
+        return len(self.exported.classical.actions)
 
     @property
     def terms(self) -> int:
@@ -143,12 +143,12 @@ class ExportedTask(Presented):
             "domain": self.domain,
             "problem": self.problem,
             "form": self.form,
-            "step_cost": self.exported.plain.step_cost,
+            "step_cost": self.exported.classical.step_cost,
             "optimal_cost": self.cost,
             "robots": list(model.robots),
             "actions": {
                 name: {model.robots[r]: _label_text(model, r, label) for r, label in chosen}
-                for name, chosen in self.exported.choices.items()
+                for name, chosen in self.exported.labels.items()
             },
         }
 

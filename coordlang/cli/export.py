@@ -125,7 +125,7 @@ def _write_pddl(exported: PddlExport, output: str | None, as_json: bool) -> None
         raise UsageError(f"the folder {output} cannot be made: {error.strerror}") from None
     for name, text in (("domain.pddl", exported.domain), ("problem.pddl", exported.problem)):
         write_atomically(os.path.join(output, name), text.encode())
-    size = f"{counted(len(exported.plain.actions), 'action')} ({exported.plain.form}), {counted(exported.terms, 'term')}"
+    size = f"{counted(len(exported.classical.actions), 'action')} ({exported.classical.form}), {counted(exported.terms, 'term')}"
     click.echo(f"written to {output}: domain.pddl, problem.pddl: {size} for the words")
 
 
@@ -134,8 +134,8 @@ def _data(exported: PddlExport) -> dict[str, Any]:
     return {
         "domain": exported.domain,
         "problem": exported.problem,
-        "form": exported.plain.form,
-        "step_cost": exported.plain.step_cost,
+        "form": exported.classical.form,
+        "step_cost": exported.classical.step_cost,
         "optimal_cost": exported.cost,
         "robots": list(model.robots),
         "actions": {
@@ -143,7 +143,7 @@ def _data(exported: PddlExport) -> dict[str, Any]:
                 model.robots[robot]: model.labels[robot][label] if label else None
                 for robot, label in choices
             }
-            for name, choices in exported.choices.items()
+            for name, choices in exported.labels.items()
         },
     }
 

@@ -78,7 +78,9 @@ def cover_data(cover: Cover) -> dict[str, Any]:
                 "literals": [
                     {
                         "variable": literal.variable.name,
-                        "values": [value and show(value) for value in literal.listed],
+                        "values": [
+                            None if value is None else show(value) for value in literal.listed
+                        ],
                     }
                     for literal in term
                 ],

@@ -57,7 +57,7 @@ class Variable:
     @property
     def value_texts(self) -> tuple[str | None, ...]:
         """The values as PDDL text."""
-        return tuple(value and show(value) for value in self.values)
+        return tuple(None if value is None else show(value) for value in self.values)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ def valuation(model: JointModel, rows: Rows) -> Valuation:
     """
     atoms, holds = truth(model, rows)
     _, everywhere = truth(model, _surroundings(model, rows))
-    sometimes, always = holds.any(axis=0), holds.all(axis=0)
+    sometimes, always = np.asarray(holds.any(axis=0)), np.asarray(holds.all(axis=0))
     variables: list[Variable] = []
     columns: list[Ints] = []
     for group in mutex_groups(atoms, everywhere, model.robots):

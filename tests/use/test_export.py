@@ -23,6 +23,7 @@ import numpy as np
 import pytest
 
 from coordlang.building import build_language
+from coordlang.explanation.cover import Conjunction
 from coordlang.language.sentences import sentence
 from coordlang.language.words import Language
 from coordlang.tasks.candidates import from_problems
@@ -34,6 +35,7 @@ from coordlang.use.sentence.fitting_plans import NoPlanFits
 from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 from planners.classical import action_names
 from planners.errors import BadInput, ProvedImpossible
+from planners.joint.model import show
 from planners.pddl import read_domain, read_problem
 from planners.search.plans import Plan, Plans
 from planners.search.reachable import explore
@@ -115,8 +117,10 @@ def by_sentence(task_language: TaskLanguage) -> dict[tuple[int, ...], set[Plan]]
 
 def planned(exported: PddlExport) -> list[Plan]:
     """The joint plans of all optimal plans of an exported problem."""
-    names = action_names(exported.plain)
-    return [exported.joint_plan([names[n] for n in plan]) for plan in optimal_plans(exported.plain)]
+    names = action_names(exported.classical)
+    return [
+        exported.joint_plan([names[n] for n in plan]) for plan in optimal_plans(exported.classical)
+    ]
 
 
 @BOTH
@@ -125,10 +129,10 @@ def test_the_optimal_plans_are_the_plans_that_fit(lot: str) -> None:
         for words, plans in islice(by_sentence(task_language).items(), 4):
             for form, limit in FORMS.items():
                 exported = export_pddl(task_language, words, limit)
-                assert exported.plain.form == form
+                assert exported.classical.form == form
                 assert Counter(planned(exported)) == Counter(plans)
-                assert optimal_plans(exported.plain).cost == exported.cost
-                assert exported.plain.cost(exported.cost) == task_language.space.cost_of(
+                assert optimal_plans(exported.classical).cost == exported.cost
+                assert exported.classical.cost(exported.cost) == task_language.space.cost_of(
                     task_language.task
                 )
 
@@ -171,8 +175,8 @@ def test_one_term_in_every_state(lot: str) -> None:
         assert tree.size <= len(set(states))
 
 
-def satisfied(term: dict[str, bool], state: frozenset[str]) -> bool:
-    return all((atom in state) == value for atom, value in term.items())
+def satisfied(term: Conjunction, state: frozenset[str]) -> bool:
+    return all((show(atom) in state) == value for atom, value in term.items())
 
 
 def test_a_word_named_in_two_ways_would_be_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -344,11 +348,11 @@ def test_plan_files_of_other_planners() -> None:
 
 def test_a_plan_that_is_cut_off_or_none() -> None:
     exported = export_pddl(rich(), max(by_sentence(rich()), key=len), 0)
-    names = action_names(exported.plain)
-    plan = [names[n] for n in next(iter(optimal_plans(exported.plain)))]
+    names = action_names(exported.classical)
+    plan = [names[n] for n in next(iter(optimal_plans(exported.classical)))]
     whole = exported.joint_plan([name.upper() for name in plan])
     assert exported.joint_plan(plan) == whole
-    last = max(place for place, name in enumerate(plan) if exported.choices[name])
+    last = max(place for place, name in enumerate(plan) if exported.labels[name])
     with pytest.raises(BadInput, match="cut off"):
         exported.joint_plan(plan[:last])
     with pytest.raises(BadInput, match="none of the exported problem"):
