@@ -30,7 +30,7 @@ def warping_clause(
 
     The path is one of ``u`` and ``v`` under ``word``.
 
-    None if the two sentences differ.  O(|u| |v|).
+    None if the two sentences differ.  O(len(u) * len(v)).
     """
     first, second = [word[a] for a in u], [word[b] for b in v]
     path = warping_path(u, v, [[a == b for b in second] for a in first])

@@ -25,15 +25,15 @@ _CHUNK = 1_000_000
 class ComposingStepper:
     """The `Stepper` of PDDL with one action per robot: every robot picks one subaction or idles.
 
+    ``tables[i, j]`` (i < j) says which labels of two robots may share a step
+    (`planners.joint.interference`).
+
     Parameters
     ----------
     subactions
         For each robot its ground actions, shared ones in the lists of all their owners.
     keeps_idle
         For each robot whether it may do nothing at all.
-
-    ``tables[i, j]`` (i < j) says which labels of two robots may share a step
-    (`planners.joint.interference`).
     """
 
     def __init__(
