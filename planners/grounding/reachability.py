@@ -5,18 +5,24 @@ They are found by Tarski's reachability program (clingo).
 Tarski gets a relaxed core of the domain: one sort, types as static predicates, the positive atoms
 of each conjunctive precondition, and add effects.  What is left out (negation, disjunction,
 quantifiers, inequality, other robots' actions) only makes the answer larger;
-`planners.grounding.instantiate` evaluates it exactly.
+`planners.grounding.instantiate` evaluates it exactly.  The program that Tarski makes of it is
+Datalog without negation, so clingo's grounder alone finds its least model.
 """
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Iterable
-from typing import Any
+import signal
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from threading import current_thread, main_thread
+from typing import TYPE_CHECKING, Any
 
-from planners.errors import CoordlangError, OutOfMemory
+from planners.errors import CoordlangError
 from planners.pddl.lifted import And, Atom, Domain, Formula, Schema, Variable
 from planners.pddl.robots import natural
+
+if TYPE_CHECKING:
+    from clingo import Control
 
 Arguments = tuple[str, ...]
 
@@ -24,59 +30,132 @@ Arguments = tuple[str, ...]
 def reachable_arguments(
     domain: Domain, objects: dict[str, tuple[str, ...]], init: Iterable[Atom]
 ) -> dict[str, list[Arguments]]:
-    """Schema name -> argument tuples of a superset of its applicable instances, sorted.
+    """Find the argument tuples of a superset of each schema's applicable instances, sorted.
 
     Parameters
     ----------
+    domain
+        The domain whose schemas are instantiated.
     objects
         Object -> its types.
     init
         All atoms (static and fluent) that hold in some initial state.
+
+    Returns
+    -------
+    dict
+        Schema name -> argument tuples, in the natural order of the objects' names.
+
+    Raises
+    ------
+    MemoryError
+        If clingo meets the memory limit.
+    CoordlangError
+        If clingo does not ground the program.
     """
-    from tarski.errors import TarskiError
-    from tarski.grounding.lp_grounding import LPGroundingStrategy
+    from tarski.reachability import create_reachability_lp
 
     core = _Core(domain, objects)
     for atom in init:
         core.add_initial(atom)
     for schema in domain.schemas:
         core.add_action(schema)
-    # Tarski leaves its files behind when it is interrupted: give it a directory that goes away.
-    before = tempfile.tempdir
-    with tempfile.TemporaryDirectory(prefix="coordlang-") as directory:
-        tempfile.tempdir = directory
-        try:
-            groundings = LPGroundingStrategy(core.problem).ground_actions()
-        except TarskiError as error:
-            raise _failure(error) from error
-        finally:
-            tempfile.tempdir = before
+    program, _ = create_reachability_lp(core.problem)
+    arities = {
+        f"action_{symbol}": len(schema.parameters)
+        for schema, symbol in zip(domain.schemas, core.actions.values(), strict=True)
+    }
+    model = _least_model(program.rules, arities)
     # Objects are numbered in natural order, so arguments sort as their numbers do.
-    place = {symbol: int(symbol[1:]) for symbol in core.objects}
+    number = {symbol: int(symbol[1:]) for symbol in core.objects}
     return {
         name: [
             tuple(core.objects[o] for o in args)
-            for args in sorted(groundings[symbol], key=lambda args: [place[o] for o in args])
+            for args in sorted(
+                model[f"action_{symbol}"], key=lambda args: [number[o] for o in args]
+            )
         ]
         for name, symbol in core.actions.items()
     }
 
 
-def _failure(error: Exception) -> CoordlangError:
-    """Tarski's error as ours.
+def _least_model(rules: Sequence[str], arities: dict[str, int]) -> dict[str, list[Arguments]]:
+    """The argument tuples of the ``arities``' predicates in the least model of a Datalog program."""
+    from clingo import Control
 
-    Clingo out of memory (it may also be killed for it), or anything else.
+    messages: list[str] = []
+
+    def note(_code: object, message: str) -> None:
+        messages.append(message)
+
+    # The first error that clingo reports allocates memory, and without memory ends the process.
+    with suppress(RuntimeError):
+        Control(logger=note).add("base", [], "not a rule")
+    messages.clear()
+    control = Control(logger=note)
+    try:
+        control.add("base", [], "\n".join(rules))
+        _ground(control)
+    except RuntimeError as error:
+        said = " ".join((str(error), *messages))
+        raise CoordlangError(f"clingo does not ground the reachability program: {said}") from error
+    atoms = control.symbolic_atoms
+    if not any(atoms.by_signature("goal", 0)):
+        raise CoordlangError("clingo's grounding of the reachability program is not complete")
+    return {
+        predicate: [
+            tuple(argument.name for argument in atom.symbol.arguments)
+            for atom in atoms.by_signature(predicate, arity)
+        ]
+        for predicate, arity in arities.items()
+    }
+
+
+class _Stopped(Exception):
+    """A signal has arrived."""
+
+
+def _ground(control: Control) -> None:
+    """Ground clingo's program; a signal (Ctrl-C, an alarm) ends it soon.
+
+    clingo runs no signal handler, and an exception that a handler raises in one of its callbacks
+    does not leave clingo as it was.  So signals are noted only, until the next ground rule ends
+    the work, and their handlers run thereafter.
     """
-    text = str(error)
-    if any(
-        sign in text
-        for sign in ("ran out of memory", "MemoryError", "bad_alloc", "exited with code -")
-    ):
-        return OutOfMemory(
-            "grounding needs more memory than it may use",
-            remedy="Use fewer objects, or a larger --memory-limit.",
-        )
-    return CoordlangError(f"Tarski's grounder failed: {text or type(error).__name__}")
+    from clingo.backend import Observer
+
+    arrived: list[int] = []
+
+    class Watch(Observer):
+        def rule(self, choice: bool, head: Sequence[int], body: Sequence[int]) -> None:
+            if arrived:
+                raise _Stopped
+
+    control.register_observer(Watch(), replace=True)
+    try:
+        with _signals_into(arrived):
+            control.ground([("base", [])])
+    except _Stopped:
+        pass
+    finally:
+        for number in arrived:
+            signal.raise_signal(number)
+
+
+@contextmanager
+def _signals_into(arrived: list[int]) -> Iterator[None]:
+    """Note the signals that have a handler in Python; other threads than the main one have none."""
+    if current_thread() is not main_thread():
+        yield
+        return
+    handlers = {n: h for n in signal.valid_signals() if callable(h := signal.getsignal(n))}
+    try:
+        for number in handlers:
+            signal.signal(number, lambda number, _frame: arrived.append(number))
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
 
 
 class _Core:

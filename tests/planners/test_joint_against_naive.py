@@ -35,9 +35,7 @@ _MOST_PLANS = 300
 
 @pytest.fixture(autouse=True, scope="module")
 def one_reachability_per_model() -> Iterator[None]:
-    """Tarski's program runs in a process of its own, and every model is built for two costs: run it
-    once.
-    """
+    """Every model is built for two costs: compile and run Tarski's program once."""
     asked: dict[str, dict[str, list[tuple[str, ...]]]] = {}
 
     def remembered(
