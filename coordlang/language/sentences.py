@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import compress
+
+import numpy as np
 
 from coordlang.language.partition import Partition
 from planners.errors import OutOfMemory
 from planners.search.plan_space import PlanSpace
+from planners.tables import Bools, Ints
+
+#: A sentence as word numbers.
+Sentence = tuple[int, ...]
 
 #: More sentences than this are not listed for one task.
 _MOST = 100_000
 
 
-def sentence(words: Iterable[int]) -> tuple[int, ...]:
+def sentence(words: Iterable[int]) -> Sentence:
     """The words of a state sequence, repeated neighbours collapsed.
 
     The TSC of a plan, in the paper's terms.
@@ -44,14 +51,14 @@ def task_sentences(space: PlanSpace, task: int, partition: Partition) -> list[Ta
 
     O(edges * sentences).  Raises `OutOfMemory` beyond 100,000 sentences.
     """
-    word = partition.word_of(space.rows)[space.state].tolist()
+    word = partition.word_of(space.rows)[space.state]
     start = int(space.starts[task])
-    below = sentence_counts(space, start, word, _MOST)
+    below = sentence_counts(space, word, start=start, most_of_node=_MOST)
     result = [
         TaskSentence(
             tuple(partition.words[w] for w in words),
             plans,
-            _choices(space, start, word, below, words),
+            _choices(space, start, word.tolist(), below, words),
         )
         for words, plans in below[start].items()
     ]
@@ -59,48 +66,84 @@ def task_sentences(space: PlanSpace, task: int, partition: Partition) -> list[Ta
 
 
 def sentence_counts(
-    space: PlanSpace, start: int, word: Sequence[int], most: int
-) -> dict[int, Counter[tuple[int, ...]]]:
-    """For each node on the plans from ``start``.
+    space: PlanSpace,
+    word: Ints,
+    *,
+    start: int | None = None,
+    edges: Bools | None = None,
+    most_of_node: int | None = None,
+    most_steps: int | None = None,
+) -> dict[int, Counter[Sentence]]:
+    """Count the plans with each sentence, from the nodes of a plan space.
 
-    Sentence (word numbers) of the rest, the node's own word first -> number of plans.
+    Backward over the plan space, for all tasks at once: O(edges * sentences of a node).
 
-    ``word`` is the word number of each node.  O(edges * sentences).  Raises `OutOfMemory` when a
-    node has more than ``most`` sentences.
+    Parameters
+    ----------
+    word
+        (nodes) The word number of each node.
+    start
+        Count from the nodes on plans from this one (default: from all nodes).
+    edges
+        (edges) A mask: count only plans over these edges (default: over all).
+    most_of_node, most_steps
+        The most sentences of one node, and the most additions in total.
+
+    Returns
+    -------
+    dict
+        For each node the sentences of the plans from it, the node's own word first, with the exact
+        numbers of these plans.
+
+    Raises
+    ------
+    OutOfMemory
+        If there are more sentences than one of the limits allows.
     """
-    counts: dict[int, Counter[tuple[int, ...]]] = {}
-    for node in sorted(_nodes_from(space, start)):
+    words: list[int] = word.tolist()
+    nodes = np.arange(len(space))
+    if start is not None:
+        nodes = nodes[space.descendants(np.array([start]))]
+    counts: dict[int, Counter[Sentence]] = {}
+    steps = 0
+    for node in nodes.tolist():
         if space.layer[node] == 0:
-            counts[node] = Counter({(word[node],): 1})
+            counts[node] = Counter({(words[node],): 1})
             continue
-        total: Counter[tuple[int, ...]] = Counter()
-        for target in space.target[space.first[node] : space.first[node + 1]].tolist():
+        total: Counter[Sentence] = Counter()
+        out = space.out_edges(node)
+        targets: Iterable[int] = space.successors(node)
+        if edges is not None:
+            targets = compress(targets, edges[out.start : out.stop])
+        for target in targets:
+            steps += len(counts[target])
             for rest, number in counts[target].items():
-                total[rest if rest[0] == word[node] else (word[node], *rest)] += number
-        if len(total) > most:
-            raise OutOfMemory(f"a task has more than {most:,} sentences: too many to list")
+                total[_in_front(words[node], rest)] += number
+        _check_limits(len(total), most_of_node, steps, most_steps)
         counts[node] = total
     return counts
 
 
-def _nodes_from(space: PlanSpace, start: int) -> set[int]:
-    seen, todo = {start}, [start]
-    while todo:
-        node = todo.pop()
-        for target in space.target[space.first[node] : space.first[node + 1]].tolist():
-            if target not in seen:
-                seen.add(target)
-                todo.append(target)
-    return seen
+def _in_front(word: int, rest: Sentence) -> Sentence:
+    """Return the sentence of a plan whose first state has ``word`` and whose rest says ``rest``."""
+    return rest if rest[0] == word else (word, *rest)
+
+
+def _check_limits(of_node: int, most_of_node: int | None, steps: int, most: int | None) -> None:
+    if most_of_node is not None and of_node > most_of_node:
+        raise OutOfMemory(f"a task has more than {most_of_node:,} sentences: too many to list")
+    if most is not None and steps > most:
+        raise OutOfMemory(f"the sentences of the tasks take more than {most:,} steps to count")
 
 
 def _choices(
     space: PlanSpace,
     start: int,
     word: list[int],
-    below: dict[int, Counter[tuple[int, ...]]],
-    words: tuple[int, ...],
+    below: dict[int, Counter[Sentence]],
+    words: Sentence,
 ) -> tuple[tuple[tuple[str | None, ...], ...], ...]:
+    """What each robot may do in each step, over all plans with a sentence."""
     model = space.model
     layer = {(start, words)}
     steps = []
@@ -108,16 +151,16 @@ def _choices(
         used: list[set[int]] = [set() for _ in model.robots]
         following = set()
         for node, rest in layer:
-            for edge in range(int(space.first[node]), int(space.first[node + 1])):
-                target = int(space.target[edge])
+            for edge in space.out_edges(node):
+                target = space.target_of(edge)
                 after = rest if word[target] == word[node] else rest[1:]
                 if below[target].get(after):
                     following.add((target, after))
-                    for robot, label in enumerate(space.labels[edge].tolist()):
-                        used[robot].add(label)
+                    for own, label in zip(used, space.labels_of(edge), strict=True):
+                        own.add(label)
         steps.append(
             tuple(
-                tuple(model.labels[robot][label] if label else None for label in sorted(own))
+                tuple(model.label_text(robot, label) for label in sorted(own))
                 for robot, own in enumerate(used)
             )
         )

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
+from coordlang.explanation.cover import Cover
 from coordlang.explanation.descriptions import WordDescriptions, describe_words
 from coordlang.explanation.text import term_text
 from coordlang.explanation.words import all_covers, mapped_states
@@ -19,7 +21,7 @@ from coordlang.language.words import Language
 from coordlang.report.layout import graph_layout, spread
 from coordlang.report.places import Point, place_layout
 from coordlang.report.shown import Selection
-from coordlang.report.task import Tables, TaskPart, task_data, told
+from coordlang.report.task import Tables, TaskPart, task_data, task_summary
 from coordlang.report.world import World, find_world
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.joint.model import JointModel, own_text
@@ -47,22 +49,21 @@ def page_data(
     parts: Sequence[TaskPart],
     known: Mapping[str, Point] | None = None,
 ) -> dict[str, Any]:
-    """The page's data for a language and the parts to be shown.
+    """Return the page's data for a language and the tasks to be shown.
 
-    ``known``: coordinates of places from a file.
+    ``known`` are coordinates of places from a file.
     """
-    first = parts[0].shown.spoken
+    first = parts[0].shown.language
     model = first.model
     tables = Tables(model, first.partition)
-    mapped = _listed_states(language, tables)
+    listed = _listed_states(language, tables)
     tasks = [task_data(part, tables) for part in parts]
-    world = find_world(model, [split_atoms(key) for key in tables.states])
-    if not 1 < len(world.places) <= _PLACES:  # no map: atoms are only text
-        world = replace(world, places=(), links=(), roles={})
-    facts = sorted({atom for key in tables.states for atom in split_atoms(key)})
+    states = [model.codec.decode(row) for row in tables.rows]
+    world = _drawn_world(model, states)
+    facts = sorted({fact for state in states for fact in state})
     number = {fact: k for k, fact in enumerate(facts)}
-    for entry, part in zip(tasks, parts, strict=True):
-        entry.update(told(part, world))
+    for task, part in zip(tasks, parts, strict=True):
+        task.update(task_summary(part, world))
     return {
         "robots": list(model.robots),
         **_words(language, model),
@@ -74,9 +75,9 @@ def page_data(
             [_label(model, world, robot, text) for text in own]
             for robot, own in enumerate(tables.labels)
         ],
-        "states": [[number[atom] for atom in split_atoms(key)] for key in tables.states],
+        "states": [[number[fact] for fact in state] for state in states],
         "state_words": tables.words,
-        "mapped": mapped,
+        "mapped": listed,
         "state_graph": _state_graph(first) if 1 < len(language.states) <= _STATES_DRAWN else None,
         "tasks": tasks,
         "candidates": {
@@ -88,10 +89,18 @@ def page_data(
     }
 
 
-def _listed_states(language: Language, tables: Tables) -> int:
-    """Enter the language's states, the first numbers, unless they are too many.
+def _drawn_world(model: JointModel, states: Sequence[Sequence[str]]) -> World:
+    """What is drawn; without a map, where there are too few or too many places, atoms are text."""
+    world = find_world(model, states)
+    if 1 < len(world.places) <= _PLACES:
+        return world
+    return replace(world, places=(), links=(), roles={})
 
-    How many were entered.
+
+def _listed_states(language: Language, tables: Tables) -> int:
+    """Enter the states of the language as the first ones, unless they are too many.
+
+    Returns how many were entered.
     """
     keys = sorted(language.states)
     atoms = len(split_atoms(keys[0])) * len(keys) if keys else 0
@@ -103,39 +112,50 @@ def _listed_states(language: Language, tables: Tables) -> int:
 
 
 def _words(language: Language, model: JointModel) -> dict[str, Any]:
-    """The words in their own order, and ``told``.
+    """The words in their own order; ``told``: in the order in which their formulas are to be read.
 
-    Their numbers in the order in which their formulas are to be read.
-
-    ``terms``: those of the formula, None if none was sought; ``rest``: the formula is "every other
-    state".
+    Of a word, ``terms`` are those of its formula, None if none was sought, and ``rest`` says that
+    the formula is "every other state".
     """
-    sizes = language.sizes()
     explained = 0 < len(language.states) <= _STATES_EXPLAINED
-    mapped = mapped_states(language, model) if explained else None
-    told = (
-        describe_words(mapped, all_covers(mapped))
-        if mapped
-        else WordDescriptions(tuple((w, None) for w in language.words), False)
-    )
-    words = {}
-    for word, cover in told.rules:
-        terms = cover.terms if cover else ()
-        mine = [] if explained else [key for key, said in language.states.items() if said == word]
-        words[word] = {
-            "name": word,
-            "size": sizes[word],
-            "rest": explained and cover is None,
-            "terms": [term_text(term) for term in terms[:_TERMS]] if explained else None,
-            "more_terms": max(0, len(terms) - _TERMS),
-            "examples": mine[:_EXAMPLES],
-        }
+    if explained:
+        mapped = mapped_states(language, model)
+        descriptions = describe_words(mapped, all_covers(mapped))
+    else:
+        descriptions = WordDescriptions(tuple((w, None) for w in language.words), in_order=False)
+    sizes = language.sizes()
+    found = {}
+    for word, cover in descriptions.rules:
+        entry = _formula_data(cover) if explained else _example_data(language, word)
+        found[word] = {"name": word, "size": sizes[word], **entry}
     return {
-        "words": [words[word] for word in language.words],
+        "words": [found[word] for word in language.words],
         "told": {
-            "in_order": told.in_order,
-            "order": [language.words.index(word) for word, _ in told.rules],
+            "in_order": descriptions.in_order,
+            "order": [language.words.index(word) for word, _ in descriptions.rules],
         },
+    }
+
+
+def _formula_data(cover: Cover | None) -> dict[str, Any]:
+    """The formula of a word; None: every other state."""
+    terms = cover.terms if cover else ()
+    return {
+        "rest": cover is None,
+        "terms": [term_text(term) for term in terms[:_TERMS]],
+        "more_terms": max(0, len(terms) - _TERMS),
+        "examples": [],
+    }
+
+
+def _example_data(language: Language, word: str) -> dict[str, Any]:
+    """A few states of a word whose formula is not sought."""
+    states = (key for key, own in language.states.items() if own == word)
+    return {
+        "rest": False,
+        "terms": None,
+        "more_terms": 0,
+        "examples": list(islice(states, _EXAMPLES)),
     }
 
 
@@ -144,14 +164,10 @@ def _map(world: World, known: Mapping[str, Point] | None) -> dict[str, Any]:
         return {"places": [], "links": [], "grid": False}
     layout = place_layout(world.places, [link.ends for link in world.links], known)
     number = {name: k for k, name in enumerate(world.places)}
+    points = [(name, *layout.points[name]) for name in world.places]
     return {
-        "places": [
-            {"name": name, "x": layout.points[name][0], "y": layout.points[name][1]}
-            for name in world.places
-        ],
-        "links": [
-            [number[a], number[b], int(link.moves)] for link in world.links for a, b in [link.ends]
-        ],
+        "places": [{"name": name, "x": x, "y": y} for name, x, y in points],
+        "links": [[*(number[end] for end in link.ends), int(link.moves)] for link in world.links],
         "grid": layout.is_grid,
     }
 
@@ -161,7 +177,7 @@ def _role(fact: str, world: World) -> list[Any]:
     if fact.startswith("(last "):
         robot, _, action = fact[len("(last ") : -1].partition(" ")
         return ["about", world.things.index(robot), f"last did {own_text(action, robot)}"]
-    kind, *rest = world.roles.get(fact, ("other",))
+    kind, *rest = world.role(fact)
     things, places = world.things, world.places
     match kind, rest:
         case "at", [thing, place]:
@@ -178,8 +194,8 @@ def _role(fact: str, world: World) -> list[Any]:
 def _label(model: JointModel, world: World, robot: int, text: str | None) -> dict[str, Any]:
     if text is None:
         return {"text": "idle", "short": "idle", "moves": []}
-    known = text in model.labels[robot]
-    moves = world.moves(model, robot, model.labels[robot].index(text)) if known else ()
+    label = model.label_number(robot, text)
+    moves = () if label is None else world.moves(model, robot, label)
     return {
         "text": text,
         "short": own_text(text, model.robots[robot]),
@@ -187,27 +203,26 @@ def _label(model: JointModel, world: World, robot: int, text: str | None) -> dic
     }
 
 
-def _state_graph(spoken: TaskLanguage) -> dict[str, Any] | None:
-    """The language's states, in the order of their keys, and the joint steps between them.
+def _state_graph(language: TaskLanguage) -> dict[str, Any]:
+    """The listed states, in the order of their keys, and the joint steps between them.
 
-    The steps are taken either way.
+    Two states are joined if a step leads from one to the other, in either direction.
     """
-    model, table = spoken.model, spoken.partition
-    keys = [model.codec.key(row) for row in table.rows]
-    place = np.argsort(np.array(keys, object), kind="stable")
+    model, rows = language.model, language.partition.rows
+    keys = [model.codec.key(row) for row in rows]
     rank = np.empty(len(keys), np.int64)
-    rank[place] = np.arange(len(keys))
-    steps = model.successors(table.rows)
-    target = find_rows(table.rows, steps.result)
+    rank[np.argsort(np.array(keys, object), kind="stable")] = np.arange(len(keys))
+    steps = model.successors(rows)
+    target = find_rows(rows, steps.result)
     inside = (target >= 0) & (target != steps.source)
     ends = np.sort(rank[np.column_stack((steps.source, target))[inside]], axis=1)
-    links = [(int(a), int(b)) for a, b in np.unique(ends, axis=0)] if len(ends) else []
+    links = [(a, b) for a, b in np.unique(ends, axis=0).tolist()]
     points = graph_layout(len(keys), links)
-    drawn = links if len(links) <= _STATE_LINES else []
     radius = max(9.0, min(26.0, 270 / len(keys) ** 0.5))
     points = spread(points * (1000 / max(float(points.max(initial=0.0)), 1e-9)), 2.1 * radius)
+    drawn = links if len(links) <= _STATE_LINES else []
     return {
-        "points": [[round(float(x)), round(float(y))] for x, y in points],
+        "points": [[round(x), round(y)] for x, y in points.tolist()],
         "radius": round(radius, 1),
         "links": [[a, b] for a, b in drawn],
         "steps": len(links),

@@ -47,11 +47,26 @@ def make_report(
     coordinates: Mapping[str, Point] | None = None,
     position: Position | None = None,
 ) -> Report:
-    """The report of a language: the same arguments give the same bytes.
+    """Render the report of a language; the same arguments give the same bytes.
 
-    Shows the problems' tasks and candidate tasks drawn with ``seed``, at most ``tasks_shown``,
-    fewer if the page would become larger than 5 MB.  Raises what
-    `coordlang.report.shown.select_tasks` raises.
+    It shows the problems' tasks and candidate tasks drawn with ``seed``, at most ``tasks_shown``,
+    fewer if the page would become larger than 5 MB.
+
+    Parameters
+    ----------
+    options
+        How the model is built (default: as the language file says).
+    coordinates
+        Of the places of the map, if they are known (`read_coordinates`).
+    position
+        What error messages name as the place of the language.
+
+    Raises
+    ------
+    OutOfMemory
+        If the page of a single task would be too large.
+    CoordlangError
+        What `coordlang.report.shown.select_tasks` raises.
     """
     selection = select_tasks(language, domain, problems, tasks_shown, seed, options, position)
     parts = [task_part(shown, seed) for shown in selection.tasks]
@@ -79,32 +94,11 @@ def _render(
     from markupsafe import Markup
 
     here = files("coordlang.report")
-    scripts = sorted(
-        entry.name for entry in (here / "script").iterdir() if entry.name.endswith(".js")
-    )
-    parts = ((here / "script" / name).read_text("utf-8") for name in scripts)
-    js = "\n".join(
-        (
-            "'use strict';",
-            "const DATA = JSON.parse(document.getElementById('data').textContent);",
-            *parts,
-        )
-    )
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
     template = environment.from_string((here / "template.html").read_text("utf-8"))
-    largest = max((word["size"] for word in data["words"]), default=1) or 1
-    words = [
-        {
-            **word,
-            "number": number,
-            "share": round(100 * word["size"] / largest, 1),
-            "default": number == data["default"],
-        }
-        for number in data["told"]["order"]
-        for word in [data["words"][number]]
-    ]
+    words = _word_rows(data)
     return template.render(
         version=version("coordlang"),
         domain=domain.name,
@@ -120,9 +114,36 @@ def _render(
         counted=counted,
         number=_number,
         css=Markup((here / "page.css").read_text("utf-8")),
-        js=Markup(js),
+        js=Markup(_script()),
         data=Markup(_json(data)),
     ).encode()
+
+
+def _script() -> str:
+    """The files of the folder ``script``, one after the other by name, as one script."""
+    folder = files("coordlang.report") / "script"
+    names = sorted(entry.name for entry in folder.iterdir() if entry.name.endswith(".js"))
+    return "\n".join(
+        (
+            "'use strict';",
+            "const DATA = JSON.parse(document.getElementById('data').textContent);",
+            *((folder / name).read_text("utf-8") for name in names),
+        )
+    )
+
+
+def _word_rows(data: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The words in the order in which their formulas are to be read, with what their rows show."""
+    largest = max((word["size"] for word in data["words"]), default=1) or 1
+    return [
+        {
+            **data["words"][number],
+            "number": number,
+            "share": round(100 * data["words"][number]["size"] / largest, 1),
+            "default": number == data["default"],
+        }
+        for number in data["told"]["order"]
+    ]
 
 
 def _json(data: Mapping[str, Any]) -> str:
@@ -174,17 +195,17 @@ def _about(
 
 
 def _formula(text: str) -> Any:
-    """A term with its ``and`` and ``not`` set apart."""
+    """Return a term with its ``and``, ``not`` and ``in`` set apart, as HTML."""
     from markupsafe import Markup, escape
 
-    said = []
+    pieces = []
     for piece in str(escape(text)).split(" "):
         if piece in ("and", "not", "in"):
             piece = f"<i>{piece}</i>"
         elif "-" in piece:  # names are not broken at their hyphens
             piece = f"<span>{piece}</span>"
-        said.append(piece)
-    return Markup(f'<span class="formula">{" ".join(said)}</span>')
+        pieces.append(piece)
+    return Markup(f'<span class="formula">{" ".join(pieces)}</span>')
 
 
 def _number(number: int) -> str:

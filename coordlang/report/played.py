@@ -12,12 +12,16 @@ from coordlang.use.sentence.task_language import TaskLanguage
 
 @dataclass(frozen=True, slots=True)
 class Played:
-    """The states (keys) that the mixture passes through, as far as its steps are possible.
+    """The execution of a mixture of plans.
 
-    The start is the first.
-
-    ``stops``: the number of the first step that is not possible (None: all are), and ``why`` it is
-    not.  ``reaches``: does the last state satisfy the goal?
+    Attributes
+    ----------
+    states
+        The keys of the states passed, the start first, as far as the steps are applicable.
+    stops, why
+        The number of the first step that is not applicable (None: all are), and the reason.
+    reaches
+        Whether the last state satisfies the goal.
     """
 
     states: tuple[str, ...]
@@ -26,11 +30,11 @@ class Played:
     reaches: bool
 
 
-def play(spoken: TaskLanguage, witness: Miscoordination) -> Played:
-    """Robot i does its part of ``witness.plans[i]``, step by step, from the start."""
-    space, model = spoken.space, spoken.model
-    row = space.rows[space.state[spoken.start]]
-    goal = space.goals[space.goal[spoken.start]]
+def play(language: TaskLanguage, witness: Miscoordination) -> Played:
+    """Play a mixture from the start: robot i executes its part of ``witness.plans[i]``."""
+    space, model = language.space, language.model
+    row = space.rows[space.state[language.start]]
+    goal = space.goals[space.goal[language.start]]
     states = [model.codec.key(row)]
     for number, step in enumerate(zip(*witness.plans, strict=True)):
         labels = model.numbers([own[robot] for robot, own in enumerate(step)])

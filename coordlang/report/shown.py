@@ -5,7 +5,7 @@ Candidate tasks are drawn at random if they are many.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from random import Random
 
@@ -24,19 +24,28 @@ from planners.search.optimal_plans import search
 _TRIES = 12
 #: The share of the drawn tasks that should require coordination, if there are such tasks.
 _REQUIRING = 0.75
+#: Pairs of states that are drawn.
+_PAIRS = 100_000
 
 
 @dataclass(frozen=True, slots=True)
 class ShownTask:
     """A task that is shown.
 
-    ``name`` is that of its problem, None for a candidate task of the language.  ``witness``: plans
-    that miscoordinate, None if there are none.  ``decided`` is False where the memory did not
-    suffice to find out.
+    Attributes
+    ----------
+    name
+        That of its problem, None for a candidate task of the language.
+    language
+        The language in this task.
+    witness
+        Plans that miscoordinate, None if there are none.
+    decided
+        False where the memory did not suffice to find out.
     """
 
     name: str | None
-    spoken: TaskLanguage
+    language: TaskLanguage
     witness: Miscoordination | None
     decided: bool
 
@@ -45,8 +54,14 @@ class ShownTask:
 class Selection:
     """The tasks shown.
 
-    ``looked`` tasks were drawn for it, ``requiring`` of which require coordination; ``complete``:
-    all candidate tasks are shown.
+    Attributes
+    ----------
+    tasks
+        Those of the problems, then those that were drawn.
+    looked, requiring
+        How many candidate tasks were examined, and how many of them require coordination.
+    complete
+        Whether all candidate tasks are shown.
     """
 
     tasks: tuple[ShownTask, ...]
@@ -64,12 +79,17 @@ def select_tasks(
     options: ModelOptions | None = None,
     position: Position | None = None,
 ) -> Selection:
-    """At most ``number`` tasks.
+    """Select at most ``number`` tasks: those of the problems, then different candidate tasks.
 
-    The problems' own first, then candidate tasks drawn without repetition.
+    Candidate tasks are drawn with ``seed``.  Tasks that require coordination are preferred, up to
+    three quarters of those drawn.
 
-    Of those drawn, tasks that require coordination are preferred, up to three quarters.  Raises
-    `UsageError` if the problems alone are more, `ProvedImpossible` for an unsolvable one.
+    Raises
+    ------
+    UsageError
+        If there are more than ``number`` problems.
+    ProvedImpossible
+        If a problem cannot be solved.
     """
     if len(problems) > number:
         raise UsageError(
@@ -77,59 +97,63 @@ def select_tasks(
             remedy="Give fewer problems, or a larger --tasks-shown.",
         )
     given = [
-        _looked_at(p.name, language_in_task(language, domain, p, options, position))
+        _examined(p.name, language_in_task(language, domain, p, options, position))
         for p in problems
     ]
-    known = {_identity(task.spoken) for task in given}
+    known = {_identity(task.language) for task in given}
     room = number - len(given)
-    first = given[0].spoken
-    drawn: tuple[list[ShownTask], list[ShownTask]] = ([], [])
-    wanted = round(room * _REQUIRING)
-    looked, complete = 0, True
-    for spoken in _candidates(first, domain, problems[0], Random(seed), position):
-        if (
-            len(drawn[1]) >= wanted and len(drawn[0]) + len(drawn[1]) >= room
-        ) or looked >= _TRIES * room:
-            complete = False
-            break
-        if _identity(spoken) in known:
-            continue
-        known.add(_identity(spoken))
-        looked += 1
-        task = _looked_at(None, spoken)
-        drawn[task.witness is not None].append(task)
-    complete = complete and len(drawn[0]) + len(drawn[1]) <= room
-    kept = [*drawn[1][: max(wanted, room - len(drawn[0]))], *drawn[0]][:room]
-    requiring = len(drawn[1])
-    return Selection((*given, *kept), looked, requiring, complete)
+    candidates = _candidates(given[0].language, domain, problems[0], Random(seed), position)
+    requiring, others, complete = _drawn(candidates, known, room)
+    kept = [*requiring[: max(round(room * _REQUIRING), room - len(others))], *others][:room]
+    examined = len(requiring) + len(others)
+    return Selection((*given, *kept), examined, len(requiring), complete and examined <= room)
 
 
-def _looked_at(name: str | None, spoken: TaskLanguage) -> ShownTask:
+def _drawn(
+    candidates: Iterable[TaskLanguage], known: set[tuple[str, str]], room: int
+) -> tuple[list[ShownTask], list[ShownTask], bool]:
+    """Examine candidate tasks until there are enough for ``room`` tasks.
+
+    Returns those that require coordination, the others, and whether all were examined.
+    """
+    requiring: list[ShownTask] = []
+    others: list[ShownTask] = []
+    for language in candidates:
+        examined = len(requiring) + len(others)
+        enough = len(requiring) >= round(room * _REQUIRING) and examined >= room
+        if enough or examined >= _TRIES * room:
+            return requiring, others, False
+        identity = _identity(language)
+        if identity not in known:
+            known.add(identity)
+            task = _examined(None, language)
+            (others if task.witness is None else requiring).append(task)
+    return requiring, others, True
+
+
+def _examined(name: str | None, language: TaskLanguage) -> ShownTask:
+    """Find out whether a task requires coordination."""
     try:
-        return ShownTask(name, spoken, miscoordination(spoken.space, spoken.task), True)
+        return ShownTask(name, language, miscoordination(language.space, language.task), True)
     except OutOfMemory:
-        return ShownTask(name, spoken, None, False)
+        return ShownTask(name, language, None, False)
 
 
-def _identity(spoken: TaskLanguage) -> tuple[str, str]:
-    space = spoken.space
-    init = space.model.codec.key(space.rows[space.state[spoken.start]])
+def _identity(language: TaskLanguage) -> tuple[str, str]:
+    """The initial state and the goal of a task, as text."""
+    space = language.space
+    init = space.model.codec.key(space.rows[space.state[language.start]])
     return init, goal_text(space.model, space.goals[0])
 
 
 def _candidates(
     first: TaskLanguage, domain: Domain, problem: Problem, random: Random, position: Position | None
 ) -> Iterator[TaskLanguage]:
-    """The language's candidate tasks in random order.
-
-    Under ``--tasks all`` endless repetition is cut off.
-    """
-    language = first.language
-    tasks = (
-        _pairs(first, random)
-        if language.provenance.tasks.get("kind") == "all"
-        else _recorded(first, domain, problem, random, position)
-    )
+    """Yield the language's candidate tasks in random order, some of them more than once."""
+    if first.language.provenance.tasks.get("kind") == "all":
+        tasks = _pairs(first, random)
+    else:
+        tasks = _recorded(first, domain, problem, random, position)
     for task in tasks:
         try:
             space = search(first.model, task)
@@ -142,6 +166,7 @@ def _candidates(
 def _recorded(
     first: TaskLanguage, domain: Domain, problem: Problem, random: Random, position: Position | None
 ) -> Iterator[PlanningTask]:
+    """Yield the tasks that the language file lists, in random order."""
     listed = recorded_list(first.language)
     random.shuffle(listed)
     for one in listed:
@@ -149,17 +174,16 @@ def _recorded(
 
 
 def _pairs(first: TaskLanguage, random: Random) -> Iterator[PlanningTask]:
-    """Ordered pairs of different mapped states.
+    """Yield ordered pairs of different listed states, at most 100,000.
 
-    Under ``--tasks all`` every state of a candidate task is mapped.
+    Under ``--tasks all`` every state of a candidate task is listed in the language.
     """
     model = first.model
     rows = first.partition.rows
     rows = rows[(model.codec.last_labels(rows) < 0).all(axis=1)]
     number = len(rows)
     total = number * (number - 1)
-    order = random.sample(range(total), min(total, 100_000))
-    for code in order:
-        a, b = divmod(code, number - 1)
-        b += b >= a
-        yield PlanningTask(f"pair {code}", rows[a], model.full_state(rows[b]))
+    for code in random.sample(range(total), min(total, _PAIRS)):
+        init, goal = divmod(code, number - 1)
+        goal += goal >= init
+        yield PlanningTask(f"pair {code}", rows[init], model.full_state(rows[goal]))

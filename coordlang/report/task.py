@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,10 +20,10 @@ from coordlang.verification.by_definition import verify
 from planners.errors import OutOfMemory
 from planners.joint.model import JointModel
 from planners.joint.states import split_atoms
-from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
+from planners.tables import Rows
 
-#: Plan-space edges beyond which a task is not verified once more for the page.
+#: Plan-space edges beyond which a task is not verified again for the page.
 _VERIFIED = 20_000
 
 
@@ -31,8 +31,16 @@ _VERIFIED = 20_000
 class TaskPart:
     """Everything about one shown task.
 
-    ``violation`` shows plans of one sentence that miscoordinate: the language is none.
-    ``verified`` is None where that was not checked.
+    Attributes
+    ----------
+    shown, graph, sentences
+        The task, its plans and its sentences.
+    played
+        What happens without a language, if plans of the task miscoordinate.
+    verified
+        Whether the language coordinates the task; None where that was not checked.
+    violation, violation_played
+        Plans of one sentence that miscoordinate: the language is none.
     """
 
     shown: ShownTask
@@ -46,102 +54,117 @@ class TaskPart:
 
 def task_part(shown: ShownTask, seed: int) -> TaskPart:
     """Compute what is shown of a task."""
-    spoken = shown.spoken
-    graph = plan_graph(spoken, seed)
-    verified, violation = _verified(spoken)
+    language = shown.language
+    graph = plan_graph(language, seed)
+    verified, violation = _verified(language)
     return TaskPart(
         shown,
         graph,
-        shown_sentences(spoken, graph, seed),
-        play(spoken, shown.witness) if shown.witness else None,
+        shown_sentences(language, graph, seed),
+        play(language, shown.witness) if shown.witness else None,
         verified,
         violation,
-        play(spoken, violation) if violation else None,
+        play(language, violation) if violation else None,
     )
 
 
-def _verified(spoken: TaskLanguage) -> tuple[bool | None, Miscoordination | None]:
-    if len(spoken.space.target) > _VERIFIED:
+def _verified(language: TaskLanguage) -> tuple[bool | None, Miscoordination | None]:
+    if len(language.space.target) > _VERIFIED:
         return None, None
     try:
-        verdict = verify(spoken.partition, [spoken.space])
+        verdict = verify(language.partition, [language.space])
     except OutOfMemory:
         return None, None
     return verdict.holds, verdict.witness
 
 
 class Tables:
-    """States and labels that the page mentions, numbered.
-
-    In the order in which they are first mentioned.
-    """
+    """States and labels that the page mentions, numbered in the order of their first mention."""
 
     def __init__(self, model: JointModel, partition: Partition) -> None:
         self.model = model
         self.partition = partition
-        self.states: dict[str, int] = {}
+        self.rows: list[Rows] = []
         self.words: list[int] = []
         self.labels: list[dict[str | None, int]] = [{None: 0} for _ in model.robots]
+        self._number: dict[str, int] = {}
 
     def state(self, key: str) -> int:
-        if key not in self.states:
-            self.states[key] = len(self.states)
+        """Return the number of a state, given by its key."""
+        number = self._number.setdefault(key, len(self._number))
+        if number == len(self.rows):
             row = self.model.codec.parse_key(key)
+            self.rows.append(row)
             self.words.append(int(self.partition.word_of(row[None, :])[0]))
-        return self.states[key]
+        return number
 
     def label(self, robot: int, text: str | None) -> int:
+        """Return the number of a robot's label; None is idling."""
         own = self.labels[robot]
         return own.setdefault(text, len(own))
 
 
 def task_data(part: TaskPart, tables: Tables) -> dict[str, Any]:
-    spoken, graph = part.shown.spoken, part.graph
-    space, model = spoken.space, spoken.model
-    makespan, second = space.cost_of(spoken.task)
-    keys = [model.codec.key(space.rows[state]) for state in space.state[graph.nodes].tolist()]
-    step = (makespan - space.layer[graph.nodes]).tolist()
-    place = np.full(len(space), -1)
-    place[graph.nodes] = np.arange(len(graph.nodes))
-    source = place[space.sources[graph.edges]]
-    first = np.searchsorted(source, np.arange(len(graph.nodes) + 1))
-    labels = space.labels[graph.edges]
+    """Return a task as JSON data, with states and labels as numbers into ``tables``."""
+    language = part.shown.language
+    space, model = language.space, language.model
+    makespan, second = space.cost_of(language.task)
+    requires = None if not part.shown.decided else part.shown.witness is not None
     return {
         "name": part.shown.name,
-        "covered": spoken.covered,
-        "requires": part.shown.witness is not None if part.shown.decided else None,
+        "covered": language.covered,
+        "requires": requires,
         "verified": part.verified,
         "steps": makespan,
         "second": second if model.cost != "makespan" else None,
-        "plans": str(counts(space)[spoken.start]),
-        "complete": graph.complete,
+        "plans": str(counts(space)[language.start]),
+        "complete": part.graph.complete,
         "all_nodes": len(space),
         "all_edges": len(space.target),
+        **_graph_data(language, part.graph, tables),
+        **_sentences_data(part.sentences),
+        "witness": _witness_data(part.shown.witness, part.played, tables),
+        "violation": _witness_data(part.violation, part.violation_played, tables),
+    }
+
+
+def _graph_data(language: TaskLanguage, graph: Graph, tables: Tables) -> dict[str, Any]:
+    """The nodes of a graph, and its edges as a CSR table: ``first``, ``target``, ``labels``."""
+    space, model = language.space, language.model
+    makespan, _ = space.cost_of(language.task)
+    number = np.full(len(space), -1)
+    number[graph.nodes] = np.arange(len(graph.nodes))
+    source = number[space.sources[graph.edges]]
+    keys = [model.codec.key(space.rows[state]) for state in space.state[graph.nodes].tolist()]
+    return {
         "nodes": {
             "state": [tables.state(key) for key in keys],
-            "step": step,
+            "step": (makespan - space.layer[graph.nodes]).tolist(),
             "order": list(graph.order),
         },
-        "first": first.tolist(),
-        "target": place[space.target[graph.edges]].tolist(),
+        "first": np.searchsorted(source, np.arange(len(graph.nodes) + 1)).tolist(),
+        "target": number[space.targets(graph.edges)].tolist(),
         "labels": [
             [
-                tables.label(robot, model.labels[robot][number] if number else None)
-                for number in labels[:, robot].tolist()
+                tables.label(robot, model.label_text(robot, label))
+                for label in space.robot_labels(robot, graph.edges).tolist()
             ]
             for robot in range(len(model.robots))
         ],
+    }
+
+
+def _sentences_data(sentences: ShownSentences) -> dict[str, Any]:
+    return {
         "sentences": [
             {
-                "words": list(s.words),
-                "plans": str(s.plans),
-                "own": [str(number) if number is not None else None for number in s.own],
+                "words": list(one.words),
+                "plans": str(one.plans),
+                "own": [None if number is None else str(number) for number in one.own],
             }
-            for s in part.sentences.listed
+            for one in sentences.listed
         ],
-        "all_sentences": part.sentences.total,
-        "witness": _witness_data(part.shown.witness, part.played, tables),
-        "violation": _witness_data(part.violation, part.violation_played, tables),
+        "all_sentences": sentences.total,
     }
 
 
@@ -165,41 +188,33 @@ def _witness_data(
     }
 
 
-def told(part: TaskPart, world: World) -> dict[str, Any]:
-    """The start and goal of a task in words and on the map."""
-    space: PlanSpace = part.shown.spoken.space
-    model = space.model
-    init = model.codec.decode(space.rows[space.state[part.shown.spoken.start]])
-    text = goal_text(model, space.goals[space.goal[part.shown.spoken.start]])
-    goal = split_atoms(text)
-    start_of = {
-        role[1]: role[2] for role in (world.roles.get(a, ("",)) for a in init) if role[0] == "at"
-    }
-    goals = {
-        role[1]: role[2] for role in (world.roles.get(a, ("",)) for a in goal) if role[0] == "at"
-    }
-    moves = [
-        f"{t} {start_of[t]} → {p}"
-        for t, p in _in_order(goals.items(), world)
-        if t in start_of and start_of[t] != p
-    ]
-    arrives = [f"{t} at {p}" for t, p in _in_order(goals.items(), world) if t not in start_of]
-    others = [
-        a.strip("()") if a.count("(") == 1 else a
-        for a in goal
-        if world.roles.get(a, ("",))[0] != "at" and a not in init
-    ]
-    stays = [f"{t} back at {p}" for t, p in _in_order(goals.items(), world) if start_of.get(t) == p]
-    said = moves + arrives + others
+def task_summary(part: TaskPart, world: World) -> dict[str, Any]:
+    """Return the start and goal of a task in words and, as ``goals``, on the map."""
+    language = part.shown.language
+    space, model = language.space, language.model
+    init = model.codec.decode(space.rows[space.state[language.start]])
+    text = goal_text(model, space.goals[space.goal[language.start]])
+    literals = split_atoms(text)
+    goals = world.located(literals)
+    others = [a for a in literals if world.role(a)[0] != "at" and a not in init]
     return {
-        "title": ", ".join(said or stays) or "nothing to do",
+        "title": _title(world.located(init), goals, others),
         "goal_text": text,
         "goals": [
-            [world.things.index(t), world.places.index(p)]
-            for t, p in _in_order(goals.items(), world)
+            [world.things.index(thing), world.places.index(place)] for thing, place in goals.items()
         ],
     }
 
 
-def _in_order(pairs: Iterable[tuple[str, str]], world: World) -> list[tuple[str, str]]:
-    return sorted(pairs, key=lambda pair: world.things.index(pair[0]))
+def _title(starts: Mapping[str, str], goals: Mapping[str, str], others: list[str]) -> str:
+    """What is to be done: what moves where, what else becomes true; else what comes back."""
+    moves, arrivals, stays = [], [], []
+    for thing, place in goals.items():
+        if thing not in starts:
+            arrivals.append(f"{thing} at {place}")
+        elif starts[thing] != place:
+            moves.append(f"{thing} {starts[thing]} → {place}")
+        else:
+            stays.append(f"{thing} back at {place}")
+    plain = [text.strip("()") if text.count("(") == 1 else text for text in others]
+    return ", ".join([*moves, *arrivals, *plain] or stays) or "nothing to do"

@@ -143,7 +143,7 @@ def test_random_models() -> None:
                 == str(len(plans))
                 == str(sum(int(s["plans"]) for s in task["sentences"]))
             )
-            assert not part.shown.spoken.covered or task["verified"]
+            assert not part.shown.language.covered or task["verified"]
             if task["witness"]:
                 requiring += 1
                 assert task["witness"]["breaks"] <= task["steps"]
@@ -190,7 +190,7 @@ def test_selection() -> None:
 
     def texts(selection: Any) -> list[Any]:
         return [
-            task.spoken.space.rows[task.spoken.space.state[task.spoken.start]].tolist()
+            task.language.space.rows[task.language.space.state[task.language.start]].tolist()
             for task in selection.tasks
         ]
 
