@@ -26,11 +26,11 @@ from coordlang.api.options import (
 )
 from coordlang.api.presenting import Presented
 from coordlang.api.speaking import SentencePlans, SentenceSource
-from coordlang.language.file import write_atomically
 from coordlang.use.export.ltlf import SentenceFormula, export_ltlf
 from coordlang.use.export.pddl import PddlExport, export_pddl, plan_names
 from coordlang.use.sentence.open_plans import OpenPlans
 from planners.errors import BadInput, Position, Refuted, UsageError
+from planners.files import write_atomically
 from planners.joint.model import JointModel
 from planners.search.plan_file import only_one_plan
 

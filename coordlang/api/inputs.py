@@ -12,7 +12,7 @@ from coordlang.language.file import read_language
 from coordlang.language.words import Language
 from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
 from coordlang.tasks.listed import ListedTask
-from coordlang.tasks.task_file import FORMAT, VERSION, read_task_file, tasks_from_data
+from coordlang.tasks.task_file import TASKS, read_task_file, tasks_from_data
 from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
 from planners.errors import Position, UsageError
 from planners.loading import ModelOptions, PlanningInstance, build
@@ -146,7 +146,7 @@ def read_tasks(tasks: TasksSource) -> tuple[tuple[ListedTask, ...], Position]:
         else dict(task)
         for task in tasks
     ]
-    data = {"format": FORMAT, "version": VERSION, "tasks": entries}
+    data = {"format": TASKS.format, "version": TASKS.version, "tasks": entries}
     return tasks_from_data(data, position), position
 
 

@@ -18,7 +18,6 @@ from coordlang.api.inputs import (
 from coordlang.api.options import GivenOptions, ModelKeywords
 from coordlang.api.presenting import Presented, html_table
 from coordlang.api.speaking import SentenceSource
-from coordlang.language.file import write_atomically
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.use.choices.choices import MOST, Choices
 from coordlang.use.choices.choices import choices as choices_under
@@ -26,6 +25,7 @@ from coordlang.use.choices.dot import to_dot
 from coordlang.use.choices.file import monitor, to_bytes, to_data
 from coordlang.use.choices.monitor import Monitor
 from planners.errors import UsageError
+from planners.files import write_atomically
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import gzip
-import sys
-import zlib
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
+from msgspec import Meta
 
-from coordlang.language.file import write_atomically
-from planners.errors import BadInput, Position
+from planners.errors import Position
+from planners.files import FileFormat, read_bytes, write_compressed
 
 FORMAT = "coordlang/certificate"
 VERSION = 1
@@ -22,13 +19,13 @@ PlanTexts = list[list[str | None]]
 
 
 class WarpingPath(msgspec.Struct, frozen=True):
-    """A warping path of the states of two of a reason's ``plans`` (numbers from 0).
+    """A warping path of the states of two plans of a reason."""
 
-    Cells (step in one, in the other).
-    """
-
-    plans: tuple[int, int]
-    cells: list[tuple[int, int]]
+    plans: Annotated[tuple[int, int], Meta(description="The numbers of the plans, from 0.")]
+    cells: Annotated[
+        list[tuple[int, int]],
+        Meta(description="Its cells: a step of the one plan and a step of the other, from 0."),
+    ]
 
 
 class Reason(msgspec.Struct, frozen=True):
@@ -36,62 +33,53 @@ class Reason(msgspec.Struct, frozen=True):
 
     Plans of a task, whose mixture - robot i does its part of ``plans[i]`` - is no optimal plan, and
     warping paths that join all of them.  On some cell of these paths the two states need different
-    words. On some cell of these paths the two states need different words.
-
-    ``init`` are the true fluents at the start, ``goal`` the literals at the end, as in a task file.
+    words.
     """
 
-    init: list[str]
-    goal: list[str]
-    plans: list[PlanTexts]
-    paths: list[WarpingPath]
+    init: Annotated[
+        list[str], Meta(description="The fluents that are true at the start, as PDDL atoms.")
+    ]
+    goal: Annotated[
+        list[str], Meta(description="PDDL literals or formulas that must all hold at the end.")
+    ]
+    plans: Annotated[
+        list[PlanTexts],
+        Meta(
+            description="Optimal plans, one for each robot: its subactions by step, null for idling."
+        ),
+    ]
+    paths: Annotated[
+        list[WarpingPath], Meta(description="Warping paths that join all of the plans.")
+    ]
 
 
 class Certificate(msgspec.Struct, frozen=True):
     """Why every coordination language for the candidate tasks has more than ``refuted`` words."""
 
-    domain: str
-    robots: list[str]
-    refuted: int
-    reasons: list[Reason]
-    format: str = FORMAT
-    version: int = VERSION
-    producer: dict[str, Any] = {}
+    domain: Annotated[str, Meta(description="The domain's name.")]
+    robots: Annotated[list[str], Meta(description="The robots, in the order of joint actions.")]
+    refuted: Annotated[int, Meta(description="A number of words that is too small.")]
+    reasons: Annotated[list[Reason], Meta(description="Why it is, all together.")]
+    format: Annotated[str, Meta(description="What kind of file this is.")] = FORMAT
+    version: Annotated[int, Meta(description="Readers refuse a version that they do not know.")] = (
+        VERSION
+    )
+    producer: Annotated[dict[str, Any], Meta(description="Who wrote it; for information.")] = {}
 
 
-@dataclass(frozen=True, slots=True)
-class _Head:
-    format: Any = None
-    version: Any = None
+CERTIFICATE = FileFormat("certificate", "certificate", Certificate, FORMAT, VERSION)
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema of certificate files."""
+    return CERTIFICATE.json_schema()
 
 
 def write_certificate(certificate: Certificate, path: str | Path) -> None:
     """Write a certificate file (gzip for ``.gz``), completely or not at all."""
-    data = msgspec.json.encode(certificate) + b"\n"
-    if str(path).endswith(".gz"):
-        data = gzip.compress(data, mtime=0)
-    write_atomically(path, data)
+    write_compressed(path, msgspec.json.encode(certificate) + b"\n")
 
 
 def read_certificate(path: str | Path) -> Certificate:
     """Read a certificate file.  Raises `BadInput` for anything else."""
-    position = Position(str(path))
-    try:
-        data = sys.stdin.buffer.read() if str(path) == "-" else Path(path).read_bytes()
-        if data[:2] == b"\x1f\x8b":
-            data = gzip.decompress(data)
-        head = msgspec.json.decode(data, type=_Head)
-        if head.format != FORMAT or head.version != VERSION:
-            raise BadInput(
-                f"format {head.format!r} version {head.version!r}, expected {FORMAT!r} version {VERSION}",
-                position=position,
-            )
-        return msgspec.json.decode(data, type=Certificate)
-    except FileNotFoundError:
-        raise BadInput("there is no such file", position=position) from None
-    except (OSError, EOFError, zlib.error) as error:
-        raise BadInput(f"cannot be read: {error}", position=position) from None
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise BadInput(
-            f"this is no certificate, or it is cut off: {error}", position=position
-        ) from None
+    return CERTIFICATE.decode(read_bytes(path), Position(str(path)))

@@ -80,7 +80,7 @@ SUMMARIES = {
     "explain": "Show a language so that a person understands it.",
     "report": "Write a page that shows a language: words, sentences, plans played.",
     "evaluate": "Run the paper's experiments again, beside its own values.",
-    "schema": "Print the JSON Schema of language files.",
+    "schema": "Print the JSON Schema of a file format.",
 }
 
 

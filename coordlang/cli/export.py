@@ -110,8 +110,8 @@ def command(
 
 def _write_pddl(exported: PddlExport, output: str | None, as_json: bool) -> None:
     from coordlang.cli.speaking import write
-    from coordlang.language.file import write_atomically
     from planners.errors import UsageError
+    from planners.files import write_atomically
 
     if as_json:
         write(json.dumps(_data(exported)) + "\n", output)

@@ -58,10 +58,11 @@ def command(
     """Write a self-contained HTML page that shows LANGUAGE: its words, and its sentences and plans
     in the tasks of PROBLEM.. and in some of its candidate tasks.
     """
-    from coordlang.language.file import read_language, write_atomically
+    from coordlang.language.file import read_language
     from coordlang.language.recorded import check_source
     from coordlang.report.page import make_report
     from planners.errors import Position
+    from planners.files import write_atomically
 
     places = coordinates if coordinates is not None else str(_beside(problems[0]))
     check_outputs([("-o", output)], [language, domain, *problems, places])

@@ -1,15 +1,25 @@
-"""``coordlang schema``: the JSON Schema of language files."""
+"""``coordlang schema``: the JSON Schemas of the file formats."""
 
 from __future__ import annotations
 
 import json
+from importlib import import_module
 
 import click
 
+#: The modules whose ``json_schema`` describes a file format.
+SCHEMAS = {
+    "language": "coordlang.language.record",
+    "tasks": "coordlang.tasks.task_file",
+    "certificate": "coordlang.certificate.file",
+    "choices": "coordlang.use.choices.record",
+    "plans": "planners.search.plan_file",
+    "coordinates": "coordlang.report.places",
+}
+
 
 @click.command(name="schema")
-def command() -> None:
-    """Print the JSON Schema of language files."""
-    from coordlang.language.record import json_schema
-
-    click.echo(json.dumps(json_schema(), indent=2))
+@click.argument("name", type=click.Choice(list(SCHEMAS)), default="language")
+def command(name: str) -> None:
+    """Print the JSON Schema of a file format: language files unless NAME is another one."""
+    click.echo(json.dumps(import_module(SCHEMAS[name]).json_schema(), indent=2))

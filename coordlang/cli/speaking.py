@@ -44,7 +44,7 @@ def covered(spoken: TaskLanguage) -> int:
 
 def write(text: str, output: str | None) -> None:
     """Write to a file, or to stdout without one (or for ``-``)."""
-    from coordlang.language.file import write_atomically
+    from planners.files import write_atomically
 
     if output is None or output == "-":
         click.echo(text, nl=False)

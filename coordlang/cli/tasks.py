@@ -53,9 +53,9 @@ def command(
 
     In a PATTERN ? stands for any one name.
     """
-    from coordlang.language.file import write_atomically
     from coordlang.tasks.patterns import varied_tasks
     from coordlang.tasks.task_file import tasks_text
+    from planners.files import write_atomically
     from planners.loading import build
 
     check_outputs([("-o", output)], [domain, problem])

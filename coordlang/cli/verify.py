@@ -60,11 +60,12 @@ def command(
     """
     from coordlang.certificate import check, read_certificate
     from coordlang.cli.miscoordination import show, witness_data
-    from coordlang.language.file import read_language, write_atomically
+    from coordlang.language.file import read_language
     from coordlang.language.recorded import check_source, recorded_candidates
     from coordlang.verification.by_definition import verify
     from coordlang.verification.overlapping import verify_overlapping
     from planners.errors import Position, Refuted
+    from planners.files import write_atomically
 
     if dimacs and not certificate:
         raise click.UsageError("--dimacs belongs to --lower-bound")

@@ -2,13 +2,6 @@
 
 from __future__ import annotations
 
-import errno
-import gzip
-import os
-import sys
-import tempfile
-import zlib
-from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -18,17 +11,18 @@ from msgspec import UNSET
 
 from coordlang.language.duplicate_keys import duplicate_key
 from coordlang.language.provenance import Guarantee, Provenance
-from coordlang.language.record import FORMAT, VERSION, LanguageRecord, TasksRecord
+from coordlang.language.record import LANGUAGE, LanguageRecord, TasksRecord
 from coordlang.language.words import Language
-from planners.errors import BadInput, Position, UsageError
+from planners.errors import BadInput, Position
+from planners.files import read_bytes, write_compressed
 
 
 def to_bytes(language: Language) -> bytes:
     """The text of a language file: the same language gives the same bytes."""
     provenance = language.provenance
     data = {
-        "format": FORMAT,
-        "version": VERSION,
+        "format": LANGUAGE.format,
+        "version": LANGUAGE.version,
         "domain": dict(provenance.domain),
         "robots": list(provenance.robots),
         "model": dict(provenance.model),
@@ -46,45 +40,7 @@ def to_bytes(language: Language) -> bytes:
 
 def write_language(language: Language, path: str | Path) -> None:
     """Write a language file (gzip for ``.gz``).  The file is complete or not there at all."""
-    data = to_bytes(language)
-    if str(path).endswith(".gz"):
-        data = gzip.compress(data, compresslevel=6, mtime=0)
-    write_atomically(path, data)
-
-
-def write_atomically(path: str | Path, data: bytes) -> None:
-    """Write beside, then rename.  Raises `UsageError` when the position cannot be written."""
-    target = Path(os.path.realpath(path))
-    try:
-        if (
-            target.exists() and not target.is_file()
-        ):  # a device or a pipe: written to, never replaced
-            if target.is_dir():
-                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
-            with open(path, "wb") as file:
-                file.write(data)
-            return
-        handle, beside = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(data)
-            os.chmod(beside, 0o666 & ~_umask())
-            os.replace(beside, target)
-        except BaseException:
-            with suppress(FileNotFoundError):
-                os.unlink(beside)
-            raise
-    except OSError as error:
-        raise UsageError(
-            f"{path} cannot be written: {error.strerror}",
-            remedy="Name a file in a folder that you may write to.",
-        ) from None
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+    write_compressed(path, to_bytes(language), level=6)
 
 
 def read_language(path: str | Path) -> Language:
@@ -93,30 +49,15 @@ def read_language(path: str | Path) -> Language:
     Raises `BadInput` for a file that is missing, cut off, no language, of another version, or that
     contradicts itself.
     """
-    position = Position(str(path))
-    try:
-        data = sys.stdin.buffer.read() if str(path) == "-" else Path(path).read_bytes()
-        if data[:2] == b"\x1f\x8b":
-            data = gzip.decompress(data)
-    except FileNotFoundError:
-        raise BadInput("there is no such file", position=position) from None
-    except (OSError, EOFError, zlib.error) as error:
-        raise BadInput(f"cannot be read: {error}", position=position) from None
-    return language_from_bytes(data, position)
+    return language_from_bytes(read_bytes(path), Position(str(path)))
 
 
 def language_from_bytes(data: bytes, position: Position) -> Language:
     """The language in the text of a language file; see `read_language`."""
-    head = _head(data, position)
+    record = LANGUAGE.decode(data, position)
+    large = msgspec.json.decode(data, type=_States).states
     try:
-        record = msgspec.json.decode(data, type=LanguageRecord)
-        twice = duplicate_key(data, memoryview(head.states), len(record.states))
-    except msgspec.ValidationError as error:
-        raise BadInput(
-            f"this is no language file: {error}",
-            position=position,
-            remedy="`coordlang schema` prints what a language file holds.",
-        ) from None
+        twice = duplicate_key(data, memoryview(large), len(record.states))
     except RecursionError as error:
         raise BadInput(f"this is no JSON that can be read: {error}", position=position) from None
     if twice is not None:
@@ -192,25 +133,5 @@ def _guarantee(record: LanguageRecord, position: Position) -> Guarantee | None:
     return Guarantee(g.method, g.size, g.lower_bound, g.proved_minimal)
 
 
-class _Head(msgspec.Struct):
-    format: Any = None
-    version: Any = None
-    states: msgspec.Raw = msgspec.Raw()
-
-
-def _head(data: bytes, position: Position) -> _Head:
-    """Format and version first: a file of another version need not look like ours."""
-    try:
-        head = msgspec.json.decode(data, type=_Head)
-    except msgspec.ValidationError as error:
-        raise BadInput(f"this is no language file: {error}", position=position) from None
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise BadInput(f"this is no JSON, or it is cut off: {error}", position=position) from None
-    if head.format != FORMAT:
-        raise BadInput(f"format {head.format!r}, expected {FORMAT!r}", position=position)
-    if head.version != VERSION:
-        raise BadInput(
-            f"language file version {head.version!r}; this program reads version {VERSION}",
-            position=position,
-        )
-    return head
+class _States(msgspec.Struct):
+    states: msgspec.Raw

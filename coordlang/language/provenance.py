@@ -65,7 +65,7 @@ def provenance_of(
     loaded = candidates.loaded
     tasks: dict[str, Any] = {"kind": candidates.kind, "count": candidates.count}
     if candidates.kind != "all":
-        tasks["tasks"] = task_data(candidates.listed)["tasks"]
+        tasks["tasks"] = task_data(candidates.listed)
     keeps_idle = zip(loaded.model.robots, loaded.model.keeps_idle, strict=True)
     return Provenance(
         robots=loaded.model.robots,

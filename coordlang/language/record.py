@@ -8,11 +8,10 @@ import msgspec
 from msgspec import UNSET, Meta, UnsetType
 
 from coordlang.tasks.candidates import Kind
+from coordlang.tasks.listed import ListedTask
+from planners.files import FileFormat
 from planners.joint.model import Cost
 from planners.pddl.robots import Unowned
-
-FORMAT = "coordlang/language"
-VERSION = 1
 
 # What JSON Schema can say and the reader checks with messages of its own.
 _SOME = {"minItems": 1, "uniqueItems": True}
@@ -58,17 +57,6 @@ class ModelRecord(msgspec.Struct):
     ] = None
 
 
-class TaskRecord(msgspec.Struct):
-    """One candidate task."""
-
-    init: Annotated[
-        list[str], Meta(description="The fluents that are true at the start, as PDDL atoms.")
-    ]
-    goal: Annotated[
-        list[str], Meta(description="PDDL literals or formulas that must all hold at the end.")
-    ]
-
-
 class TasksRecord(msgspec.Struct):
     """The candidate tasks that the language is guaranteed for."""
 
@@ -76,7 +64,7 @@ class TasksRecord(msgspec.Struct):
         Kind, Meta(description="All pairs of states, those of problems, or those of a task file.")
     ]
     count: Annotated[int, Meta(description="How many they are.", ge=0)]
-    tasks: Annotated[list[TaskRecord] | None, Meta(description="The tasks; not for 'all'.")] = None
+    tasks: Annotated[list[ListedTask] | None, Meta(description="The tasks; not for 'all'.")] = None
 
 
 class GuaranteeRecord(msgspec.Struct):
@@ -135,18 +123,13 @@ class LanguageRecord(msgspec.Struct):
     ] = {}
 
 
+LANGUAGE = FileFormat("language", "language file", LanguageRecord, "coordlang/language")
+
+
 def json_schema() -> dict[str, Any]:
     """The JSON Schema of language files.
 
     What it cannot say, readers check besides: words of ``states``, ``default`` and ``also`` are
     among ``words``, the guarantee fits their number, and no key occurs twice.
     """
-    schema: dict[str, Any] = msgspec.json.schema(LanguageRecord)
-    properties = schema["$defs"]["LanguageRecord"]["properties"]
-    for name, value in (("format", FORMAT), ("version", VERSION)):
-        properties[name] = {"const": value, "description": properties[name]["description"]}
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "coordlang language",
-        **schema,
-    }
+    return LANGUAGE.json_schema()

@@ -7,11 +7,14 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Any
 
 import msgspec
+from msgspec import Meta
 
 from coordlang.report.layout import graph_layout
 from planners.errors import BadInput, Position
+from planners.files import FileFormat, read_bytes
 
 Point = tuple[float, float]
 
@@ -53,8 +56,21 @@ def place_layout(
     )
 
 
-class _CoordinatesFile(msgspec.Struct):
-    coordinates: dict[str, tuple[float, float]]
+class CoordinatesFile(msgspec.Struct):
+    """A file of coordinates.  Keys that are not listed here are ignored by readers."""
+
+    coordinates: Annotated[
+        dict[str, tuple[float, float]],
+        Meta(description="Place -> [x, y], x to the right and y down; no two alike."),
+    ]
+
+
+COORDINATES = FileFormat("coordinates", "file of coordinates", CoordinatesFile)
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema of files of coordinates."""
+    return COORDINATES.json_schema()
 
 
 def read_coordinates(path: str | Path) -> dict[str, Point]:
@@ -68,17 +84,7 @@ def read_coordinates(path: str | Path) -> dict[str, Point]:
         For anything else, and if two places have the same coordinates.
     """
     position = Position(str(path))
-    try:
-        text = Path(path).read_text("utf-8-sig")
-        entries = msgspec.json.decode(text, type=_CoordinatesFile).coordinates
-    except OSError as error:
-        raise BadInput(f"cannot be read: {error.strerror}", position=position) from None
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise BadInput(
-            f"this file has no coordinates: {error}",
-            position=position,
-            remedy='Write {"coordinates": {"PLACE": [X, Y], ..}}.',
-        ) from None
+    entries = COORDINATES.decode(read_bytes(path), position).coordinates
     for name, point in entries.items():
         if not all(abs(value) < _LARGEST for value in point):
             raise BadInput(

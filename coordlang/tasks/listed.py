@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
+
+from msgspec import Meta
 
 from planners.errors import BadInput, Position
 from planners.grounding import ground_goal
@@ -19,13 +22,15 @@ from planners.pddl.sexpr import Source, parse
 
 @dataclass(frozen=True, slots=True)
 class ListedTask:
-    """A task as a task file lists it.
+    """A task as a file lists it, as PDDL text."""
 
-    True fluents at the start, literals (or formulas) at the end, as PDDL text.
-    """
-
-    init: tuple[str, ...]
-    goal: tuple[str, ...]
+    init: Annotated[
+        tuple[str, ...], Meta(description="The fluents that are true at the start, as PDDL atoms.")
+    ]
+    goal: Annotated[
+        tuple[str, ...],
+        Meta(description="PDDL literals or formulas that must all hold at the end."),
+    ]
 
 
 def listed_task(domain: Domain, problem: Problem, task: PlanningTask) -> ListedTask:

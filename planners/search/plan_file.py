@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import re
-import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import msgspec
+from msgspec import Meta
 
 from planners.errors import BadInput, Position
+from planners.files import FileFormat, read_bytes
 from planners.joint.model import JointModel
 from planners.search.plans import Plan, Plans
 
@@ -21,6 +23,46 @@ _EXACT = 2**53
 #: A step number above this one is a mistake, not a plan with so many steps in which all robots
 #: idle.
 _MOST_STEPS = 1_000_000
+
+
+#: A count as it stands in JSON.
+Count = int | Annotated[str, Meta(pattern=r"^\d+$")]
+
+
+class ListedPlan(msgspec.Struct, frozen=True):
+    """One plan."""
+
+    actions: Annotated[
+        list[list[str | None]],
+        Meta(description="For each step the subaction of each robot, null for idling."),
+    ]
+    cost: Annotated[int | None, Meta(description="The makespan.")] = None
+
+
+class PlansFile(msgspec.Struct, frozen=True):
+    """Plans as JSON.  Keys that are not listed here are ignored by readers."""
+
+    plans: Annotated[list[ListedPlan], Meta(description="The listed plans.")]
+    count: Annotated[
+        Count | None,
+        Meta(description="The exact number of optimal plans; a string if it is above 2^53."),
+    ] = None
+    complete: Annotated[bool | None, Meta(description="Whether all of them are listed.")] = None
+    optimal_cost: Annotated[int | None, Meta(description="The least makespan.")] = None
+    optimal_second_cost: Annotated[
+        int | None, Meta(description="The least second cost, where the cost has two parts.")
+    ] = None
+    robots: Annotated[list[str] | None, Meta(description="The order of the robots in a step.")] = (
+        None
+    )
+
+
+PLANS = FileFormat("plans", "JSON plan file", PlansFile)
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema of plan files in JSON."""
+    return PLANS.json_schema()
 
 
 def json_count(number: int) -> int | str:
@@ -88,9 +130,7 @@ def read_plans(path: str | Path, model: JointModel) -> list[tuple[Texts, ...]]:
     """The plans of a plan file, JSON or IPC text.  Raises `BadInput` with the line."""
     position = Position(str(path))
     try:
-        text = sys.stdin.read() if str(path) == "-" else Path(path).read_text()
-    except OSError as error:
-        raise BadInput(f"cannot be read: {error.strerror}", position=position) from None
+        text = read_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise BadInput(f"this is no text: {error}", position=position) from None
     if text.lstrip().startswith("{"):
@@ -145,16 +185,11 @@ class _StepNumbers:
 
 
 def _from_json(text: str, model: JointModel, position: Position) -> list[tuple[Texts, ...]]:
-    try:
-        entries = json.loads(text)["plans"]
-        found = [tuple(tuple(step) for step in entry["actions"]) for entry in entries]
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise BadInput(f"this is no JSON plan file: {error}", position=position) from None
+    file = PLANS.decode(text.encode(), position)
+    found = [tuple(map(tuple, plan.actions)) for plan in file.plans]
     for plan in found:
         for number, step in enumerate(plan):
-            if len(step) != len(model.robots) or not all(
-                t is None or isinstance(t, str) for t in step
-            ):
+            if len(step) != len(model.robots):
                 raise BadInput(
                     f"step {number} must have one text or null for each of {', '.join(model.robots)}",
                     position=position,

@@ -163,7 +163,7 @@ def test_tasks_as_objects(tmp_path: Path) -> None:
     path.write_text(json.dumps(data))
     counts = {coordlang.build(*CELLS, tasks=source).tasks for source in (tasks, data, path)}
     assert counts == {1}
-    with pytest.raises(coordlang.BadInput, match="expected a list of texts 'goal'"):
+    with pytest.raises(coordlang.BadInput, match="missing required field `goal`"):
         coordlang.build(*CELLS, tasks=[{"init": []}])
 
 

@@ -348,8 +348,11 @@ def task_file(folder: Path, tasks: object) -> Path:
         ([{"init": ["(at r9 a)"], "goal": []}], "(at r9 a): object 'r9' is not declared"),
         ([{"init": ["(door a a)"], "goal": []}], "(door a a) is static and false"),
         ([{"init": ["(at r1 a)", "(at r2 b)"], "goal": ["(at r1"]}], "cannot read the atoms"),
-        ([{"init": "at r1"}], "task 1: expected a list of texts 'init'"),
-        ({}, "expected a list 'tasks'"),
+        (
+            [{"init": "at r1"}],
+            "this is no task file: Expected `array`, got `str` - at `$.tasks[0].init`",
+        ),
+        ({}, "this is no task file: Expected `array`, got `object` - at `$.tasks`"),
     ],
 )
 def test_wrong_task_file(

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coordlang.language.file import write_atomically
+from planners.files import write_atomically
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,7 +9,7 @@ from pathlib import Path
 from coordlang.evaluation.lab.figure_style import save
 from coordlang.evaluation.lab.recipe import Figure, Recipe, Record, Section, table
 from coordlang.evaluation.lab.results import Line, Results, name_of, record_of
-from coordlang.language.file import write_atomically
+from planners.files import write_atomically
 
 
 def sections(

@@ -1,0 +1,184 @@
+"""Files in and out: written whole or not at all, JSON read against the record of its format."""
+
+from __future__ import annotations
+
+import errno
+import gzip
+import os
+import sys
+import tempfile
+import zlib
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import msgspec
+
+from planners.errors import BadInput, Position, UsageError
+
+T = TypeVar("T")
+
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+
+
+class _Head(msgspec.Struct):
+    format: Any = None
+    version: Any = None
+
+
+@dataclass(frozen=True, slots=True)
+class FileFormat(Generic[T]):
+    """A JSON file format.
+
+    Attributes
+    ----------
+    name
+        Its name for ``coordlang schema``, "tasks".
+    title
+        What messages call such a file, "task file".
+    record
+        A msgspec struct: the keys and their types.  Keys that it does not have are ignored.
+    format
+        The value of the key ``format``, None for files without that key.
+    version
+        The value of the key ``version``: another one is refused.
+    """
+
+    name: str
+    title: str
+    record: type[T]
+    format: str | None = None
+    version: int = 1
+
+    def decode(self, data: bytes, position: Position) -> T:
+        """Read the text of a file.
+
+        Raises
+        ------
+        BadInput
+            For a text that is no JSON, of another format or version, or that does not fit the
+            record.
+        """
+        data = data.removeprefix(_BYTE_ORDER_MARK)
+        try:
+            if self.format is not None:
+                self.check_head(data, position)
+            return msgspec.json.decode(data, type=self.record)
+        except msgspec.ValidationError as error:
+            raise self._refused(error, position) from None
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+            raise BadInput(
+                f"this is no JSON, or it is cut off: {error}", position=position
+            ) from None
+
+    def convert(self, data: Any, position: Position) -> T:
+        """Read what a JSON reader made of such a file.  Raises `BadInput` as `decode` does."""
+        try:
+            if self.format is not None:
+                self._check_format(msgspec.convert(data, _Head), position)
+            return msgspec.convert(data, self.record)
+        except (msgspec.ValidationError, RecursionError) as error:
+            raise self._refused(error, position) from None
+
+    def check_head(self, data: bytes, position: Position) -> None:
+        """Raise `BadInput` for another format or version: such a file need not fit the record."""
+        self._check_format(msgspec.json.decode(data, type=_Head), position)
+
+    def _check_format(self, head: _Head, position: Position) -> None:
+        if head.format != self.format:
+            raise BadInput(f"format {head.format!r}, expected {self.format!r}", position=position)
+        if head.version != self.version or isinstance(head.version, bool):
+            raise BadInput(
+                f"{self.title} version {head.version!r}; this program reads version {self.version}",
+                position=position,
+            )
+
+    def _refused(self, error: Exception, position: Position) -> BadInput:
+        return BadInput(
+            f"this is no {self.title}: {error}",
+            position=position,
+            remedy=f"`coordlang schema {self.name}` prints what a {self.title} holds.",
+        )
+
+    def json_schema(self) -> dict[str, Any]:
+        """The JSON Schema (draft 2020-12) of such files."""
+        schema: dict[str, Any] = msgspec.json.schema(self.record)
+        record = schema["$defs"][schema["$ref"].rpartition("/")[2]]
+        if self.format is not None:
+            for key, value in (("format", self.format), ("version", self.version)):
+                entry = record["properties"][key]
+                record["properties"][key] = {"const": value, "description": entry["description"]}
+            record["required"] += [k for k in ("format", "version") if k not in record["required"]]
+        return {
+            "$schema": "https://json-schema.org/draft/2020-12/schema",
+            "title": f"coordlang {self.name}",
+            **schema,
+        }
+
+
+def read_bytes(path: str | Path) -> bytes:
+    """Read a file, or standard input for ``-``; what gzip compressed is decompressed.
+
+    Raises
+    ------
+    BadInput
+        A file that is missing or cannot be read.
+    """
+    position = Position(str(path))
+    try:
+        data = sys.stdin.buffer.read() if str(path) == "-" else Path(path).read_bytes()
+        return gzip.decompress(data) if data[:2] == b"\x1f\x8b" else data
+    except FileNotFoundError:
+        raise BadInput("there is no such file", position=position) from None
+    except OSError as error:
+        raise BadInput(f"cannot be read: {error.strerror or error}", position=position) from None
+    except (EOFError, zlib.error) as error:
+        raise BadInput(f"cannot be read: {error}", position=position) from None
+
+
+def write_atomically(path: str | Path, data: bytes) -> None:
+    """Write beside, then rename, so that a file is whole or as it was before.
+
+    Raises
+    ------
+    UsageError
+        A file that cannot be written.
+    """
+    target = Path(os.path.realpath(path))
+    try:
+        if target.exists() and not target.is_file():
+            # A device or a pipe: written to, never replaced.
+            if target.is_dir():
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+            with open(path, "wb") as file:
+                file.write(data)
+            return
+        handle, beside = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(data)
+            os.chmod(beside, 0o666 & ~_umask())
+            os.replace(beside, target)
+        except BaseException:
+            with suppress(FileNotFoundError):
+                os.unlink(beside)
+            raise
+    except OSError as error:
+        raise UsageError(
+            f"{path} cannot be written: {error.strerror}",
+            remedy="Name a file in a folder that you may write to.",
+        ) from None
+
+
+def write_compressed(path: str | Path, data: bytes, level: int = 9) -> None:
+    """Write like `write_atomically`; compressed for a name that ends in ``.gz``."""
+    if str(path).endswith(".gz"):
+        data = gzip.compress(data, compresslevel=level, mtime=0)
+    write_atomically(path, data)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
