@@ -49,10 +49,12 @@ def main(name: str = "gwb7-3x5") -> None:
             subplans += [own.automaton.count for own in found.robots]
     free = sum(count > 1 for count in subplans)
     print(
-        f"{candidates.count:,} tasks, {sentences:,} sentences of {len(language.words)} words: every combination optimal"
+        f"{candidates.count:,} tasks, {sentences:,} sentences of {len(language.words)} words: "
+        "every combination optimal"
     )
     print(
-        f"{len(states):,} automata, {free:,} of them with more than one subplan (at most {max(subplans):,})"
+        f"{len(states):,} automata, {free:,} of them with more than one subplan (at "
+        f"most {max(subplans):,})"
     )
     print(f"states: {sum(states):,}, {sum(states) / len(states):.1f} each, at most {max(states)}")
     print(f"{walked:,} nodes of combinations walked; choices files: {size / 1e6:.1f} MB")

@@ -171,7 +171,8 @@ def by_kstar(folder: Path, exported: PddlExport, seconds: float) -> int | None:
     except ImportError:
         return None
     search = (
-        f"kstar(blind(transform=undo_to_origin()), q=1.0, k={10 * MOST}, max_time={seconds}, find_unordered_plans=false, "
+        f"kstar(blind(transform=undo_to_origin()), q=1.0, k={10 * MOST}, max_time={seconds}, "
+        "find_unordered_plans=false, "
         "dump_plan_files=false, json_file_to_dump=PLANS_JSON_NAME)"
     )
     files = [str(folder / "domain.pddl"), str(folder / "problem.pddl")]
@@ -197,7 +198,10 @@ def by_symk(folder: Path, exported: PddlExport, seconds: float) -> int | None:
         return None
     from coordlang.use.export.pddl import plan_names
 
-    search = "symq_bd(simple=false,plan_selection=top_k(num_plans=infinity,dump_plans=false),bound=infinity,quality=1.0)"
+    search = (
+        "symq_bd(simple=false,plan_selection=top_k(num_plans=infinity,dump_plans=false),"
+        "bound=infinity,quality=1.0)"
+    )
     command = [
         sys.executable,
         get_resource_path(),

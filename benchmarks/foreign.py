@@ -98,7 +98,7 @@ def _chain(header: Sequence[str], lines: Iterable[Sequence[object]]) -> Iterable
 
 
 # ---- the numbers
-# -----------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------
 
 
 def numbers(rows: Sequence[Row], *, oracles: bool) -> int:
@@ -184,7 +184,8 @@ def _counted(row: Row, cost: str, wrong: list[str]) -> str:
         )
     if done.data["plans"] != done.data["ours"]:
         wrong.append(
-            f"{row.name}: K* counts {done.data['plans']} plans under {cost}, coordlang {done.data['ours']}"
+            f"{row.name}: K* counts {done.data['plans']} plans under {cost}, "
+            f"coordlang {done.data['ours']}"
         )
     return f"{done.data['plans']:,} ({done.seconds:.1f} s)"
 
@@ -248,7 +249,7 @@ def load(row: Row, cost: str, *, remember_actions: bool = False) -> Any:
 
 
 # ---- a language for each
-# ---------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------
 
 
 def languages(chosen: Sequence[Language], seconds: float) -> int:
@@ -330,7 +331,7 @@ def build(language: Language, seconds: float) -> dict[str, object]:
 
 
 # ---- what is refused
-# -------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------
 
 
 def refused() -> int:

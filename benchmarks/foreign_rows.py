@@ -178,7 +178,8 @@ LANGUAGES = (
             "press-switch",
         ),
         exactly,
-        "who drives the forklift and lifts the pallet, and who examines it; who unlocks and who presses the switch",
+        "who drives the forklift and lifts the pallet, and who examines it; who unlocks and who "
+        "presses the switch",
     ),
     Language(
         "workshop-cn",
@@ -239,7 +240,8 @@ LANGUAGES = (
         ("(on crate0 ?)", "(on crate1 ?)"),
         all_of(who_does_what("load", "unload", "drive"), in_which_order("load")),
         exactly,
-        "which truck carries a crate, and which crate is loaded first; when the hoist lifts it stays open",
+        "which truck carries a crate, and which crate is loaded first; when the hoist lifts it "
+        "stays open",
     ),
     Language(
         "depot-con",
@@ -267,7 +269,8 @@ LANGUAGES = (
         ("(in crate0 ?)", "(in crate1 ?)"),
         who("go-out", "lift", "drop"),
         exactly,
-        "which hoists go out and fetch the crates, where both could; else mostly which crate, and where to",
+        "which hoists go out and fetch the crates, where both could; else mostly which crate, and "
+        "where to",
     ),
     Language(
         "blocks-arms",

@@ -53,7 +53,7 @@ _PLACELESS = ("no such file", "found an empty file", "binary file")
 
 
 # ---- the files to break
-# ----------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ def _bytes(text: str) -> bytes:
 
 
 # ---- ways to break a text
-# --------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------
 
 Mutation = Callable[[str, Random], str]
 
@@ -142,7 +142,7 @@ def _visible(tokens: Sequence[str]) -> list[int]:
 
 
 def _edit_tokens(text: str, random: Random, edit: Callable[[list[str], list[int]], None]) -> str:
-    """Apply an edit of the token list (and the numbers of its visible tokens) one to three times."""
+    """Apply an edit of the token list (and numbers of its visible tokens) one to three times."""
     tokens = _tokens(text)
     for _ in range(random.choice((1, 1, 1, 2, 3))):
         numbers = _visible(tokens)
@@ -543,7 +543,8 @@ def foreign_section(text: str, random: Random) -> str:
                 "(:action x :parameters (?r - robot) :effect (increase (total-cost) "
                 + "9" * 400
                 + "))",
-                "(:action x :parameters (?r - robot) :effect (increase (total-cost) 99999999999999999999))",
+                "(:action x :parameters (?r - robot) :effect (increase (total-cost) "
+                "99999999999999999999))",
                 "(:action x :parameters (?a ?b ?c ?d ?e ?f ?g ?h) :effect (and))",
             )
         ),
@@ -673,7 +674,7 @@ _WEIGHT: dict[Mutation, float] = {
 
 
 # ---- mutants
-# ---------------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -719,7 +720,7 @@ def mutant(number: int, seed: int, sources: Sequence[Pair]) -> Mutant:
 
 
 # ---- running them
-# ----------------------------------------------------------------------------------------------------
+# ------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)

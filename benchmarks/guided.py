@@ -18,8 +18,8 @@ The paper reports 1.6 times fewer nodes on GWB7.  For each language and heuristi
 
 "pruned" is the paper's search: what does not fit the sentence is pruned, nothing else.  "+words"
 also takes the number of words still to say as a lower bound on the steps.  Ties are broken as
-`coordlang.use.sentence.guided_search.a_star` says.  All plans found are checked to be optimal and to have
-the sentence.
+`coordlang.use.sentence.guided_search.a_star` says.  All plans found are checked to be optimal and
+to have the sentence.
 """
 
 from __future__ import annotations

@@ -99,7 +99,7 @@ def run(step: str, path: Path, states: int, words: int) -> None:
     show((f"{LOOKED_UP:,} look-ups", path.suffix[1:], "", f"{process_time() - start:.1f}", "", ""))
 
 
-class measured:
+class measured:  # noqa: N801 - reads as a verb: with measured(..)
     def __init__(self, step: str, path: Path) -> None:
         self.step, self.path = step, path
 
@@ -135,9 +135,10 @@ def grid() -> JointModel:
     domain = read_domain(DOMAINS / "grid" / "domain.pddl")
     cells = [(y, x) for y in range(HEIGHT) for x in range(WIDTH)]
     edges = [(c, d) for c in cells for d in cells if abs(c[0] - d[0]) + abs(c[1] - d[1]) == 1]
+    links = " ".join(f"(adjacent {name(c)} {name(d)})" for c, d in edges)
     text = f"""(define (problem large) (:domain grid)
       (:objects {" ".join(ROBOTS)} - robot {" ".join(name(c) for c in cells)} - cell)
-      (:init (at r1 c0-0) (at r2 c0-1) (at r3 c1-0) {" ".join(f"(adjacent {name(c)} {name(d)})" for c, d in edges)})
+      (:init (at r1 c0-0) (at r2 c0-1) (at r3 c1-0) {links})
       (:goal (at r1 c0-0)))"""
     return build(domain, [parse_problem(Source("large", text), domain)]).model
 

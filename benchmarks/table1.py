@@ -111,7 +111,8 @@ def main(wanted: list[str]) -> int:
             )
         )
     print(
-        f"together {perf_counter() - begin:.2f} s; rows that differ from the paper in tasks or states: {wrong}"
+        f"together {perf_counter() - begin:.2f} s; rows that differ from the paper in tasks or "
+        f"states: {wrong}"
     )
     return 1 if wrong else 0
 

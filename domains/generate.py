@@ -356,7 +356,8 @@ def _add_options(one: argparse.ArgumentParser) -> None:
         type=int,
         default=0,
         metavar="K",
-        help="tasks in which some robot's start and goal are at least K apart, by Manhattan distance (0: all tasks)",
+        help="tasks in which some robot's start and goal are at least K apart, by Manhattan "
+        "distance (0: all tasks)",
     )
 
 

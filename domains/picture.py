@@ -27,7 +27,8 @@ def draw(grid: GridMap, title: str, starts: dict[str, str], goals: dict[str, str
         f"{robot} starts in {starts[robot]} and goes to {goals[robot]}" for robot in starts
     )
     shapes = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" '
+        f'height="{height}" '
         'role="img" font-family="Helvetica, Arial, sans-serif" text-anchor="middle">',
         f"<title>{escape(title)}</title>",
         f"<desc>{escape(told)}.</desc>",
@@ -60,7 +61,8 @@ def _floor(name: str, cell: Cell) -> str:
     x, y = _corner(cell)
     return (
         f'<rect x="{x}" y="{y}" width="{CELL}" height="{CELL}" fill="{FLOOR}" stroke="{LINE}"/>'
-        f'<text x="{x + 4}" y="{y + 12}" font-size="10" text-anchor="start" fill="{FAINT}">{escape(name)}</text>'
+        f'<text x="{x + 4}" y="{y + 12}" font-size="10" text-anchor="start" '
+        f'fill="{FAINT}">{escape(name)}</text>'
     )
 
 
@@ -95,8 +97,10 @@ def _line(a: tuple[int, int], b: tuple[int, int], colour: str, thickness: int) -
 def _goal(robot: str, cell: Cell, colour: str) -> str:
     x, y = _centre(cell)
     return (
-        f'<circle cx="{x}" cy="{y}" r="20" fill="none" stroke="{colour}" stroke-width="3" stroke-dasharray="6 4"/>'
-        f'<text x="{x + CELL // 2 - 4}" y="{y + CELL // 2 - 4}" font-size="11" font-weight="bold" text-anchor="end" '
+        f'<circle cx="{x}" cy="{y}" r="20" fill="none" stroke="{colour}" stroke-width="3" '
+        'stroke-dasharray="6 4"/>'
+        f'<text x="{x + CELL // 2 - 4}" y="{y + CELL // 2 - 4}" font-size="11" font-weight="bold" '
+        'text-anchor="end" '
         f'fill="{colour}">{escape(robot)} goal</text>'
     )
 
@@ -105,5 +109,6 @@ def _robot(robot: str, cell: Cell, colour: str) -> str:
     x, y = _centre(cell)
     return (
         f'<circle cx="{x}" cy="{y}" r="15" fill="{colour}"/>'
-        f'<text x="{x}" y="{y + 5}" font-size="13" font-weight="bold" fill="#ffffff">{escape(robot)}</text>'
+        f'<text x="{x}" y="{y + 5}" font-size="13" font-weight="bold" '
+        f'fill="#ffffff">{escape(robot)}</text>'
     )

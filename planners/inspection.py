@@ -167,7 +167,8 @@ def _formulas(model: JointModel) -> tuple[str, ...]:
         for kind, others in (("speaks of", touched.partners), ("forbids", touched.excluded)):
             if others and (key := f"{action.schema} {kind}") not in found:
                 found[key] = (
-                    f"{action.label} {kind} {_some(others & there) or _nobody(others)} in the same step"
+                    f"{action.label} {kind} {_some(others & there) or _nobody(others)} in the "
+                    "same step"
                 )
     return tuple(found.values())
 

@@ -1,4 +1,4 @@
-"""Domain and problems -> joint model and planning tasks: the steps of the front end in their order."""
+"""Domain and problems -> joint model and tasks: the steps of the front end in their order."""
 
 from __future__ import annotations
 
@@ -93,7 +93,8 @@ def build(
     options = options or ModelOptions()
     if options.remember_actions and "last" in domain.predicates:
         raise UsageError(
-            "--remember-actions writes facts (last ROBOT ACTION), but this domain has a predicate 'last'",
+            "--remember-actions writes facts (last ROBOT ACTION), but this domain has a predicate "
+            "'last'",
             remedy="Rename the predicate.",
         )
     first = problems[0]
@@ -138,7 +139,10 @@ def _require_one_of(option: str, value: str, values: Sequence[str]) -> None:
 
 
 def _check_same_world(domain: Domain, first: Problem, other: Problem) -> None:
-    remedy = f"Compared with {first.source.name}: the problems of one model have the same objects and statics."
+    remedy = (
+        f"Compared with {first.source.name}: the problems of one model have the same objects "
+        "and statics."
+    )
     objects, init = other.source.section(":objects"), other.source.section(":init")
     if first.objects != other.objects:
         odd = sorted({*first.objects.items()} ^ {*other.objects.items()})[0][0]

@@ -1,6 +1,7 @@
 """Tables of numbers: runs of a CSR table, duplicate rows out, rows found.
 
-A table has one row for each item (a state, a node of a walk) and is sorted where it is looked up in.
+A table has one row for each item (a state, a node of a walk) and is sorted where it is looked up
+in.
 """
 
 from __future__ import annotations

@@ -65,7 +65,7 @@ class ExportedTask(Presented):
 
     @property
     def form(self) -> str:
-        """How joint steps are written: ``explicit`` (one action each) or one robot after another."""
+        """How joint steps are written: ``explicit`` (one action each) or robot after robot."""
         return self.exported.classical.form
 
     @property

@@ -107,7 +107,7 @@ def say(
 
 
 class SentencePlans(OptimalPlans):
-    """The optimal plans that a sentence leaves open, as `OptimalPlans`; in a notebook, their DAG."""
+    """The optimal plans that a sentence leaves open, as `OptimalPlans` with a drawn DAG."""
 
     __slots__ = ("_open",)
 

@@ -73,7 +73,8 @@ def check(
     cnf = encode(clauses, certificate.refuted)
     if certificate.refuted and not cnf.refuted():
         raise Refuted(
-            f"the certificate's {len(clauses):,} reasons leave languages with {certificate.refuted} words"
+            f"the certificate's {len(clauses):,} reasons leave languages "
+            f"with {certificate.refuted} words"
         )
     names = {state: candidates.model.codec.key(candidates.rows[state]) for state in cnf.word}
     return Checked(certificate.refuted + 1, len(clauses), cnf, names)

@@ -46,7 +46,8 @@ class Cnf:
     def dimacs(self, names: Mapping[int, str]) -> str:
         """DIMACS text.  ``names`` are the states' keys, for the comments."""
         lines = [
-            f"c Unsatisfiable iff no {self.size} words satisfy the clauses of a coordlang certificate."
+            f"c Unsatisfiable iff no {self.size} words satisfy the clauses of a coordlang "
+            "certificate."
         ]
         for state, variables in self.word.items():
             lines += [f"c {v}: word {n} holds {names[state]}" for n, v in enumerate(variables)]

@@ -45,7 +45,8 @@ class Reason(msgspec.Struct, frozen=True):
     plans: Annotated[
         list[PlanTexts],
         Meta(
-            description="Optimal plans, one for each robot: its subactions by step, null for idling."
+            description="Optimal plans, one for each robot: its subactions by step, null for "
+            "idling."
         ),
     ]
     paths: Annotated[

@@ -46,7 +46,7 @@ def run(arguments: list[str]) -> int:
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EIO, errno.EBADF):
             return _internal(error, debug)
-        sys.stdout = open(os.devnull, "w")
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - open to the end
         return _fail(f"the output cannot be written: {error.strerror}", 2)
     except MemoryError:
         return _fail(

@@ -75,7 +75,8 @@ if TYPE_CHECKING:
     type=click.Choice(["fail", "skip"]),
     default="fail",
     show_default=True,
-    help="What to do about candidate tasks without plans: stop (exit 11), or name and leave them out.",
+    help="What to do about candidate tasks without plans: stop (exit 11), or name and leave "
+    "them out.",
 )
 @click.option(
     "-o",
@@ -236,21 +237,25 @@ def _summary(figures: dict[str, Any], output: str) -> str:
     )
     flexible = (
         f"a sentence leaves {figures['flexibility']:,.2f} plans open on average ("
-        f"{figures['flexibility_before']:,.2f} before, {figures['flexibility_bound']:,.2f} at most), "
+        f"{figures['flexibility_before']:,.2f} before, {figures['flexibility_bound']:,.2f} at "
+        "most), "
         f"communication saving {100 * figures['communication_saving']:.1f} %\n"
         if "flexibility" in figures
         else ""
     )
     if "overlapping_words" in figures:
         flexible += (
-            f"{counted(figures['overlapping_words'], 'further word')} of states: a sentence well chosen leaves "
+            f"{counted(figures['overlapping_words'], 'further word')} of states: a sentence well "
+            "chosen leaves "
             f"{figures['overlapping_flexibility']:,.2f} plans open on average (without them "
             f"{figures['partition_flexibility']:,.2f})\n"
         )
     return (
-        f"{counted(words, 'word')} ({figures['method']}, {proof}verified) for {counted(figures['tasks'], 'task')}, "
+        f"{counted(words, 'word')} ({figures['method']}, {proof}verified) "
+        f"for {counted(figures['tasks'], 'task')}, "
         f"{figures['tasks_requiring_coordination']:,} of which require coordination\n"
-        f"{figures['states_on_plans']:,} states on optimal plans, {figures['divergences']:,} divergences, "
+        f"{figures['states_on_plans']:,} states on optimal plans, {figures['divergences']:,} "
+        "divergences, "
         f"{figures['walk_nodes']:,} walk nodes, {total:.2f} s\n"
         f"{flexible}"
         f"written to {'stdout' if output == '-' else output}"

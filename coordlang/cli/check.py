@@ -51,7 +51,8 @@ def command(as_json: bool, load: Callable[[], PlanningInstance]) -> int:
     else:
         click.echo(f"coordlang      {_cost(ours, model.cost)}")
         click.echo(
-            f"Fast Downward  {_cost(theirs, model.cost)}   ({answer.form} form, {answer.actions} plain actions)"
+            f"Fast Downward  {_cost(theirs, model.cost)}   ({answer.form} form, {answer.actions} "
+            "plain actions)"
         )
     if ours != theirs:
         click.echo("coordlang: the optimal costs differ", err=True)

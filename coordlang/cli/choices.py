@@ -175,7 +175,8 @@ def _text(found: Choices, chosen: list[int], check: bool) -> str:
             number *= own.automaton.count
         nodes = counted(found.mixtures.nodes, "node")
         lines.append(
-            f"checked: {counted(number, 'combination')} of own subplans, all optimal plans ({nodes} walked)"
+            f"checked: {counted(number, 'combination')} of own subplans, all optimal plans "
+            f"({nodes} walked)"
         )
     for robot in chosen:
         lines += ["", *_table(found, found.robots[robot])]

@@ -53,7 +53,8 @@ def command(pddl: PlanningFiles, as_json: bool, given: GivenOptions) -> None:
         if not witness and plans > 1:
             answer += ": any mixture of them is optimal"
         click.echo(
-            f"{name}: {counted(plans, 'optimal plan')} of {counted(makespan, 'step')}; coordination {answer}"
+            f"{name}: {counted(plans, 'optimal plan')} of {counted(makespan, 'step')}; "
+            f"coordination {answer}"
         )
         if witness:
             click.echo()

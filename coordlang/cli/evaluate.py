@@ -125,7 +125,8 @@ def command(
         if r.status != "done"
     ]
     done = sum(map(len, found.values()))
-    told = f"{counted(done, 'piece')} of work in {seconds:.1f} s; results in {folder}, page {written[0]}"
+    work = f"{counted(done, 'piece')} of work in {seconds:.1f} s"
+    told = f"{work}; results in {folder}, page {written[0]}"
     click.echo(told, err=True)
     if unfinished:
         click.echo(f"coordlang: met their limit: {', '.join(unfinished)}", err=True)

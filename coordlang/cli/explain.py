@@ -175,7 +175,8 @@ def _words(spoken: TaskLanguage, mapped: MappedStates, told: WordDescriptions) -
         else "no recorded task"
     )
     lines = [
-        f"{counted(len(language.words), 'word')} ({g.method}, {proof}) for {tasks} of {', '.join(spoken.model.robots)}."
+        f"{counted(len(language.words), 'word')} ({g.method}, {proof}) for {tasks} "
+        f"of {', '.join(spoken.model.robots)}."
     ]
     if told.in_order:
         lines.append("The first formula that is true in a state gives its word:")
@@ -184,12 +185,14 @@ def _words(spoken: TaskLanguage, mapped: MappedStates, told: WordDescriptions) -
     if not mapped.word.size:
         return "\n".join([*lines, f"No state is mapped: the word is always {language.default}."])
     lines.append(
-        f"Exact in all {counted(sum(mapped.states), 'mapped state')}. No optimal plan of these tasks leaves them; "
+        f"Exact in all {counted(sum(mapped.states), 'mapped state')}. No optimal plan of these "
+        "tasks leaves them; "
         f"elsewhere the word is {language.default}."
     )
     if long:
         lines.append(
-            f"Fewer terms may suffice for {', '.join(long)}; for the others it is proved that they do not."
+            f"Fewer terms may suffice for {', '.join(long)}; for the others it is proved that "
+            "they do not."
         )
     elif told.length > 1:
         lines.append("It is proved that no formula can do with fewer terms.")
@@ -207,7 +210,8 @@ def _task(
     steps = int(spoken.space.layer[spoken.start])
     lines = [f"The task {describe(spoken.space, spoken.task)}"]
     lines.append(
-        f"has {counted(total, 'optimal plan')} of {counted(steps, 'step')} in {counted(number, 'sentence')}."
+        f"has {counted(total, 'optimal plan')} of {counted(steps, 'step')} "
+        f"in {counted(number, 'sentence')}."
     )
     if asks and spoken.covered:
         lines.append(

@@ -125,7 +125,10 @@ def _write_pddl(exported: PddlExport, output: str | None, as_json: bool) -> None
         raise UsageError(f"the folder {output} cannot be made: {error.strerror}") from None
     for name, text in (("domain.pddl", exported.domain), ("problem.pddl", exported.problem)):
         write_atomically(os.path.join(output, name), text.encode())
-    size = f"{counted(len(exported.classical.actions), 'action')} ({exported.classical.form}), {counted(exported.terms, 'term')}"
+    size = (
+        f"{counted(len(exported.classical.actions), 'action')} "
+        f"({exported.classical.form}), {counted(exported.terms, 'term')}"
+    )
     click.echo(f"written to {output}: domain.pddl, problem.pddl: {size} for the words")
 
 

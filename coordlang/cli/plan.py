@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     "wishes",
     multiple=True,
     metavar="WISH",
-    help='Instead of SENTENCE: shortest, most-plans, first:ROBOT or avoid:"(ATOM)"; a second one decides among equals.',
+    help='Instead of SENTENCE: shortest, most-plans, first:ROBOT or avoid:"(ATOM)"; a second one '
+    "decides among equals.",
 )
 @click.option(
     "--heuristic",
@@ -92,7 +93,8 @@ def command(
     if best:
         _comment(read, best)
     click.echo(
-        f"A* ({heuristic}) expanded {counted(found.expanded, 'node')}; without the sentence {without.expanded:,}",
+        f"A* ({heuristic}) expanded {counted(found.expanded, 'node')}; without the "
+        f"sentence {without.expanded:,}",
         err=True,
     )
     return covered(spoken)

@@ -59,7 +59,8 @@ _DEFAULT_NODES = 200
     "--nodes",
     type=click.IntRange(min=1),
     metavar="N",
-    help=f"Cut the DAG to about N nodes (default: {_DEFAULT_NODES} for dot and svg; json: not cut).",
+    help=f"Cut the DAG to about N nodes (default: {_DEFAULT_NODES} for dot and svg; json: "
+    "not cut).",
 )
 @click.option("-o", "--output", metavar="FILE", help="Write to this file instead of stdout.")
 @model_options

@@ -121,13 +121,15 @@ def command(
     claimed = spoken.guarantee.lower_bound
     if bound.lower_bound < claimed:
         raise Refuted(
-            f"{language} says that {counted(claimed, 'word')} are needed; the certificate proves {bound.lower_bound} only"
+            f"{language} says that {counted(claimed, 'word')} are needed; the certificate "
+            f"proves {bound.lower_bound} only"
         )
     if not as_json:
         why = "every language has a word"
         if bound.lower_bound > 1:
             why = (
-                f"{counted(bound.reasons, 'reason')} checked, and with {counted(bound.lower_bound - 1, 'word')} they "
+                f"{counted(bound.reasons, 'reason')} checked, and "
+                f"with {counted(bound.lower_bound - 1, 'word')} they "
                 f"contradict each other ({counted(len(bound.cnf.clauses), 'clause')})"
             )
         click.echo(f"lower bound {bound.lower_bound}: {why}")

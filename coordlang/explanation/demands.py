@@ -137,8 +137,8 @@ def sentence_demands(
 def words_passed(space: PlanSpace, word: Ints) -> Ints:
     """For each node how many words of the sentence plans have passed there, its own included.
 
-    ``space`` holds one task's plans with one sentence, and each node is on one of them; so it is one
-    number for each node.
+    ``space`` holds one task's plans with one sentence, and each node is on one of them; so it is
+    one number for each node.
     """
     passed = np.ones(len(space), np.int64)
     for layer in range(space.cost_of(0)[0], 0, -1):

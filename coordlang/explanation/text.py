@@ -108,7 +108,8 @@ def descriptions_text(told: WordDescriptions, mapped: MappedStates) -> str:
                 zip(terms[:_TERMS], formula.counts, strict=False)
             ):
                 lines.append(
-                    f"      {'or ' if number else '   '}{term_text(term):{min(width, 70)}}  [{count}]"
+                    f"      {'or ' if number else '   '}{term_text(term):{min(width, 70)}}  "
+                    f"[{count}]"
                 )
             if len(terms) > _TERMS:
                 lines.append(f"      .. and {len(terms) - _TERMS} more terms")
@@ -130,9 +131,8 @@ def _part_lines(part: RobotPart, steps: int) -> list[str]:
     if not steps:
         return [f"  {part.robot} has nothing to do."]
     if part.subplans == 1:
-        return [
-            f"  {part.robot}: {_sequence(part.listed[0] if part.listed else [own[0] for own in part.by_step])}."
-        ]
+        only = part.listed[0] if part.listed else [own[0] for own in part.by_step]
+        return [f"  {part.robot}: {_sequence(only)}."]
     if part.listed:
         return [
             f"  {part.robot} may choose:",
@@ -184,7 +184,8 @@ def _cause(change: WordChange) -> str:
     if not change.robots:
         return "whatever the robots do"
     if len(change.robots) == 1:
-        return f"{change.robots[0]} decides it by {_alternatives([own or 'waiting' for (own,), _ in change.ways])}"
+        ways = [own or "waiting" for (own,), _ in change.ways]
+        return f"{change.robots[0]} decides it by {_alternatives(ways)}"
     together = [
         " and ".join(
             f"{robot} {own or 'wait'}" for robot, own in zip(change.robots, does, strict=True)
@@ -193,7 +194,8 @@ def _cause(change: WordChange) -> str:
     ]
     rest = len(together) - _ALTERNATIVES
     more = f"; or in {counted(rest, 'other way')}" if rest > 0 else ""
-    return f"{' and '.join(change.robots)} decide it together: {'; or '.join(together[:_ALTERNATIVES])}{more}"
+    first = "; or ".join(together[:_ALTERNATIVES])
+    return f"{' and '.join(change.robots)} decide it together: {first}{more}"
 
 
 def counted(number: int, noun: str) -> str:

@@ -34,7 +34,7 @@ class MappedStates:
 
 
 def mapped_states(language: Language, model: JointModel, also: Rows | None = None) -> MappedStates:
-    """The states that a language maps (and ``also`` these, which have their word by its default)."""
+    """The states that a language maps, and ``also`` these, which have its default word."""
     table = language.partition(model)
     rows, word = table.rows, table.word
     if also is not None:

@@ -125,7 +125,8 @@ def _guarantee(record: LanguageRecord, position: Position) -> Guarantee | None:
     g = record.guarantee
     if g.size != size or not 1 <= g.lower_bound <= g.size:
         raise BadInput(
-            f"the guarantee (size {g.size}, lower bound {g.lower_bound}) contradicts the {size} words",
+            f"the guarantee (size {g.size}, lower bound {g.lower_bound}) contradicts "
+            f"the {size} words",
             position=position,
         )
     if g.proved_minimal != (g.lower_bound == g.size):

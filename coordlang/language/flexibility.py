@@ -60,7 +60,7 @@ class Flexibility:
 
     @property
     def saving(self) -> Floats:
-        """Communication saving of each task's plans in expectation, against the states of a plan."""
+        """Expected communication saving of each task's plans, against the states of a plan."""
         return 1 - self.words / (self.steps + 1)
 
     @property

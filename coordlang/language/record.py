@@ -26,7 +26,8 @@ class DomainRecord(msgspec.Struct):
     sha256: Annotated[
         str | None,
         Meta(
-            description="The SHA-256 of the text of the domain file; a file without it is not held to one text."
+            description="The SHA-256 of the text of the domain file; a file without it is not "
+            "held to one text."
         ),
     ] = None
 
@@ -42,7 +43,8 @@ class ModelRecord(msgspec.Struct):
     idle: Annotated[
         list[str] | None,
         Meta(
-            description="The robots that may idle without an action of their own; without it: found from the model."
+            description="The robots that may idle without an action of their own; without it: "
+            "found from the model."
         ),
     ] = None
     problem_sha256: Annotated[
@@ -75,7 +77,8 @@ class GuaranteeRecord(msgspec.Struct):
     lower_bound: Annotated[
         int,
         Meta(
-            description="A proved lower bound on the words of any language for these tasks that gives each state one word.",
+            description="A proved lower bound on the words of any language for these tasks that "
+            "gives each state one word.",
             extra_json_schema=_SIZE,
         ),
     ]
@@ -94,14 +97,16 @@ class LanguageRecord(msgspec.Struct):
     states: Annotated[
         dict[str, str],
         Meta(
-            description="State key -> word.  A key lists the true fluents, sorted, joined by one space."
+            description="State key -> word.  A key lists the true fluents, sorted, joined by one "
+            "space."
         ),
     ]
     default: Annotated[str, Meta(description="The word of every state that is not listed.")]
     robots: Annotated[
         list[str] | UnsetType,
         Meta(
-            description="The robots, in the order of joint actions; without it: as the domain says.",
+            description="The robots, in the order of joint actions; without it: as the "
+            "domain says.",
             extra_json_schema=_SOME,
         ),
     ] = UNSET
@@ -112,13 +117,15 @@ class LanguageRecord(msgspec.Struct):
     producer: Annotated[
         dict[str, Any],
         Meta(
-            description="Version, arguments, seed, seconds; the only part that may differ between two runs."
+            description="Version, arguments, seed, seconds; the only part that may differ between "
+            "two runs."
         ),
     ] = {}
     also: Annotated[
         dict[str, list[str]],
         Meta(
-            description="Further words of states, where words overlap; without it this is a language all the same."
+            description="Further words of states, where words overlap; without it this is a "
+            "language all the same."
         ),
     ] = {}
 

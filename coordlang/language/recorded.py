@@ -1,4 +1,4 @@
-"""What follows from a language's provenance: model options, checks of the files, candidate tasks."""
+"""What a language's provenance implies: model options, checks of the files, candidate tasks."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ def options_of(
     cost: str | None = None,
     remember_actions: bool | None = None,
 ) -> ModelOptions:
-    """How the language's model is built.  Raises `UsageError` for a flag that contradicts the file."""
+    """How the language's model is built.
+
+    Raises `UsageError` for a flag that contradicts the file.
+    """
     model: Mapping[str, Any] = language.provenance.model
     recorded = {
         "--cost": model.get("cost", "makespan"),
@@ -71,7 +74,8 @@ def check_source(
     wanted = language.provenance.domain.get("sha256")
     if wanted is not None and wanted != domain.source.sha256:
         raise BadInput(
-            f"this language belongs to another domain ({language.provenance.domain.get('name')!r}): the text of "
+            "this language belongs to another domain "
+            f"({language.provenance.domain.get('name')!r}): the text of "
             f"{domain.source.name} has another hash",
             position=position,
             remedy="Give the domain file that the language was built from.",
@@ -80,9 +84,11 @@ def check_source(
     for problem in problems:
         if world is not None and world != world_sha256(domain, problem):
             raise BadInput(
-                f"{problem.source.name} has other objects or static facts than the language's problem",
+                f"{problem.source.name} has other objects or static facts than the language's "
+                "problem",
                 position=position,
-                remedy="A language serves the problems of one world: same objects, same static facts.",
+                remedy="A language serves the problems of one world: same objects, same static "
+                "facts.",
             )
 
 
@@ -101,7 +107,7 @@ def recorded_candidates(
     options: ModelOptions,
     position: Position,
 ) -> Candidates:
-    """The candidate tasks that a language file records; the problems' own ones if it records none."""
+    """The candidate tasks that a language file records, else the problems' own ones."""
     kind = language.provenance.tasks["kind"]
     if kind == "problems" and not language.provenance.tasks["count"]:
         return from_problems(domain, problems, options)
@@ -115,15 +121,18 @@ def recorded_candidates(
                     else f"these {len(problems)} problems have"
                 )
                 raise BadInput(
-                    f"the language records {language.provenance.tasks['count']:,} tasks, but {have} {candidates.count:,} pairs of "
+                    f"the language records {language.provenance.tasks['count']:,} tasks, "
+                    f"but {have} {candidates.count:,} pairs of "
                     "reachable states",
-                    remedy="Give the problems that the language was built for, or say --tasks all to check these.",
+                    remedy="Give the problems that the language was built for, or say --tasks all "
+                    "to check these.",
                 )
             return candidates
         listed = recorded_list(language)
         if not listed or len(listed) != language.provenance.tasks["count"]:
             raise BadInput(
-                f"the language records {language.provenance.tasks['count']} tasks but lists {len(listed)}",
+                f"the language records {language.provenance.tasks['count']} tasks but "
+                f"lists {len(listed)}",
                 remedy="Say --tasks all or --tasks FILE.",
             )
         make = from_listed if kind == "file" else from_recorded

@@ -38,7 +38,7 @@ def graph_layout(number: int, links: Sequence[tuple[int, int]]) -> Floats:
     Returns
     -------
     array (number, 2)
-        Linked nodes are about 1 apart, the longer axis lies along x, all coordinates are at least 0.
+        Linked nodes are about 1 apart, the longer axis lies along x, no coordinate is negative.
     """
     if number <= 1:
         return np.zeros((number, 2))

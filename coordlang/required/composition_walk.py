@@ -112,7 +112,8 @@ def walk(space: PlanSpace) -> Walk:
 
     def so_far() -> str:
         return (
-            f"{len(layers)} of {len(space.layers)} layers of the composition walk over {len(space):,} states on optimal "
+            f"{len(layers)} of {len(space.layers)} layers of the composition walk "
+            f"over {len(space):,} states on optimal "
             f"plans, {sum(len(layer.nodes) for layer in layers):,} nodes"
         )
 
@@ -179,7 +180,8 @@ def _check_size(sizes: NDArray[np.float64], robots: int) -> None:
         )
     if total > _MOST:
         raise OutOfMemory(
-            f"the {len(sizes):,} nodes of one layer of the walk have {total:.1e} combinations of {robots} plans' next steps",
+            f"the {len(sizes):,} nodes of one layer of the walk have {total:.1e} combinations "
+            f"of {robots} plans' next steps",
             remedy=f"Use {INSTEAD}.",
         )
 
@@ -338,13 +340,15 @@ def _check_rest(
     more = 3 * used / progress - used
     if more > memory_left():
         raise OutOfMemory(
-            f"the composition walk needs about {more / 2**30:.1f} GiB more to pass one layer of {size}; it holds "
+            f"the composition walk needs about {more / 2**30:.1f} GiB more to pass one layer "
+            f"of {size}; it holds "
             f"{(held + used) / 2**30:.1f} GiB, and {memory_left() / 2**30:.1f} GiB are left",
             remedy=f"Use {INSTEAD}, or a larger --memory-limit.",
         )
     left = seconds / progress - seconds
     if left > 2 * time_left():
         raise OutOfTime(
-            f"the composition walk needs about {left:.0f} s more to pass one layer of {size}; {time_left():.0f} s are left",
+            f"the composition walk needs about {left:.0f} s more to pass one layer "
+            f"of {size}; {time_left():.0f} s are left",
             remedy=f"Use {INSTEAD}, or a larger --time-limit.",
         )

@@ -235,7 +235,8 @@ def _walk(space: PlanSpace) -> list[_Layer]:
             links.append((source, child))
         if 4 * sum(a.nbytes + b.nbytes for a, b in links) > memory_left():
             raise OutOfMemory(
-                f"the composition walk has more than {sum(len(t) for t in tables):,} nodes: too large to keep",
+                f"the composition walk has more than {sum(len(t) for t in tables):,} nodes: too "
+                "large to keep",
                 remedy="Use --method greedy or minimal, fewer tasks, or a larger --memory-limit.",
             )
     return _pruned(space, tables[::-1], links[::-1])

@@ -59,9 +59,11 @@ class Inseparable(ProvedImpossible):
 
     def __init__(self, witness: Miscoordination) -> None:
         super().__init__(
-            f"two optimal plans of task {witness.task} introduce required coordination but pass through the "
+            f"two optimal plans of task {witness.task} introduce required coordination but pass "
+            "through the "
             "same states: no language over states can tell them apart",
-            remedy="Build with --remember-actions: the state then also holds each robot's last subaction.",
+            remedy="Build with --remember-actions: the state then also holds each robot's last "
+            "subaction.",
         )
         self.witness = witness
 
@@ -108,7 +110,10 @@ def _trail(space: PlanSpace, starts: Ints, *, together: bool) -> Trail | None:
     walked = [0, 0]
 
     def so_far() -> str:
-        return f"{walked[0]} of {len(space.layers) - 1} steps of the composition walk, {walked[1]:,} nodes"
+        return (
+            f"{walked[0]} of {len(space.layers) - 1} steps of the composition "
+            f"walk, {walked[1]:,} nodes"
+        )
 
     with reaching(so_far, INSTEAD):
         return _walk_to_a_break(space, starts, walked, together=together)
@@ -235,5 +240,8 @@ def _reason(space: PlanSpace, node: int, labels: tuple[int, ...]) -> str:
         return "it is possible, but then the goal can no longer be reached"
     makespan, _ = onward.cost_of(0)
     if makespan > left:
-        return f"it is possible, but too late: the goal is then {makespan} steps away and {left} are left"
+        return (
+            f"it is possible, but too late: the goal is then {makespan} steps away and {left} "
+            "are left"
+        )
     return "it is possible and in time, but costs more than an optimal plan"

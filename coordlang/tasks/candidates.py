@@ -196,7 +196,8 @@ def _require_reached(
     if len(unknown):
         number = int(unknown[0])
         raise BadInput(
-            f"task {number + 1}: the state {model.state_text(tasks[number].init)} cannot be reached "
+            f"task {number + 1}: the state {model.state_text(tasks[number].init)} cannot be "
+            "reached "
             f"from the initial state of {problem.source.name}",
             position=position,
             remedy="Is a fluent missing or one too many?  List all fluents that are true.",

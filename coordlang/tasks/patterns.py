@@ -61,7 +61,8 @@ def varied_tasks(
         ]
     if not pairs:
         raise ProvedImpossible(
-            f"there is no such task: none of {len(here):,} starts reaches one of {len(texts):,} goals that it is not at"
+            f"there is no such task: none of {len(here):,} starts reaches one of {len(texts):,} "
+            "goals that it is not at"
         )
     return tuple(
         sorted(
@@ -105,6 +106,7 @@ def _matching(space: Space, pattern: str) -> list[int]:
     if not found:
         raise UsageError(
             f"no fluent of this problem matches {pattern}",
-            remedy="A pattern is an atom with ? for any one name, as in '(at r1 ?)'; coordlang inspect lists the fluents.",
+            remedy="A pattern is an atom with ? for any one name, as in '(at r1 ?)'; coordlang "
+            "inspect lists the fluents.",
         )
     return found

@@ -211,7 +211,8 @@ class _Check:
 
         def so_far() -> str:
             return (
-                f"layer {layers - number} of {layers} of the verification, {walked:,} nodes of its walk; "
+                f"layer {layers - number} of {layers} of the verification, {walked:,} nodes of "
+                "its walk; "
                 f"{len(table):,} in this layer"
             )
 
@@ -301,7 +302,7 @@ class _Check:
         return np.flatnonzero(failed & (table[:, self.robots + 1 :] == 0).all(axis=1))
 
     def _moves(self, table: Ints) -> Iterator[tuple[Ints, Ints, Ints]]:
-        """(row, each robot's move, node reached) of every move, without those whose sentences part."""
+        """(row, each robot's move, node reached) of every move whose sentences do not part."""
         sizes = np.ones(len(table))
         for robot, view in enumerate(self._views):
             sizes *= np.diff(view.first)[table[:, robot]]
@@ -342,7 +343,7 @@ class _Check:
         return rows, moves, np.column_stack((*children, mixed, leads))
 
     def _mix(self, y: Ints, labels: Sequence[Ints]) -> Ints:
-        """Where the mixture goes: the edge of ``y`` in which each robot does its own plan's part."""
+        """Where the mixture goes: the edge of ``y`` in which each robot does its plan's part."""
         if not len(self._edge_sorted):
             return np.full(len(y), self._failed)
         name = np.zeros(len(y), np.int64)

@@ -182,7 +182,7 @@ class _Check:
         )
 
     def _mixed(self, y: int, edges: tuple[int, ...]) -> int:
-        """Where each robot's own part leads from ``y``; -1 where that is no optimal plan any more."""
+        """Where each robot's own part leads from ``y``; -1 where that is no optimal plan."""
         if y < 0:
             return -1
         labels = tuple(self._labels[edge][robot] for robot, edge in enumerate(edges))

@@ -145,7 +145,7 @@ class _Search:
         )
 
     def _add(self, state: int, word: int) -> bool:
-        """Give a state a further word if that is a language and leaves more plans open on average."""
+        """Give a state a further word if that is a language and leaves more plans open."""
         self.tried += 1
         old = self.words[state]
         above = [nodes_above(space, state) for space in self._spaces]

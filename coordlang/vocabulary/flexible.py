@@ -132,8 +132,10 @@ class _Search:
             for share in annealing.cool(length):
                 self._moves = annealing.moves
                 job.progress(
-                    f"{words} words leave {annealing.best_value:,.2f} of at most {most:,.2f} plans open: "
-                    f"cooling {100 * share:.0f} %, {annealing.moves:,} moves, {len(clauses):,} clauses"
+                    f"{words} words leave {annealing.best_value:,.2f} of at most {most:,.2f} "
+                    "plans open: "
+                    f"cooling {100 * share:.0f} %, {annealing.moves:,} moves, {len(clauses):,} "
+                    "clauses"
                 )
             if annealing.best_value > _BETTER * before:
                 length, stale = 2 * length, 0
@@ -173,10 +175,7 @@ class _Clauses:
             self.pairs.append(tuple(sorted(image)))
 
     def violated(self, number: int, word: Sequence[int]) -> bool:
-        for a, b in self.pairs[number]:
-            if word[a] != word[b]:
-                return False
-        return True
+        return all(word[a] == word[b] for a, b in self.pairs[number])
 
     def refute(self, word: Ints) -> bool:
         """Look for counterexamples and add their clauses; False if there is none."""

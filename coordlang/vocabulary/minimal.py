@@ -128,7 +128,7 @@ class _Search:
         found = separated(replace(self._job, incumbent=self.best))
         self.best = found.partition
         if found.stopped is not None and not isinstance(found.stopped, OutOfMemory):
-            raise found.stopped  # its walk may be larger than ours, that we can do without; but not time
+            raise found.stopped  # its walk may be larger than ours and is not needed; time is
 
     def exceeds(self, size: int) -> bool:
         """Whether every partition that is a language has more words than ``size``."""

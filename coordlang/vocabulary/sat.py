@@ -64,7 +64,8 @@ class PartitionProblem:
         required as well.
         """
         for symmetry in symmetries:
-            equal = 0  # a variable that holds if a partition and its image agree on all pairs so far; 0: there is none
+            # A variable: a partition and its image agree on all pairs so far (0: none yet).
+            equal = 0
             for states in pairs:
                 image = pair(*(symmetry[s] for s in states))
                 if image == states:
@@ -246,7 +247,7 @@ def close_bounds(
 
 @dataclass(frozen=True, slots=True)
 class SolverBudget:
-    """What may be spent on one number of words: partitions refuted, and conflicts for each of them."""
+    """What may be spent on one number of words: partitions refuted, and conflicts for each."""
 
     rounds: int = 60
     conflicts: int = 30_000

@@ -247,13 +247,20 @@ class Rules:
                 if len(group) < constraint.low or (
                     constraint.high is not None and len(group) > constraint.high
                 ):
-                    bounds = f"{constraint.low} to {constraint.high if constraint.high is not None else 'any number'}"
+                    most = "any number" if constraint.high is None else constraint.high
+                    bounds = f"{constraint.low} to {most}"
                     doing = ", ".join(action.text for action in group)
-                    return f"constraint {constraint.name} {' '.join(binding)} takes {bounds} together: {doing}"
+                    return (
+                        f"constraint {constraint.name} {' '.join(binding)} takes {bounds} "
+                        f"together: {doing}"
+                    )
         for needed, by in self.domain.dependences:
             for binding, group in used[by].items():
                 if binding not in used[needed]:
-                    return f"{group[0].text} needs an action of constraint {needed} {' '.join(binding)} in the same step"
+                    return (
+                        f"{group[0].text} needs an action of "
+                        f"constraint {needed} {' '.join(binding)} in the same step"
+                    )
         return None
 
     def _matches(self, constraint: Constraint, action: Instance) -> set[tuple[str, ...]]:
@@ -328,13 +335,15 @@ class Rules:
             if self.holds(formula, action.binding, True, moment):
                 results.setdefault(self._after(state, (action,)), action.text)
             elif reason is None:
-                reason = f"{action.text} is not applicable: {self.why_not(formula, action.binding, True, moment)}"
+                why = self.why_not(formula, action.binding, True, moment)
+                reason = f"{action.text} is not applicable: {why}"
         if len(results) > 1:
             first, second = sorted(results.values())[:2]
             raise BadInput(
                 f"{first} and {second} have the same subactions but different results",
                 position=self.domain.source.position(self.domain.schemas[0].offset),
-                remedy="The subactions of a joint action must determine what it does: rename one of them.",
+                remedy="The subactions of a joint action must determine what it does: rename one "
+                "of them.",
             )
         for result in results:
             return None, result

@@ -185,7 +185,7 @@ def _run(directory: Path, left: float | None) -> int:
                 # What the worker's libraries put into a temporary directory goes away with this
                 # one.
                 env={**os.environ, **_ENVIRONMENT, "PYTHONPATH": path, "TMPDIR": str(directory)},
-                stdin=subprocess.PIPE,  # ends when we do, even by a signal: then the worker ends its group
+                stdin=subprocess.PIPE,  # ends when we do; then the worker ends its group
                 stdout=subprocess.DEVNULL,
                 stderr=errors,
                 start_new_session=True,

@@ -51,7 +51,7 @@ def main(task_file: str, result_file: str) -> None:
 
 
 def _end_with_parent() -> None:
-    """End the whole process group when the parent is gone (its end of our standard input closes)."""
+    """End the whole process group when the parent's end of our standard input closes."""
     os.read(0, 1)
     os.killpg(0, signal.SIGKILL)
 
@@ -113,7 +113,7 @@ def build(task: dict[str, Any]) -> tuple[Any, dict[str, int]]:
     prices, costs = {}, {}
     for number, (conditions, adds, deletes, cost) in enumerate(task["actions"]):
         if not adds and not deletes:
-            continue  # of no use in a plan, and unified-planning would write PDDL that Fast Downward cannot read
+            continue  # of no use in a plan, and its PDDL could not be read by Fast Downward
         action = InstantaneousAction(f"a{number}")
         for n, positive in conditions:
             action.add_precondition(true[n] if positive else false[n])

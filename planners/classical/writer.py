@@ -118,7 +118,7 @@ class Writer:
 
 
 def _ordered(atoms: Iterable[Atom]) -> list[Atom]:
-    """Ground atoms in an order that does not depend on hashes: new facts get their numbers in it."""
+    """Ground atoms in an order that does not depend on hashes, that of new facts' numbers."""
     return sorted(atoms, key=lambda atom: (atom.predicate, atom.args))
 
 

@@ -152,7 +152,8 @@ class _Grounder:
             return None
         if not owners:
             raise BadInput(
-                f"action {label(schema.name, args)} names no robot (robots: {', '.join(self._team.robots)})",
+                f"action {label(schema.name, args)} names no robot "
+                f"(robots: {', '.join(self._team.robots)})",
                 position=self._domain.source.position(schema.offset),
                 remedy="Say --unowned environment (one extra chooser owns such actions) "
                 "or --unowned shared (all robots choose them together).",
@@ -357,7 +358,8 @@ class _Grounder:
         value = self._problem.values.get(atom)
         if value is None or not 0 <= value <= MAX_COST or value != int(value):
             raise BadInput(
-                f"the cost {label(atom.predicate, atom.args)} has no whole value from 0 to {MAX_COST} in the initial state "
+                f"the cost {label(atom.predicate, atom.args)} has no whole value from 0 "
+                f"to {MAX_COST} in the initial state "
                 f"of {self._problem.source.name}",
                 position=self._domain.source.position(schema.offset),
                 remedy="Give it a value in (:init ..), or leave out --cost makespan+cost.",

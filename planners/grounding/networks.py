@@ -64,8 +64,10 @@ def _check_types(domain: Domain, problem: Problem, constraint: Constraint) -> No
             }:  # an object of two types
                 continue
             raise BadInput(
-                f"argument {position} of {name} is {argument.name} - {' or '.join(argument.types)}, which is never "
-                f"{parameter.name} - {' or '.join(parameter.types)}: the constraint {constraint.name!r} would never match",
+                f"argument {position} of {name} is {argument.name} "
+                f"- {' or '.join(argument.types)}, which is never "
+                f"{parameter.name} - {' or '.join(parameter.types)}: the "
+                f"constraint {constraint.name!r} would never match",
                 position=domain.source.position(offset),
                 remedy="Positions count from 0; if the action has an :agent, it is argument 0.",
             )

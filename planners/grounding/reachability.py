@@ -80,7 +80,7 @@ def reachable_arguments(
 
 
 def _least_model(rules: Sequence[str], arities: dict[str, int]) -> dict[str, list[Arguments]]:
-    """The argument tuples of the ``arities``' predicates in the least model of a Datalog program."""
+    """The argument tuples of ``arities``' predicates in the least model of a Datalog program."""
     from clingo import Control
 
     messages: list[str] = []

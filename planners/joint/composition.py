@@ -114,7 +114,8 @@ class ComposingStepper:
     def _interfering(
         self, labels: Sequence[int], chosen: Sequence[GroundAction | None]
     ) -> str | None:
-        for j, i in ((j, i) for j in range(len(chosen)) for i in range(j)):
+        pairs = sorted(combinations(range(len(chosen)), 2), key=lambda pair: pair[::-1])
+        for i, j in pairs:
             first, second = chosen[i], chosen[j]
             if first and second and not self.tables[i, j][labels[i], labels[j]]:
                 return conflict(first, second) or f"{first.label} and {second.label} interfere"
@@ -186,13 +187,15 @@ class ComposingStepper:
         return Steps(source, labels, *self._apply(rows, source, labels))
 
     def _require_room(self, combinations: int, robot: int, states: int) -> None:
-        """Stop before the combinations of one more robot's labels take more memory than there is."""
+        """Stop before combinations with one more robot's labels take more memory than there is."""
         # A number of the state and one of each label so far, in two copies, and what compares them.
         needed = 8 * (2 * robot + 6) * combinations
         if combinations > _CHUNK and needed > memory_left():
             raise OutOfMemory(
-                f"{robot + 1} of {len(self._robots)} robots have {combinations:,} combinations of subactions in {states:,} "
-                f"state{'s' * (states != 1)}: about {needed / 2**30:,.1f} GiB, and {memory_left() / 2**30:.1f} GiB are left",
+                f"{robot + 1} of {len(self._robots)} robots have {combinations:,} combinations of "
+                f"subactions in {states:,} "
+                f"state{'s' * (states != 1)}: about {needed / 2**30:,.1f} GiB, "
+                f"and {memory_left() / 2**30:.1f} GiB are left",
                 remedy="Use fewer robots, or a larger --memory-limit.",
             )
 
@@ -249,7 +252,7 @@ class _Subactions:
         return self._operators.applicable(rows)
 
     def drop_unmet(self, fits: Bools, robot: int, rows: Rows, source: Ints, labels: Labels) -> None:
-        """Clear ``fits`` where a formula of this robot's subaction about the joint step is not met."""
+        """Clear ``fits`` where a formula of this robot's subaction about the step is not met."""
         asks = np.flatnonzero(self._has_step_formula[labels[:, robot]])
         own = labels[asks, robot]
         for label in np.unique(own):

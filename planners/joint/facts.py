@@ -1,4 +1,4 @@
-"""The fluent atoms of a joint model, numbered: the one table that turns atoms into text and back."""
+"""The fluent atoms of a joint model, numbered: the table that turns atoms into text and back."""
 
 from __future__ import annotations
 

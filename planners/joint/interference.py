@@ -85,9 +85,15 @@ def conflict(a: GroundAction, b: GroundAction) -> str | None:
         return None
     for one, other, x, y in ((a, b, first, second), (b, a, second, first)):
         if x.deletes & y.requires_true:
-            return f"{one.label} deletes {_show(x.deletes & y.requires_true)}, which {other.label} needs"
+            return (
+                f"{one.label} deletes {_show(x.deletes & y.requires_true)}, "
+                f"which {other.label} needs"
+            )
         if x.adds & y.requires_false:
-            return f"{one.label} adds {_show(x.adds & y.requires_false)}, which {other.label} needs to be false"
+            return (
+                f"{one.label} adds {_show(x.adds & y.requires_false)}, which {other.label} "
+                "needs to be false"
+            )
     return None
 
 

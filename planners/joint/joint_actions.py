@@ -63,7 +63,8 @@ class JointActionStepper:
             raise BadInput(
                 f"{first.label} and {second.label} have the same subactions but different results",
                 position=self._positions.get(second.schema),
-                remedy="The subactions of a joint action must determine what it does: rename one of them.",
+                remedy="The subactions of a joint action must determine what it does: rename one "
+                "of them.",
             )
         keep = ~same
         return Steps(row[keep], labels[keep], result[keep], cost[keep])
@@ -98,7 +99,7 @@ class JointActionStepper:
         effects: list[GroundEffect],
         result: Rows,
     ) -> Rows:
-        """The results with the conditional effects of one action applied (adds win over deletes)."""
+        """The results with an action's conditional effects applied (adds win over deletes)."""
         there = np.flatnonzero(operator == number)
         for adding in (False, True):
             for effect in effects:

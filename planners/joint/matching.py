@@ -17,7 +17,7 @@ from planners.tables import Ints, Rows, ranges
 
 @dataclass(frozen=True, slots=True)
 class _Level:
-    """One depth of the tree: each node's children (facts to test) and the operators that end in it."""
+    """One depth of the tree: each node's children (facts to test), and operators that end in it."""
 
     first_child: Ints
     child_fact: Ints

@@ -20,9 +20,10 @@ _BLOCK_BITS = 64
 class StateCodec:
     """Joint states <-> rows of ``width`` 64-bit blocks.
 
-    The first ``fact_blocks`` blocks have a bit for each of ``facts``.  If ``memory`` is not None the
-    row ends with one block per robot: 0 before its first subaction, else 1 + the number of its last
-    label in ``memory`` (``--remember-actions``).  Nothing but this class knows where a fact's bit is.
+    The first ``fact_blocks`` blocks have a bit for each of ``facts``.  If ``memory`` is not None
+    the row ends with one block per robot: 0 before its first subaction, else 1 + the number of its
+    last label in ``memory`` (``--remember-actions``).  Nothing but this class knows where a fact's
+    bit is.
     """
 
     facts: FactTable
@@ -63,7 +64,8 @@ class StateCodec:
             if number is None:
                 raise BadInput(
                     f"{atom} can never be true in this model",
-                    remedy="A state lists true fluents: atoms of this problem that some action can change.",
+                    remedy="A state lists true fluents: atoms of this problem that some action "
+                    "can change.",
                 )
             facts.append(number)
         row[: self.fact_blocks] = self.mask(facts)

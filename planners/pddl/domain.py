@@ -411,7 +411,8 @@ def _check_parts(
         item = actions[schema.name]
         if not schema.parts:
             raise document.fail(
-                f"action {schema.name!r} has no '; subaction' comment, but others in this domain have",
+                f"action {schema.name!r} has no '; subaction' comment, but others in this "
+                "domain have",
                 item,
                 "In joint-action PDDL every action says what each robot does in it.",
             )

@@ -38,7 +38,8 @@ def read_factored(directory: str | Path) -> tuple[Domain, Problem]:
     if not domains or set(domains) != set(problems):
         odd = ", ".join(sorted(set(domains) ^ set(problems))) or "no such files"
         raise BadInput(
-            f"expected domain-ROBOT.pddl and problem-ROBOT.pddl for every robot; without a partner: {odd}",
+            "expected domain-ROBOT.pddl and problem-ROBOT.pddl for every robot; without a "
+            f"partner: {odd}",
             position=Position(str(directory)),
             remedy="Unfactored files are given as DOMAIN PROBLEM, without --factored.",
         )

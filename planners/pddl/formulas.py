@@ -82,7 +82,7 @@ def read_formula(names: Names, item: Expression) -> Formula:
 
 
 def read_effects(names: Names, item: Expression) -> tuple[tuple[Effect, ...], int | Atom | None]:
-    """The literal effects, flattened, and the ``(increase (total-cost) ..)`` term if there is one."""
+    """The literal effects, flattened, and the term of ``(increase (total-cost) ..)``, if any."""
     effects: list[Effect] = []
     costs: list[int | Atom] = []
     _collect(names, item, (), TRUE, effects, costs)

@@ -36,7 +36,7 @@ class Atom:
 
 @dataclass(frozen=True, slots=True)
 class StepAtom:
-    """An action used as a literal: "this subaction is part of the same joint step" (Kovacs 2012)."""
+    """An action as a literal: "this subaction is part of the same joint step" (Kovacs 2012)."""
 
     action: str
     args: tuple[Term, ...]
@@ -96,7 +96,7 @@ class Effect:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """``; subaction r1 (move ?f ?t)``: one robot's part of a joint-action schema (None: it idles)."""
+    """``; subaction r1 (move ?f ?t)``: a robot's part of a joint-action schema (None: idle)."""
 
     robot: str
     template: tuple[Term, ...] | None
@@ -178,7 +178,7 @@ class Domain:
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """A problem; ``init`` holds the ground atoms that are true, ``values`` the numeric constants."""
+    """A problem; ``init`` has the ground atoms that are true, ``values`` the numeric constants."""
 
     name: str
     source: Source

@@ -12,7 +12,7 @@ from planners.pddl.sexpr import Document, Expression, Group, Word
 
 
 def known(names: Iterable[str], wrong: str, what: str) -> str:
-    """A remedy: the close match among ``names`` if there is one, else all of them (the first ten)."""
+    """A remedy: the close match among ``names`` if there is one, else the first ten of them."""
     names = sorted(names)
     close = get_close_matches(wrong, names, n=1)
     if close:

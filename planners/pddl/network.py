@@ -82,7 +82,8 @@ def _constraint(names: Names, arities: dict[str, int], section: Group) -> Constr
         positions = tuple(_number(names, part) for part in entry.items[1:])
         if len(positions) != len(parameters) or any(p >= arities[entry.head] for p in positions):
             raise document.fail(
-                f"expected {len(parameters)} argument positions below {arities[entry.head]} (the agent is argument 0)",
+                f"expected {len(parameters)} argument positions below {arities[entry.head]} (the "
+                "agent is argument 0)",
                 entry,
             )
         actions.append((entry.head, positions))

@@ -63,7 +63,8 @@ def _read_goal(names: Names, document: Document, sections: dict[str, list[Group]
         raise document.fail(
             f"expected one '(:goal FORMULA)', {found}",
             goals[-1] if goals else document.root,
-            "Write (:goal (and ..)) with all that must hold at the end, once; (:goal (and)) asks for nothing.",
+            "Write (:goal (and ..)) with all that must hold at the end, once; (:goal (and)) asks "
+            "for nothing.",
         )
     return read_formula(names, goals[0].items[1])
 

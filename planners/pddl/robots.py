@@ -129,7 +129,8 @@ def find_team(domain: Domain, problem: Problem, choice: RobotSelection) -> Team:
     ):
         if ENVIRONMENT in problem.objects:
             raise UsageError(
-                f"--unowned environment: an object of this problem is called {ENVIRONMENT!r} already",
+                f"--unowned environment: an object of this problem is called {ENVIRONMENT!r} "
+                "already",
                 remedy="Rename the object.",
             )
         robots = (*robots, ENVIRONMENT)
@@ -179,7 +180,7 @@ def _possible_agents(domain: Domain, problem: Problem, schema: Schema) -> tuple[
 
 
 def _of_kind(domain: Domain, problem: Problem, kind: str) -> tuple[str, ...]:
-    """Objects of a type, or objects of which a unary predicate of that name is true at the start."""
+    """Objects of a type, or those of which a unary predicate of that name is true at the start."""
     if kind in domain.types:
         return objects_of(domain, problem, (kind,))
     names = [a.args[0] for a in problem.init if a.predicate == kind and len(a.args) == 1]

@@ -51,7 +51,7 @@ class Source:
 
 
 class JoinedSource(Source):
-    """Several texts as one, one below the other; its positions are those in the texts themselves."""
+    """Several texts as one, one below the other; positions are those in the texts themselves."""
 
     __slots__ = ("_parts", "_starts")
 

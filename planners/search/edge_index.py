@@ -1,4 +1,4 @@
-"""Tables of node tuples: duplicates out, members found.  The inner loop of the composition walks."""
+"""Tables of node tuples: duplicates out, members found; the inner loop of composition walks."""
 
 from __future__ import annotations
 

@@ -37,7 +37,8 @@ def search(model: JointModel, task: PlanningTask) -> PlanSpace:
 
     def so_far() -> str:
         return (
-            f"{sum(map(len, layers)):,} states within {len(layers) - 1} steps of the initial state of {task.name}, "
+            f"{sum(map(len, layers)):,} states within {len(layers) - 1} steps of the initial "
+            f"state of {task.name}, "
             f"{len(layers[-1]) if layers else 0:,} of them new in the last step"
         )
 

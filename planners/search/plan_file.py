@@ -191,7 +191,8 @@ def _from_json(text: str, model: JointModel, position: Position) -> list[tuple[T
         for number, step in enumerate(plan):
             if len(step) != len(model.robots):
                 raise BadInput(
-                    f"step {number} must have one text or null for each of {', '.join(model.robots)}",
+                    f"step {number} must have one text or null for each "
+                    f"of {', '.join(model.robots)}",
                     position=position,
                 )
     return found

@@ -34,8 +34,8 @@ class LayerEdges:
 class UnfoldingStep:
     """The edges from one layer of an unfolding to the next (`PlanSpace.from_layers`).
 
-    ``source`` numbers nodes of the upper layer, ``target`` of the lower one; ``edge`` is the edge of
-    the unfolded plan space that each stands for.  Sorted by source, then by labels.
+    ``source`` numbers nodes of the upper layer, ``target`` of the lower one; ``edge`` is the edge
+    of the unfolded plan space that each stands for.  Sorted by source, then by labels.
     """
 
     source: Ints
@@ -105,7 +105,7 @@ class PlanSpace:
         return found
 
     def edge_with(self, node: int, labels: Sequence[int]) -> int | None:
-        """The edge out of a node with these labels, None if there is none.  O(edges of the node)."""
+        """The edge out of a node with these labels, None if there is none; O(edges of the node)."""
         edges = self.out_edges(node)
         same = (self.labels[edges.start : edges.stop] == np.asarray(labels)).all(axis=1)
         found = np.flatnonzero(same)
@@ -114,7 +114,7 @@ class PlanSpace:
     # ---- paths: plans as the edges that they take
 
     def first_path(self, node: int) -> list[int]:
-        """The edges of the first plan from a node, in the order of `planners.search.plans.Plans`."""
+        """The edges of the first plan from a node, in `planners.search.plans.Plans`' order."""
         path = []
         while self.layer[node] > 0:
             path.append(int(self.first[node]))
@@ -193,7 +193,7 @@ class PlanSpace:
         return reached
 
     def ancestors(self, nodes: Ints | Bools) -> Bools:
-        """From which nodes paths reach these nodes (numbers or a mask), these included.  O(edges)."""
+        """The nodes from which paths reach these (numbers or a mask), these included; O(edges)."""
         leads = np.zeros(len(self), np.bool_)
         leads[nodes] = True
         for below in self.edges_by_layer():
@@ -258,7 +258,8 @@ class PlanSpace:
         Parameters
         ----------
         layers
-            For each layer, from the start down, the nodes of ``space`` that its nodes are copies of.
+            For each layer, from the start down, the nodes of ``space`` that its nodes are copies
+            of.
         steps
             The edges between consecutive layers, one fewer than there are layers.
         task

@@ -70,7 +70,8 @@ def explore(model: JointModel, inits: Rows) -> Space:
 
     def so_far() -> str:
         return (
-            f"{len(seen):,} states within {depth} steps of the initial states, {sum(map(len, found)):,} joint steps; "
+            f"{len(seen):,} states within {depth} steps of the initial "
+            f"states, {sum(map(len, found)):,} joint steps; "
             f"{len(layer):,} states are new in the last step"
         )
 
@@ -98,7 +99,10 @@ def count(model: JointModel, inits: Rows) -> tuple[int, int]:
     steps_counted = depth = 0
 
     def so_far() -> str:
-        return f"{len(seen):,} states within {depth} steps of the initial states, {steps_counted:,} joint steps"
+        return (
+            f"{len(seen):,} states within {depth} steps of the initial "
+            f"states, {steps_counted:,} joint steps"
+        )
 
     with reaching(so_far, "fewer objects or robots"):
         while len(layer):

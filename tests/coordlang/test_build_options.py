@@ -41,5 +41,5 @@ def test_bad_model_options() -> None:
     bogus: Any = "bogus"
     with pytest.raises(UsageError, match=r"(?s)'bogus'.*makespan\+actions"):
         ModelOptions(cost=bogus)
-    with pytest.raises(UsageError, match="(?s)'bogus'.*environment"):
+    with pytest.raises(UsageError, match=r"(?s)'bogus'.*environment"):
         ModelOptions(RobotSelection((), None, bogus))

@@ -66,7 +66,7 @@ def test_pictures_are_self_contained_and_say_what_they_show():
         tags = {element.tag.rpartition("}")[2] for element in root.iter()}
         assert tags <= {"svg", "title", "desc", "rect", "line", "circle", "text"}
         assert "starts in" in (root.findtext("{http://www.w3.org/2000/svg}desc") or "")
-        assert not [key for element in root.iter() for key in element.keys() if "href" in key]
+        assert not [key for element in root.iter() for key in element.attrib if "href" in key]
 
 
 def test_a_ring_of_two_rows_is_drawn_with_its_wall():

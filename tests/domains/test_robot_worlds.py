@@ -31,8 +31,8 @@ ROOT = Path(__file__).resolve().parents[2]
 DOMAINS = ROOT / "domains"
 sys.path.insert(0, str(ROOT))  # this folder is no package, so pytest does not do it
 
-from tests.docs.pages import blocks, commands, links
-from tests.docs.test_run import run_command
+from tests.docs.pages import blocks, commands, links  # noqa: E402 - the path is set above
+from tests.docs.test_run import run_command  # noqa: E402 - the path is set above
 
 #: The folders, and how the robots are found in each.
 WORLDS = {

@@ -45,9 +45,11 @@ def test_all_arguments_in_the_natural_order_of_the_names() -> None:
 
 def test_the_time_limit_ends_clingo() -> None:
     begin = time.monotonic()
-    with pytest.raises(OutOfTime, match=r"the time limit of 0\.4 s is over") as caught:
-        with time_limit(0.4):
-            ground(200)
+    with (
+        pytest.raises(OutOfTime, match=r"the time limit of 0\.4 s is over") as caught,
+        time_limit(0.4),
+    ):
+        ground(200)
     assert str(caught.value).endswith("\n  Use a larger --time-limit.")
     assert time.monotonic() - begin < 10  # the whole of it takes minutes
 

@@ -228,7 +228,7 @@ def test_random_graphs() -> None:
         )
         value = {
             "shortest": lambda words: len(words),
-            "most-plans": lambda words: -len(groups[words]),
+            "most-plans": lambda words, groups=groups: -len(groups[words]),
         }
         best = min(
             groups,

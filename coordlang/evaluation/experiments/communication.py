@@ -93,14 +93,17 @@ def section(records: Sequence[Record]) -> Section:
         blocks += [
             Figure(
                 "communication-tasks",
-                f"Plan and sentence lengths of the first {SHOWN} tasks of {row} whose sentence is shorter",
+                f"Plan and sentence lengths of the first {SHOWN} tasks of {row} whose sentence is "
+                "shorter",
                 lambda: _first_tasks(mine),
             ),
-            f"The first {SHOWN} tasks whose greedy sentence is shorter than the plan, as in the paper's figure; below, the "
+            f"The first {SHOWN} tasks whose greedy sentence is shorter than the plan, as in the "
+            "paper's figure; below, the "
             "savings of all tasks.",
             Figure(
                 "communication-savings",
-                f"Distribution of the communication saving over the tasks of {row}, by method, with means",
+                f"Distribution of the communication saving over the tasks of {row}, by method, "
+                "with means",
                 lambda: _savings(mine),
             ),
         ]
@@ -186,8 +189,10 @@ def _told_orders(record: Record) -> str:
     savings = sorted(saving for name, (_, saving) in found.items() if name not in NATURAL)
     named = ", ".join(f"{name} {percent(found[name][1])}" for name in NATURAL)
     return (
-        f"With its states in {len(savings)} random orders, the greedy method saves {percent(savings[0])} to "
-        f"{percent(savings[-1])} over all tasks (median {percent(savings[len(savings) // 2])}); in orders that an "
+        f"With its states in {len(savings)} random orders, the greedy method "
+        f"saves {percent(savings[0])} to "
+        f"{percent(savings[-1])} over all tasks (median {percent(savings[len(savings) // 2])}); "
+        "in orders that an "
         f"implementation may well have, {named}."
     )
 
@@ -233,8 +238,10 @@ def _differences(row: str, records: Sequence[Record], orders: Sequence[Record]) 
     if row != ROW or greedy is None:
         return ()
     text = (
-        f"**Communication.** The paper saves {percent(SAVING_ALL)} over all tasks of {ROW}, our greedy language "
-        f"{percent(greedy['saving'])}. The figure depends on the order in which the greedy method tries the states and on "
+        f"**Communication.** The paper saves {percent(SAVING_ALL)} over all tasks of {ROW}, our "
+        "greedy language "
+        f"{percent(greedy['saving'])}. The figure depends on the order in which the greedy method "
+        "tries the states and on "
         "which plan is called the first, and the paper's are not known."
     )
     if orders:
@@ -244,9 +251,13 @@ def _differences(row: str, records: Sequence[Record], orders: Sequence[Record]) 
             if min(savings) <= SAVING_ALL <= max(savings)
             else "none gives the paper's"
         )
-        text += f" {len(savings)} orders give {percent(min(savings))} to {percent(max(savings))} for first plans, {reached}."
+        text += (
+            f" {len(savings)} orders give {percent(min(savings))} to {percent(max(savings))} "
+            f"for first plans, {reached}."
+        )
     return (
-        f"{text} The last plans in our order save {percent(greedy['saving_last'])}, the plans with the shortest sentences "
+        f"{text} The last plans in our order save {percent(greedy['saving_last'])}, the plans "
+        "with the shortest sentences "
         f"{percent(greedy['saving_most'])}.",
     )
 

@@ -87,7 +87,8 @@ def section(records: Sequence[Record]) -> Section:
         blocks.append(
             Figure(
                 "flexibility",
-                f"Distribution over the tasks of {row} of the number of plans open after the first plan's sentence",
+                f"Distribution over the tasks of {row} of the number of plans open after the "
+                "first plan's sentence",
                 lambda: _open(mine),
             )
         )
@@ -168,8 +169,10 @@ def _told_orders(record: Record) -> str:
     middle = len(random) // 2
     named = ", ".join(f"{name} {found[name][0]:.1f}" for name in NATURAL)
     return (
-        f"With its states in {len(random)} random orders, the greedy method leaves {first[0]:.1f} to {first[-1]:.1f} plans "
-        f"open (median {first[middle]:.1f}), in expectation {expected[0]:.1f} to {expected[-1]:.1f} (median "
+        f"With its states in {len(random)} random orders, the greedy method leaves {first[0]:.1f} "
+        f"to {first[-1]:.1f} plans "
+        f"open (median {first[middle]:.1f}), in expectation {expected[0]:.1f} "
+        f"to {expected[-1]:.1f} (median "
         f"{expected[middle]:.1f}); in orders that an implementation may well have, {named}."
     )
 
@@ -195,10 +198,15 @@ def _differences(row: str, records: Sequence[Record], orders: Sequence[Record]) 
     spread = ""
     if orders:
         first = [pair[0] for pair in orders[0].result["open_and_expected"].values()]
-        spread = f" The order of the states decides: {len(first)} orders give {min(first):.1f} to {max(first):.1f}."
+        spread = (
+            f" The order of the states decides: {len(first)} orders give {min(first):.1f} "
+            f"to {max(first):.1f}."
+        )
     return (
-        f"**Flexibility.** The paper leaves {OPEN_ALL} plans open on average over all tasks of {ROW} and {OPEN_SEVERAL} over "
-        f"{SEVERAL}, our greedy language {greedy['open']:.1f} and {greedy['open_several']:.1f} over {greedy['several']}."
+        f"**Flexibility.** The paper leaves {OPEN_ALL} plans open on average over all tasks "
+        f"of {ROW} and {OPEN_SEVERAL} over "
+        f"{SEVERAL}, our greedy language {greedy['open']:.1f} and {greedy['open_several']:.1f} "
+        f"over {greedy['several']}."
         f"{spread}",
     )
 

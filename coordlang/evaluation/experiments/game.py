@@ -154,7 +154,8 @@ def section(records: Sequence[Record]) -> Section:
         here = [r for r in found if r.unit.parameters["world"] == name]
         runs = here[0].unit.parameters["runs"]
         blocks += [
-            f"{name}, {here[0].result['tasks']:,} tasks, means of {runs} games and exact expectations:",
+            f"{name}, {here[0].result['tasks']:,} tasks, means of {runs} games and exact "
+            "expectations:",
             _table(here),
         ]
         if name == ROW:
@@ -222,10 +223,12 @@ def _differences(records: Sequence[Record]) -> tuple[str, ...]:
         return ()
     first = records[0].result
     return (
-        f"**Coordination game.** The order of the paper's proposals and the values of its figure are not known to us; our "
+        "**Coordination game.** The order of the paper's proposals and the values of its figure "
+        "are not known to us; our "
         f"expectations on {ROW} for k = 1 are {first['exact']['plan'][0]:.2f} plans against "
         + ", ".join(
-            f"{r.result['exact']['sentence'][0]:.2f} sentences ({TITLES[r.unit.parameters['method']]})"
+            f"{r.result['exact']['sentence'][0]:.2f} sentences "
+            f"({TITLES[r.unit.parameters['method']]})"
             for r in records
         )
         + ".",

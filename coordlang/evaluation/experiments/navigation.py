@@ -110,7 +110,8 @@ def section(records: Sequence[Record]) -> Section:
             _table(here),
             Figure(
                 f"navigation-{layout}",
-                f"Success rates of deliveries {layout} the warehouse under an agreed plan and under sentences, by map",
+                f"Success rates of deliveries {layout} the warehouse under an agreed plan and "
+                "under sentences, by map",
                 partial(_drawn, here),
             ),
         ]
@@ -208,7 +209,8 @@ def _differences(records: Sequence[Record]) -> tuple[str, ...]:
     gains = [_rate(r.result, "sentence") - _rate(r.result, "plan") for r in records]
     lower = [gain for gain in gains if gain < 0]
     text = (
-        "**Robust navigation.** The paper's map and rates are not known to us, so nothing can be compared. On our maps a "
+        "**Robust navigation.** The paper's map and rates are not known to us, so nothing can be "
+        "compared. On our maps a "
         f"sentence adds {min(gains):.1f} to {max(gains):.1f} points to the plan's success rate"
     )
     return (

@@ -98,13 +98,15 @@ def section(records: Sequence[Record]) -> Section:
         blocks.append(
             Figure(
                 "planning-cost",
-                f"How many times fewer nodes A* expands with a sentence on {row}, by heuristic and language",
+                f"How many times fewer nodes A* expands with a sentence on {row}, by heuristic "
+                "and language",
                 lambda: _drawn(mine),
             )
         )
     if others:
         blocks += [
-            "Worlds that are no grids, where the Manhattan distance says nothing; tasks drawn at random:",
+            "Worlds that are no grids, where the Manhattan distance says nothing; tasks drawn at "
+            "random:",
             _table(others, world=True),
         ]
     return Section(tuple(blocks), _differences(row, mine), _headlines(row, mine))
@@ -184,14 +186,21 @@ def _differences(row: str, records: Sequence[Record]) -> tuple[str, ...]:
         return ()
     greedy = of["manhattan", "greedy"]
     text = (
-        f"**Planning cost.** The paper's A* expands {PLANNING_RATIO} times fewer nodes with a sentence on {ROW}, ours "
-        f"{greedy['alone'] / greedy['pruned']:.2f} times with the Manhattan distance and greedy words. What can be saved "
-        "depends on how ties among equally good nodes are broken, and the paper's way is not known: ours goes on from the "
-        f"node that was reached last, and alone expands {greedy['alone'] / greedy['tasks']:.1f} nodes a task."
+        f"**Planning cost.** The paper's A* expands {PLANNING_RATIO} times fewer nodes with a "
+        f"sentence on {ROW}, ours "
+        f"{greedy['alone'] / greedy['pruned']:.2f} times with the Manhattan distance and greedy "
+        "words. What can be saved "
+        "depends on how ties among equally good nodes are broken, and the paper's way is not "
+        "known: ours goes on from the "
+        f"node that was reached last, and alone expands {greedy['alone'] / greedy['tasks']:.1f} "
+        "nodes a task."
     )
     least = of.get(("manhattan", "minimal"))
     if least and least["alone"] <= 1.05 * least["pruned"]:
-        text += " Minimal words cut off little: their sentences leave most plans open, which is what they are for."
+        text += (
+            " Minimal words cut off little: their sentences leave most plans open, which is "
+            "what they are for."
+        )
     return (text,)
 
 

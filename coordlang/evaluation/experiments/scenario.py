@@ -224,7 +224,10 @@ They have agreed on the sentence of the first plan found. On the way {PLACE} bec
 there among its own choices and takes it. r2 is not told, does what it would have done, and nothing is late. (Candidate tasks:
 robot 1 from any cell of the left room to any of the right one, robot 2 the other way.)"""
 
-_ALT = "Above the agreed plan in the corridor; below r1 passes the place of interest and r2 does the same as before"
+_ALT = (
+    "Above the agreed plan in the corridor; below r1 passes the place of interest and r2 does "
+    "the same as before"
+)
 
 _FREEDOM = """\
 Over all tasks of the corridor, and on worlds that are no grids, summed over the robots of a task: cells (there: subactions)
@@ -235,9 +238,12 @@ of all optimal plans, for the rest of which robots would have to agree anew."""
 def _told(record: Record) -> str:
     r = record.result["drawn"]
     return (
-        f"The language is {TITLES[record.unit.parameters['method']]} ({record.result['words']} words), the sentence "
-        f"`{' '.join(r['sentence'])}`. The task has {r['plans']:,} optimal plans. On these r1 can pass {PLACE} in "
-        f"{r['parts']} ways, of which {r['parts_that_fit']} do with what r2 does; the others collide or are late. The "
+        f"The language is {TITLES[record.unit.parameters['method']]} ({record.result['words']} "
+        "words), the sentence "
+        f"`{' '.join(r['sentence'])}`. The task has {r['plans']:,} optimal plans. On these r1 can "
+        f"pass {PLACE} in "
+        f"{r['parts']} ways, of which {r['parts_that_fit']} do with what r2 does; the others "
+        "collide or are late. The "
         f"sentence leaves r1 {r['ways']} of them, whatever r2 chooses from its own."
     )
 

@@ -147,7 +147,8 @@ def section(records: Sequence[Record]) -> Section:
             "Words of every row of Table 1, by method, beside the paper's",
             lambda: _drawn(rows, of),
         ),
-        "Seconds of processor time, from the PDDL text to the verified language (the paper's on its author's machine):",
+        "Seconds of processor time, from the PDDL text to the verified language (the paper's on "
+        "its author's machine):",
         _seconds(rows, of),
     ]
     stopped = [
@@ -289,7 +290,8 @@ def _differences(names: Sequence[str], of: dict[str, dict[str, Record]]) -> tupl
     if ratios:
         exact = " and ".join(n for n, paper in TABLE_1.items() if paper.exact)
         told.append(
-            f"**The least number of words** is {min(ratios):.1f} to {max(ratios):.1f} times smaller than the paper's (median "
+            f"**The least number of words** is {min(ratios):.1f} to {max(ratios):.1f} times "
+            "smaller than the paper's (median "
             f"{median(ratios):.1f}), which has an exact value for {exact} only."
         )
     slow = [
@@ -297,7 +299,8 @@ def _differences(names: Sequence[str], of: dict[str, dict[str, Record]]) -> tupl
     ]
     if slow:
         told.append(
-            f"**Brute force** ends within {BRUTE_SECONDS:g} s on {len(names) - len(slow)} of {len(names)} rows; where tasks "
+            f"**Brute force** ends within {BRUTE_SECONDS:g} s on {len(names) - len(slow)} "
+            f"of {len(names)} rows; where tasks "
             f"have more than {MOST_PAIRS:,} pairs of optimal plans together, it is not begun."
         )
     return tuple(told)
@@ -308,13 +311,17 @@ def _about_orders(names: Sequence[str], of: dict[str, dict[str, Record]]) -> lis
     if not other:
         return []
     text = (
-        f"**Words of the greedy method** differ from the paper's on {len(other)} of {len(names)} rows ({', '.join(other)}). "
+        f"**Words of the greedy method** differ from the paper's on {len(other)} of {len(names)} "
+        f"rows ({', '.join(other)}). "
         "The method takes the states in an order, and the order decides; the paper's is not known."
     )
     orders = {n: _in_orders(of[n]) for n in other if "orders" in of[n]}
     beyond = [n for n, found in orders.items() if not min(found) <= TABLE_1[n].words <= max(found)]
     if beyond:
-        text += f" On {', '.join(beyond)} the paper's number is outside of what {len(orders[beyond[0]])} orders gave."
+        text += (
+            f" On {', '.join(beyond)} the paper's number is outside of "
+            f"what {len(orders[beyond[0]])} orders gave."
+        )
     return [text]
 
 
@@ -331,8 +338,10 @@ def _about_alpha(names: Sequence[str], of: dict[str, dict[str, Record]]) -> list
         f"{n} ({TABLE_1[n].words} against {least[n].result['words']})" for n in below
     )
     return [
-        f"**Fewer words than alpha allows.** On {listed} the paper's greedy method reports fewer words than any partition "
-        "has that separates all first differences, as is proved. So its condition must be a weaker one there; with last "
+        f"**Fewer words than alpha allows.** On {listed} the paper's greedy method reports fewer "
+        "words than any partition "
+        "has that separates all first differences, as is proved. So its condition must be a "
+        "weaker one there; with last "
         "differences, too, fewer words can do."
     ]
 

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Okabe and Ito's colours (2008), distinguishable with every kind of colour vision, and a marker for
-#: each kind of series.
+#: Okabe and Ito's colours (2008), distinguishable with every kind of colour vision, and a marker
+#: for each kind of series.
 MARKERS = {
     "paper": ("#000000", "D"),
     "plan": ("#D55E00", "s"),

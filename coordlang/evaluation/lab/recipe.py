@@ -105,8 +105,8 @@ class Figure:
     draw: Callable[[], Drawing]
 
 
-#: A line of the first table of the page: the measure, the paper's value, ours with a greedy and with
-#: a minimal language.
+#: A line of the first table of the page: the measure, the paper's value, ours with a greedy and
+#: with a minimal language.
 Headline = tuple[str, str, str, str]
 
 

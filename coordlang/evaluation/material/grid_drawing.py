@@ -46,7 +46,7 @@ def position(cell: str) -> tuple[int, int]:
 def draw_map(
     axes: Axes, cells: Collection[str], paths: Sequence[Path], place: str | None, title: str
 ) -> None:
-    """Cells, robots' ways with the times at which they are where, and a place of interest (a star)."""
+    """Cells, robots' ways with the times at each cell, and a place of interest (a star)."""
     from matplotlib.patches import Rectangle
 
     for cell in sorted(cells):

@@ -326,7 +326,10 @@ def _check(
     growth = log10(max(members, 1)) / max(depth, 1)
     estimate = 10 ** min(18.0, log10(size / 2**30) + growth * max(steps - depth, 0))
     raise OutOfMemory(
-        f"the choices of {space.model.robots[robot]} have too many different histories: after {depth + 1} of {steps} "
-        f"steps their subsets have {members:,} members, at this rate about {estimate:,.1f} GiB in the end",
-        remedy="Use --cost makespan+actions, another sentence or a smaller task, or a larger --memory-limit.",
+        f"the choices of {space.model.robots[robot]} have too many different histories: "
+        f"after {depth + 1} of {steps} "
+        f"steps their subsets have {members:,} members, at this rate about {estimate:,.1f} GiB in "
+        "the end",
+        remedy="Use --cost makespan+actions, another sentence or a smaller task, or a larger "
+        "--memory-limit.",
     )

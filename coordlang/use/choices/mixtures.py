@@ -52,8 +52,8 @@ class Mixtures:
 class _JointMoves:
     """The joint moves out of one layer.
 
-    ``step`` has them as edges of the unfolded plan space; ``labels`` (moves, robots) are the robots'
-    labels.
+    ``step`` has them as edges of the unfolded plan space; ``labels`` (moves, robots) are the
+    robots' labels.
     """
 
     step: UnfoldingStep
@@ -209,7 +209,9 @@ def _check(
     ):
         states = " x ".join(f"{len(own.layers[step]):,}" for own in automata)
         raise OutOfMemory(
-            f"step {step + 1} has {moves:,.0f} combinations of what the robots may do ({states} states of their "
+            f"step {step + 1} has {moves:,.0f} combinations of what the robots may do ({states} "
+            "states of their "
             f"automata): about {needed / 2**30:,.1f} GiB",
-            remedy="Leave out --check, use --cost makespan+actions or a smaller task, or a larger --memory-limit.",
+            remedy="Leave out --check, use --cost makespan+actions or a smaller task, or a larger "
+            "--memory-limit.",
         )

@@ -65,7 +65,7 @@ def named_by_words(
 
 
 class _NamingFacts:
-    """The new facts, and what they do to actions and goal; facts by number, as in `ClassicalTask`."""
+    """The new facts (by number, as in `ClassicalTask`), and what they do to actions and goal."""
 
     def __init__(
         self,

@@ -1,8 +1,8 @@
 """A task under a sentence as plain PDDL, so that any planner can take part.
 
 The plain task of `planners.classical` gets facts and actions that follow the sentence
-(`coordlang.use.export.naming`): after each joint step the state is *named* by its word, and then the
-sentence *stays* at this word or *goes on* to the next one, both without cost.
+(`coordlang.use.export.naming`): after each joint step the state is *named* by its word, and then
+the sentence *stays* at this word or *goes on* to the next one, both without cost.
 
 Why its optimal plans are exactly the plans with the sentence, one to one:
 
@@ -18,8 +18,8 @@ Why its optimal plans are exactly the plans with the sentence, one to one:
    plans of the task, and by 2 it has the sentence.
 
 States elsewhere never matter to optimal plans, so this needs no list of all states, and holds for
-tasks that the language does not cover, too.  A plan of higher cost follows the sentence as far as it
-stays in states that the language maps.
+tasks that the language does not cover, too.  A plan of higher cost follows the sentence as far as
+it stays in states that the language maps.
 """
 
 from __future__ import annotations
@@ -106,7 +106,8 @@ class PddlExport:
         if labels is None:
             raise BadInput(
                 f"action {number} of the plan, {name!r}, is none of the exported problem",
-                remedy="Give a plan of the problem that this command exports, with the same arguments.",
+                remedy="Give a plan of the problem that this command exports, with the same "
+                "arguments.",
             )
         return labels
 

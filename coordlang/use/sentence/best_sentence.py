@@ -87,8 +87,10 @@ def best_sentence(
             heappush(queue, (graph.bound(longer), longer.words, pushed, longer))
         if (most is not None and entries > most) or entries * _ENTRY_BYTES > memory_left():
             raise OutOfMemory(
-                f"{prefixes:,} beginnings of sentences were looked at, and the best sentence is not decided yet",
-                remedy="Prefer the shortest sentence first, use a smaller task, or a larger --memory-limit.",
+                f"{prefixes:,} beginnings of sentences were looked at, and the best sentence is "
+                "not decided yet",
+                remedy="Prefer the shortest sentence first, use a smaller task, or a larger "
+                "--memory-limit.",
             )
     raise AssertionError("a task has at least one sentence")
 
@@ -123,8 +125,8 @@ class _Graph:
 
     A point is a plan-space node with what the preferences remember there.  Points are numbered from
     the start on, layer by layer.  ``following[p]`` holds pairs (point, number of joint actions);
-    ``node`` and ``word`` are those of each point.  The rest bounds the continuations of plans from p
-    on: ``more[p]`` is the least number of further words, ``grades[p]`` the least grade for each
+    ``node`` and ``word`` are those of each point.  The rest bounds the continuations of plans from
+    p on: ``more[p]`` is the least number of further words, ``grades[p]`` the least grade for each
     `PlanPreference`, and ``open[p]``, if ``most-plans`` is a preference, has for each next word how
     many plans from p can have one sentence with it, at most.
     """

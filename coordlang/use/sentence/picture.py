@@ -164,12 +164,15 @@ def _stack(items: list[_Item], column: Sequence[int], wanted: Sequence[float]) -
 
 def _open(width: float, height: float, title: str, task: str) -> list[str]:
     return [
-        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" width="{width:.0f}" height="{height:.0f}" '
-        f'viewBox="0 0 {width:.0f} {height:.0f}" font-family="ui-monospace, Menlo, Consolas, \'DejaVu Sans Mono\', '
+        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" width="{width:.0f}" '
+        f'height="{height:.0f}" '
+        f'viewBox="0 0 {width:.0f} {height:.0f}" font-family="ui-monospace, Menlo, Consolas, '
+        "'DejaVu Sans Mono', "
         f'monospace" font-size="{_FONT}">',
         f"<title>{escape(title)}</title>",
         f"<desc>{escape(task)}</desc>",
-        '<defs><marker id="head" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7" markerHeight="7" orient="auto">'
+        '<defs><marker id="head" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7" '
+        'markerHeight="7" orient="auto">'
         '<path d="M0,0.5 L8,4 L0,7.5 z" fill="#555"/></marker></defs>',
         f'<rect width="{width:.0f}" height="{height:.0f}" fill="#ffffff"/>',
     ]
@@ -185,7 +188,8 @@ def _heading(dag: PlanDag, ink: dict[str, Ink], title: Sequence[str]) -> list[st
     for word in dag.sentence:
         width = _CHAR * len(word) + 2 * _PAD
         out.append(
-            f'<rect x="{x:.1f}" y="56" width="{width:.1f}" height="{_BAND}" rx="4" fill="{ink[word].fill}"/>'
+            f'<rect x="{x:.1f}" y="56" width="{width:.1f}" height="{_BAND}" rx="4" '
+            f'fill="{ink[word].fill}"/>'
         )
         out.append(_text(x + _PAD, 69, word, colour=ink[word].text, weight="bold"))
         x += width + 6
@@ -227,7 +231,10 @@ def _node(
     ink: dict[str, Ink],
 ) -> list[str]:
     left = centre - item.width / 2
-    box = f'x="{left:.1f}" y="{item.y:.1f}" width="{item.width:.1f}" height="{item.height:.1f}" rx="4"'
+    box = (
+        f'x="{left:.1f}" y="{item.y:.1f}" width="{item.width:.1f}" height="{item.height:.1f}" '
+        'rx="4"'
+    )
     own = ink.get(word)
     out = [f"<g><title>{escape(key or lines[0])}</title>"]
     if own is None:  # several nodes as one
@@ -242,7 +249,8 @@ def _node(
         )
         y, h = item.y + _BAND, item.height - _BAND
         out.append(
-            f'<path d="M{left:.1f},{y:.1f} h{item.width:.1f} v{h:.1f} h-{item.width:.1f} z" fill="#ffffff"/>'
+            f'<path d="M{left:.1f},{y:.1f} h{item.width:.1f} v{h:.1f} h-{item.width:.1f} z" '
+            'fill="#ffffff"/>'
         )
         out.append(f'<rect {box} fill="none" stroke="{own.fill}" stroke-width="1.5"{dashes}/>')
     out += [

@@ -194,7 +194,7 @@ def _unmet_goal(task_language: TaskLanguage, row: Rows) -> str:
 def _not_optimal(
     task_language: TaskLanguage, plan: Sequence[Texts], executed: ExecutedPlan, step: int
 ) -> NotOptimal:
-    """The error that says how much too expensive a plan is, and where it leaves all optimal ones."""
+    """The error that says how much too expensive a plan is, and where it leaves optimal ones."""
     model, space = task_language.model, task_language.space
     makespan, second = space.cost_of(task_language.task)
     excess = len(plan) - makespan, executed.second - second

@@ -67,9 +67,9 @@ def goes_first(model: JointModel, robot: str) -> PlanPreference:
     """The preference that a robot goes first.
 
     A robot *acts* in a step if it neither idles nor does a subaction that has the same effect as
-    idling.  Robot r goes before robot q in a plan if, in the first step in which one of the two acts
-    and the other one does not, it is r that acts.  Grades: 0 if r goes before every other robot, 2
-    if some other robot goes before r, else 1.
+    idling.  Robot r goes before robot q in a plan if, in the first step in which one of the two
+    acts and the other one does not, it is r that acts.  Grades: 0 if r goes before every other
+    robot, 2 if some other robot goes before r, else 1.
 
     Raises `UsageError` for a robot that the model does not have.
     """

@@ -1,4 +1,4 @@
-"""coordlang inside unified-planning: an engine that plans for several robots, and under a sentence."""
+"""coordlang in unified-planning: an engine that plans for several robots, and under a sentence."""
 
 from __future__ import annotations
 

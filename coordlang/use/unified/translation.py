@@ -231,7 +231,8 @@ class _Writer:
         if node.is_iff():
             return f"(and (imply {parts[0]} {parts[1]}) (imply {parts[1]} {parts[0]}))"
         if node.is_exists() or node.is_forall():
-            return f"({'exists' if node.is_exists() else 'forall'} ({self.variables(node.variables())}) {parts[0]})"
+            quantifier = "exists" if node.is_exists() else "forall"
+            return f"({quantifier} ({self.variables(node.variables())}) {parts[0]})"
         for test, word in (("and", "and"), ("or", "or"), ("not", "not"), ("implies", "imply")):
             if getattr(node, f"is_{test}")():
                 return f"({' '.join((word, *parts))})"
@@ -259,7 +260,7 @@ class _Writer:
         return f"?{self.variable_names.of((variable.name,), f'any-{variable.name}')}"
 
     def predicate(self, fluent: Any, owner: Any) -> str:
-        """The predicate of a fluent; agents' own fluents with equal name and parameters share one."""
+        """The predicate of a fluent; agents' fluents with equal name and parameters share one."""
         if not fluent.type.is_bool_type():
             raise Unsupported(
                 f"fluent {fluent.name!r} of type {fluent.type}: only Boolean fluents are supported",
