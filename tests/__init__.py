@@ -1,0 +1,5 @@
+"""The tests: a folder for each package and room, ``support`` for what several of them need."""
+
+import pytest
+
+pytest.register_assert_rewrite("tests.support")

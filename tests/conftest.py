@@ -1,27 +1,15 @@
-"""Running the command line in this process: its exit code, output and messages."""
+"""Fixtures of all tests: the command line in this process, and a first language."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from coordlang.cli import run
-
-ROOT = Path(__file__).parent.parent
-DOMAINS = ROOT / "domains"
-
-
-@dataclass(frozen=True)
-class Outcome:
-    code: int
-    out: str
-    err: str
-
-
-Command = Callable[..., Outcome]
+from tests.support.command import Command, Outcome
+from tests.support.domains import DOMAINS, World, world_of
 
 
 @pytest.fixture
@@ -45,3 +33,9 @@ def language(coordlang: Command, t_map: tuple[Path, Path], tmp_path: Path) -> Pa
     path = tmp_path / "language.json"
     assert coordlang("build", *t_map, "--tasks", "all", "-o", path).code == 0
     return path
+
+
+@pytest.fixture(scope="session")
+def world() -> Callable[[str, str], World]:
+    """``world(folder, problem)``: the model, its reachable states and all optimal plans."""
+    return world_of

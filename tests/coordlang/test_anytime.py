@@ -18,8 +18,8 @@ from coordlang.language.file import read_language
 from coordlang.vocabulary.sat import PartitionProblem
 from planners.errors import OutOfMemory, OutOfTime
 from planners.limits import time_limit
-from tests.conftest import DOMAINS, Command
-from tests.coordlang.test_minimal import shipped
+from tests.support.command import Command
+from tests.support.domains import DOMAINS, all_tasks
 
 HANDOVER = DOMAINS / "handover"
 #: Three words are found soon; whether two suffice is open after minutes.
@@ -90,7 +90,7 @@ def test_words_are_kept_when_enlarging_them_is_stopped(
         raise error
 
     monkeypatch.setattr(coordlang.building, "verify_overlapping", stop)
-    built = build_language(shipped("grid", "gw1-2x2"), "minimal", overlap=True)
+    built = build_language(all_tasks("grid", "gw1-2x2"), "minimal", overlap=True)
     assert built.stopped is error
     assert built.language.also == {}
     assert len(built.language.words) == 3
@@ -106,11 +106,11 @@ def test_a_better_partition_found_on_the_way_is_kept(monkeypatch: pytest.MonkeyP
         raise OutOfTime("late")
 
     monkeypatch.setattr(sys.modules["coordlang.vocabulary.separating"]._AlphaOrBeta, "decide", late)
-    built = build_language(shipped("grid", "gw2-2x3"), "minimal")
+    built = build_language(all_tasks("grid", "gw2-2x3"), "minimal")
     assert isinstance(built.stopped, OutOfTime)
     assert (
         len(built.language.words)
-        < build_language(shipped("grid", "gw2-2x3"), "greedy").language.guarantee.size
+        < build_language(all_tasks("grid", "gw2-2x3"), "greedy").language.guarantee.size
     )
 
 

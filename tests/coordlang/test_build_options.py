@@ -10,7 +10,7 @@ from coordlang.building import BuildOptions, build_language
 from planners.errors import UsageError
 from planners.loading import ModelOptions
 from planners.pddl.robots import RobotSelection
-from tests.coordlang.test_minimal import shipped
+from tests.support.domains import all_tasks
 
 
 @pytest.mark.parametrize(
@@ -28,7 +28,7 @@ def test_bad_build_options(options: dict[str, Any], said: str) -> None:
         BuildOptions(**options)
     assert raised.match(f"(?s){said}")
     with pytest.raises(UsageError):
-        build_language(shipped("three-cells"), **options)
+        build_language(all_tasks("three-cells"), **options)
 
 
 def test_good_build_options() -> None:

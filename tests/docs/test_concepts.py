@@ -12,7 +12,7 @@ from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
-from tests.docs.pages import DOCS, code, rows, sections
+from tests.support.pages import DOCS, code, rows, sections
 
 
 def joint_space(

@@ -13,7 +13,8 @@ from planners.errors import Unsupported
 from planners.loading import build
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
-from tests.docs.pages import DOCS, ROOT, blocks, code, links, rows, sections
+from tests.support.domains import ROOT
+from tests.support.pages import DOCS, blocks, code, links, rows, sections
 
 PAGE = DOCS / "pddl.md"
 REFUSED = rows(sections(PAGE)["What is not supported"])

@@ -18,7 +18,8 @@ from coordlang.tasks.candidates import all_pairs
 from coordlang.tasks.task_file import read_task_file
 from planners.pddl import read_domain, read_problem
 from planners.search.plans import Plans, counts
-from tests.docs.pages import DOCS, ROOT, blocks
+from tests.support.domains import ROOT
+from tests.support.pages import DOCS, blocks
 
 DOMAIN, PROBLEM = (ROOT / "domains" / "t-map" / name for name in ("domain.pddl", "problem.pddl"))
 

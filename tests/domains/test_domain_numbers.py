@@ -8,7 +8,6 @@ import json
 import re
 from collections import Counter
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,8 +22,7 @@ from planners.search.optimal_plans import plan_spaces
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans, counts
 from planners.search.reachable import Space, explore
-
-DOMAINS = Path(__file__).resolve().parents[2] / "domains"
+from tests.support.domains import DOMAINS
 
 #: Table 1 of the paper: problem, tasks, states.
 ALL_TASKS = [

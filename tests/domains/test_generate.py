@@ -15,8 +15,7 @@ from gridmap import open_grid
 
 from planners.errors import UsageError
 from planners.loading import load
-
-DOMAINS = Path(__file__).resolve().parents[2] / "domains"
+from tests.support.domains import DOMAINS
 
 #: The folders that the generator writes; the other worlds are written by hand.
 MAPS = ("grid", "grid-joint", "three-cells", "t-map", "corridor")

@@ -8,8 +8,7 @@ import pytest
 from gridmap import open_grid, read_map, ring
 
 from planners.errors import BadInput
-
-SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
+from tests.support.domains import SHARED
 
 
 def written(tmp_path: Path, text: str) -> Path:

@@ -5,7 +5,6 @@ true.
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
@@ -15,24 +14,18 @@ import pytest
 
 from coordlang.building import build_language
 from coordlang.required.miscoordination import Inseparable, miscoordination
-from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
-from coordlang.tasks.task_file import read_task_file
 from coordlang.verification.by_definition import verify
 from planners.classical.fast_downward import optimal_cost
 from planners.joint.model import Cost
 from planners.loading import ModelOptions, PlanningInstance, load
-from planners.pddl import read_domain, read_problem
 from planners.pddl.robots import static_atoms
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from planners.search.reachable import Space
-
-ROOT = Path(__file__).resolve().parents[2]
-DOMAINS = ROOT / "domains"
-sys.path.insert(0, str(ROOT))  # this folder is no package, so pytest does not do it
-
-from tests.docs.pages import blocks, commands, links  # noqa: E402 - the path is set above
-from tests.docs.test_run import run_command  # noqa: E402 - the path is set above
+from tests.support.console import run_command
+from tests.support.domains import DOMAINS
+from tests.support.pages import blocks, commands, links
+from tests.support.readme_tables import Row, candidates, files, tables
 
 #: The folders, and how the robots are found in each.
 WORLDS = {
@@ -46,19 +39,6 @@ WORLDS = {
     "elevator": "type robot",
     "flags": ":agent of type robot",
 }
-
-Row = dict[str, str]
-
-
-def tables(folder: str, first: str) -> Iterator[Row]:
-    """The rows of the README tables whose first column is ``first``."""
-    text = (DOMAINS / folder / "README.md").read_text()
-    for table in re.findall(rf"^\| {first} \|.*\n(?:\|.*\n)+", text, re.MULTILINE):
-        columns, _, *rows = (
-            [cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines()
-        )
-        yield from (dict(zip(columns, row, strict=True)) for row in rows)
-
 
 PROBLEMS = [(folder, row) for folder in WORLDS for row in tables(folder, "problem")]
 LANGUAGES = [(folder, row) for folder in WORLDS for row in tables(folder, "language for")]
@@ -94,28 +74,6 @@ def test_the_table_of_problems(world, folder: str, row: Row) -> None:
 def plans_under(folder: str, problem: str, cost: Cost) -> int:
     loaded = load(*files(folder, problem), ModelOptions(cost=cost))
     return Plans.of(search(loaded.model, loaded.tasks[0])).count
-
-
-def files(folder: str, problem: str) -> tuple[Path, list[Path]]:
-    return DOMAINS / folder / "domain.pddl", [DOMAINS / folder / f"{problem}.pddl"]
-
-
-def candidates(folder: str, row: Row) -> Candidates:
-    """The tasks of a row about a language."""
-    path, (problem_path,) = files(folder, row["language for"])
-    domain = read_domain(path)
-    problems = [read_problem(problem_path, domain)]
-    words = row["options"].split()
-    cost = words[words.index("--cost") + 1] if "--cost" in words else "makespan"
-    options = ModelOptions(cost=cost, remember_actions="--remember-actions" in words)  # type: ignore[arg-type]
-    assert len(words) == 2 * ("--cost" in words) + options.remember_actions
-    match row["--tasks"]:
-        case "all":
-            return all_pairs(domain, problems, options)
-        case "its own":
-            return from_problems(domain, problems, options)
-        case name:
-            return from_listed(domain, problems, read_task_file(DOMAINS / folder / name), options)
 
 
 @by_language

@@ -8,25 +8,22 @@ coordination.
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from test_robot_worlds import DOMAINS, ROOT, Row, candidates, tables
+from telling import Feature, Plan, exactly, said, who, who_does_what
 
 from coordlang.building import build_language
 from coordlang.language.words import Language
 from coordlang.tasks.candidates import Candidates
 from coordlang.verification.by_definition import Verdict, verify
 from planners.joint.states import split_atoms
-from tests.docs.pages import blocks, commands
-from tests.docs.test_run import run_command
-
-sys.path.insert(0, str(ROOT / "benchmarks"))
-
-from telling import Feature, Plan, exactly, said, who, who_does_what
+from tests.support.console import run_command
+from tests.support.domains import DOMAINS
+from tests.support.pages import blocks, commands
+from tests.support.readme_tables import Row, candidates, tables
 
 #: Says of a state, given as its atoms, whether it belongs to a word.
 Word = Callable[[frozenset[str]], bool]

@@ -6,20 +6,16 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from dataclasses import replace
 from pathlib import Path
 
+import foreign
 import pytest
+from foreign_rows import BY_NAME, LANGUAGE_BY_NAME, LANGUAGES, ROWS, SHARED, Row
 
 from coordlang.cli import run
 from coordlang.required.miscoordination import Inseparable
 from coordlang.tasks.patterns import varied_tasks
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
-
-import foreign
-from foreign_rows import BY_NAME, LANGUAGE_BY_NAME, LANGUAGES, ROWS, SHARED, Row
 
 pytestmark = [
     pytest.mark.foreign,

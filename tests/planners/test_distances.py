@@ -11,7 +11,7 @@ from planners.loading import build
 from planners.search.optimal_plans import distances
 from planners.search.reachable import Space, explore
 from planners.tables import Bools
-from tests.coordlang.random_models import random_model
+from tests.support.random_models import random_model
 
 
 def by_definition(space: Space, reached: Bools) -> list[list[int]]:

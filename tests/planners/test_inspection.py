@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
-from random_pddl import KINDS, Kind, random_model
 
 from planners.inspection import inspect, unparse
 from planners.joint.composition import ComposingStepper
@@ -17,8 +15,8 @@ from planners.pddl.names import Names
 from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source, parse
 from planners.search.reachable import explore
-
-DOMAINS = Path(__file__).parents[2] / "domains"
+from tests.support.domains import DOMAINS
+from tests.support.random_pddl import KINDS, Kind, random_model
 
 PUSHING = """(define (domain pushing) (:types robot place heavy light)
   (:predicates (at ?r - robot ?p - place) (in ?x - (either heavy light) ?p - place) (glows ?p - place) (seen ?p - place))

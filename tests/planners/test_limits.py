@@ -7,7 +7,6 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,8 +26,7 @@ from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import count, explore
 from planners.tables import Rows
-
-DOMAINS = Path(__file__).parents[2] / "domains"
+from tests.support.domains import DOMAINS
 
 
 def late() -> OutOfTime:

@@ -1,0 +1,262 @@
+"""Certificates of lower bounds: what is written holds, and what was tampered with does not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import count
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from coordlang.building import Built, build_language, certificate_of
+from coordlang.certificate import (
+    Certificate,
+    Reason,
+    check,
+    encode,
+    read_certificate,
+    write_certificate,
+)
+from coordlang.certificate.encoding import core
+from coordlang.certificate.file import WarpingPath
+from coordlang.required.miscoordination import inseparable
+from coordlang.tasks.candidates import all_pairs, from_listed, from_problems
+from coordlang.tasks.task_file import read_task_file
+from coordlang.vocabulary.minimal import refute
+from planners.errors import BadInput, ProvedImpossible, Refuted
+from planners.loading import ModelOptions
+from planners.pddl import read_domain, read_problem
+from tests.support.candidates import states_of
+from tests.support.command import Command
+from tests.support.domains import DOMAINS, all_tasks
+from tests.support.random_models import random_model
+
+
+@pytest.fixture(scope="module")
+def built() -> Built:
+    return build_language(all_tasks("grid", "gw1-2x2"), "minimal")
+
+
+@pytest.fixture(scope="module")
+def certificate(built: Built) -> Certificate:
+    return certificate_of(built)
+
+
+def test_proves_the_minimum(built: Built, certificate: Certificate, tmp_path: Path) -> None:
+    write_certificate(certificate, tmp_path / "c.json.gz")
+    again = read_certificate(tmp_path / "c.json.gz")
+    assert again == certificate
+    checked = check(again, built.job.candidates)
+    assert checked.lower_bound == built.language.guarantee.size == 3
+    assert checked.reasons == len(certificate.reasons) > 1
+
+
+def test_any_solver_refutes_the_dimacs(built: Built, certificate: Certificate) -> None:
+    from pysat.formula import CNF
+    from pysat.solvers import Solver
+
+    text = check(certificate, built.job.candidates).dimacs()
+    assert "c 1: word 0 holds (at r1 c" in text
+    formula = CNF(from_string=text)
+    assert len(formula.clauses) > 20
+    for name in ("minisat22", "lingeling"):
+        with Solver(name=name, bootstrap_with=formula) as solver:
+            assert solver.solve() is False
+
+
+def test_a_language_satisfies_the_clauses_of_more_words(
+    built: Built, certificate: Certificate
+) -> None:
+    """The same reasons with one word more must be satisfiable: otherwise the encoding refutes
+    anything.
+    """
+    more = msgspec.structs.replace(certificate, refuted=3)
+    with pytest.raises(Refuted, match="leave languages with 3 words"):
+        check(more, built.job.candidates)
+
+
+def changed(certificate: Certificate, number: int, **fields: object) -> Certificate:
+    reasons = list(certificate.reasons)
+    reasons[number] = msgspec.structs.replace(reasons[number], **fields)
+    return msgspec.structs.replace(certificate, reasons=reasons)
+
+
+def _same_plan(reason: Reason) -> dict[str, object]:
+    return {
+        "plans": [reason.plans[0], reason.plans[0]],
+        "paths": [WarpingPath((0, 1), [(k, k) for k in range(len(reason.plans[0]) + 1)])],
+    }
+
+
+TAMPERED: list[tuple[str, Callable[[Reason], dict[str, object]]]] = [
+    ("is no optimal plan", lambda r: {"plans": [r.plans[0][:-1], r.plans[1]]}),
+    (
+        "is no optimal plan",
+        lambda r: {"plans": [r.plans[0], [["(move r1 c9 c9)", None], *r.plans[1][1:]]]},
+    ),
+    ("is no optimal plan", lambda r: {"plans": [r.plans[0], [step[:1] for step in r.plans[1]]]}),
+    ("the mixture of its plans is an optimal plan", _same_plan),
+    ("expected a plan for each of 2 robots", lambda r: {"plans": [*r.plans, r.plans[0]]}),
+    ("do not join all of its plans", lambda r: {"paths": []}),
+    ("is no warping path", lambda r: {"paths": [WarpingPath((0, 1), r.paths[0].cells[1:])]}),
+    ("is no warping path", lambda r: {"paths": [WarpingPath((0, 1), r.paths[0].cells[:-1])]}),
+    (
+        "is no warping path",
+        lambda r: {"paths": [WarpingPath((0, 1), [r.paths[0].cells[0], r.paths[0].cells[-1]])]},
+    ),
+    ("there are no plans", lambda r: {"paths": [WarpingPath((0, 2), r.paths[0].cells)]}),
+    ("is no candidate task", lambda r: {"goal": r.init}),
+    ("is no candidate task", lambda r: {"goal": r.goal[:1]}),
+    ("can never be true", lambda r: {"init": ["(at r1 nowhere)"]}),
+]
+
+
+@pytest.mark.parametrize(("what", "change"), TAMPERED)
+def test_tampered(
+    built: Built, certificate: Certificate, what: str, change: Callable[[Reason], dict[str, object]]
+) -> None:
+    number = next(n for n, r in enumerate(certificate.reasons) if len(r.paths[0].cells) > 2)
+    bad = changed(certificate, number, **change(certificate.reasons[number]))
+    with pytest.raises(Refuted, match=f"reason {number + 1} of the certificate is wrong.*{what}"):
+        check(bad, built.job.candidates)
+
+
+def test_missing_reasons_prove_nothing(built: Built, certificate: Certificate) -> None:
+    with pytest.raises(Refuted, match="leave languages with 2 words"):
+        check(
+            msgspec.structs.replace(certificate, reasons=certificate.reasons[:1]),
+            built.job.candidates,
+        )
+    with pytest.raises(Refuted, match="other robots"):
+        check(msgspec.structs.replace(certificate, robots=["a", "b"]), built.job.candidates)
+
+
+@pytest.mark.parametrize("method", ["greedy", "separating", "exhaustive"])
+def test_other_methods(method: str) -> None:
+    """A certificate for what the method proves, also where it met no counterexamples itself."""
+    built = build_language(all_tasks("three-cells"), method)
+    checked = check(certificate_of(built), built.job.candidates)
+    assert (
+        checked.lower_bound
+        == built.language.guarantee.lower_bound
+        == (3 if method == "exhaustive" else 2)
+    )
+
+
+def test_nothing_to_refute() -> None:
+    built = build_language(all_tasks("grid", "gw1-2x2"), "greedy")
+    with pytest.raises(ValueError, match="there is a language with 3 words"):
+        refute(built.job, 3)
+    with pytest.raises(ValueError, match="leave a partition into 1 words"):
+        core([], 1)
+    assert encode([frozenset({(0, 1)})], 1).refuted()
+    assert not encode([frozenset({(0, 1)})], 2).refuted()
+
+
+@pytest.mark.parametrize(
+    ("folder", "remember"),
+    [("tray", False), ("lock", True), ("charger", False), ("push-box", True)],
+)
+def test_three_robots(folder: str, remember: bool) -> None:
+    domain = read_domain(DOMAINS / folder / "domain.pddl")
+    problem = read_problem(DOMAINS / folder / "three-robots.pddl", domain)
+    built = build_language(
+        from_problems(domain, [problem], ModelOptions(remember_actions=remember)), "minimal"
+    )
+    assert (
+        check(certificate_of(built), built.job.candidates).lower_bound
+        == built.language.guarantee.size
+    )
+
+
+def test_task_file_with_symmetries() -> None:
+    """Images under symmetries, robot swaps among them, become plans of other candidate tasks."""
+    domain = read_domain(DOMAINS / "grid" / "domain.pddl")
+    problem = read_problem(DOMAINS / "grid" / "gwb5-3x3.pddl", domain)
+    tasks = read_task_file(DOMAINS / "grid" / "gwb5-3x3.tasks.json")
+    built = build_language(from_listed(domain, [problem], tasks), "minimal")
+    assert built.figures["symmetries"] > 0
+    certificate = certificate_of(built)
+    assert check(certificate, built.job.candidates).lower_bound == 3
+    fewer = from_listed(domain, [problem], tasks[:5])
+    with pytest.raises(Refuted, match="is no candidate task"):
+        check(certificate, fewer)
+
+
+@pytest.mark.parametrize(("robots", "number"), [(2, 12), (3, 5)])
+def test_random_models(robots: int, number: int) -> None:
+    """Every minimum of random models is proved by its certificate, and of none a larger one."""
+    bounds = []
+    for seed in count():
+        domain, problem, options = random_model(seed, robots)
+        try:
+            candidates = (all_pairs if seed % 3 else from_problems)(domain, [problem], options)
+        except ProvedImpossible:
+            continue
+        if not 0 < candidates.count <= 100 or states_of(candidates.spaces) > 12:
+            continue
+        if any(inseparable(space) is not None for space in candidates.spaces):
+            continue
+        built = build_language(candidates, "minimal")
+        if built.language.guarantee.size == 1 and seed % 50:
+            continue
+        certificate = certificate_of(built)
+        assert check(certificate, candidates).lower_bound == built.language.guarantee.size
+        with pytest.raises(Refuted, match="leave languages"):
+            check(msgspec.structs.replace(certificate, refuted=certificate.refuted + 1), candidates)
+        bounds.append(built.language.guarantee.size)
+        if len(bounds) == number:
+            break
+    assert max(bounds) > 2
+
+
+def test_command_line(coordlang: Command, tmp_path: Path) -> None:
+    files = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
+    language, proof, dimacs = tmp_path / "l.json", tmp_path / "c.json", tmp_path / "c.cnf"
+    made = coordlang(
+        "build",
+        *files,
+        "--tasks",
+        "all",
+        "--method",
+        "minimal",
+        "-o",
+        language,
+        "--certificate",
+        proof,
+    )
+    assert made.code == 0
+    good = coordlang("verify", language, *files, "--lower-bound", proof, "--dimacs", dimacs)
+    assert (good.code, good.out.splitlines()[-1].split(":")[0]) == (0, "lower bound 3")
+    assert "p cnf" in dimacs.read_text()
+    data = msgspec.json.decode(proof.read_bytes())
+    data["reasons"] = data["reasons"][1:2]
+    proof.write_bytes(msgspec.json.encode(data))
+    bad = coordlang("verify", language, *files, "--lower-bound", proof)
+    assert bad.code == 1
+    assert "leave languages with 2 words" in bad.err
+    data |= {"refuted": 1}
+    proof.write_bytes(msgspec.json.encode(data))
+    weak = coordlang("verify", language, *files, "--lower-bound", proof)
+    assert weak.code == 1
+    assert "says that 3 words are needed; the certificate proves 2 only" in weak.err
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{}",
+        '{"format": "coordlang/certificate", "version": 2}',
+        "[1]",
+        '{"format": "coordlang/certificate", "version": 1, "reasons": 3}',
+    ],
+)
+def test_what_is_no_certificate(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "c.json"
+    path.write_text(text)
+    with pytest.raises(BadInput, match=r"c\.json"):
+        read_certificate(path)
+    with pytest.raises(BadInput, match="no such file"):
+        read_certificate(tmp_path / "none.json")

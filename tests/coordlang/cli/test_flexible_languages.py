@@ -1,0 +1,96 @@
+"""``build --prefer flexible`` and ``--overlap``: what is printed, written, and verified again."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from tests.support.command import Command
+from tests.support.domains import DOMAINS
+
+GRID = DOMAINS / "grid"
+SQUARE = GRID / "domain.pddl", GRID / "gw1-2x2.pddl"
+
+
+def test_prefer_flexible(tmp_path: Path, coordlang: Command) -> None:
+    path = tmp_path / "l.json"
+    outcome = coordlang(
+        "build",
+        *SQUARE,
+        "--tasks",
+        "all",
+        "--method",
+        "minimal",
+        "--prefer",
+        "flexible",
+        "-o",
+        path,
+        "--json",
+    )
+    figures = json.loads(outcome.out)
+    assert outcome.code == 0
+    assert figures["words"] == figures["lower_bound"] == 3
+    assert (
+        figures["flexibility_before"]
+        < figures["flexibility"]
+        <= figures["flexibility_bound"] + 1e-9
+    )
+    assert 0 < figures["communication_saving"] < 1
+    assert coordlang("verify", path, *SQUARE).code == 0
+    again = tmp_path / "again.json"
+    coordlang(
+        "build",
+        *SQUARE,
+        "--tasks",
+        "all",
+        "--method",
+        "minimal",
+        "--prefer",
+        "flexible",
+        "-o",
+        again,
+    )
+    first, second = (json.loads(p.read_text()) for p in (path, again))
+    assert first["states"] == second["states"]
+
+
+def test_the_summary_says_what_is_left_open(tmp_path: Path, coordlang: Command) -> None:
+    arguments = ("--tasks", "all", "--method", "exhaustive", "--prefer", "flexible", "--overlap")
+    files = DOMAINS / "three-cells" / "domain.pddl", DOMAINS / "three-cells" / "problem.pddl"
+    outcome = coordlang("build", *files, *arguments, "-o", tmp_path / "l.json")
+    assert outcome.code == 0
+    assert "a sentence leaves 1.20 plans open on average (1.20 before, 1.20 at most)" in outcome.out
+    assert "0 further words of states" in outcome.out
+
+
+def test_prefer_belongs_to_the_exact_methods(tmp_path: Path, coordlang: Command) -> None:
+    outcome = coordlang("build", *SQUARE, "--prefer", "flexible", "-o", tmp_path / "l.json")
+    assert outcome.code == 2
+    assert "--prefer flexible belongs to --method minimal or exhaustive" in outcome.err
+    assert not (tmp_path / "l.json").exists()
+
+
+def test_overlapping_words_are_written_and_verified(tmp_path: Path, coordlang: Command) -> None:
+    path = tmp_path / "l.json"
+    outcome = coordlang("build", *SQUARE, "--tasks", "all", "--overlap", "-o", path, "--json")
+    figures = json.loads(outcome.out)
+    assert outcome.code == 0
+    assert figures["overlapping_words"] > 0
+    assert figures["overlapping_flexibility"] > figures["partition_flexibility"]
+    data = json.loads(path.read_text())
+    assert sum(map(len, data["also"].values())) == figures["overlapping_words"]
+    outcome = coordlang("verify", path, *SQUARE)
+    assert outcome.code == 0
+    assert "words overlap, every optimal plan has a sentence whose plans mix freely" in outcome.out
+    # All words for all states: no sentence is usable any more.
+    data["also"] = {
+        state: [w for w in data["words"][:3] if w != word] for state, word in data["states"].items()
+    }
+    path.write_text(json.dumps(data))
+    outcome = coordlang("verify", path, *SQUARE)
+    assert outcome.code == 1
+    assert outcome.out.startswith("refuted: plans with the sentence")
+    assert "breaks here" in outcome.out
+    data["also"] = {"(at r1 c0-0) (at r2 c0-1)": ["w99"]}
+    path.write_text(json.dumps(data))
+    assert coordlang("verify", path, *SQUARE).code == 31

@@ -1,0 +1,221 @@
+"""The recipes that search and draw: small runs of each, looked at."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from coordlang.evaluation.experiments import planning_cost, scenario, table1
+from coordlang.evaluation.experiments.registry import RECIPES
+from coordlang.evaluation.lab.recipe import Record, Settings, Unit, table
+from coordlang.evaluation.lab.results import name_of
+from coordlang.evaluation.material.grid_drawing import place_of, position
+from coordlang.evaluation.material.languages import language_for
+from coordlang.evaluation.material.paper import (
+    DIFFERING,
+    OPEN_ALL,
+    OPEN_SEVERAL,
+    SAVING_ALL,
+    SAVING_DIFFERING,
+    SEVERAL,
+    TABLE_1,
+)
+from coordlang.evaluation.material.suite import OTHERS, ROWS, WORLDS, find_domains
+from coordlang.use.sentence.guided_search import ExpandedStates
+from coordlang.use.sentence.task_language import languages_in_tasks
+from coordlang.vocabulary.sat import PartitionProblem
+from planners.errors import OutOfTime, UsageError
+from planners.search.plans import Plans
+from tests.support.domains import DOMAINS
+from tests.support.task_languages import task_languages, three_cells
+
+
+def test_the_papers_figures_agree_with_each_other() -> None:
+    """Tasks that do not differ save nothing; tasks without several plans have one."""
+    assert pytest.approx(SAVING_DIFFERING * DIFFERING / 956, abs=5e-4) == SAVING_ALL
+    assert pytest.approx((OPEN_SEVERAL * SEVERAL + (956 - SEVERAL)) / 956, abs=0.05) == OPEN_ALL
+
+
+@pytest.mark.parametrize("name", ["GW1", "GW2", "GWB5", "GWB6"])
+def test_rows_are_the_papers(name: str) -> None:
+    candidates = WORLDS[name].candidates(DOMAINS)
+    assert (candidates.count, candidates.states) == (TABLE_1[name].tasks, TABLE_1[name].states)
+
+
+def test_every_row_and_world_has_its_files() -> None:
+    assert [world.name for world in ROWS] == list(TABLE_1)
+    for world in (*ROWS, *OTHERS):
+        assert all((DOMAINS / name).is_file() for name in world.files)
+    with pytest.raises(UsageError, match="no domains"):
+        find_domains("no/such/folder")
+
+
+def test_units_have_names_of_their_own(tmp_path: Path) -> None:
+    whole = Settings(DOMAINS, tmp_path)
+    for settings in (Settings(DOMAINS, tmp_path, quick=True), whole):
+        units = [unit for recipe in RECIPES.values() for unit in recipe.units(settings)]
+        assert len({name_of(unit) for unit in units}) == len(units)
+        assert {unit.experiment for unit in units} == set(RECIPES)
+        assert all(unit.files for unit in units)
+    # Each on grids and on worlds that are none.
+    grids = {
+        name: {
+            u.parameters.get("world", "grid") in {w.name for w in OTHERS}
+            for u in recipe.units(whole)
+        }
+        for name, recipe in RECIPES.items()
+    }
+    assert all(kinds == {True, False} for kinds in grids.values())
+
+
+def test_expansions_on_three_cells() -> None:
+    """By hand: the start, then a state after one step; from all but one of them the goal is a step
+    away, and comes up next.
+    """
+    one = three_cells()
+    terrain = ExpandedStates(one.model, one.partition)
+    assert planning_cost.expansions(one, "blind", terrain) == (2, 2, 2)
+    assert planning_cost.expansions(one, "relaxed", terrain) == (2, 2, 2)
+
+
+def test_a_sentence_saves_work() -> None:
+    tasks = task_languages("tray", "serve", "greedy")
+    terrain = ExpandedStates(tasks[0].model, tasks[0].partition)
+    counted = [
+        planning_cost.expansions(one, "relaxed", terrain) for one in Random(1).sample(tasks, 40)
+    ]
+    alone, pruned, bounded = (sum(column) for column in zip(*counted, strict=True))
+    assert bounded <= pruned < alone
+
+
+def test_the_detour_is_optimal_and_nobody_else_moves_otherwise(tmp_path: Path) -> None:
+    settings = Settings(DOMAINS, tmp_path)
+    candidates, language = language_for(
+        scenario.CORRIDOR, "greedy", settings, scenario.trading_rooms()
+    )
+    assert candidates.count == 36 * 36
+    one = next(
+        s
+        for s in languages_in_tasks(language, candidates)
+        if scenario._ends(s) == (scenario.START, scenario.GOAL)
+    )
+    found = scenario.detour(one)
+    way, (agreed, other) = found["detour"], found["agreed"]
+    assert scenario.PLACE in way
+    assert scenario.PLACE not in agreed
+    assert found["optimal"] is True
+    # Looked at without the library: one step at a time, never in one cell, never through each
+    # other.
+    for r1, r2 in ((agreed, other), (way, other)):
+        assert (r1[0], r2[0], r1[-1], r2[-1]) == (*scenario.START, *scenario.GOAL)
+        assert len(r1) == len(r2) == len(agreed)
+        for (a, b), (c, d) in zip(
+            zip(r1, r2, strict=True), zip(r1[1:], r2[1:], strict=True), strict=False
+        ):
+            assert c != d
+            assert (a, b) != (d, c)
+            for before, after in ((a, c), (b, d)):
+                rows, columns = zip(position(before), position(after), strict=True)
+                assert abs(rows[0] - rows[1]) + abs(columns[0] - columns[1]) <= 1
+    # All parts of robot 1 through the place, by listing the plans.
+    wanted = {n for n, text in enumerate(one.model.labels[0]) if place_of(text) == scenario.PLACE}
+    parts = {tuple(step[0] for step in plan) for plan in Plans.of(one.space, one.task)}
+    assert found["parts"] == sum(bool(wanted & set(part)) for part in parts)
+    assert 0 < found["ways"] <= found["parts_that_fit"] <= found["parts"]
+
+
+def test_freedom_on_three_cells() -> None:
+    """Agreed: r1 a..a..b with one move, r2 b..c..a with two.  Under b c a r1 may as well move
+    first: the same subaction.
+    """
+    one = three_cells()
+    found = scenario.freedom([one])
+    assert found == {
+        "plan": 3,
+        "sentence": 0,
+        "optimal": 3,
+    }  # r1 could go through c, and r2 straight
+
+
+def test_places() -> None:
+    assert place_of("(move r1 c0-0 c2-11)") == "c2-11"
+    assert place_of("(move r1 a b)") is None
+    with pytest.raises(ValueError, match="no cell"):
+        position("kitchen")
+
+
+def test_languages_are_kept_and_unfinished_ones_are_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = Settings(DOMAINS, tmp_path / "cache")
+    world = WORLDS["GW1"]
+    _, first = language_for(world, "minimal", settings)
+    kept = list((tmp_path / "cache").glob("*.json.gz"))
+    assert len(kept) == 1
+    stamp = kept[0].stat().st_mtime_ns
+    candidates, again = language_for(world, "minimal", settings)
+    assert kept[0].stat().st_mtime_ns == stamp
+    assert dict(again.states) == dict(first.states)
+    assert len(again.partition(candidates.model).words) == 3
+
+    def late(*_: object) -> bool:
+        raise OutOfTime("the time limit is over")
+
+    monkeypatch.setattr(PartitionProblem, "solve", late)
+    with pytest.raises(OutOfTime):
+        language_for(WORLDS["GW2"], "minimal", settings)
+    assert list((tmp_path / "cache").glob("*.json.gz")) == kept
+
+
+def record(world: str, column: str, **result: object) -> Record:
+    unit = Unit("table1", f"{world}/{column}", {"world": world, "column": column}, ())
+    return Record(unit, "done", dict(result), 1.0)
+
+
+def test_what_table_1_says_of_the_paper() -> None:
+    """Told from the results: other numbers, other sentences."""
+    base = {
+        "tasks": 132,
+        "states": 12,
+        "divergences": 68,
+        "proved_minimal": False,
+        "stopped": False,
+        "work": {},
+    }
+    least = {**base, "work": {"separating_lower_bound": 8}, "words": 8}
+    records = [
+        record("GW1", "greedy", **base, words=8),
+        record("GW1", "least alpha", **least),
+        record("GW1", "minimal", **{**base, "proved_minimal": True}, words=3),
+        record("GW1", "orders", words={"by number": 8, "random 1": 9}),
+    ]
+    section = table1.section(records)
+    assert "| GW1 | 132 | 12 | 68 | 7 (exact 3) | 8 | 8 to 9 | 8* |" in "\n".join(
+        map(str, section.blocks)
+    )
+    told = "\n".join(section.differences)
+    assert "On GW1 the paper's number is outside of what 2 orders gave" in told
+    assert "GW1 (7 against 8)" in told
+    assert "2.3 to 2.3 times smaller" in told
+    assert section.headlines == (("GW1: words", "7", "8", "3*"),)
+    same = [
+        record("GW1", "greedy", **base, words=7),
+        record("GW1", "orders", words={"by number": 6, "random 1": 8}),
+    ]
+    assert table1.section(same).differences == ()
+    wrong = [record("GW1", "greedy", **{**base, "tasks": 131}, words=7)]
+    assert "Tasks or states" in table1.section(wrong).differences[0]
+
+
+def test_random_numbers_belong_to_a_unit() -> None:
+    one, other = Unit("table1", "GW1/orders", {}, ()), Unit("table1", "GW2/orders", {}, ())
+    drawn = [unit.random(seed).random() for unit in (one, other) for seed in (0, 1)]
+    assert drawn == [unit.random(seed).random() for unit in (one, other) for seed in (0, 1)]
+    assert len(set(drawn)) == 4
+
+
+def test_tables() -> None:
+    text = table(("a", "b"), [["x", 1234], ["y", None]])
+    assert text == "| a | b |\n| --- | --: |\n| x | 1,234 |\n| y | – |"

@@ -1,0 +1,241 @@
+"""What a sentence asks, against a list of its plans."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from random import Random
+
+import numpy as np
+import pytest
+
+from coordlang.building import build_language
+from coordlang.explanation import word_formulas
+from coordlang.explanation.demands import SentenceDemands, sentence_demands
+from coordlang.explanation.text import demands_text
+from coordlang.tasks.candidates import all_pairs, from_problems
+from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
+from planners.errors import ProvedImpossible
+from planners.pddl import read_domain, read_problem
+from planners.search.plans import Plan, Plans
+from tests.support import naive
+from tests.support.command import Command
+from tests.support.domains import DOMAINS, all_tasks
+from tests.support.languages import language_of, random_language
+from tests.support.random_models import random_model
+
+
+def by_sentence(task_language: TaskLanguage, most: int) -> dict[tuple[int, ...], list[Plan]]:
+    word = task_language.partition.word_of(task_language.space.rows)
+    groups: dict[tuple[int, ...], list[Plan]] = {}
+    for plan in naive.listed(task_language.space, task_language.task, most):
+        said = naive.sentence(
+            [int(word[s]) for s in naive.states(task_language.space, task_language.task, plan)]
+        )
+        groups.setdefault(said, []).append(plan)
+    return groups
+
+
+def check(
+    task_language: TaskLanguage,
+    words: tuple[int, ...],
+    plans: list[Plan],
+    found: SentenceDemands,
+    few: int,
+) -> None:
+    model = task_language.model
+    assert found.sentence == tuple(task_language.partition.words[w] for w in words)
+    assert (found.plans, found.steps) == (len(plans), len(plans[0]))
+    for robot, part in enumerate(found.parts):
+        texts = {
+            tuple(model.texts(step)[robot] for step in plan) for plan in plans
+        }  # the texts here still have the robot's name and the parentheses
+        assert part.subplans == len(texts)
+        assert len(part.listed) == (len(texts) if len(texts) <= few else 0)
+        short = {tuple(t and own_text(t, model.robots[robot]) for t in text) for text in texts}
+        assert len(texts) > few or set(part.listed) == short
+        assert [set(own) for own in part.by_step] == [
+            set(step) for step in zip(*short, strict=True)
+        ]
+    assert [(c.before, c.after) for c in found.changes] == list(
+        zip(found.sentence, found.sentence[1:], strict=False)
+    )
+    space = task_language.space
+    word = task_language.partition.word_of(space.rows)
+    steps: list[set[int]] = [set() for _ in found.changes]
+    for plan in plans:
+        said = [int(word[s]) for s in naive.states(space, task_language.task, plan)]
+        for number, step in enumerate(k for k in range(1, len(said)) if said[k] != said[k - 1]):
+            steps[number].add(step)
+    assert [(c.earliest, c.latest) for c in found.changes] == [(min(s), max(s)) for s in steps]
+    assert [set().union(*(when for _, when in c.ways)) for c in found.changes] == steps
+
+
+def own_text(label: str, robot: str) -> str:
+    return label.strip("()").replace(f" {robot} ", " ").removesuffix(f" {robot}")
+
+
+@pytest.mark.parametrize("robots", [2, 3])
+def test_against_listed_plans(robots: int) -> None:
+    seen: Counter[str] = Counter()
+    for seed in range(20):
+        domain, problem, options = random_model(seed, robots)
+        try:
+            candidates = (all_pairs if seed % 3 else from_problems)(domain, [problem], options)
+        except ProvedImpossible:
+            continue
+        if not 0 < candidates.count <= 300:
+            continue
+        language = random_language(
+            Random(seed), candidates
+        )  # RC or not: what is asked is about listed plans
+        formulas = word_formulas(language, candidates.model)
+        for task_language in list(languages_in_tasks(language, candidates))[:8]:
+            try:
+                groups = by_sentence(task_language, 60)
+            except naive.TooLarge:
+                continue
+            for words, plans in groups.items():
+                few = 2
+                found = sentence_demands(
+                    task_language.plans_with(words), task_language.partition, formulas, few
+                )
+                check(task_language, words, plans, found, few)
+                assert demands_text(found)
+                seen["changes"] += len(found.changes) > 0
+                seen["many subplans"] += any((p.subplans or 0) > few for p in found.parts)
+                for change in found.changes:
+                    seen[f"{len(change.robots)} decide"] += 1
+    assert all(
+        seen[case] for case in ("changes", "many subplans", "0 decide", "1 decide", "2 decide")
+    ), seen
+
+
+def test_changes_that_may_come_sooner_or_later() -> None:
+    """Three words that say in which third of the grid a robot is."""
+    domain = read_domain(DOMAINS / "grid" / "domain.pddl")
+    candidates = from_problems(
+        domain, [read_problem(DOMAINS / "grid" / "corners-4x4.pddl", domain)]
+    )
+    keys = [candidates.model.codec.key(row) for row in candidates.rows]
+    words = {key: f"w{min(2, int(key.split('(at r1 c')[1][0]))}" for key in keys}
+    language = language_of(words, ("w0", "w1", "w2"))
+    formulas = word_formulas(language, candidates.model)
+    (task_language,) = languages_in_tasks(language, candidates)
+    several = 0
+    for said, plans in by_sentence(task_language, 10_000).items():
+        found = sentence_demands(
+            task_language.plans_with(said), task_language.partition, formulas, 3
+        )
+        check(task_language, said, plans, found, 3)
+        assert all(change.robots == ("r1",) for change in found.changes)
+        several += sum(change.earliest < change.latest for change in found.changes)
+    assert several
+
+
+@pytest.mark.parametrize(
+    ("folder", "stem", "every"), [("t-map", "problem", 3), ("grid", "gw2-2x3", 100)]
+)
+def test_who_decides_a_change(folder: str, stem: str, every: int) -> None:
+    """In every state before the change: these robots' subactions settle it, and no smaller set of
+    robots does.
+    """
+    candidates = all_tasks(folder, stem)
+    language = build_language(candidates, "greedy").language
+    formulas = word_formulas(language, candidates.model)
+    sizes: Counter[int] = Counter()
+    for task_language in list(languages_in_tasks(language, candidates))[::every]:
+        for words in by_sentence(task_language, 1000):
+            fits = task_language.plans_with(words)
+            found = sentence_demands(fits, task_language.partition, formulas)
+            for number, change in enumerate(found.changes):
+                before = states_before(fits, task_language, number)
+                robots = [task_language.model.robots.index(r) for r in change.robots]
+                assert settled(task_language, before, words[number + 1], robots)
+                for left_out in robots:
+                    assert not settled(
+                        task_language,
+                        before,
+                        words[number + 1],
+                        [r for r in robots if r != left_out],
+                    )
+                sizes[len(robots)] += 1
+    assert sizes[1], sizes
+    assert sizes[2], sizes
+
+
+def states_before(fits: object, task_language: TaskLanguage, number: int) -> set[int]:
+    """The states in which a plan is just before its change of word ``number``, by following all
+    plans.
+    """
+    found = set()
+    word = task_language.partition.word_of(task_language.space.rows)
+    plans = Plans.of(fits)  # type: ignore[arg-type]
+    for plan in plans:
+        states = plans.states(plan)
+        changes = [k for k in range(1, len(states)) if word[states[k]] != word[states[k - 1]]]
+        found.add(states[changes[number] - 1])
+    return found
+
+
+def settled(task_language: TaskLanguage, states: set[int], after: int, robots: list[int]) -> bool:
+    mapped = set(task_language.language.states)
+    for state in states:
+        answer: dict[tuple[int, ...], bool] = {}
+        steps = task_language.model.successors(task_language.space.rows[[state]])
+        for labels, result in zip(steps.labels.tolist(), steps.result, strict=True):
+            if task_language.model.codec.key(result) not in mapped:
+                continue
+            own = tuple(labels[r] for r in robots)
+            makes = int(task_language.partition.word_of(np.array([result]))[0]) == after
+            if answer.setdefault(own, makes) != makes:
+                return False
+    return True
+
+
+def test_the_running_example_in_plain_sentences() -> None:
+    domain = read_domain(DOMAINS / "three-cells" / "domain.pddl")
+    candidates = from_problems(
+        domain, [read_problem(DOMAINS / "three-cells" / "problem.pddl", domain)]
+    )
+    language = build_language(candidates, "greedy").language
+    formulas = word_formulas(language, candidates.model)
+    (task_language,) = languages_in_tasks(language, candidates)
+    found = sentence_demands(
+        task_language.plans_with(task_language.words_of("w1 w0")), task_language.partition, formulas
+    )
+    assert demands_text(found).splitlines() == [
+        '"w1 w0" leaves 2 plans open.',
+        "  r1: move a c, move c b.",
+        "  r2 may choose:",
+        "    wait, move b a",
+        "    move b a, wait",
+        "  w1 -> w0 in step 1: r1 decides it by move a c.",
+    ]
+
+
+def test_command_refusals(
+    coordlang: Command, language: object, t_map: tuple[object, object]
+) -> None:
+    assert coordlang("explain", language, *t_map, "--sentence", "w0").code == 2
+    wrong = coordlang("explain", language, *t_map, "--task", "--sentence", "w3 w0")
+    assert wrong.code == 1
+    assert "no optimal plan has the sentence" in wrong.err
+    unknown = coordlang("explain", language, *t_map, "--task", "--sentence", "hello")
+    assert unknown.code == 31
+
+
+def test_json(coordlang: Command, language: object, t_map: tuple[object, object]) -> None:
+    data = json.loads(coordlang("explain", language, *t_map, "--task", "--json").out)
+    assert data["told"]["rules"][-1]["text"] is None
+    assert {word: formula["states"] for word, formula in data["formulas"].items()} == data["words"]
+    assert data["formulas"]["w0"]["pddl"] == "(and (not (at r1 c1-1)) (not (at r2 c1-1)))"
+    assert sum(s["plans"] for s in data["sentences"]) == 2
+    for said in data["sentences"]:
+        assert said["sentence"].split() == [
+            said["changes"][0]["from"],
+            *(c["to"] for c in said["changes"]),
+        ]
+        assert [len(robot["listed"][0]) for robot in said["robots"]] == [said["steps"]] * 2
+    each = coordlang("explain", language, *t_map, "--each").out
+    assert "every other state" not in each

@@ -1,0 +1,346 @@
+"""Formulas against their definition: state by state, and the fewest boxes by trying all of them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from itertools import combinations, product
+from random import Random
+
+import numpy as np
+import pytest
+
+from coordlang.building import build_language
+from coordlang.explanation import Cover, Literal, Variable, word_formulas
+from coordlang.explanation.boxes import Points, expand
+from coordlang.explanation.descriptions import describe_words
+from coordlang.explanation.minimise import minimise
+from coordlang.explanation.text import literal_text, pddl_condition, shown
+from coordlang.explanation.variables import truth, valuation
+from coordlang.explanation.words import all_covers, mapped_states
+from coordlang.language.words import Language
+from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
+from planners.errors import ProvedImpossible
+from planners.joint.model import show
+from planners.loading import ModelOptions
+from planners.pddl import read_domain, read_problem
+from planners.pddl.lifted import Atom
+from planners.search.reachable import explore
+from tests.support.domains import DOMAINS, all_tasks
+from tests.support.languages import language_of, random_language
+from tests.support.random_models import random_model
+
+
+def listed(conjunction: tuple[str, ...], atoms: set[str]) -> bool:
+    """A conjunction of ground literals as PDDL reads it."""
+    return all(
+        text[5:-1] not in atoms if text.startswith("(not ") else text in atoms
+        for text in conjunction
+    )
+
+
+def check_exact(language: Language, candidates: Candidates, formulas: dict[str, Cover]) -> None:
+    model = candidates.model
+    for key, word in language.states.items():
+        atoms = set(model.codec.decode(model.codec.parse_key(key)))
+        assert [w for w, formula in formulas.items() if formula.holds(atoms)] == [word]
+        assert [
+            w for w, f in formulas.items() if any(listed(c, atoms) for c in f.conditions())
+        ] == [word]
+    for word, formula in formulas.items():
+        assert formula.states == sum(w == word for w in language.states.values())
+        for term, count in zip(formula.terms, formula.counts, strict=True):
+            alone = Cover((term,), (count,), 0, False)
+            mine = [k for k, w in language.states.items() if w == word]
+            assert (
+                count
+                == sum(alone.holds(model.codec.decode(model.codec.parse_key(k))) for k in mine)
+                > 0
+            )
+
+
+@pytest.mark.parametrize("robots", [2, 3])
+def test_exactly_one_formula_is_true_in_every_mapped_state(robots: int) -> None:
+    seen: Counter[str] = Counter()
+    for seed in range(24):
+        random = Random(seed)
+        domain, problem, options = random_model(seed, robots)
+        try:
+            candidates = (all_pairs if seed % 2 else from_problems)(domain, [problem], options)
+        except ProvedImpossible:
+            continue
+        if not 0 < candidates.count <= 600:
+            continue
+        language = random_language(random, candidates)
+        mapped = mapped_states(language, candidates.model)
+        formulas = all_covers(mapped)
+        check_exact(language, candidates, formulas)
+        told = describe_words(mapped, formulas)
+        for key, word in language.states.items():
+            atoms = candidates.model.codec.decode(candidates.model.codec.parse_key(key))
+            true = [w for w, formula in told.rules if formula is None or formula.holds(atoms)]
+            assert word in true
+            assert (
+                true[0] == word
+                if told.in_order
+                else [w for w in true if dict(told.rules)[w]] in ([word], [])
+            )
+        seen["in order"] += told.in_order
+        seen["every other state"] += any(formula is None for _, formula in told.rules)
+        seen["each"] += all(formula is not None for _, formula in told.rules)
+        seen["several terms"] += any(len(f.terms) > 1 for f in formulas.values())
+        seen["a word without states"] += any(not f.states for f in formulas.values())
+        seen["several values"] += any(len(v.values) > 2 for v in mapped.valuation.variables)
+    assert all(
+        seen[case]
+        for case in ("every other state", "each", "several terms", "a word without states")
+    ), seen
+    assert seen["several values"]
+
+
+@pytest.mark.parametrize(
+    ("folder", "stem", "method"),
+    [
+        ("t-map", "problem", "minimal"),
+        ("grid", "gwb2-3x3", "greedy"),
+        ("charger", "queue", "greedy"),
+        ("grid-joint", "gw2-2x3", "greedy"),
+    ],
+)
+def test_exact_on_shipped_domains(folder: str, stem: str, method: str) -> None:
+    domain = read_domain(DOMAINS / folder / "domain.pddl")
+    make = from_problems if folder == "charger" else all_pairs
+    candidates = make(domain, [read_problem(DOMAINS / folder / f"{stem}.pddl", domain)])
+    language = build_language(candidates, method).language
+    check_exact(language, candidates, word_formulas(language, candidates.model))
+
+
+def test_where_a_robot_is() -> None:
+    """The three words of the running example say where one of the robots is."""
+    candidates = all_tasks("three-cells")
+    language = build_language(candidates, "minimal").language
+    formulas = word_formulas(language, candidates.model)
+    for robot in ("r1", "r2"):
+        if {shown(f) for f in formulas.values()} == {f"at({robot}) = {cell}" for cell in "abc"}:
+            break
+    else:
+        raise AssertionError({w: shown(f) for w, f in formulas.items()})
+    assert all(f.fewest and f.length == 1 and len(f.conditions()) == 1 for f in formulas.values())
+
+
+def test_text_and_pddl() -> None:
+    """One robot's place out of three, and everything else: as text, and as PDDL where a set of
+    values needs negations.
+    """
+    candidates = all_tasks("three-cells")
+    keys = [candidates.model.codec.key(row) for row in candidates.rows]
+    language = language_of(
+        {key: "w1" if "(at r1 a)" in key else "w0" for key in keys}, ("w0", "w1")
+    )
+    formulas = word_formulas(language, candidates.model)
+    assert shown(formulas["w1"]) == "at(r1) = a"
+    assert pddl_condition(formulas["w1"]) == "(at r1 a)"
+    assert shown(formulas["w0"]) == "at(r1) != a"
+    assert pddl_condition(formulas["w0"]) == "(not (at r1 a))"
+    one = word_formulas(language_of(dict.fromkeys(keys, "w0"), ("w0", "w1")), candidates.model)
+    assert [shown(one["w0"]), shown(one["w1"])] == ["true", "false"]
+    assert [pddl_condition(one["w0"]), pddl_condition(one["w1"])] == ["(and)", "(or)"]
+
+
+def test_conditions_of_sets_of_values() -> None:
+    """Not excluding the others, where "none of them" is one of the others; and text that says which
+    are excluded.
+    """
+    atoms = tuple(Atom("at", ("b", place)) for place in "xyz")
+    places = tuple(("at(b)", place) for place in "xyz")
+    carried = Variable("at(b)", (*atoms, None), (*places, ("at(b)", "none")))
+    somewhere = Literal(carried, frozenset(atoms[:2]))
+    assert somewhere.conjunctions() == [{atoms[0]: True}, {atoms[1]: True}]
+    assert literal_text(somewhere) == "at(b) in {x, y}"
+    assert Literal(carried, frozenset((atoms[0], None))).conjunctions() == [
+        {atoms[1]: False, atoms[2]: False}
+    ]
+    assert literal_text(Literal(carried, frozenset(atoms))) == "at(b) != none"
+    lying = Variable("at(b)", atoms, places)
+    assert Literal(lying, frozenset(atoms[:2])).conjunctions() == [{atoms[2]: False}]
+    both = Variable(
+        "free/holds(r)",
+        (Atom("free", ("r",)), Atom("holds", ("r", "b")), Atom("holds", ("r", "c"))),
+        (("free(r)", ""), ("holds(r)", "b"), ("holds(r)", "c")),
+    )
+    assert literal_text(Literal(both, frozenset(both.values[:1]))) == "free(r)"
+    assert literal_text(Literal(both, frozenset(both.values[1:]))) == "not free(r)"
+    for variable in (carried, lying, both):
+        for size in range(1, len(variable.values)):
+            for values in combinations(variable.values, size):
+                literal = Literal(variable, frozenset(values))
+                for true in variable.values:
+                    state = {true} if true else set()
+                    assert literal.holds(frozenset(state)) == (true in values)
+                    cover = Cover(((literal,),), (1,), 1, False)
+                    texts = {show(atom) for atom in state}
+                    assert cover.holds(texts) == (true in values)
+                    assert any(listed(c, texts) for c in cover.conditions()) == (true in values)
+
+
+def test_further_states_have_the_default() -> None:
+    """`also`: states that no candidate task visits must get their word too."""
+    candidates = all_tasks("three-cells")
+    keys = [candidates.model.codec.key(row) for row in candidates.rows]
+    language = language_of({keys[0]: "w0", keys[1]: "w1"}, ("w0", "w1"))
+    free = word_formulas(language, candidates.model)
+    exact = word_formulas(language, candidates.model, candidates.rows)
+    states = [set(candidates.model.codec.decode(row)) for row in candidates.rows]
+    assert all(
+        [w for w, f in exact.items() if f.holds(s)] == [language.states.get(k, "w0")]
+        for k, s in zip(keys, states, strict=True)
+    )
+    assert not all(
+        [w for w, f in free.items() if f.holds(s)] == [language.states.get(k, "w0")]
+        for k, s in zip(keys, states, strict=True)
+    )
+    assert exact["w1"].length > free["w1"].length
+
+
+def every_box(points: Points) -> list[np.ndarray]:
+    """All boxes without `off` points."""
+    sets = [[s for r in range(1, n + 1) for s in combinations(range(n), r)] for n in points.sizes]
+    boxes = []
+    for chosen in product(*sets):
+        box = np.zeros(sum(points.sizes), np.bool_)
+        for start, values in zip(points.offset, chosen, strict=True):
+            box[[start + v for v in values]] = True
+        if not points.inside(box[None, :], points.off)[0].any():
+            boxes.append(box)
+    return boxes
+
+
+def random_points(random: Random) -> Points:
+    sizes = tuple(random.randint(2, 3) for _ in range(random.randint(1, 3)))
+    every = [list(p) for p in product(*(range(n) for n in sizes))]
+    random.shuffle(every)
+    on = random.randint(1, min(8, len(every)))
+    off = random.randint(0, len(every) - on)
+    tables = [
+        np.array(part, np.int64).reshape(-1, len(sizes))
+        for part in (every[:on], every[on : on + off])
+    ]
+    return Points(sizes, *tables)
+
+
+def limited(points: Points, box: np.ndarray) -> int:
+    return sum(
+        not box[start : start + size].all()
+        for start, size in zip(points.offset, points.sizes, strict=True)
+    )
+
+
+def test_fewest_boxes_by_trying_all() -> None:
+    numbers: Counter[int] = Counter()
+    for seed in range(150):
+        points = random_points(Random(seed))
+        boxes = minimise(points)
+        maximal = every_box(points)
+        held = {tuple(np.flatnonzero(points.inside(b[None, :], points.on)[0])) for b in maximal}
+        most = [frozenset(h) for h in held if not any(set(h) < set(o) for o in held)]
+        best = next(
+            k
+            for k in range(1, len(points.on) + 1)
+            if any(
+                len(frozenset().union(*c)) == len(points.on)
+                for c in combinations(most, min(k, len(most)))
+            )
+        )
+        assert boxes.fewest
+        assert len(boxes.prime) == best
+        for least, prime in zip(boxes.least, boxes.prime, strict=True):
+            assert (least <= prime).all()
+            assert any((prime == box).all() for box in maximal)
+            assert not any((prime < box).any() and (prime <= box).all() for box in maximal)
+        assert points.inside(boxes.least, points.on).any(axis=0).all()
+        if best == 1:  # then with as few variables limited as any box has
+            around = [box for box in maximal if points.inside(box[None, :], points.on).all()]
+            assert limited(points, boxes.prime[0]) == min(limited(points, box) for box in around)
+        numbers[best] += 1
+    assert {1, 2, 3, 4} <= set(numbers), numbers
+
+
+def test_a_single_term_limits_as_few_variables_as_possible() -> None:
+    shorter = 0
+    for seed in range(60):
+        random = Random(seed)
+        off = np.array([[random.randint(0, 1) for _ in range(8)] for _ in range(10)], np.int64)
+        on = np.ones((1, 8), np.int64)
+        off = off[(off != 1).any(axis=1)]
+        points = Points((2,) * 8, on, off)
+        (box,) = minimise(points).prime
+        needed = next(
+            k
+            for k in range(9)
+            if any((off[:, list(c)] != 1).any(axis=1).all() for c in combinations(range(8), k))
+        )
+        assert limited(points, box) == needed
+        shorter += limited(points, expand(points, points.supercube([0]), on)) > needed
+    assert shorter > 10  # expanding alone does not do it
+
+
+@pytest.mark.parametrize("ordered", [True, False])
+def test_expanded_boxes_are_prime(ordered: bool) -> None:
+    for seed in range(60):
+        random = Random(seed)
+        points = random_points(random)
+        order = random.sample(range(len(points.sizes)), len(points.sizes)) if ordered else None
+        box = expand(points, points.supercube([0]), points.on, order)
+        assert not points.inside(box[None, :], points.off).any()
+        for column in np.flatnonzero(~box):
+            larger = box.copy()
+            larger[column] = True
+            assert points.inside(larger[None, :], points.off).any()
+
+
+@pytest.mark.parametrize(
+    ("folder", "stem", "names"),
+    [
+        ("grid", "gw2-2x3", {"at(r1)", "at(r2)"}),
+        (
+            "two-arms",
+            "exchange",
+            {"over(arm1)", "over(arm2)", "empty/holds(arm1)", "empty/holds(arm2)"},
+        ),
+        ("vans", "two-vans", {"aboard/at(d1)", "at(v1)", "at(v2)"}),
+        ("elevator", "two-calls", {"inside/outside(r1)", "stops"}),
+    ],
+)
+def test_variables_are_invariants(folder: str, stem: str, names: set[str]) -> None:
+    """At most one atom of a variable is true in every reachable state; "none" is a value only where
+    it can happen.
+    """
+    domain = read_domain(DOMAINS / folder / "domain.pddl")
+    candidates = from_problems(domain, [read_problem(DOMAINS / folder / f"{stem}.pddl", domain)])
+    space = explore(candidates.model, np.stack([task.init for task in candidates.loaded.tasks]))
+    found = valuation(candidates.model, space.rows)
+    assert names <= {variable.name for variable in found.variables}
+    atoms, holds = truth(candidates.model, space.rows)
+    for variable in found.variables:
+        true = holds[:, [atoms.index(atom) for atom in variable.atoms]].sum(axis=1)
+        assert true.max() == 1
+        assert (true.min() == 0) == (None in variable.values)
+    assert len(np.unique(found.value, axis=0)) == len(space.rows)
+
+
+def test_remembered_actions_are_one_variable_a_robot() -> None:
+    domain = read_domain(DOMAINS / "three-cells" / "domain.pddl")
+    problem = read_problem(DOMAINS / "three-cells" / "problem.pddl", domain)
+    candidates = from_problems(domain, [problem], ModelOptions(remember_actions=True))
+    language = build_language(candidates, "greedy").language
+    formulas = word_formulas(language, candidates.model)
+    check_exact(language, candidates, formulas)
+    table = language.partition(candidates.model)
+    names = {variable.name for variable in valuation(candidates.model, table.rows).variables}
+    assert {"last(r1)", "last(r2)"} <= names
+
+
+def test_same_input_same_formulas() -> None:
+    candidates = all_tasks("grid", "gw2-2x3")
+    language = build_language(candidates, "greedy").language
+    backwards = language_of(dict(reversed(language.states.items())), language.words)
+    assert word_formulas(language, candidates.model) == word_formulas(backwards, candidates.model)

@@ -1,0 +1,248 @@
+"""The JSON Schema of language files: the packaged copy, what is written, what is not allowed, and
+what is written by hand.
+"""
+
+from __future__ import annotations
+
+import copy
+import gzip
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+import coordlang
+from coordlang.building import build_language
+from coordlang.language.file import language_from_bytes, read_language, to_bytes, write_language
+from coordlang.language.record import json_schema
+from planners.errors import BadInput, Position
+from tests.support.command import Command
+from tests.support.domains import DOMAINS, all_tasks
+
+HERE = Position("here")
+RUNNING = [DOMAINS / "three-cells" / name for name in ("domain.pddl", "problem.pddl")]
+
+
+@pytest.fixture(scope="module")
+def written() -> dict[str, Any]:
+    data: dict[str, Any] = json.loads(
+        to_bytes(build_language(all_tasks("three-cells"), "minimal").language)
+    )
+    return data
+
+
+def valid(data: object) -> bool:
+    return jsonschema.Draft202012Validator(json_schema()).is_valid(data)
+
+
+def readable(data: object) -> bool:
+    try:
+        language_from_bytes(json.dumps(data).encode(), HERE)
+    except BadInput:
+        return False
+    return True
+
+
+def test_packaged_schema_is_the_printed_one(coordlang: Command) -> None:
+    packaged = Path(coordlang_folder() / "language" / "language.schema.json").read_text()
+    assert packaged == coordlang("schema").out, (
+        "coordlang schema > coordlang/language/language.schema.json"
+    )
+    jsonschema.Draft202012Validator.check_schema(json.loads(packaged))
+
+
+def coordlang_folder() -> Path:
+    return Path(str(coordlang.__file__)).parent
+
+
+@pytest.mark.parametrize(
+    ("method", "folder", "stem"),
+    [("minimal", "three-cells", "problem"), ("greedy", "grid", "gw2-2x3")],
+)
+def test_what_is_written_is_valid(method: str, folder: str, stem: str, tmp_path: Path) -> None:
+    language = build_language(all_tasks(folder, stem), method).language
+    for name in ("l.json", "l.json.gz"):
+        write_language(language, tmp_path / name)
+        assert read_language(tmp_path / name) == language
+    assert valid(json.loads((tmp_path / "l.json").read_text()))
+    assert (
+        gzip.decompress((tmp_path / "l.json.gz").read_bytes()) == (tmp_path / "l.json").read_bytes()
+    )
+
+
+Change = Callable[[dict[str, Any]], object]
+
+#: What neither the schema nor the reader takes.
+WRONG: list[Change] = [
+    lambda d: d.update(format="coordlang/tasks"),
+    lambda d: d.update(version=2),
+    lambda d: d.update(version="1"),
+    lambda d: d.pop("format"),
+    lambda d: d.pop("version"),
+    lambda d: d.pop("words"),
+    lambda d: d.pop("states"),
+    lambda d: d.pop("default"),
+    lambda d: d.update(words=[]),
+    lambda d: d.update(words=["w0", "w1", "w2", "w0"]),
+    lambda d: d.update(words="w0"),
+    lambda d: d["words"].append("two words"),
+    lambda d: d["words"].append(""),
+    lambda d: d["words"].append(3),
+    lambda d: d.update(states=[]),
+    lambda d: d["states"].update({"(at r1 a)": 0}),
+    lambda d: d.update(default=None),
+    lambda d: d.update(robots=[]),
+    lambda d: d.update(robots=["r1", "r1"]),
+    lambda d: d.update(robots=None),
+    lambda d: d.update(domain=None),
+    lambda d: d["domain"].pop("name"),
+    lambda d: d["domain"].update(sha256=5),
+    lambda d: d.update(model=None),
+    lambda d: d["model"].update(cost="time"),
+    lambda d: d["model"].update(unowned="nobody"),
+    lambda d: d["model"].update(remember_actions="no"),
+    lambda d: d["model"].update(idle="r1"),
+    lambda d: d.update(tasks=None),
+    lambda d: d["tasks"].pop("kind"),
+    lambda d: d["tasks"].update(kind="some"),
+    lambda d: d["tasks"].update(count="many"),
+    lambda d: d["tasks"].update(count=-1),
+    lambda d: d["tasks"].update(tasks=[{"init": []}]),
+    lambda d: d["tasks"].update(tasks=[{"init": [], "goal": "(at r1 a)"}]),
+    lambda d: d.update(guarantee=None),
+    lambda d: d["guarantee"].pop("method"),
+    lambda d: d["guarantee"].update(size=0),
+    lambda d: d["guarantee"].update(lower_bound=0),
+    lambda d: d["guarantee"].update(proved_minimal=1),
+    lambda d: d.update(producer=[]),
+    lambda d: d.update(also={"(at r1 a) (at r2 b)": "w1"}),
+]
+#: What only the reader can refuse.
+CONTRADICTORY: list[Change] = [
+    lambda d: d.update(default="w9"),
+    lambda d: d["states"].update({"(at r1 a) (at r2 b)": "w9"}),
+    lambda d: d["guarantee"].update(size=2, lower_bound=2),
+    lambda d: d["guarantee"].update(lower_bound=2),
+    lambda d: d["guarantee"].update(lower_bound=4),
+]
+
+
+@pytest.mark.parametrize("number", range(len(WRONG)))
+def test_schema_and_reader_refuse(number: int, written: dict[str, Any]) -> None:
+    data = copy.deepcopy(written)
+    assert valid(data)
+    assert readable(data)
+    WRONG[number](data)
+    assert not valid(data)
+    assert not readable(data)
+
+
+@pytest.mark.parametrize("number", range(len(CONTRADICTORY)))
+def test_only_the_reader_refuses(number: int, written: dict[str, Any]) -> None:
+    data = copy.deepcopy(written)
+    CONTRADICTORY[number](data)
+    assert valid(data)
+    assert not readable(data)
+
+
+def test_further_keys_are_ignored(written: dict[str, Any]) -> None:
+    data = copy.deepcopy(written) | {"note": "by me"}
+    data["guarantee"]["note"] = 1
+    assert valid(data)
+    assert language_from_bytes(json.dumps(data).encode(), HERE) == language_from_bytes(
+        json.dumps(written).encode(), HERE
+    )
+
+
+BY_HAND = {
+    "format": "coordlang/language",
+    "version": 1,
+    "words": ["a", "b", "c"],
+    "states": {
+        "(at r1 b) (at r2 a)": "a",
+        "(at r1 c) (at r2 a)": "a",
+        "(at r1 a) (at r2 b)": "b",
+        "(at r1 c) (at r2 b)": "b",
+        "(at r1 a) (at r2 c)": "c",
+        "(at r1 b) (at r2 c)": "c",
+    },
+    "default": "a",
+}
+
+
+def test_by_hand(coordlang: Command, tmp_path: Path) -> None:
+    """Five keys are a language: where r2 is, for the running example."""
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps(BY_HAND, indent=2))
+    assert valid(BY_HAND)
+    assert coordlang("verify", path, *RUNNING, "--tasks", "all").code == 0
+    verified = coordlang("verify", path, *RUNNING)
+    assert verified.code == 0
+    assert "1 task" in verified.out
+    explained = coordlang("explain", path, *RUNNING)
+    assert explained.code == 0
+    assert "at(r2) = a" in explained.out
+    assert "r1, r2" in explained.out
+    assert (
+        coordlang("explain", path, *RUNNING, "--task").code == 1
+    )  # it records no task, so it guarantees nothing
+
+
+def test_by_hand_only_a_default(coordlang: Command, tmp_path: Path) -> None:
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps(BY_HAND | {"words": ["a"], "states": {}}))
+    refuted = coordlang("verify", path, *RUNNING)
+    assert refuted.code == 1  # the running example needs more words
+    explained = coordlang("explain", path, *RUNNING)
+    assert "No state is mapped: the word is always a." in explained.out
+
+
+def test_by_hand_and_wrong(coordlang: Command, tmp_path: Path) -> None:
+    path = tmp_path / "mine.json"
+    swapped = BY_HAND["states"] | {"(at r1 a) (at r2 b)": "a", "(at r1 c) (at r2 a)": "b"}  # type: ignore[operator]
+    path.write_text(json.dumps(BY_HAND | {"states": swapped}))
+    assert coordlang("verify", path, *RUNNING, "--tasks", "all").code == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        (
+            '"(at r1 b) (at r2 a)":',
+            '"(at r1 a) (at r2 b)": "a", "(at r1 b) (at r2 a)":',
+            "(at r1 a) (at r2 b)",
+        ),
+        (
+            '"(at r1 b) (at r2 a)":',
+            '"(at r1 \\u0061) (at r2 b)": "a", "(at r1 b) (at r2 a)":',
+            "(at r1 a) (at r2 b)",
+        ),
+        ('"default":', '"default": "b", "default":', "default"),
+        ('"states":', '"states": {"(at r1 a) (at r2 b)": "b"}, "states":', "states"),
+        ('"version":', '"producer": {"seed": 1, "\\u0073eed": 2}, "version":', "seed"),
+        ('"version":', '"tasks": {"kind": "all", "count": 30, "kind": "all"}, "version":', "kind"),
+    ],
+)
+def test_a_key_twice(old: str, new: str, key: str) -> None:
+    text = json.dumps(BY_HAND)
+    assert old in text
+    for spaces in (None, 3):
+        once = json.dumps(BY_HAND, indent=spaces)
+        language_from_bytes(once.encode(), HERE)
+        with pytest.raises(BadInput, match="occurs twice") as refused:
+            language_from_bytes(once.replace(old, new, 1).encode(), HERE)
+        assert repr(key) in refused.value.what
+
+
+def test_escapes_in_keys_are_no_duplicates() -> None:
+    """Quotation marks and backslashes in keys, which the count of marks would get wrong."""
+    data = BY_HAND | {"states": {'(say "a")': "a", "(say \\)": "b", '(say \\")': "c", "(é)": "a"}}
+    language = language_from_bytes(json.dumps(data).encode(), HERE)
+    assert dict(language.states) == data["states"]
+    assert (
+        dict(language_from_bytes(json.dumps(data, ensure_ascii=False).encode(), HERE).states)
+        == data["states"]
+    )

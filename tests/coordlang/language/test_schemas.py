@@ -1,0 +1,137 @@
+"""The JSON Schemas of all file formats: shipped as printed, and what is written fits them."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from coordlang.building import build_language, certificate_of
+from coordlang.certificate import read_certificate, write_certificate
+from coordlang.cli.schema import SCHEMAS
+from coordlang.language.sentences import task_sentences
+from coordlang.report.places import read_coordinates
+from coordlang.tasks.listed import ListedTask
+from coordlang.tasks.task_file import read_task_file, tasks_text
+from coordlang.use.choices.choices import choices
+from coordlang.use.choices.file import to_bytes
+from coordlang.use.choices.monitor import Monitor, MonitorError
+from coordlang.use.sentence.task_language import languages_in_tasks
+from planners.errors import BadInput
+from planners.search.plan_file import read_plans, to_json
+from planners.search.plans import Plans
+from tests.support.command import Command
+from tests.support.domains import ROOT, all_tasks
+
+
+@cache
+def schema(name: str) -> dict[str, Any]:
+    (path,) = [
+        path
+        for folder in ("coordlang", "planners")
+        for path in (ROOT / folder).rglob(f"{name}.schema.json")
+    ]
+    found: dict[str, Any] = json.loads(path.read_text())
+    return found
+
+
+@pytest.mark.parametrize("name", list(SCHEMAS))
+def test_shipped_as_printed(name: str, coordlang: Command) -> None:
+    jsonschema.Draft202012Validator.check_schema(schema(name))
+    assert schema(name) == json.loads(coordlang("schema", name).out), f"coordlang schema {name}"
+
+
+def test_the_language_schema_is_the_default(coordlang: Command) -> None:
+    assert coordlang("schema").out == coordlang("schema", "language").out
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
+    """A file of each format, as it is written."""
+    candidates = all_tasks("three-cells")
+    built = build_language(candidates, "minimal")
+    certificate = tmp_path_factory.mktemp("schemas") / "certificate.json"
+    write_certificate(certificate_of(built), certificate)
+    plans = Plans.of(candidates.spaces[0])
+    task = next(languages_in_tasks(built.language, candidates))
+    (words, *_) = (task.words_of(s.words) for s in task_sentences(task.space, 0, task.partition))
+    texts = {
+        "tasks": tasks_text([ListedTask(("(at r1 a)", "(at r2 b)"), ("(at r1 b)",))]),
+        "certificate": certificate.read_text(),
+        "choices": to_bytes(choices(task, words)).decode(),
+        "plans": json.dumps(to_json(plans, [plans.unrank(0)])),
+        "coordinates": json.dumps({"coordinates": {"a": [0, 0], "b": [1, 0.5]}}),
+    }
+    return {name: json.loads(text) for name, text in texts.items()}
+
+
+READ: dict[str, Callable[[Path], object]] = {
+    "tasks": read_task_file,
+    "certificate": read_certificate,
+    "choices": lambda path: Monitor.read(str(path), "r1"),
+    "plans": lambda path: read_plans(path, all_tasks("three-cells").model),
+    "coordinates": read_coordinates,
+}
+
+#: What neither a schema nor its reader takes.
+WRONG: list[tuple[str, Callable[[dict[str, Any]], object]]] = [
+    ("tasks", lambda d: d.update(format="coordlang/language")),
+    ("tasks", lambda d: d.update(version=True)),
+    ("tasks", lambda d: d.update(version=2)),
+    ("tasks", lambda d: d.pop("tasks")),
+    ("tasks", lambda d: d["tasks"][0].pop("goal")),
+    ("tasks", lambda d: d["tasks"][0]["init"].append(3)),
+    ("certificate", lambda d: d.pop("format")),
+    ("certificate", lambda d: d.update(version=2)),
+    ("certificate", lambda d: d.update(refuted="2")),
+    ("certificate", lambda d: d["reasons"][0].pop("plans")),
+    ("certificate", lambda d: d["reasons"][0]["paths"][0]["cells"].append([1])),
+    ("choices", lambda d: d.update(version=2)),
+    ("choices", lambda d: d.pop("choices")),
+    ("choices", lambda d: d["choices"][0].pop("states")),
+    ("choices", lambda d: d["choices"][0]["states"][0].update(next=[])),
+    ("plans", lambda d: d.pop("plans")),
+    ("plans", lambda d: d["plans"][0].update(actions="(move r1 a b)")),
+    ("plans", lambda d: d["plans"][0]["actions"][0].append(5)),
+    ("coordinates", lambda d: d.pop("coordinates")),
+    ("coordinates", lambda d: d["coordinates"].update(a=[0])),
+    ("coordinates", lambda d: d["coordinates"].update(a=["0", "0"])),
+]
+
+
+@pytest.mark.parametrize("name", list(READ))
+def test_what_is_written_fits(
+    name: str, written: dict[str, dict[str, Any]], tmp_path: Path
+) -> None:
+    jsonschema.validate(written[name], schema(name))
+    path = tmp_path / f"{name}.json"
+    path.write_text(json.dumps(written[name] | {"a key of later": 1}))
+    READ[name](path)
+    path.write_text("\ufeff" + json.dumps(written[name]), "utf-8")
+    if name != "choices":  # a monitor reads what coordlang wrote
+        READ[name](path)
+
+
+@pytest.mark.parametrize(("name", "change"), WRONG)
+def test_what_does_not_fit_is_refused(
+    name: str,
+    change: Callable[[dict[str, Any]], object],
+    written: dict[str, dict[str, Any]],
+    tmp_path: Path,
+) -> None:
+    data = copy.deepcopy(written[name])
+    change(data)
+    if data.get("version") is not True:  # in JSON Schema true is a constant of its own, too
+        assert not jsonschema.Draft202012Validator(schema(name)).is_valid(data)
+    path = tmp_path / "file.json"
+    path.write_text(json.dumps(data))
+    with pytest.raises((BadInput, MonitorError)) as raised:
+        READ[name](path)
+    if name != "choices" and data.get("format", "").endswith(name):
+        assert raised.match("(?s)file.json: .*(version|`coordlang schema " + name + "`)")

@@ -1,0 +1,164 @@
+"""Pages of shipped domains, each built once, and a real Chromium to open them in."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from coordlang.building import build_language
+from coordlang.language.words import Language
+from coordlang.report.page import Report, make_report
+from coordlang.tasks.candidates import all_pairs, from_listed, from_problems
+from coordlang.tasks.task_file import read_task_file
+from planners.loading import ModelOptions
+from planners.pddl import read_domain, read_problem
+from planners.pddl.lifted import Domain, Problem
+from tests.support.domains import DOMAINS
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+CHROMIUM = Path("/usr/bin/chromium")
+ARGUMENTS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+
+
+@dataclass(frozen=True)
+class World:
+    """A language with its files, and its report."""
+
+    language: Language
+    domain: Domain
+    problem: Problem
+    report: Report
+
+    @property
+    def data(self) -> dict[str, Any]:
+        return data_of(self.report.html)
+
+
+def data_of(html: bytes) -> dict[str, Any]:
+    """The data inside a page."""
+    found = re.search(rb'<script type="application/json" id="data">(.*?)</script>', html, re.DOTALL)
+    assert found
+    data: dict[str, Any] = json.loads(found[1])
+    return data
+
+
+@cache
+def make_language(
+    domain: str,
+    problem: str,
+    tasks: str | None = "all",
+    method: str = "greedy",
+    options: ModelOptions | None = None,
+) -> tuple[Language, Domain, Problem]:
+    lifted = read_domain(DOMAINS / domain / "domain.pddl")
+    read = read_problem(DOMAINS / domain / f"{problem}.pddl", lifted)
+    if tasks is None:
+        candidates = from_problems(lifted, [read], options)
+    elif tasks == "all":
+        candidates = all_pairs(lifted, [read], options)
+    else:
+        candidates = from_listed(lifted, [read], read_task_file(DOMAINS / domain / tasks), options)
+    built = build_language(candidates, method)
+    return built.language, lifted, read
+
+
+@cache
+def make_world(
+    domain: str, problem: str, tasks: str | None = "all", method: str = "greedy", shown: int = 6
+) -> World:
+    language, lifted, read = make_language(domain, problem, tasks, method)
+    return World(language, lifted, read, make_report(language, lifted, [read], tasks_shown=shown))
+
+
+def refuted(language: Language) -> Language:
+    """A language file that is none: all states in one word."""
+    return replace(language, states=dict.fromkeys(language.states, language.words[0]))
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    api = pytest.importorskip(
+        "playwright.sync_api", reason="playwright is not installed: the page is not opened"
+    )
+    if not CHROMIUM.exists():
+        pytest.skip(f"there is no {CHROMIUM}: the page is not opened")
+    with api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+@dataclass
+class Opened:
+    """An open page with what it logged and asked the network for."""
+
+    page: Page
+    messages: list[str]
+    requests: list[str]
+
+    def things(self, stage: str = "#stage") -> dict[str, str]:
+        """Where the map shows each thing: name -> place."""
+        found: dict[str, str] = self.page.evaluate(
+            """stage => Object.fromEntries([...document.querySelectorAll(`${stage} .token`)]
+               .filter(t => t.style.display !== 'none').map(t => [t.dataset.thing, t.dataset.place]))""",
+            stage,
+        )
+        return found
+
+    def forward(self, steps: int = 1) -> None:
+        self.page.evaluate(
+            "n => { while (n--) document.querySelector('#transport .forward').click(); }", steps
+        )
+
+
+class Opener:
+    def __init__(self, browser: Browser, folder: Path) -> None:
+        self.browser = browser
+        self.folder = folder
+        self.pages: list[Opened] = []
+
+    def __call__(self, html: bytes, width: int = 1200, height: int = 900, **context: Any) -> Opened:
+        path = self.folder / f"{len(self.pages)}.html"
+        path.write_bytes(html)
+        page = self.browser.new_context(
+            viewport={"width": width, "height": height}, **context
+        ).new_page()
+        opened = Opened(page, [], [])
+        page.on("console", lambda message: opened.messages.append(message.text))
+        page.on("pageerror", lambda error: opened.messages.append(str(error)))
+        page.on("request", lambda request: opened.requests.append(request.url))
+        page.goto(path.as_uri())
+        self.pages.append(opened)
+        return opened
+
+
+@pytest.fixture
+def open_page(browser: Browser, tmp_path: Path) -> Iterator[Opener]:
+    """Opens pages from files; in the end none may have logged anything or asked for anything but
+    its own file.
+    """
+    opener = Opener(browser, tmp_path)
+    yield opener
+    for opened in opener.pages:
+        assert opened.messages == []
+        assert [url for url in opened.requests if not url.startswith("file:")] == []
+        assert len(opened.requests) >= 1  # the listener works: the page itself was seen
+        opened.page.context.close()

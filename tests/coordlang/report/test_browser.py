@@ -1,0 +1,414 @@
+"""The page in a real Chromium, opened from a file: what it shows is what the planner says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import pytest
+
+from coordlang.report.page import LARGEST, make_report
+from coordlang.use.sentence.task_language import language_in_task
+from planners.pddl.lifted import And
+from planners.search.plans import Plans
+from tests.coordlang.report.conftest import (
+    Opened,
+    Opener,
+    World,
+    make_language,
+    make_world,
+    refuted,
+)
+
+WORLDS = [
+    ("t-map", "problem", "all"),
+    ("three-cells", "problem", "all"),
+    ("lock", "both-in", "all"),
+    ("handover", "two-doors", "all"),
+    ("vans", "two-vans", "all"),
+    ("elevator", "two-calls", "all"),
+    ("grid", "three-robots-3x3", None),
+]
+
+
+def at(key: str, predicate: str = "at") -> dict[str, str]:
+    """``(at r1 a) (at r2 b)`` -> r1: a, r2: b."""
+    atoms = [atom.strip("()").split() for atom in key.split(") (")]
+    return {atom[1]: atom[2] for atom in atoms if atom[0] == predicate}
+
+
+@pytest.mark.parametrize(("domain", "problem", "tasks"), WORLDS)
+def test_every_page_plays(open_page: Opener, domain: str, problem: str, tasks: str | None) -> None:
+    """Every task of the page, at its end and in each robot's place; in the end nothing was logged."""
+    world = make_world(domain, problem, tasks)
+    opened = open_page(world.report.html)
+    seen = opened.page.evaluate(
+        """() => DATA.tasks.map((task, number) => {
+          const byId = id => document.getElementById(id), forward = () => document.querySelector('#transport .forward').click();
+          openTask(number);
+          for (let k = 0; k < task.steps; k++) forward();
+          const ends = [byId('now').textContent], output = document.querySelector('#transport output').textContent;
+          const without = !byId('without-player').hidden;
+          DATA.robots.forEach((_, robot) => {
+            document.querySelector(`[data-mode='${robot}']`).click();
+            for (let k = 0; k < task.steps + 2; k++) forward();
+            ends.push(byId('now').textContent);
+          });
+          return [output, without, ends];
+        })"""
+    )
+    for task, (output, without, ends) in zip(world.data["tasks"], seen, strict=True):
+        assert output == f"step {task['steps']} of {task['steps']}"
+        assert without == task["requires"]
+        assert len(ends) == 1 + len(world.data["robots"])
+        assert all("goal is reached" in end for end in ends)
+
+
+def test_plans_are_those_of_the_planner(open_page: Opener) -> None:
+    """Each sentence, each of its plans, each step: every robot is where the planner says."""
+    world = make_world("grid", "three-robots-3x3", None)
+    spoken = language_in_task(world.language, world.domain, world.problem)
+    opened = open_page(world.report.html)
+    checked = 0
+    for number, entry in list(enumerate(world.data["tasks"][0]["sentences"]))[::6]:
+        fits = spoken.plans_with(entry["words"])
+        plans = Plans.of(fits)
+        assert entry["plans"] == str(plans.count)
+        opened.page.click(f"[data-sentence='{number}']")
+        for rank in range(plans.count):
+            if rank:
+                opened.page.dispatch_event("#plan-next", "click")
+            assert f"Plan {rank + 1} of {plans.count}" in opened.page.inner_text("#transport")
+            opened.page.press("#player", "Home")
+            for step, state in enumerate(plans.states(plans.unrank(rank))):
+                if step:
+                    opened.forward()
+                assert opened.things() == at(spoken.model.codec.key(fits.rows[state]))
+                checked += 1
+    assert checked > 100
+
+
+def test_all_plans_through_the_interface_of_the_page(open_page: Opener) -> None:
+    """The page's own counting and ranking, over all sentences of all tasks: nothing is missing,
+    nothing twice.
+    """
+    for domain, problem, tasks in WORLDS:
+        opened = open_page(make_world(domain, problem, tasks).report.html)
+        found = opened.page.evaluate(
+            """() => DATA.tasks.map(task => {
+              const wordOf = node => DATA.state_words[task.nodes.state[node]];
+              const all = new Fits(task, wordOf, null);
+              const ranked = new Set();
+              for (const s of task.sentences) {
+                const fits = new Fits(task, wordOf, s.words);
+                if (String(fits.total) !== s.plans) return `${s.words}: ${fits.total} of ${s.plans}`;
+                for (let k = 0n; k < fits.total; k++) {
+                  const edges = fits.unrank(k);
+                  if (fits.rank(edges) !== k) return `rank ${k}`;
+                  ranked.add(String(all.rank(edges)));
+                }
+              }
+              const whole = task.sentences.length === task.all_sentences;
+              return (whole ? BigInt(ranked.size) === all.total : ranked.size > 200) && String(all.total) === task.plans;
+            })"""
+        )
+        assert set(found) == {True}
+
+
+def test_a_robots_options_are_its_own_subplans(open_page: Opener) -> None:
+    """What the page lets a robot do, step by step, is what its part is in some plan with the
+    sentence; no more, no less.
+    """
+    world = make_world("grid", "three-robots-3x3", None)
+    spoken = language_in_task(world.language, world.domain, world.problem)
+    opened = open_page(world.report.html)
+    ways = opened.page.evaluate(
+        """() => { const task = DATA.tasks[0], wordOf = node => DATA.state_words[task.nodes.state[node]];
+          return task.sentences.slice(0, 10).map(s => { const fits = new Fits(task, wordOf, s.words);
+            return DATA.robots.map((_, robot) => { const found = [];
+              const walk = (nodes, done) => { const own = fits.options(robot, nodes);
+                if (!own.size) found.push(done.map(label => DATA.labels[robot][label].text));
+                for (const [label, next] of own) walk(next, [...done, label]); };
+              walk(new Set([0]), []); return found; }); }); }"""
+    )
+    for entry, robots in zip(world.data["tasks"][0]["sentences"], ways, strict=False):
+        plans = [
+            [spoken.model.texts(step) for step in plan]
+            for plan in Plans.of(spoken.plans_with(entry["words"]))
+        ]
+        for robot, found in enumerate(robots):
+            expected = {tuple(step[robot] or "idle" for step in plan) for plan in plans}
+            assert sorted(map(tuple, found)) == sorted(expected)
+
+
+def test_choosing_for_a_robot(open_page: Opener) -> None:
+    world = make_world("grid", "three-robots-3x3", None)
+    opened = open_page(world.report.html)
+    page = opened.page
+    page.click("[data-mode='0']")
+    words = page.evaluate("taskView.sentence")
+    assert words >= 0  # being a robot needs a sentence: one was chosen
+    for step in range(4):
+        buttons = page.query_selector_all("#choices button")
+        labels = [button.get_attribute("title") for button in buttons]
+        page.keyboard.press(str(len(buttons)))  # keys choose, too
+        assert page.evaluate(f"DATA.labels[0][taskView.steps[{step}][0]].text") == labels[-1]
+    assert "on an optimal plan" in page.inner_text("#now")
+    # Every mixture of the robots' choices is optimal: over and over with other choices of the
+    # others.
+    for _ in range(25):
+        page.dispatch_event("#transport .plan-nav button", "click")
+        opened.forward(4)
+        assert "on an optimal plan" in page.inner_text("#now")
+
+
+def test_without_a_sentence_it_goes_wrong(open_page: Opener) -> None:
+    """In the place of a robot, with all optimal plans open (a language of one word), some mixture
+    breaks, and it is said.
+    """
+    language, domain, problem = make_language("t-map", "problem")
+    opened = open_page(make_report(refuted(language), domain, [problem], tasks_shown=1).html)
+    page = opened.page
+    assert "no coordination language" in page.inner_text("#task-warning")
+    assert "do not mix" in page.inner_text("#without-note")
+    page.click("[data-mode='0']")
+    said = set()
+    for _ in range(12):
+        page.dispatch_event("#transport .plan-nav button", "click")
+        for _ in range(4):
+            opened.forward()
+        said.add(page.inner_text("#now").rsplit(". ", 1)[-1])
+    assert any("not part of any optimal plan" in text for text in said)
+    assert any("on an optimal plan" in text for text in said)
+
+
+def test_keys(open_page: Opener) -> None:
+    world = make_world("grid", "three-robots-3x3", None)
+    opened = open_page(world.report.html)
+    page = opened.page
+    output = "#transport output"
+    for key, step in [
+        ("ArrowRight", 1),
+        ("ArrowRight", 2),
+        ("ArrowLeft", 1),
+        ("End", 4),
+        ("ArrowRight", 4),
+        ("Home", 0),
+        ("ArrowLeft", 0),
+    ]:
+        page.keyboard.press(key)  # nothing is focused: the task's player listens
+        assert page.inner_text(output) == f"step {step} of 4"
+    page.keyboard.press("Space")
+    assert page.get_attribute("#transport .play", "aria-label") == "Pause"
+    page.wait_for_selector("#transport output:has-text('step 4 of 4')")
+    page.wait_for_selector("#transport .play[aria-label='Play']")
+    page.focus("[data-sentence='-1']")
+    page.keyboard.press("ArrowDown")
+    assert page.get_attribute("[data-sentence='0']", "aria-checked") == "true"
+    page.focus("#atlas-picture svg")
+    page.keyboard.press("ArrowRight")
+    assert page.inner_text("#atlas-readout")
+    # Everything that can be done can be reached by Tab, and has a name.
+    nameless = page.evaluate(
+        """() => [...document.querySelectorAll('button, select, input, [role=img], [role=region]')].filter(e =>
+          !e.textContent.trim() && !e.getAttribute('aria-label') && !e.labels?.length).map(e => e.outerHTML)"""
+    )
+    assert nameless == []
+    seen = set()
+    for _ in range(60):
+        page.keyboard.press("Tab")
+        seen.add(page.evaluate("document.activeElement.closest('[id]')?.id"))
+    assert seen >= {
+        "task-select",
+        "modes",
+        "transport",
+        "sentence-list",
+        "timeline",
+        "space",
+        "without-transport",
+    }
+
+
+def test_a_sentence_highlights_what_remains(open_page: Opener) -> None:
+    world = make_world("grid", "three-robots-3x3", None)
+    opened = open_page(world.report.html)
+    for number in (-1, 0, 5, 11):
+        opened.page.click(f"[data-sentence='{number}']")
+        bright = opened.page.evaluate(
+            "[...document.querySelectorAll('#space .n:not(.off)')].map(e => +e.dataset.node).sort((a, b) => a - b)"
+        )
+        assert bright == sorted(remaining(world, number))
+
+
+def remaining(world: World, number: int) -> set[int]:
+    """Nodes of the page's graph on plans with a sentence: all ways listed."""
+    data, task = world.data, world.data["tasks"][0]
+    words = None if number < 0 else task["sentences"][number]["words"]
+    found: set[int] = set()
+    todo: list[list[int]] = [[0]]
+    while todo:
+        nodes = todo.pop()
+        if len(nodes) == task["steps"] + 1:
+            said = [data["state_words"][task["nodes"]["state"][n]] for n in nodes]
+            if (
+                words is None
+                or [w for k, w in enumerate(said) if not k or said[k - 1] != w] == words
+            ):
+                found.update(nodes)
+            continue
+        todo += [
+            [*nodes, n]
+            for n in set(task["target"][task["first"][nodes[-1]] : task["first"][nodes[-1] + 1]])
+        ]
+    return found
+
+
+def test_the_picture_of_the_words(open_page: Opener) -> None:
+    """Every state of the language is there once, with its word; a word alone, on demand; and the
+    map's tint agrees.
+    """
+    world = make_world("t-map", "problem")
+    opened = open_page(world.report.html)
+    page = opened.page
+    for view in (1, 2):
+        page.click(f"#atlas-tabs button:nth-child({view})")
+        shown = page.evaluate(
+            "[...document.querySelectorAll('#atlas .state')].map(e => e.querySelector('title').textContent)"
+        )
+        expected = sorted(
+            f"{word}: " + ", ".join(f"{r} at {p}" for r, p in sorted(at(key).items()))
+            for key, word in world.language.states.items()
+        )
+        assert sorted(shown) == expected
+    page.click(".word-row[data-word='1']")
+    on = page.evaluate("document.querySelectorAll('#atlas .state:not(.off)').length")
+    assert on == world.language.sizes()["w1"]
+    page.select_option("#tint", "0")
+    row = page.evaluate("told(taskView.states[0])")
+    other = row.split(", ")[1].split(" at ")[1]
+    tinted = page.evaluate(
+        "Object.fromEntries(taskView.scene.places.map(({ tint }, k) => [DATA.places[k].name, tint.textContent]).filter(e => e[1]))"
+    )
+    assert tinted == {
+        at(key)["r1"]: word[1:]
+        for key, word in world.language.states.items()
+        if at(key)["r2"] == other
+    }
+
+
+@pytest.mark.parametrize(("domain", "problem", "tasks"), [WORLDS[0], WORLDS[2], WORLDS[3]])
+def test_the_miscoordination(
+    open_page: Opener, domain: str, problem: str, tasks: str | None
+) -> None:
+    """Played to its end: each robot's plan and what they do together, as the witness has them."""
+    world = make_world(domain, problem, tasks)
+    opened = open_page(world.report.html)
+    witness = world.data["tasks"][0]["witness"]
+    for _ in range(witness["breaks"]):
+        opened.page.click("#without-transport .forward")
+    assert opened.page.inner_text("#verdict") in ("So far, so good.", "")
+    for robot, states in enumerate([*witness["states"], witness["together"]]):
+        shown = opened.things(f"#acts .act:nth-child({robot + 1})")
+        keys = [
+            world.data["facts"][f]["text"] for f in world.data["states"][states[witness["breaks"]]]
+        ]
+        expected = at(" ".join(keys)) | at(" ".join(keys), "lies")
+        assert {thing: shown[thing] for thing in expected} == expected
+    opened.page.click("#without-transport .forward")
+    assert witness["reason"] in opened.page.inner_text("#verdict")
+    assert "bad" in (opened.page.get_attribute("#verdict", "class") or "")
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(320, "light"), (390, "dark"), (1280, "light")])
+def test_narrow_and_wide(open_page: Opener, width: int, scheme: str) -> None:
+    for domain, problem, tasks in (WORLDS[0], WORLDS[3], WORLDS[6]):
+        opened = open_page(
+            make_world(domain, problem, tasks).report.html, width=width, color_scheme=scheme
+        )
+        assert opened.page.evaluate("document.documentElement.scrollWidth") == width
+        wide = opened.page.evaluate(
+            """() => [...document.querySelectorAll('main *')].filter(e => !e.closest('svg, .scroller')
+              && e.getBoundingClientRect().right > innerWidth + 1).map(e => e.outerHTML.slice(0, 80))"""
+        )
+        assert wide == []
+        small = opened.page.evaluate(
+            """() => [...document.querySelectorAll('.transport button, .tabs button, select, .sentence')]
+              .filter(e => e.offsetHeight && e.offsetHeight < 32).map(e => e.outerHTML.slice(0, 80))"""
+        )
+        assert small == []
+
+
+def contrast(opened: Opened, text: str, ground: str) -> float:
+    """The contrast of two colours, WCAG 2.1."""
+    ratio: float = opened.page.evaluate(
+        """([text, ground]) => { const of = name => { const e = document.createElement('i'); e.style.color = `var(${name})`;
+            document.body.append(e); const c = getComputedStyle(e).color.match(/[0-9.]+/g).map(Number); e.remove();
+            const [r, g, b] = c.slice(0, 3).map(v => v / 255).map(v => v <= .03928 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4);
+            return .2126 * r + .7152 * g + .0722 * b; };
+          const [a, b] = [of(text), of(ground)].sort((x, y) => y - x); return (a + .05) / (b + .05); }""",
+        [text, ground],
+    )
+    return ratio
+
+
+def test_text_can_be_read(open_page: Opener) -> None:
+    for scheme in ("light", "dark"):
+        opened = open_page(make_world("t-map", "problem").report.html, color_scheme=scheme)
+        for text, ground in product(
+            ("--ink", "--soft", "--accent", "--bad"), ("--paper", "--panel")
+        ):
+            assert contrast(opened, text, ground) >= 4.5, (scheme, text, ground)
+
+
+def test_odd_names_stay_text(open_page: Opener) -> None:
+    """Names are put into the page as text, wherever they come from."""
+    language, domain, problem = make_language("t-map", "problem")
+    odd = replace(
+        language,
+        words=tuple(f"{w}</script><b onclick='1'>" for w in language.words),
+        states={key: f"{word}</script><b onclick='1'>" for key, word in language.states.items()},
+        default=f"{language.default}</script><b onclick='1'>",
+    )
+    opened = open_page(make_report(odd, domain, [problem], tasks_shown=2).html)
+    opened.forward(2)
+    assert opened.page.evaluate("document.querySelectorAll('main b[onclick]').length") == 0
+    assert "</script>" in opened.page.inner_text("#now-word")
+
+
+def test_odd_languages_and_tasks(open_page: Opener, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No map; no state mapped; a task that is done before it begins."""
+    language, domain, problem = make_language("t-map", "problem")
+    bare = replace(language, states={})
+    done = replace(
+        problem, goal=And(tuple(atom for atom in problem.init if atom.predicate == "at"))
+    )
+    monkeypatch.setattr("coordlang.report.data._PLACES", 1)
+    for spoken, asked in [(language, problem), (bare, problem), (language, done)]:
+        opened = open_page(make_report(spoken, domain, [asked], tasks_shown=1).html)
+        assert not opened.page.is_visible("#stage")
+        for mode in (-1, 0, 1):
+            opened.page.click(f"[data-mode='{mode}']")
+            opened.forward(5)
+            assert opened.page.inner_text("#timeline")
+        assert opened.page.is_visible("#facts li") == (asked is problem)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("domain", "problem", "tasks"),
+    [
+        ("corridor", "problem", "all"),
+        ("grid", "gwb7-3x5", "gwb7-3x5.tasks.json"),
+        ("grid", "corners-10x10", None),
+    ],
+)
+def test_large_languages(open_page: Opener, domain: str, problem: str, tasks: str | None) -> None:
+    world = make_world(domain, problem, tasks, shown=30)
+    assert len(world.report.html) <= LARGEST
+    opened = open_page(world.report.html)
+    note = opened.page.inner_text("#tasks-note")
+    if tasks is not None:
+        assert "drawn at random" in note
+    for number in range(0, world.report.tasks, 5):
+        opened.page.evaluate(f"openTask({number})")
+        opened.forward(2)

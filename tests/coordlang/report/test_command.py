@@ -1,0 +1,123 @@
+"""``coordlang report`` at the terminal."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from coordlang.report import data
+from tests.coordlang.report.conftest import data_of
+from tests.support.command import Command
+from tests.support.domains import DOMAINS
+
+FILES = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
+
+
+def test_a_page_is_written(coordlang: Command, language: Path, tmp_path: Path) -> None:
+    page = tmp_path / "report.html"
+    outcome = coordlang("report", language, *FILES, "-o", page, "--tasks-shown", "4")
+    assert outcome.code == 0
+    assert outcome.out == f"4 tasks of 132, {page.stat().st_size:,} bytes, written to {page}\n"
+    assert page.read_text().startswith("<!DOCTYPE html>")
+    assert len(data_of(page.read_bytes())["tasks"]) == 4
+    to_stdout = coordlang("report", language, *FILES, "-o", "-", "--tasks-shown", "4")
+    assert to_stdout.out == page.read_text()
+    assert "written to stdout" in to_stdout.err
+
+
+def test_the_same_input_gives_the_same_bytes_in_other_processes(
+    language: Path, tmp_path: Path
+) -> None:
+    pages = []
+    for seed in ("1", "2"):
+        page = tmp_path / f"{seed}.html"
+        done = subprocess.run(
+            [
+                sys.executable,
+                "-c",
+                "from coordlang.cli import main; main()",
+                "report",
+                language,
+                *FILES,
+                "-o",
+                page,
+            ],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            check=False,
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, done.stderr
+        pages.append(page.read_bytes())
+    assert pages[0] == pages[1]
+
+
+def test_coordinates(coordlang: Command, language: Path, tmp_path: Path) -> None:
+    sidecar = tmp_path / "mine.json"
+    sidecar.write_text(
+        '{"coordinates": {"c0-1": [9, 0], "c1-0": [0, 5], "c1-1": [9, 5], "c1-2": [20, 5]}}'
+    )
+    page = tmp_path / "report.html"
+    assert (
+        coordlang(
+            "report", language, *FILES, "-o", page, "--tasks-shown", "1", "--coordinates", sidecar
+        ).code
+        == 0
+    )
+    assert data_of(page.read_bytes())["places"][0] == {"name": "c0-1", "x": 9, "y": 0}
+    # Beside the problem it needs no option.
+    copy = tmp_path / "problem.pddl"
+    copy.write_text(FILES[1].read_text())
+    sidecar.rename(tmp_path / "coordinates.json")
+    assert coordlang("report", language, FILES[0], copy, "-o", page, "--tasks-shown", "1").code == 0
+    assert data_of(page.read_bytes())["places"][0]["x"] == 9
+    (tmp_path / "coordinates.json").write_text("[]")
+    assert (
+        coordlang("report", language, FILES[0], copy, "-o", page, "--tasks-shown", "1").code == 31
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        (("-o", "{language}"), 2),
+        (("-o", "{folder}"), 2),
+        (("-o", "{folder}/missing/page.html"), 2),
+        (("--tasks-shown", "0", "-o", "-"), 2),
+        ((), 2),
+        (("--coordinates", "{folder}/none.json", "-o", "-"), 31),
+        (("--cost", "makespan+actions", "-o", "-"), 2),
+    ],
+)
+def test_what_is_refused(
+    arguments: tuple[str, ...], code: int, coordlang: Command, language: Path, tmp_path: Path
+) -> None:
+    before = language.read_bytes()
+    given = [a.format(language=language, folder=tmp_path) for a in arguments]
+    outcome = coordlang("report", language, *FILES, *given)
+    assert outcome.code == code
+    assert outcome.err
+    assert language.read_bytes() == before
+
+
+def test_another_domain_is_refused(coordlang: Command, language: Path, tmp_path: Path) -> None:
+    other = DOMAINS / "three-cells" / "domain.pddl", DOMAINS / "three-cells" / "problem.pddl"
+    page = tmp_path / "report.html"
+    assert coordlang("report", language, *other, "-o", page).code == 31
+    assert not page.exists()
+
+
+def test_without_a_map(
+    coordlang: Command, language: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(data, "_PLACES", 3)
+    page = tmp_path / "report.html"
+    assert coordlang("report", language, *FILES, "-o", page, "--tasks-shown", "1").code == 0
+    shown = data_of(page.read_bytes())
+    assert shown["places"] == []
+    assert {fact["role"][0] for fact in shown["facts"]} == {"other"}
+    assert all(label["moves"] == [] for own in shown["labels"] for label in own)

@@ -1,0 +1,680 @@
+"""The engine inside unified-planning: its plans against ours and against unified-planning's own
+simulator and validator.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import pytest
+import unified_planning.shortcuts as up
+from unified_planning.engines import FailedValidationReason
+from unified_planning.engines import PlanGenerationResultStatus as Status
+from unified_planning.engines import ValidationResultStatus as Validity
+from unified_planning.exceptions import UPUsageError
+from unified_planning.io import PDDLReader
+from unified_planning.model.multi_agent import Agent, MultiAgentProblem
+from unified_planning.plans import ActionInstance, PartialOrderPlan, PlanKind, SequentialPlan
+
+from coordlang.building import build_language
+from coordlang.language.sentences import task_sentences
+from coordlang.tasks.candidates import from_problems
+from coordlang.use.sentence.task_language import languages_in_tasks
+from coordlang.use.unified import engine as engine_module
+from coordlang.use.unified import register
+from coordlang.use.unified.names import Names
+from coordlang.use.unified.plans import label
+from coordlang.use.unified.translation import translate
+from planners.loading import ModelOptions, load
+from planners.pddl import read_domain
+from planners.pddl.robots import RobotSelection
+from planners.search.optimal_plans import search
+from planners.search.plans import Plans
+from tests.support.command import Command
+from tests.support.domains import DOMAINS, ROOT
+
+
+@pytest.fixture(autouse=True)
+def _registered() -> None:
+    register()
+
+
+def solve(problem: Any, timeout: float | None = None, **params: Any) -> Any:
+    with up.OneshotPlanner(name="coordlang", params=params) as planner:
+        return planner.solve(problem, timeout=timeout)
+
+
+def all_plans(problem: Any, **params: Any) -> list[Any]:
+    with up.AnytimePlanner(name="coordlang", params=params) as planner:
+        results = list(planner.get_solutions(problem))
+    assert [r.status for r in results] == [Status.INTERMEDIATE] * (len(results) - 1) + [
+        Status.SOLVED_OPTIMALLY
+    ]
+    return [r.plan for r in results]
+
+
+def verdict(problem: Any, plan: Any, **params: Any) -> Any:
+    with up.PlanValidator(name="coordlang", params=params) as validator:
+        return validator.validate(problem, plan)
+
+
+def crossing(cells: int = 4) -> Any:
+    """Two robots on a star of cells (the T-map with four) trade places, one cell each; entering
+    asks for a free cell.
+    """
+    cell, robot = up.UserType("Cell"), up.UserType("Robot")
+    at = up.Fluent("At", up.BoolType(), r=robot, c=cell)
+    near, free = (
+        up.Fluent("near", up.BoolType(), a=cell, b=cell),
+        up.Fluent("free", up.BoolType(), c=cell),
+    )
+    move = up.InstantaneousAction("Move", r=robot, a=cell, b=cell)
+    for condition in (at(move.r, move.a), near(move.a, move.b), free(move.b)):
+        move.add_precondition(condition)
+    for fluent, value in ((at(move.r, move.a), False), (at(move.r, move.b), True)):
+        move.add_effect(fluent, value)
+    move.add_effect(free(move.b), False)
+    move.add_effect(free(move.a), True)
+    problem = up.Problem("crossing")
+    for fluent in (at, near, free):
+        problem.add_fluent(fluent, default_initial_value=False)
+    problem.add_action(move)
+    places = [problem.add_object(f"c{n}", cell) for n in range(cells)]
+    robots = [problem.add_object(f"R{n}", robot) for n in (1, 2)]
+    for place in (p for n, p in enumerate(places) if n != 1):
+        problem.set_initial_value(near(place, places[1]), True)
+        problem.set_initial_value(near(places[1], place), True)
+    for r, start, goal in ((robots[0], 0, 2), (robots[1], 2, 0)):
+        problem.set_initial_value(at(r, places[start]), True)
+        problem.add_goal(at(r, places[goal]))
+    for n in (1, *range(3, cells)):
+        problem.set_initial_value(free(places[n]), True)
+    return problem
+
+
+def read(folder: str, problem: str) -> Any:
+    """A shipped domain by unified-planning's own reader."""
+    return PDDLReader().parse_problem(
+        str(DOMAINS / folder / "domain.pddl"), str(DOMAINS / folder / f"{problem}.pddl")
+    )
+
+
+def steps_of(found: Any, plan: PartialOrderPlan) -> list[list[str]]:
+    """The labels of a partial-order plan, layer by layer, by its definition."""
+    before = {
+        a: {b for b, later in plan.get_adjacency_list.items() if a in later}
+        for a in plan.get_adjacency_list
+    }
+    depth: dict[Any, int] = {}
+    while len(depth) < len(before):
+        for action, earlier in before.items():
+            if action not in depth and earlier <= depth.keys():
+                depth[action] = 1 + max((depth[b] for b in earlier), default=-1)
+    layers: list[list[str]] = [[] for _ in range(1 + max(depth.values(), default=-1))]
+    for action, number in depth.items():
+        layers[number].append(label(found, action))
+    return [sorted(layer) for layer in layers]
+
+
+def our_steps(space: Any) -> list[list[list[str]]]:
+    texts = space.model.texts
+    return [[sorted({t for t in texts(step) if t}) for step in plan] for plan in Plans.of(space)]
+
+
+@pytest.mark.parametrize(
+    ("folder", "name", "robots"),
+    [
+        ("handover", "two-doors", {}),
+        ("handover", "three-rooms", {}),
+        ("elevator", "same-floor", {}),
+        ("two-arms", "pass-on", {}),
+        ("two-arms", "exchange", {"robots": ("arm1", "arm2")}),
+    ],
+)
+def test_the_plans_are_those_of_the_pddl_files(
+    folder: str, name: str, robots: dict[str, Any]
+) -> None:
+    path = DOMAINS / folder
+    choice = RobotSelection(tuple(robots.get("robots", ())))
+    loaded = load(path / "domain.pddl", [path / f"{name}.pddl"], ModelOptions(choice))
+    space = search(loaded.model, loaded.tasks[0])
+    problem = read(folder, name)
+    found = translate(problem)
+    plans = all_plans(problem, **robots)
+    assert plans
+    ours = Counter(map(str, our_steps(space)))
+    assert Counter(str(steps_of(found, plan)) for plan in plans) == ours
+    for plan in plans[:5]:
+        assert verdict(problem, plan, **robots).status == Validity.VALID
+
+
+def sequential_verdicts(problem: Any, plan: PartialOrderPlan, most: int = 12) -> set[Any]:
+    """What unified-planning's own validator says of the linearisations."""
+    problem = problem.clone()
+    problem.clear_quality_metrics()
+    with up.PlanValidator(name="sequential_plan_validator") as validator:
+        plans = [plan for _, plan in zip(range(most), plan.all_sequential_plans(), strict=False)]
+        return {validator.validate(problem, plan).status for plan in plans}
+
+
+def test_every_linearisation_is_a_plan_by_the_library_itself() -> None:
+    for problem in (crossing(), read("handover", "two-doors")):
+        plans = all_plans(problem)
+        assert len(plans) >= 2
+        for plan in plans[:4]:
+            assert sequential_verdicts(problem, plan) == {Validity.VALID}
+
+
+def test_an_optimal_plan() -> None:
+    problem = crossing()
+    problem.add_quality_metric(up.MinimizeMakespan())
+    result = solve(problem)
+    assert result.status == Status.SOLVED_OPTIMALLY
+    assert result.engine_name == "coordlang"
+    assert result.metrics == {"makespan": "6", "plans": "2"}
+    assert isinstance(result.plan, PartialOrderPlan)
+    assert verdict(problem, result.plan).status == Validity.VALID
+    kinds = {kind: solve(problem, plan_kind=kind).plan for kind in engine_module._PLANS}
+    assert {kind: plan.kind for kind, plan in kinds.items()} == {kind: kind for kind in kinds}
+    assert all(verdict(problem, plan).status == Validity.VALID for plan in kinds.values())
+
+
+def test_a_sequential_plan_forgets_the_steps() -> None:
+    """Why partial-order plans are the default: other joint plans, the same sequence."""
+    problem, robot = up.Problem("relay"), up.UserType("robot")
+    robots = [problem.add_object(f"r{n}", robot) for n in (1, 2, 3)]
+    done = problem.add_fluent("done", up.BoolType(), r=robot, default_initial_value=False)
+    work = up.InstantaneousAction("work", r=robot)
+    work.add_precondition(up.Not(done(work.r)))
+    work.add_precondition(up.Or(up.Not(up.Equals(work.r, robots[2])), done(robots[0])))
+    work.add_effect(done(work.r), True)
+    problem.add_action(work)
+    for r in robots:
+        problem.add_goal(done(r))
+    first, second = all_plans(problem)  # r3 comes after r1, r2 shares a step with either
+    assert first != second
+    sequences = all_plans(problem, plan_kind=PlanKind.SEQUENTIAL_PLAN)
+    assert sequences[0] == sequences[1]
+
+
+# Multi-agent problems.
+
+
+def agents(meet: bool = False) -> Any:
+    """Two agents with positions of their own, and what is free in the environment; the same as
+    `crossing`.
+    """
+    problem = MultiAgentProblem("crossing")
+    cell = up.UserType("Cell")
+    near, free = (
+        up.Fluent("near", up.BoolType(), a=cell, b=cell),
+        up.Fluent("free", up.BoolType(), c=cell),
+    )
+    for fluent in (near, free):
+        problem.ma_environment.add_fluent(fluent, default_initial_value=False)
+    places = [up.Object(f"c{n}", cell) for n in range(4)]
+    problem.add_objects(places)
+    goals = {}
+    for name, start, goal in (("R1", 0, 2), ("R2", 2, 0)):
+        agent = Agent(name, problem)
+        at = up.Fluent("At", up.BoolType(), c=cell)
+        agent.add_public_fluent(at, default_initial_value=False)
+        move = up.InstantaneousAction("Move", a=cell, b=cell)
+        for condition in (at(move.a), near(move.a, move.b), free(move.b)):
+            move.add_precondition(condition)
+        for fluent, value in (
+            (at(move.a), False),
+            (at(move.b), True),
+            (free(move.b), False),
+            (free(move.a), True),
+        ):
+            move.add_effect(fluent, value)
+        agent.add_action(move)
+        problem.add_agent(agent)
+        problem.set_initial_value(up.Dot(agent, at(places[start])), True)
+        goals[agent] = at(places[goal])
+    for n in (0, 2, 3):
+        problem.set_initial_value(near(places[n], places[1]), True)
+        problem.set_initial_value(near(places[1], places[n]), True)
+    for n in (1, 3):
+        problem.set_initial_value(free(places[n]), True)
+    first, second = goals
+    problem.add_goal(up.Dot(first, goals[first]))
+    if meet:  # a goal of an agent's own
+        second.add_private_goal(goals[second])
+    else:
+        problem.add_goal(up.Dot(second, goals[second]))
+    return problem
+
+
+@pytest.mark.parametrize("own_goals", [False, True])
+def test_a_multi_agent_problem(own_goals: bool) -> None:
+    problem, same = agents(own_goals), crossing()
+    found = translate(problem)
+    assert [schema.name for schema in found.domain.schemas] == ["move"]
+    plans = all_plans(problem)
+    ours = [steps_of(translate(same), plan) for plan in all_plans(same)]
+    assert sorted(steps_of(found, plan) for plan in plans) == sorted(ours)
+    first = plans[0]
+    assert {str(a.agent.name) for a in first.get_adjacency_list} == {"R1", "R2"}
+    assert verdict(problem, first).status == Validity.VALID
+    result = solve(problem)
+    assert result.status == Status.SOLVED_OPTIMALLY
+    assert "R1.Move" in str(result.plan)
+
+
+def test_agents_of_different_kinds() -> None:
+    """One action name with different meanings, fluents of others (Dot), a private fluent; the guard
+    opens, the guest enters.
+    """
+    problem = MultiAgentProblem("door")
+    open_ = up.Fluent("open", up.BoolType())
+    problem.ma_environment.add_fluent(open_, default_initial_value=False)
+    guard, guest = Agent("guard", problem), Agent("guest", problem)
+    tired, inside = up.Fluent("tired", up.BoolType()), up.Fluent("inside", up.BoolType())
+    guard.add_private_fluent(tired, default_initial_value=False)
+    guest.add_public_fluent(inside, default_initial_value=False)
+    act = up.InstantaneousAction("act")
+    act.add_precondition(up.Not(tired()))
+    act.add_effect(open_(), True)
+    act.add_effect(tired(), True)
+    guard.add_action(act)
+    enter = up.InstantaneousAction("act")
+    enter.add_precondition(up.And(open_(), up.Dot(guard, tired())))
+    enter.add_effect(inside(), True)
+    guest.add_action(enter)
+    problem.add_agent(guard)
+    problem.add_agent(guest)
+    problem.add_goal(up.Dot(guest, inside()))
+    found = translate(problem)
+    assert sorted(schema.name for schema in found.domain.schemas) == ["act", "act__2"]
+    (plan,) = all_plans(problem)
+    assert steps_of(found, plan) == [["(act guard)"], ["(act__2 guest)"]]
+    assert [
+        f"{a.agent.name}.{a.action.name}"
+        for a in plan.convert_to(PlanKind.SEQUENTIAL_PLAN, problem).actions
+    ] == ["guard.act", "guest.act"]
+
+
+# Every feature of conditions and effects, against unified-planning's own simulator.
+
+
+def random_problem(seed: int) -> Any:
+    """One robot, three facts, actions with random formulas and conditional, universal and copying
+    effects.
+    """
+    random = Random(seed)
+    robot, thing = up.UserType("robot"), up.UserType("thing")
+    special = up.UserType("special", thing)
+    p, q = up.Fluent("p", up.BoolType(), x=thing), up.Fluent("q", up.BoolType())
+    problem = up.Problem(f"random {seed}")
+    problem.add_fluent(p, default_initial_value=random.random() < 0.3)
+    problem.add_fluent(q, default_initial_value=random.random() < 0.5)
+    problem.add_object("r", robot)
+    things = [problem.add_object("a", thing), problem.add_object("b", special)]
+
+    def formula(x: Any, depth: int = 2) -> Any:
+        y = up.Variable("y", random.choice([thing, special]))
+        leaves = [p(x), q(), up.Equals(x, things[0]), p(things[1])]
+        if depth == 0 or random.random() < 0.2:
+            return random.choice(leaves)
+        left, right = formula(x, depth - 1), formula(x, depth - 1)
+        kind = random.randrange(7)
+        if kind == 5:
+            return up.Forall(up.Or(p(y), left), y)
+        if kind == 6:
+            return up.Exists(up.And(p(y), up.Not(up.Equals(y, x)), right), y)
+        return [
+            up.And(left, right),
+            up.Or(left, right),
+            up.Not(left),
+            up.Implies(left, right),
+            up.Iff(left, right),
+        ][kind]
+
+    for number in range(4):
+        action = up.InstantaneousAction(f"a{number}", r=robot, x=thing)
+        if random.random() < 0.8:
+            action.add_precondition(formula(action.x))
+        v = up.Variable("v", thing)
+        kind = random.randrange(4)
+        if kind == 0:
+            action.add_effect(
+                p(v), random.random() < 0.6, up.Or(q(), up.Equals(v, action.x)), forall=[v]
+            )
+        elif kind == 1:
+            action.add_effect(p(action.x), up.Iff(q(), p(things[0])))
+        else:
+            action.add_effect(p(action.x), random.random() < 0.7)
+        if random.random() < 0.7:
+            condition = formula(action.x) if random.random() < 0.5 else up.TRUE()
+            action.add_effect(q(), random.random() < 0.5, condition)
+        problem.add_action(action)
+    problem.add_goal(up.And(*(p(t) if random.random() < 0.7 else up.Not(p(t)) for t in things)))
+    problem.add_goal(q() if random.random() < 0.6 else up.Not(q()))
+    return problem
+
+
+def shortest(problem: Any) -> tuple[int, int] | None:
+    """The length and number of the shortest plans, by breadth-first search with unified-planning's
+    simulator.
+    """
+    with up.SequentialSimulator(problem) as simulator:
+        start = simulator.get_initial_state()
+        atoms = [*problem.initial_values]
+
+        def key(state: Any) -> tuple[bool, ...]:
+            return tuple(state.get_value(atom).is_true() for atom in atoms)
+
+        layer, seen, length = {key(start): (start, 1)}, {key(start)}, 0
+        while layer:
+            goals = sum(ways for state, ways in layer.values() if simulator.is_goal(state))
+            if goals:
+                return length, goals
+            following: dict[tuple[bool, ...], tuple[Any, int]] = {}
+            for state, ways in layer.values():
+                for action, args in simulator.get_applicable_actions(state):
+                    after = simulator.apply(state, action, args)
+                    if after is not None and key(after) not in seen:
+                        following[key(after)] = (
+                            after,
+                            ways + following.get(key(after), (None, 0))[1],
+                        )
+            seen |= following.keys()
+            layer, length = following, length + 1
+    return None
+
+
+def test_formulas_and_effects_mean_what_they_mean_to_the_library() -> None:
+    answers = Counter[str]()
+    for seed in range(30):
+        problem = random_problem(seed)
+        expected = shortest(problem)
+        result = solve(problem)
+        if expected is None:
+            assert result.status == Status.UNSOLVABLE_PROVEN, seed
+            answers["unsolvable"] += 1
+            continue
+        assert result.status == Status.SOLVED_OPTIMALLY
+        assert (int(result.metrics["makespan"]), int(result.metrics["plans"])) == expected, seed
+        assert isinstance(result.plan, SequentialPlan)
+        answers["long" if expected[0] > 1 else "short"] += 1
+    assert min(answers["unsolvable"], answers["long"], answers["short"]) >= 2, answers
+
+
+# Joint actions.
+
+
+def test_joint_actions() -> None:
+    """Each action is a whole step; the comments that say so in PDDL are given as an argument."""
+    path = DOMAINS / "grid-joint"
+    loaded = load(path / "domain.pddl", [path / "three-cells.pddl"])
+    problem = read("grid-joint", "three-cells")
+    parts: dict[str, dict[str, str | None]] = {
+        schema.name: {
+            p.robot: f"({' '.join(p.template)})" if p.template else None for p in schema.parts
+        }
+        for schema in read_domain(path / "domain.pddl").schemas
+    }
+    plans = all_plans(problem, subactions=parts)
+    assert len(plans) == Plans.of(search(loaded.model, loaded.tasks[0])).count == 4
+    assert all(isinstance(plan, SequentialPlan) and len(plan.actions) == 2 for plan in plans)
+    with up.PlanValidator(name="sequential_plan_validator") as validator:
+        assert all(validator.validate(problem, plan).status == Validity.VALID for plan in plans)
+    assert all(verdict(problem, plan, subactions=parts).status == Validity.VALID for plan in plans)
+
+
+# Under a sentence.
+
+
+def test_a_sentence_leaves_exactly_its_plans() -> None:
+    problem = crossing(5)
+    found = translate(problem)
+    candidates = from_problems(found.domain, [found.problem])
+    language = build_language(candidates).language
+    task_language = next(languages_in_tasks(language, candidates))
+    everything = sorted(str(steps_of(found, plan)) for plan in all_plans(problem))
+    listed = []
+    sentences = task_sentences(task_language.space, 0, task_language.partition)
+    assert len(sentences) > 1
+    for sentence in sentences:
+        text = " ".join(sentence.words)
+        plans = all_plans(problem, language=language, sentence=text)
+        assert len(plans) == sentence.plans
+        listed += [str(steps_of(found, plan)) for plan in plans]
+        assert verdict(problem, plans[0], language=language, sentence=text).status == Validity.VALID
+        other = next(" ".join(s.words) for s in sentences if s != sentence)
+        wrong = verdict(problem, plans[0], language=language, sentence=other)
+        assert wrong.status == Validity.INVALID
+        assert text in str(wrong.log_messages)
+    assert sorted(listed) == everything
+    assert len(all_plans(problem, language=language)) == len(everything)
+    one = solve(problem, language=language, sentence=sentences[0].words)
+    assert (one.status, one.log_messages) == (Status.SOLVED_OPTIMALLY, [])
+    wrong_word = (
+        " ".join((*sentences[0].words, *sentences[0].words[-2:]))
+        if len(sentences[0].words) > 1
+        else "w1 w0 w1"
+    )
+    none = solve(problem, language=language, sentence=wrong_word)
+    assert none.status == Status.UNSOLVABLE_INCOMPLETELY
+    assert "no optimal plan has the sentence" in str(none.log_messages)
+    with pytest.raises(UPUsageError, match="no word of this language"):
+        solve(problem, language=language, sentence="hello")
+
+
+def test_a_language_file_for_the_problem_that_the_library_read(
+    coordlang: Command, tmp_path: Path
+) -> None:
+    path, file = DOMAINS / "handover", tmp_path / "language.json"
+    assert coordlang("build", path / "domain.pddl", path / "two-doors.pddl", "-o", file).code == 0
+    told = json.loads(
+        coordlang("explain", file, path / "domain.pddl", path / "two-doors.pddl", "--json").out
+    )
+    assert told
+    problem = read("handover", "two-doors")
+    result = solve(problem, language=str(file))
+    assert (result.status, result.log_messages) == (Status.SOLVED_OPTIMALLY, [])
+    problem.clear_goals()
+    problem.add_goal(up.TRUE())
+    result = solve(problem, language=str(file))
+    assert result.status == Status.SOLVED_OPTIMALLY
+    assert "does not cover this task" in str(result.log_messages)
+    with pytest.raises(UPUsageError, match="not declared"):
+        solve(crossing(), language=str(file))
+
+
+# What goes wrong, and how it is said.
+
+
+def test_an_unsolvable_problem() -> None:
+    problem = crossing(3)
+    result = solve(problem)
+    assert (result.status, result.plan) == (Status.UNSOLVABLE_PROVEN, None)
+    with up.AnytimePlanner(name="coordlang") as planner:
+        assert [r.status for r in planner.get_solutions(problem)] == [Status.UNSOLVABLE_PROVEN]
+
+
+def test_a_goal_that_holds_already() -> None:
+    problem = crossing()
+    problem.clear_goals()
+    result = solve(problem)
+    assert result.status == Status.SOLVED_OPTIMALLY
+    assert not result.plan.get_adjacency_list
+    assert verdict(problem, result.plan).status == Validity.VALID
+
+
+def test_limits(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert solve(crossing(), timeout=1e-6).status == Status.TIMEOUT
+    with up.AnytimePlanner(name="coordlang") as planner:
+        stream = planner.get_solutions(crossing(), timeout=60)
+        assert next(stream).status == Status.INTERMEDIATE
+        monkeypatch.setattr(engine_module.time, "monotonic", lambda: 1e12)
+        assert [r.status for r in stream] == [Status.TIMEOUT]
+        monkeypatch.undo()
+
+    def out_of_memory(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(engine_module, "search", out_of_memory)
+    assert solve(crossing()).status == Status.MEMOUT
+
+
+def numeric() -> Any:
+    problem = crossing()
+    fuel = problem.add_fluent("fuel", up.IntType(), default_initial_value=3)
+    problem.action("Move").add_decrease_effect(fuel, 1)
+    return problem
+
+
+def test_kinds() -> None:
+    kind = up.get_environment().factory.engine("coordlang").supported_kind()
+    assert crossing().kind <= kind
+    assert agents(True).kind <= kind
+    assert not numeric().kind <= kind
+    costs = crossing()
+    costs.add_quality_metric(up.MinimizeActionCosts({costs.action("Move"): up.Int(1)}))
+    assert not costs.kind <= kind
+    # SentenceDemands for by name, an engine is tried in spite of the warning.
+    with pytest.warns(UserWarning, match="cannot establish"):
+        assert solve(costs).status == Status.SOLVED_SATISFICING
+    with pytest.warns(UserWarning, match="cannot establish"):
+        unsupported = solve(numeric())
+    assert unsupported.status == Status.UNSUPPORTED_PROBLEM
+    assert "fuel" in str(unsupported.log_messages)
+
+
+def test_the_factory_finds_the_engine_for_several_agents() -> None:
+    with up.OneshotPlanner(problem_kind=agents().kind) as planner:
+        assert planner.name == "coordlang"
+    problem = agents()
+    with up.AnytimePlanner(
+        problem_kind=problem.kind, anytime_guarantee=up.AnytimeGuarantee.OPTIMAL_PLANS
+    ) as planner:
+        assert planner.name == "coordlang"
+
+
+@pytest.mark.parametrize(
+    ("params", "message"),
+    [
+        ({"sentence": "w0"}, "needs its language"),
+        ({"robots": ("nobody",)}, "no object 'nobody'"),
+        ({"robot_type": "cheese"}, "cheese"),
+        ({"language": "missing.json"}, "no such file"),
+        ({"plan_kind": PlanKind.STN_PLAN}, "partial-order"),
+    ],
+)
+def test_wrong_parameters(params: dict[str, Any], message: str) -> None:
+    with pytest.raises(UPUsageError, match=message):
+        solve(crossing(), **params)
+
+
+def test_who_the_robots_are() -> None:
+    problem = crossing()
+    assert (
+        solve(problem, robots=problem.objects(problem.user_type("Robot"))).metrics["plans"] == "2"
+    )
+    assert solve(problem, robots=("R1", "R2")).metrics["plans"] == "2"
+    assert solve(problem, robot_type=problem.user_type("Robot")).metrics["plans"] == "2"
+    nobody = up.Problem("nobody")
+    on = nobody.add_fluent("on", up.BoolType(), default_initial_value=False)
+    press = up.InstantaneousAction("press")
+    press.add_effect(on, True)
+    nobody.add_action(press)
+    nobody.add_goal(on)
+    with pytest.raises(UPUsageError, match="which objects are the robots"):
+        solve(nobody)
+
+
+def test_invalid_plans() -> None:
+    problem = crossing()
+    good = solve(problem, plan_kind=PlanKind.SEQUENTIAL_PLAN).plan.actions
+
+    def again(actions: list[Any]) -> SequentialPlan:
+        return SequentialPlan([ActionInstance(a.action, a.actual_parameters) for a in actions])
+
+    assert verdict(problem, again(good)).status == Validity.VALID
+    late = verdict(problem, again([*good[:1], *good[:1], *good]))
+    assert (late.status, late.reason) == (
+        Validity.INVALID,
+        FailedValidationReason.INAPPLICABLE_ACTION,
+    )
+    assert str(late.inapplicable_action) == str(good[0])
+    assert "step 2" in str(late.log_messages)
+    short = verdict(problem, again(good[:-1]))
+    assert (short.status, short.reason) == (
+        Validity.INVALID,
+        FailedValidationReason.UNSATISFIED_GOALS,
+    )
+    twice = verdict(
+        problem,
+        PartialOrderPlan({ActionInstance(a.action, a.actual_parameters): [] for a in good[:2]}),
+    )
+    assert (twice.status, twice.reason) == (Validity.INVALID, FailedValidationReason.MUTEX_CONFLICT)
+
+
+def test_odd_names() -> None:
+    """Capitals, spaces, names of PDDL itself, names that become equal in lower case."""
+    problem = up.Problem("Odd (names)")
+    robot, thing = up.UserType("Robot"), up.UserType("And")
+    done = problem.add_fluent("Is Done?", up.BoolType(), x=thing, default_initial_value=False)
+    twin = problem.add_fluent("is done?", up.BoolType(), x=thing, default_initial_value=False)
+    things = [problem.add_object(name, thing) for name in ("Not", "not", "a b", "(x)")]
+    problem.add_object("R 1", robot)
+    problem.add_object("r 1", robot)
+    for name in ("Do It", "do it"):
+        action = up.InstantaneousAction(name, R=robot, r=thing)
+        action.add_precondition(up.Not(done(action.parameter("r"))))
+        action.add_effect((done if name == "Do It" else twin)(action.parameter("r")), True)
+        problem.add_action(action)
+    for thing_ in things[:2]:
+        problem.add_goal(up.And(done(thing_), up.Not(twin(thing_))))
+    plans = all_plans(problem)
+    assert len(plans) == 2  # who does which
+    assert {str(a) for a in plans[0].get_adjacency_list} in (
+        {"Do It(R 1, Not)", "Do It(r 1, not)"},
+        {"Do It(R 1, not)", "Do It(r 1, Not)"},
+    )
+    assert sequential_verdicts(problem, plans[0]) == {Validity.VALID}
+    names = Names()
+    assert [names.of(n, n) for n in ("x", "X", "?x", "", "-", "object", "x")] == [
+        "x",
+        "x__2",
+        "_x",
+        "x__3",
+        "x__4",
+        "object__2",
+        "x",
+    ]
+
+
+def test_nothing_is_printed(capfd: pytest.CaptureFixture[str]) -> None:
+    solve(crossing())
+    all_plans(agents())
+    assert capfd.readouterr() == ("", "")
+
+
+def test_unified_planning_is_imported_by_register_only() -> None:
+    code = (
+        "import sys, coordlang.use.unified as u; before = 'unified_planning' in sys.modules; u.register();"
+        "print(before, 'unified_planning' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("False True\n", "")
+
+
+def test_the_example_script() -> None:
+    script = ROOT / "docs" / "examples" / "unified_planning_example.py"
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = done.stdout.splitlines()
+    assert [line.split()[0] for line in lines[:2]] == ["INTERMEDIATE", "SOLVED_OPTIMALLY"]
+    assert [line.split("leaves")[1] for line in lines[3:]] == [
+        " 1 open; SOLVED_OPTIMALLY VALID"
+    ] * 2

@@ -1,0 +1,196 @@
+"""Fast algorithms against their naive twins on random models with two and three robots."""
+
+from __future__ import annotations
+
+from random import Random
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from coordlang.language.partition import Partition
+from coordlang.required.divergences import first_differences, separations
+from coordlang.required.miscoordination import inseparable, miscoordination
+from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
+from coordlang.verification.by_definition import verify
+from coordlang.vocabulary.greedy import fill
+from planners.errors import ProvedImpossible
+from planners.joint.model import FullState
+from planners.search.plan_space import PlanSpace
+from tests.support import naive
+from tests.support.random_models import random_model
+
+#: (robots, plans of one task that the twin lists at most)
+SIZES = [(2, 60), (3, 14)]
+COMPARED = settings(max_examples=200, deadline=None, derandomize=True)
+
+
+def candidates_of(seed: int, robots: int) -> Candidates:
+    """All pairs of states of a random model, or its one task with its partial goal."""
+    domain, problem, options = random_model(seed, robots)
+    try:
+        make = all_pairs if seed % 3 else from_problems
+        found = make(domain, [problem], options)
+    except ProvedImpossible:
+        assume(False)
+        raise
+    assume(0 < found.count <= 300)
+    return found
+
+
+def listable(candidates: Candidates, most: int) -> None:
+    for space in candidates.spaces:
+        for task in range(len(space.starts)):
+            try:
+                naive.listed(space, task, most)
+            except naive.TooLarge:
+                assume(False)
+
+
+def naive_divergences(
+    spaces: tuple[PlanSpace, ...], most: int
+) -> tuple[set[tuple[int, frozenset[int]]], list[bool], bool]:
+    """alpha* of all failing mixtures, which tasks require coordination, and whether some plans are
+    inseparable.
+    """
+    found, requires, same_states = set(), [], False
+    for space in spaces:
+        for task in range(len(space.starts)):
+            any_failure = False
+            for chosen in naive.failing(naive.listed(space, task, most), len(space.model.robots)):
+                any_failure = True
+                where = naive.divergence([naive.states(space, task, plan) for plan in chosen])
+                if where is None:
+                    same_states = True
+                else:
+                    found.add(where)
+            requires.append(any_failure)
+    return naive.minimal(found), requires, same_states
+
+
+@pytest.mark.parametrize(("robots", "most"), SIZES)
+def test_walk_equals_listing(robots: int, most: int) -> None:
+    seen = {"required": 0, "inseparable": 0, "compared": 0}
+
+    @COMPARED
+    @given(st.integers(0, 10**9))
+    def compare(seed: int) -> None:
+        candidates = candidates_of(seed, robots)
+        listable(candidates, most)
+        expected, requires, same_states = naive_divergences(candidates.spaces, most)
+        witnesses = [
+            miscoordination(space, task)
+            for space in candidates.spaces
+            for task in range(len(space.starts))
+        ]
+        assert [w is not None for w in witnesses] == requires
+        assert any(inseparable(space) is not None for space in candidates.spaces) == same_states
+        seen["compared"] += 1
+        seen["required"] += any(requires)
+        seen["inseparable"] += same_states
+        if not same_states:
+            found = first_differences(candidates.spaces)
+            assert found.requiring == sum(requires)
+            table = {
+                (last, frozenset(s for s in after if s >= 0))
+                for last, after in zip(
+                    found.divergences.last.tolist(),
+                    found.divergences.following.tolist(),
+                    strict=True,
+                )
+            }
+            assert table == expected
+
+    compare()
+    # The comparison is worth something only if both answers occur.
+    assert seen["required"] >= 20
+    assert seen["inseparable"] >= 5
+    assert seen["compared"] - seen["required"] >= 20
+
+
+@pytest.mark.parametrize(("robots", "most"), SIZES)
+def test_verify_equals_definition(robots: int, most: int) -> None:
+    seen = {True: 0, False: 0}
+
+    @COMPARED
+    @given(st.integers(0, 10**9))
+    def compare(seed: int) -> None:
+        candidates = candidates_of(seed, robots)
+        listable(candidates, most)
+        random = Random(seed)
+        size = random.randint(1, 4)
+        word = np.array([random.randrange(size) for _ in candidates.rows])
+        table = Partition(tuple(f"w{n}" for n in range(size)), candidates.rows, word, 0)
+        expected = all(
+            naive.is_language(space, dict(enumerate(word.tolist())), most)
+            for space in candidates.spaces
+        )
+        verdict = verify(table, candidates.spaces)
+        assert verdict.holds == expected
+        seen[expected] += 1
+        if not expected:
+            check_witness(candidates, table, verdict.witness)
+
+    compare()
+    assert min(seen.values()) >= 20
+
+
+def check_witness(candidates: Candidates, table: Partition, witness: object) -> None:
+    """The shown plans are optimal, have one sentence, and their mixture is no plan."""
+    model = candidates.model
+    plans = tuple(tuple(model.numbers(step) for step in plan) for plan in witness.plans)
+    for space in candidates.spaces:
+        for task in range(len(space.starts)):
+            all_plans = naive.listed(space, task, 10**6)
+            if not set(plans) <= set(all_plans) or naive.mixture(plans) in all_plans:
+                continue
+            words = table.word_of(space.rows)
+            sentences = {
+                naive.sentence([int(words[s]) for s in naive.states(space, task, p)]) for p in plans
+            }
+            if len(sentences) == 1:
+                return
+    raise AssertionError("no task has these plans with one sentence and a failing mixture")
+
+
+@pytest.mark.parametrize(("robots", "most"), SIZES)
+def test_greedy_is_a_language_and_merging_is_judged_right(robots: int, most: int) -> None:
+    """Merging two words that alpha separates is refuted by `verify` exactly when the naive twin
+    says so.
+    """
+    seen = {True: 0, False: 0}
+
+    @settings(max_examples=120, deadline=None, derandomize=True)
+    @given(st.integers(0, 10**9))
+    def compare(seed: int) -> None:
+        candidates = candidates_of(seed, robots)
+        listable(candidates, most)
+        assume(all(inseparable(space) is None for space in candidates.spaces))
+        found = first_differences(candidates.spaces)
+        partition = fill(range(len(candidates.rows)), separations(found.divergences))
+        word = np.array([partition[s] for s in range(len(candidates.rows))])
+        names = tuple(f"w{n}" for n in range(int(word.max()) + 1))
+        assert verify(Partition(names, candidates.rows, word, 0), candidates.spaces).holds
+        for a in range(len(names)):
+            for b in range(a):
+                merged = np.where(word == a, b, word)
+                expected = all(
+                    naive.is_language(space, dict(enumerate(merged.tolist())), most)
+                    for space in candidates.spaces
+                )
+                assert (
+                    verify(Partition(names, candidates.rows, merged, 0), candidates.spaces).holds
+                    == expected
+                )
+                seen[expected] += 1
+
+    compare()
+    assert seen[False] >= (9 if robots == 2 else 3)
+    assert seen[True] >= 1
+
+
+def test_full_state_goals_are_all_pairs() -> None:
+    domain, problem, options = random_model(1, 2)
+    candidates = all_pairs(domain, [problem], options)
+    assert all(isinstance(goal, FullState) for space in candidates.spaces for goal in space.goals)

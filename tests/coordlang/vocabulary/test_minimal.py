@@ -1,0 +1,220 @@
+"""The exact method: known minima, agreement with brute force, and what it rests on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations, permutations, product
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from coordlang.building import build_language
+from coordlang.language.sentences import sentence
+from coordlang.language.warping import Clause, pair, separation_clause, warping_clause
+from coordlang.required.miscoordination import inseparable
+from coordlang.tasks.candidates import all_pairs, from_problems
+from coordlang.vocabulary.sat import PartitionProblem, PartitionProblems, reduce
+from planners.errors import ProvedImpossible
+from tests.support import naive
+from tests.support.candidates import states_of
+from tests.support.domains import all_tasks
+from tests.support.random_models import random_model
+
+
+@pytest.mark.parametrize(
+    ("folder", "stem", "words"),
+    [
+        ("three-cells", "problem", 3),
+        ("t-map", "problem", 3),
+        ("grid", "gw1-2x2", 3),
+        ("grid-joint", "gw1-2x2", 3),
+        ("grid", "gw2-2x3", 5),
+        ("grid", "gwb2-3x3", 3),
+    ],
+)
+def test_known_minima(folder: str, stem: str, words: int) -> None:
+    built = build_language(all_tasks(folder, stem), "minimal")
+    guarantee = built.language.guarantee
+    assert (guarantee.size, guarantee.lower_bound, guarantee.proved_minimal) == (words, words, True)
+    assert built.verdict.holds
+
+
+def test_t_map_has_two_single_words() -> None:
+    """Two words of a single state each, and two sentences of three words that say who moves first."""
+    sizes = build_language(all_tasks("t-map"), "minimal").language.sizes()
+    assert sorted(sizes.values()) == [1, 1, 10]
+
+
+SEQUENCES = st.lists(st.integers(0, 4), min_size=1, max_size=6)
+
+
+@settings(max_examples=500, deadline=None)
+@given(SEQUENCES, SEQUENCES, st.lists(st.integers(0, 2), min_size=5, max_size=5))
+def test_same_sentence_iff_a_warping_path_exists(
+    u: list[int], v: list[int], word: list[int]
+) -> None:
+    clause = warping_clause(u, v, word)
+    assert (clause is not None) == (sentence(word[s] for s in u) == sentence(word[s] for s in v))
+    if clause is not None:
+        assert all(word[a] == word[b] and a != b for a, b in clause)
+        assert len(clause) <= fewest_cells(tuple(u), tuple(v), word)
+
+
+def fewest_cells(u: tuple[int, ...], v: tuple[int, ...], word: list[int]) -> int:
+    """Non-identical cells of the best warping path, by trying all of them."""
+
+    def best(i: int, j: int) -> int:
+        if word[u[i]] != word[v[j]]:
+            return 10**9
+        here = int(u[i] != v[j])
+        steps = [(i - a, j - b) for a, b in ((1, 0), (0, 1), (1, 1)) if i >= a and j >= b]
+        return here + (min(best(*step) for step in steps) if steps else 0)
+
+    return best(len(u) - 1, len(v) - 1)
+
+
+def test_separation_clause_of_three_plans() -> None:
+    assert separation_clause([[0, 1, 3], [0, 2, 3], [0, 4, 3]], [0] * 5) == {(1, 2), (1, 4)}
+    assert separation_clause([[0, 1, 3], [0, 2, 3], [0, 4, 3]], [0, 1, 0, 0, 1]) is None
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.integers(1, 3),
+    st.lists(st.sets(st.tuples(st.integers(0, 4), st.integers(0, 4)), min_size=1), max_size=6),
+)
+def test_colouring_against_trying_all(size: int, drawn: list[set[tuple[int, int]]]) -> None:
+    clauses = [frozenset(pair(a, b) for a, b in clause if a != b) for clause in drawn]
+    colouring = PartitionProblem([2, 0, 1, 4, 3], size)
+    for clause in clauses:
+        colouring.add(clause)
+    found = colouring.solve()
+    colouring.delete()
+
+    def holds(word: tuple[int, ...] | dict[int, int]) -> bool:
+        return all(any(word[a] != word[b] for a, b in clause) for clause in clauses)
+
+    assert (found is not None) == any(holds(word) for word in product(range(size), repeat=5))
+    assert found is None or holds(found)
+
+
+GROUPS = (
+    [],
+    [[0, 1, 2, 4, 3]],
+    [[1, 2, 3, 4, 0], [2, 3, 4, 0, 1], [3, 4, 0, 1, 2], [4, 0, 1, 2, 3]],
+    [list(p) for p in permutations(range(5)) if p != (0, 1, 2, 3, 4)],
+)
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.integers(1, 3),
+    st.sampled_from(GROUPS),
+    st.lists(st.sets(st.tuples(st.integers(0, 4), st.integers(0, 4)), min_size=1), max_size=4),
+    st.permutations(list(combinations(range(5), 2))),
+)
+def test_one_of_symmetric_partitions(
+    size: int,
+    group: list[list[int]],
+    drawn: list[set[tuple[int, int]]],
+    pairs: list[tuple[int, int]],
+) -> None:
+    """Where all images of a clause are clauses, a partition is left if there was one, and it is the
+    first of its images.
+    """
+    clauses = {
+        frozenset(pair(s[a], s[b]) for a, b in clause if a != b)
+        for clause in drawn
+        for s in [range(5), *group]
+    }
+    plain, led = PartitionProblem(range(5), size), PartitionProblem(range(5), size)
+    for colouring in (plain, led):
+        for clause in sorted(clauses, key=sorted):
+            colouring.add(clause)
+    led.add_lex_leaders(group, pairs)
+    found = led.solve()
+    assert (found is None) == (plain.solve() is None)
+    for colouring in (plain, led):
+        colouring.delete()
+    if found is not None:
+        images = [[found[s[a]] != found[s[b]] for a, b in pairs] for s in [range(5), *group]]
+        assert images[0] == max(images)
+
+
+def test_problems_are_kept_and_learn_what_is_new() -> None:
+    started: list[int] = []
+
+    def start(size: int, known: Sequence[Clause]) -> PartitionProblem:
+        started.append(len(known))
+        colouring = PartitionProblem([0, 1, 2], size)
+        for clause in known:
+            colouring.add(clause)
+        return colouring
+
+    problems = PartitionProblems(start, PartitionProblem.add)
+    known: list[Clause] = [frozenset({(0, 1)}), frozenset({(0, 1), (1, 2)})]
+    first = problems.of(2, known)
+    assert first.solve() is not None
+    known.append(frozenset({(1, 2)}))
+    assert problems.of(2, known) is first
+    assert (found := first.solve()) is not None
+    assert found[0] == found[2] != found[1]
+    known.append(frozenset({(0, 2)}))
+    assert problems.of(2, known) is first
+    assert first.solve() is None
+    known.append(frozenset({(0, 2), (1, 2)}))
+    assert problems.of(2, known) is not first, "more than twice what it started with: afresh"
+    assert problems.of(3, known).solve() is not None
+    assert started == [2, 5, 5]
+    problems.drop_all()
+    assert problems.of(2, known).solve() is None
+    assert started == [2, 5, 5, 5]
+    problems.drop_all()
+
+
+def test_reduce_drops_what_is_implied() -> None:
+    short, long, other = (
+        frozenset({(0, 1)}),
+        frozenset({(0, 1), (1, 2)}),
+        frozenset({(1, 2), (2, 3)}),
+    )
+    assert reduce([long, short, other, short]) == [short, other]
+    assert reduce([long, short, other], 1) == [short, other], "short ones first"
+    assert reduce([long, short, other], 0) == [short, long, other]
+
+
+@pytest.mark.parametrize(("robots", "most", "examples"), [(2, 40, 140), (3, 14, 70)])
+def test_minimal_equals_exhaustive(robots: int, most: int, examples: int) -> None:
+    """On random models with two and three robots, all pairs of states or one partial goal."""
+    seen: dict[int, int] = {}
+
+    @settings(max_examples=examples, deadline=None, derandomize=True)
+    @given(st.integers(0, 10**9))
+    def compare(seed: int) -> None:
+        domain, problem, options = random_model(seed, robots)
+        try:
+            make = all_pairs if seed % 3 else from_problems
+            candidates = make(domain, [problem], options)
+        except ProvedImpossible:
+            assume(False)
+            raise
+        assume(0 < candidates.count <= 100)
+        assume(states_of(candidates.spaces) <= 8)
+        for space in candidates.spaces:
+            for task in range(len(space.starts)):
+                try:
+                    naive.listed(space, task, most)
+                except naive.TooLarge:
+                    assume(False)
+        assume(all(inseparable(space) is None for space in candidates.spaces))
+        brute = build_language(candidates, "exhaustive").language.guarantee
+        exact = build_language(candidates, "minimal").language.guarantee
+        greedy = build_language(candidates, "greedy").language.guarantee
+        assert exact.size == exact.lower_bound == brute.size
+        assert brute.size <= greedy.size
+        seen[brute.size] = seen.get(brute.size, 0) + 1
+
+    compare()
+    # Worth something only if more than one word is needed now and then.
+    assert sum(n for size, n in seen.items() if size > 1) >= (12 if robots == 2 else 4), seen

@@ -1,0 +1,239 @@
+"""Theorem 3 against its definition: plans listed, all failing tuples separated, all partitions
+tried.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from itertools import combinations, count
+
+import pytest
+
+from coordlang.building import build_language
+from coordlang.required.composition_walk import walk
+from coordlang.required.divergences import alternatives
+from coordlang.required.last_differences import SeparationWalk
+from coordlang.required.miscoordination import inseparable
+from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
+from coordlang.vocabulary.exhaustive import _partitions
+from planners.errors import ProvedImpossible
+from tests.support import naive
+from tests.support.candidates import states_of
+from tests.support.domains import all_tasks
+from tests.support.random_models import random_model
+
+#: Groups of pairs of states; all pairs of one group must be separated.
+Demand = tuple[frozenset[frozenset[int]], ...]
+
+
+def demands(candidates: Candidates, most: int, *, beta: bool) -> set[Demand]:
+    """What Theorem 3 asks, one demand for each failing tuple of plans."""
+    found = set()
+    for space in candidates.spaces:
+        for task in range(len(space.starts)):
+            plans = naive.listed(space, task, most)
+            for chosen in naive.failing(plans, len(space.model.robots)):
+                sequences = [naive.states(space, task, plan) for plan in chosen]
+                found.add(tuple(sorted({*_demand(sequences, beta)}, key=sorted_pairs)))
+    return found
+
+
+def _demand(sequences: list[tuple[int, ...]], beta: bool) -> Iterator[frozenset[frozenset[int]]]:
+    differ = [n for n, here in enumerate(zip(*sequences, strict=True)) if len(set(here)) > 1]
+    yield from _triples(sequences[0][differ[0] - 1], {s[differ[0]] for s in sequences})
+    if beta and differ[-1] == len(sequences[0]) - 1:
+        yield from (frozenset({frozenset(p)}) for p in combinations({s[-1] for s in sequences}, 2))
+    elif beta:
+        yield from _triples(sequences[0][differ[-1] + 1], {s[differ[-1]] for s in sequences})
+
+
+def _triples(shared: int, others: set[int]) -> Iterator[frozenset[frozenset[int]]]:
+    for a, b in combinations(others, 2):
+        yield frozenset({frozenset({shared, a}), frozenset({shared, b}), frozenset({a, b})})
+
+
+def sorted_pairs(group: frozenset[frozenset[int]]) -> list[list[int]]:
+    return sorted(sorted(p) for p in group)
+
+
+def satisfies(word: dict[int, int], demand: Demand) -> bool:
+    # A "pair" of one state (the shared state is also a next one) cannot be separated.
+    return any(all(len({word[s] for s in p}) == len(p) == 2 for p in group) for group in demand)
+
+
+def least(candidates: Candidates, states: list[int], wanted: set[Demand]) -> int:
+    for size in range(1, len(states) + 1):
+        for words in _partitions(len(states), size):
+            word = dict(zip(states, words, strict=True))
+            if all(satisfies(word, demand) for demand in wanted):
+                return size
+    raise AssertionError("all states apart separate everything")
+
+
+def small_models(robots: int, most: int, number: int) -> Iterator[tuple[int, Candidates]]:
+    """Random models that require coordination, small enough to list plans and partitions."""
+    for seed in count():
+        domain, problem, options = random_model(seed, robots)
+        make: Callable[..., Candidates] = all_pairs if seed % 3 else from_problems
+        try:
+            candidates = make(domain, [problem], options)
+        except ProvedImpossible:
+            continue
+        if not 0 < candidates.count <= 100 or states_of(candidates.spaces) > 7:
+            continue
+        if any(inseparable(space) is not None for space in candidates.spaces):
+            continue
+        if not any(walk(space).requires[space.starts].any() for space in candidates.spaces):
+            continue
+        try:
+            demands(candidates, most, beta=True)
+        except naive.TooLarge:
+            continue
+        yield seed, candidates
+        number -= 1
+        if not number:
+            return
+
+
+@pytest.mark.parametrize("written", [True, False])
+@pytest.mark.parametrize(
+    ("robots", "most", "number"),
+    [
+        (2, 40, 12),
+        (3, 14, 6),
+        pytest.param(2, 40, 200, marks=pytest.mark.slow),
+        pytest.param(3, 14, 100, marks=pytest.mark.slow),
+    ],
+)
+def test_against_the_theorem(
+    robots: int, most: int, number: int, written: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Least sizes with and without beta, and the order of the four methods; `minimal` equals
+    `exhaustive`.
+
+    With all constraints written down, and with constraints asked of the walk.
+    """
+    if not written:
+        monkeypatch.setattr(SeparationWalk, "every", lambda *_: None)
+    seen: Counter[tuple[int, ...]] = Counter()
+    for seed, candidates in small_models(robots, most, number):
+        both, alpha = (demands(candidates, most, beta=b) for b in (True, False))
+        states = sorted({int(s) for space in candidates.spaces for s in space.state})
+        full = build_language(candidates, "separating", seed=seed)
+        first = build_language(candidates, "separating", alpha_only=True)
+        codec = candidates.model.codec
+        for built, wanted in ((full, both), (first, alpha)):
+            assert built.stopped is None
+            size = built.language.guarantee.size
+            assert (
+                size == least(candidates, states, wanted) == built.figures["separating_lower_bound"]
+            )
+            word = {
+                s: built.language.words.index(built.language.states[codec.key(candidates.rows[s])])
+                for s in states
+            }
+            assert all(satisfies(word, demand) for demand in wanted)
+        exhaustive, minimal, greedy = (
+            build_language(candidates, method).language.guarantee
+            for method in ("exhaustive", "minimal", "greedy")
+        )
+        assert exhaustive.size == minimal.size == minimal.lower_bound
+        sizes = (
+            exhaustive.size,
+            full.language.guarantee.size,
+            first.language.guarantee.size,
+            greedy.size,
+        )
+        assert list(sizes) == sorted(sizes)
+        seen[sizes] += 1
+    assert any(a < b for a, b, _, _ in seen), "no model where the minimum is below Theorem 3's"
+    assert any(b < c for _, b, c, _ in seen), "no model where beta helps"
+
+
+@pytest.mark.parametrize(
+    ("folder", "stem", "both", "alpha"),
+    [
+        ("three-cells", "problem", 3, 6),
+        ("grid", "gw1-2x2", 6, 8),
+        ("grid", "gw2-2x3", 7, 13),
+        ("grid", "gwb2-3x3", 6, 8),
+    ],
+)
+def test_known_minima(folder: str, stem: str, both: int, alpha: int) -> None:
+    """The running example needs 6 words under alpha alone and 3 under alpha or beta (the paper)."""
+    candidates = all_tasks(folder, stem)
+    for words, alpha_only in ((both, False), (alpha, True)):
+        built = build_language(candidates, "separating", alpha_only=alpha_only)
+        assert built.language.guarantee.size == words == built.figures["separating_lower_bound"]
+
+
+def test_gw1_has_eight_states_that_alpha_alone_keeps_apart() -> None:
+    """So no partition with the paper's 7 words satisfies alpha alone."""
+    candidates = all_tasks("grid", "gw1-2x2")
+    apart = {p for (group,) in demands(candidates, 1000, beta=False) for p in group}
+    states = sorted({s for p in apart for s in p})
+    assert any(
+        all(frozenset(p) in apart for p in combinations(group, 2))
+        for group in combinations(states, 8)
+    )
+    assert not any(
+        all(frozenset(p) in apart for p in combinations(group, 2))
+        for group in combinations(states, 9)
+    )
+
+
+def test_different_ends_need_one_pair_only() -> None:
+    (only,) = alternatives(-1, [4, 7, 4])
+    assert only.pairs == {(4, 7)}
+    assert [sorted(s.pairs) for s in alternatives(2, [5, 3])] == [[(2, 3), (2, 5), (3, 5)]]
+
+
+@pytest.mark.parametrize(
+    ("robots", "most", "number"),
+    [
+        (2, 40, 14),
+        (3, 14, 8),
+        pytest.param(2, 40, 100, marks=pytest.mark.slow),
+        pytest.param(3, 14, 50, marks=pytest.mark.slow),
+    ],
+)
+def test_every_constraint_and_no_other(robots: int, most: int, number: int) -> None:
+    """What is written down are the demands of the failing tuples, all listed."""
+    for _, candidates in small_models(robots, most, number):
+        found = [SeparationWalk(space).every(10**6) for space in candidates.spaces]
+        every = {
+            tuple(
+                sorted(
+                    (frozenset(frozenset(p) for p in s.pairs) for s in constraint), key=sorted_pairs
+                )
+            )
+            for constraints in found
+            if constraints is not None
+            for constraint in constraints
+        }
+        assert None not in found
+        assert every == demands(candidates, most, beta=True)
+
+
+def test_too_many_constraints_are_not_written_down() -> None:
+    (space,) = all_tasks("three-cells").spaces
+    walk_of = SeparationWalk(space)
+    every = walk_of.every(10**6)
+    assert every is not None
+    assert len(every) == 12
+    assert walk_of.every(24) == every, "each constraint is met in two ways: the domain is symmetric"
+    assert walk_of.every(11) is None
+
+
+def test_walk_keeps_only_what_fails() -> None:
+    """Where nothing requires coordination nothing is kept, and every partition is separating."""
+    import numpy as np
+
+    candidates = all_tasks("t-map")
+    kept = [SeparationWalk(space) for space in candidates.spaces]
+    assert sum(w.nodes for w in kept) > 0
+    apart = np.arange(len(candidates.rows))
+    random = np.random.default_rng(0)
+    assert not [c for w in kept for c in w.unseparated(apart, random)]
+    assert [c for w in kept for c in w.unseparated(apart * 0, random)]

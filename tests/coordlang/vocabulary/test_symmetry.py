@@ -1,0 +1,214 @@
+"""Symmetries: the group that the slow twin finds, checked on the model, and bounded."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from random import Random
+
+import numpy as np
+import pytest
+
+from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
+from coordlang.tasks.task_file import ListedTask
+from coordlang.vocabulary.symmetry import Symmetry, SymmetryGroup, generated, symmetry_group
+from coordlang.vocabulary.symmetry_check import SymmetryCheck
+from coordlang.vocabulary.symmetry_graph import automorphism_generators
+from planners.errors import ProvedImpossible
+from planners.joint.states import split_atoms
+from planners.pddl import parse_domain, parse_problem, read_domain
+from planners.pddl.sexpr import Source
+from planners.search.plans import Plans, counts
+from tests.support import slow_symmetry
+from tests.support.domains import DOMAINS, all_tasks
+from tests.support.random_models import random_model
+
+GRID = read_domain(DOMAINS / "grid" / "domain.pddl")
+
+
+def world(cells: int, edges: list[tuple[int, int]], robots: int) -> str:
+    """Robots in the first cells of a graph, each wants to be in the cell of the next one."""
+    names = [f"r{n + 1}" for n in range(robots)]
+    adjacent = " ".join(f"(adjacent c{a} c{b}) (adjacent c{b} c{a})" for a, b in edges)
+    at = " ".join(f"(at {name} c{n})" for n, name in enumerate(names))
+    goal = " ".join(f"(at {name} c{(n + 1) % robots})" for n, name in enumerate(names))
+    return f"""(define (problem p) (:domain grid)
+      (:objects {" ".join(names)} - robot {" ".join(f"c{n}" for n in range(cells))} - cell)
+      (:init {at} {adjacent}) (:goal (and {goal})))"""
+
+
+def random_world(random: Random) -> Candidates | None:
+    """A few cells, some of which are neighbours; all tasks, one task, or a few of them."""
+    cells = random.randint(3, 5)
+    edges = [edge for edge in combinations(range(cells), 2) if random.random() < 0.85]
+    robots = random.choice([2, 2, 3]) if cells < 5 else 2
+    problem = parse_problem(Source("p", world(cells, edges, robots)), GRID)
+    every = all_pairs(GRID, [problem])
+    if not every.count:
+        return None
+    kind = random.choice(["all", "one", "some"])
+    if kind == "all":
+        return every
+    if kind == "one":
+        try:
+            return from_problems(GRID, [problem])
+        except ProvedImpossible:
+            return None
+    tasks = []
+    for _ in range(random.randint(1, 4)):
+        init, goal = (
+            tuple(split_atoms(every.model.codec.key(row)))
+            for row in every.rows[random.sample(range(len(every.rows)), 2)]
+        )
+        tasks.append(ListedTask(init, goal[: random.randint(1, len(goal))]))
+    return from_listed(GRID, [problem], tasks)
+
+
+def elements(group: SymmetryGroup) -> set[tuple[int, ...]]:
+    return set(map(tuple, group.permutations))
+
+
+def is_group(permutations: set[tuple[int, ...]]) -> bool:
+    """Whether one after another, and the identity, are among them again."""
+    known = permutations | {tuple(range(len(next(iter(permutations)))))} if permutations else set()
+    return all(tuple(a[s] for s in b) in known for a in permutations for b in permutations)
+
+
+def test_the_group_that_the_slow_twin_finds() -> None:
+    random = Random(5)
+    sizes = []
+    for _ in range(40):
+        candidates = random_world(random)
+        if candidates is None:
+            continue
+        group = symmetry_group(candidates, largest=1_000)
+        assert elements(group) == slow_symmetry.state_symmetries(candidates, 100_000)
+        assert not group.dropped
+        sizes.append(len(group.symmetries))
+    assert sum(size > 1 for size in sizes) >= 8
+    assert max(sizes) >= 47
+
+
+@pytest.mark.parametrize("robots", [2, 3])
+def test_the_group_of_unstructured_models(robots: int) -> None:
+    """Random models: mostly no symmetry, and never one that the twin does not find."""
+    found = 0
+    for seed in range(40):
+        domain, problem, options = random_model(seed, robots)
+        try:
+            make = all_pairs if seed % 3 else from_problems
+            candidates = make(domain, [problem], options)
+        except ProvedImpossible:
+            continue
+        if not 0 < candidates.count <= 3_000:
+            continue
+        group = symmetry_group(candidates)
+        assert elements(group) == slow_symmetry.state_symmetries(candidates, 100_000)
+        found += bool(group.symmetries)
+    assert found >= 2
+
+
+@pytest.mark.parametrize(
+    ("folder", "stem"),
+    [
+        ("three-cells", "problem"),
+        ("t-map", "problem"),
+        ("grid", "gw2-2x3"),
+        ("grid-joint", "gw1-2x2"),
+        ("handover", "two-doors"),
+        ("push-box", "next-door"),
+        ("lock", "three-robots"),
+        ("tray", "serve"),
+    ],
+)
+def test_the_group_of_shipped_domains(folder: str, stem: str) -> None:
+    candidates = all_tasks(folder, stem)
+    group = symmetry_group(candidates)
+    assert elements(group) == slow_symmetry.state_symmetries(candidates, 200_000)
+    assert is_group(elements(group))
+    assert not group.dropped
+
+
+def test_of_a_large_group_a_subgroup() -> None:
+    """Three robots in four cells, all neighbours of each other: 4! times 3! symmetries."""
+    edges = list(combinations(range(4), 2))
+    candidates = all_pairs(GRID, [parse_problem(Source("p", world(4, edges, 3)), GRID)])
+    whole = elements(symmetry_group(candidates, largest=144))
+    assert len(whole) == 143
+    for largest in (1, 2, 7, 64, 143):
+        part = elements(symmetry_group(candidates, largest))
+        assert part < whole
+        assert len(part) < largest
+        assert is_group(part)
+    assert len(elements(symmetry_group(candidates))) >= 23
+
+
+def test_what_is_generated() -> None:
+    turn, back, swap = ([1, 2, 0], [2, 0, 1], [1, 0, 2])
+
+    def group(*permutations: list[int], largest: int = 6) -> list[list[int]]:
+        found = generated([Symmetry({}, np.array(p)) for p in permutations], largest)
+        return sorted(symmetry.states.tolist() for symmetry in found)
+
+    assert group() == []
+    assert group(swap) == [swap]
+    assert group(turn) == group(back) == group(turn, back) == [turn, back]
+    assert len(group(turn, swap)) == 5
+    assert group(turn, swap, largest=5) == [turn, back], "the whole group has six elements"
+    assert group(swap, turn, largest=5) == [swap]
+    assert group(turn, largest=2) == []
+
+
+SIGNS = """(define (domain signs) (:types robot place sign)
+  (:predicates (at ?r - robot ?p - place) (way ?a ?b - place) (posted ?s - sign ?p - place))
+  (:action go :agent ?r - robot :parameters (?a ?b - place)
+    :precondition (and (at ?r ?a) (way ?a ?b)
+      (forall (?s - sign ?o - robot ?x - place)
+        (or (not (posted ?s ?b)) (= ?o ?r) (not (go ?o ?x ?b)))))
+    :effect (and (at ?r ?b) (not (at ?r ?a)))))"""
+
+
+def test_a_renaming_that_changes_what_an_action_needs_is_dropped() -> None:
+    """Two ways around; where a sign is posted one robot at a time may come.
+
+    Signs are in no fact and in no action.
+    """
+    domain = parse_domain(Source("signs", SIGNS))
+    text = """(define (problem p) (:domain signs) (:objects r1 r2 - robot a b c d - place s - sign)
+      (:init (at r1 a) (at r2 a) (way a c) (way a d) (way c b) (way d b) {})
+      (:goal (and (at r1 b) (at r2 b))))"""
+    groups = []
+    for posted in ("", "(posted s c) (posted s b)", "(posted s c) (posted s d)"):
+        problem = parse_problem(Source("p", text.format(posted)), domain)
+        candidates = from_problems(domain, [problem])
+        groups.append(symmetry_group(candidates))
+        check_plans(candidates, groups[-1])
+    assert [len(group.symmetries) for group in groups] == [3, 1, 1]
+    assert [group.dropped for group in groups] == [0, 1, 0]
+
+
+def check_plans(candidates: Candidates, group: SymmetryGroup) -> None:
+    """The definition: the optimal plans of a task go to the optimal plans of a task."""
+    plans_of_tasks = set()
+    for space in candidates.spaces:
+        counted = counts(space)
+        for start in space.starts.tolist():
+            plans = Plans(space, start, counted)
+            plans_of_tasks.add(frozenset(tuple(plans.states(plan)) for plan in plans))
+    for permutation in group.permutations:
+        assert plans_of_tasks == {
+            frozenset(tuple(permutation[s] for s in states) for states in plans)
+            for plans in plans_of_tasks
+        }
+
+
+def test_without_room_for_tasks_the_check_decides() -> None:
+    """The graph of the model alone has symmetries that the one task of the problem has not."""
+    text = world(4, [(0, 1), (1, 2), (2, 3), (3, 0)], 2)
+    candidates = from_problems(GRID, [parse_problem(Source("p", text), GRID)])
+    whole = automorphism_generators(candidates)
+    check = SymmetryCheck(candidates)
+    assert whole
+    assert all(check.states_under(renaming) is not None for renaming in whole)
+    proposed = [r for n in range(20, 60) for r in automorphism_generators(candidates, largest=n)]
+    assert any(check.states_under(renaming) is None for renaming in proposed)
+    assert automorphism_generators(candidates, largest=5) == []

@@ -1,0 +1,93 @@
+"""The optimal plans of both plain forms stand one to one for the optimal joint plans."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import event, given, reject, settings
+from hypothesis import strategies as st
+
+from planners.classical import compile_classical
+from planners.errors import BadInput
+from planners.joint.model import Cost
+from planners.loading import PlanningInstance
+from planners.search.optimal_plans import search
+from planners.search.plans import Plans
+from planners.search.reachable import explore
+from tests.support.classical_models import COSTS, FORMS, MODELS, random_state, read
+from tests.support.naive_classical import optimal_plans
+from tests.support.random_pddl import KINDS, Kind, random_model
+
+#: Two ground actions of joint-action PDDL with the same parts: where both are possible they are one
+#: joint action.
+TWICE = """
+(define (domain twice)
+  (:types lamp)
+  (:constants b - lamp)
+  (:predicates (lit ?l - lamp) (far) (done))
+  (:functions (total-cost) (price ?l - lamp))
+  (:action walk
+    ; subaction r1 (walk)
+    ; subaction r2 idle
+    :parameters (?l - lamp) :precondition (lit ?l) :effect (and (far) (increase (total-cost) (price ?l))))
+  (:action stop
+    ; subaction r1 idle
+    ; subaction r2 (stop)
+    :parameters () :precondition (far) :effect (done))
+  (:action break-b
+    ; subaction r1 (walk)
+    ; subaction r2 (break)
+    :parameters () :precondition () :effect (and (far) (not (lit b)))))
+"""
+TWICE_TASK = """(define (problem p) (:domain twice) (:objects a - lamp)
+  (:init (lit a) (lit b) (= (price a) 2) (= (price b) 1)) (:goal (done)))"""
+#: A goal in disjunctions, several of which hold at the end.
+ANYWAY = """
+(define (domain anyway) (:types robot)
+  (:predicates (done ?r - robot) (warm))
+  (:action work :agent ?r - robot :parameters ()
+    :precondition (or (not (done ?r)) (warm) (exists (?o - robot) (and (not (= ?o ?r)) (not (done ?o)))))
+    :effect (and (done ?r) (when (or (warm) (not (done ?r)) (exists (?o - robot) (done ?o))) (warm)))))
+"""
+ANYWAY_TASK = """(define (problem p) (:domain anyway) (:objects r1 r2 - robot) (:init)
+  (:goal (or (and (done r1) (or (done r2) (warm))) (warm) (and (done r2) (warm)))))"""
+
+
+def ours(loaded: PlanningInstance) -> int:
+    return Plans.of(search(loaded.model, loaded.tasks[0])).count
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("cost", [*COSTS, "makespan+cost"])
+@pytest.mark.parametrize("name", [*MODELS, "twice", "anyway"])
+def test_every_plan_once(name: str, cost: Cost, form: str) -> None:
+    texts = {**MODELS, "twice": (TWICE, TWICE_TASK), "anyway": (ANYWAY, ANYWAY_TASK)}[name]
+    loaded = read(*texts, cost)
+    plain = compile_classical(loaded.model, loaded.tasks[0], FORMS[form])
+    assert plain.form == form
+    assert optimal_plans(plain).count() == ours(loaded)
+
+
+def test_one_joint_action_in_two_guises() -> None:
+    loaded = read(TWICE, TWICE_TASK, "makespan+cost")
+    space = search(loaded.model, loaded.tasks[0])
+    assert (space.cost_of(0), Plans.of(space).count) == ((2, 0), 1)
+    assert ours(read(TWICE, TWICE_TASK)) == 2
+
+
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 100_000), kind=st.sampled_from(KINDS), cost=st.sampled_from(COSTS))
+def test_every_plan_of_random_models_once(seed: int, kind: Kind, cost: Cost) -> None:
+    text = random_model(seed, kind)
+    try:
+        loaded = read(text.domain, text.problem, cost, text.unowned)
+        space = explore(loaded.model, random_state(loaded, seed)[None, :])
+    except BadInput:  # one label tuple, two results
+        reject()
+    last = space.model.full_state(space.rows[seed % len(space)])
+    task = replace(loaded.tasks[0], init=random_state(loaded, seed), goal=last)
+    expected = Plans.of(search(loaded.model, task)).count
+    event(f"plans: {expected if expected < 3 else 'many'}")
+    for limit in FORMS.values():
+        assert optimal_plans(compile_classical(loaded.model, task, limit)).count() == expected

@@ -1,0 +1,226 @@
+"""Concurrency networks: each kind of constraint by hand, and random networks against the naive
+twin.
+"""
+
+from __future__ import annotations
+
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planners.check.rules import Rules
+from planners.errors import BadInput
+from planners.loading import PlanningInstance, build
+from planners.pddl import parse_domain, parse_problem
+from planners.pddl.lifted import Atom, Domain
+from planners.pddl.sexpr import Source
+from tests.support.joint_twin import check_model
+from tests.support.random_pddl import RandomModel, random_model
+
+ROWING = """(define (domain rowing) (:types robot boat place)
+  (:predicates (on ?r - robot ?b - boat) (moored ?b - boat ?p - place) (lit))
+  (:action row :agent ?r - robot :parameters (?b - boat ?to - place)
+    :precondition (on ?r ?b) :effect (moored ?b ?to))
+  (:action light :agent ?r - robot :parameters (?b - boat) :precondition (on ?r ?b) :effect ())
+  NETWORK)"""
+CREW = """(define (problem crew) (:domain rowing)
+  (:objects r1 r2 r3 - robot b - boat shore - place)
+  (:init (on r1 b) (on r2 b) (on r3 b)) (:goal (moored b shore)))"""
+
+
+def rowing(network: str) -> PlanningInstance:
+    domain = parse_domain(Source("rowing", ROWING.replace("NETWORK", network)))
+    return build(domain, [parse_problem(Source("crew", CREW), domain)])
+
+
+def crews(network: str) -> set[tuple[str, ...]]:
+    """Who does what in the joint steps of the first state: 'row', 'light' or '-'."""
+    loaded = rowing(network)
+    model = loaded.model
+    steps = model.successors(loaded.tasks[0].init[None, :])
+    return {
+        tuple(text[1:].split(" ")[0] if text else "-" for text in model.texts(row))
+        for row in steps.labels
+    }
+
+
+def rowers(network: str) -> set[int]:
+    return {crew.count("row") for crew in crews(network)}
+
+
+def constraint(name: str, bounds: str, action: str) -> str:
+    return f"(:concurrency-constraint {name} :parameters (?b - boat) :bounds {bounds} :actions (({action} 1)))"
+
+
+@pytest.mark.parametrize(
+    ("bounds", "numbers"),
+    [
+        ("(1 1)", {0, 1}),
+        ("(2 2)", {0, 2}),
+        ("(2 inf)", {0, 2, 3}),
+        ("(1 2)", {0, 1, 2}),
+        ("(3 3)", {0, 3}),
+        ("(4 4)", {0}),
+        (f"(2 {10**20})", {0, 2, 3}),
+        (f"(2 {'9' * 5000})", {0, 2, 3}),
+        (f"({10**20} {10**30})", {0}),
+        ("(02 003)", {0, 2, 3}),
+    ],
+)
+def test_bounds(bounds: str, numbers: set[int]) -> None:
+    assert rowers(constraint("v", bounds, "row")) == numbers
+
+
+@pytest.mark.parametrize(
+    "parameter", ["?b", "?b - object", "?b - (either boat place)", "?b - vessel", "?b - tub"]
+)
+def test_types_that_some_object_may_share(parameter: str) -> None:
+    network = constraint("v", "(2 2)", "row").replace("?b - boat", parameter)
+    text = ROWING.replace("robot boat place", "robot place tub - boat boat - vessel").replace(
+        "NETWORK", network
+    )
+    domain = parse_domain(Source("rowing", text))
+    build(domain, [parse_problem(Source("crew", CREW), domain)])
+
+
+def test_an_object_of_two_types_matches() -> None:
+    network = constraint("v", "(2 2)", "row").replace("?b - boat", "?b - place")
+    domain = parse_domain(Source("rowing", ROWING.replace("NETWORK", network)))
+    build(
+        domain,
+        [
+            parse_problem(
+                Source("crew", CREW.replace("b - boat", "b - (either boat place)")), domain
+            )
+        ],
+    )
+
+
+def test_without_a_network_anybody_rows() -> None:
+    assert rowers("") == {0, 1, 2, 3}
+
+
+def test_dependence_is_needed_by_the_second_only() -> None:
+    network = (
+        constraint("v", "(1 1)", "light")
+        + constraint("w", "(2 2)", "row")
+        + "(:positive-dependence v w)"
+    )
+    found = crews(network)
+    assert {crew for crew in found if "row" in crew} == {
+        ("row", "row", "light"),
+        ("row", "light", "row"),
+        ("light", "row", "row"),
+    }
+    assert ("light", "-", "-") in found  # a light alone is allowed
+    assert ("light", "light", "-") not in found
+
+
+@pytest.mark.parametrize(
+    ("network", "message"),
+    [
+        (constraint("v", "(1 1)", "swim"), "unknown action 'swim'"),
+        (constraint("v", "(2 1)", "row"), "nobody can meet the bounds (2 1)"),
+        (constraint("v", "(1)", "row"), "expected '(LOW HIGH)'"),
+        (constraint("v", "(x 1)", "row"), "expected a number from 0, found 'x'"),
+        (constraint("v", "(1 ²)", "row"), "expected a number from 0, found '²'"),
+        (
+            constraint("v", "(1 1)", "row").replace("(row 1)", "(row 0)"),
+            "argument 0 of row is ?r - robot, which is never ?b - boat: the constraint 'v' would never match",
+        ),
+        (
+            constraint("v", "(1 1)", "row").replace("boat", "place"),
+            "argument 1 of row is ?b - boat, which is never ?b - place",
+        ),
+        (
+            constraint("v", "(1 1)", "row").replace("(row 1)", "(row 9)"),
+            "expected 1 argument positions below 3",
+        ),
+        ("(:concurrency-constraint v :bounds (1 1))", "missing: :actions, :parameters"),
+        ("(:positive-dependence v w)", "unknown constraint 'v'"),
+    ],
+)
+def test_a_wrong_network(network: str, message: str) -> None:
+    with pytest.raises(BadInput, match=r"rowing:6:\d+") as error:
+        rowing(network)
+    assert message in str(error.value)
+
+
+def random_network(random: Random, domain: Domain) -> str:
+    """One to three constraints over the arguments of a random type, and maybe a dependence between
+    two of them.
+    """
+    kinds = sorted({p.types for s in domain.schemas for p in s.parameters})
+    kind = random.choice(kinds)
+    places = [
+        (s.name, n) for s in domain.schemas for n, p in enumerate(s.parameters) if p.types == kind
+    ]
+    typed = kind[0] if len(kind) == 1 else f"(either {' '.join(kind)})"
+    lines = []
+    for number in range(random.randint(1, 3)):
+        chosen = random.sample(places, random.randint(1, min(2, len(places))))
+        bounds = random.choice(["(1 1)", "(2 inf)", "(2 2)", "(1 2)", "(1 inf)"])
+        actions = " ".join(f"({name} {position})" for name, position in chosen)
+        lines.append(
+            f"(:concurrency-constraint v{number} :parameters (?x - {typed}) :bounds {bounds} :actions ({actions}))"
+        )
+    if len(lines) > 1 and random.random() < 0.7:
+        lines.append("(:positive-dependence v0 v1)")
+    return "\n".join(lines)
+
+
+def test_random_networks() -> None:
+    seen: dict[str, int] = {}
+
+    @settings(max_examples=80, deadline=None, derandomize=True)
+    @given(st.integers(0, 10**9))
+    def compare(seed: int) -> None:
+        text = random_model(seed, "agent")
+        domain = parse_domain(Source("domain", text.domain))
+        network = random_network(Random(seed), domain)
+        with_network = text.domain.rstrip().removesuffix(")") + network + ")"
+
+        def note(what: str) -> None:
+            seen[what] = seen.get(what, 0) + 1
+
+        check_model(RandomModel(with_network, text.problem, text.unowned), note)
+
+    compare()
+    assert seen.get("several states", 0) >= 30, seen
+
+
+def test_an_action_that_satisfies_both_itself_is_still_linked() -> None:
+    """(v, w) dependent and `a` in both: it needs nobody, but it is meant to be done together with
+    the others in v.
+    """
+    domain = parse_domain(
+        Source(
+            "d",
+            """(define (domain d) (:types robot) (:predicates (p) (q) (n))
+      (:action a :agent ?r - robot :parameters () :effect (and (not (p)) (q)))
+      (:action b :agent ?r - robot :parameters () :precondition (p) :effect (n))
+      (:concurrency-constraint v :parameters () :bounds (1 inf) :actions ((a) (b)))
+      (:concurrency-constraint w :parameters () :bounds (1 inf) :actions ((a)))
+      (:positive-dependence v w))""",
+        )
+    )
+    text = "(define (problem p) (:domain d) (:objects r1 r2 - robot) (:init (p)) (:goal (q)))"
+    problem = parse_problem(Source("p", text), domain)
+    loaded = build(domain, [problem])
+    steps = loaded.model.successors(loaded.tasks[0].init[None, :])
+    found = {loaded.model.texts(row) for row in steps.labels}
+    rules = Rules.of(domain, problem, loaded.team)
+    assert ("(a r1)", "(b r2)") in found
+    assert rules.broken_rule(frozenset({Atom("p", ())}), ("(a r1)", "(b r2)")) is None
+
+
+def test_a_network_of_joint_actions_is_refused() -> None:
+    text = """(define (domain d) (:predicates (p))
+      (:action x :parameters ()
+        ; subaction r1 (do)
+        :effect (p))
+      (:concurrency-constraint v :parameters () :bounds (2 2) :actions ((x))))"""
+    with pytest.raises(BadInput, match="a concurrency network in a joint-action domain"):
+        parse_domain(Source("d", text))

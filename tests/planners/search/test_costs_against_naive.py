@@ -1,0 +1,148 @@
+"""``--cost makespan+cost`` against brute force: least makespan, then least PDDL action cost, on
+random models.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from random import Random
+
+import pytest
+
+from planners.check.validate import Moment, State
+from planners.errors import BadInput
+from planners.joint.model import show
+from planners.loading import ModelOptions, PlanningInstance, build, task_of
+from planners.pddl import parse_domain, parse_problem
+from planners.pddl.lifted import And, Formula, Not
+from planners.pddl.robots import RobotSelection
+from planners.pddl.sexpr import Source
+from planners.search.optimal_plans import plan_spaces, search
+from planners.search.plans import Plans
+from planners.search.reachable import explore
+from tests.support.naive_joint_steps import TooLarge, Twin
+from tests.support.random_pddl import Kind, random_model
+
+Price = Callable[[str], int]
+
+
+def priced(seed: int, kind: Kind) -> tuple[PlanningInstance, Price]:
+    """A random model in which every action costs a constant, or what its first argument costs, or
+    nothing.
+    """
+    text = random_model(seed, kind)
+    random = Random(seed)
+    names = re.findall(r"\(:action (\S+)", text.domain)
+    pieces = re.split(r"(?=\(:action )", text.domain)
+    fixed: dict[str, int | None] = {}
+    for number, name in enumerate(names, 1):
+        variables = re.findall(r"\?\w+", pieces[number].split(":precondition")[0])
+        fixed[name] = random.choice((0, 1, 2, 5, None if variables else 3))
+        term = f"(price {variables[0]})" if fixed[name] is None else str(fixed[name])
+        cost = (
+            "" if fixed[name] == 0 and random.random() < 0.5 else f"(increase (total-cost) {term}) "
+        )
+        pieces[number] = re.sub(
+            r":effect \((?:and ?)?", f":effect (and {cost}", pieces[number], count=1
+        )
+    domain = parse_domain(
+        Source(
+            "d", "".join(pieces).replace("(:predicates", "(:functions (price ?x)) (:predicates", 1)
+        )
+    )
+    plain = parse_problem(Source("p", text.problem), domain)
+    prices = {name: random.randrange(4) for name in sorted(plain.objects)}
+    known = " ".join(f"(= (price {name}) {value})" for name, value in prices.items())
+    problem = parse_problem(
+        Source("p", text.problem.replace("(:init", f"(:init {known}", 1)), domain
+    )
+    loaded = build(
+        domain, [problem], ModelOptions(RobotSelection(unowned=text.unowned), "makespan+cost")
+    )
+
+    def price(label: str) -> int:
+        name, *args = label.strip("()").split()
+        own = fixed[name]
+        return prices[args[0]] if own is None else own
+
+    return loaded, price
+
+
+def brute_force(twin: Twin, goal: Formula, price: Price) -> tuple[int, int, int]:
+    """(makespan, cost, number of plans): all sequences of joint steps, of least length, then of
+    least price.
+    """
+    paths: dict[State, Counter[int]] = {twin.init: Counter({0: 1})}
+    for makespan in range(len(twin.reachable(128))):
+        done = [
+            costs
+            for state, costs in paths.items()
+            if twin.rules.holds(goal, {}, True, Moment(state))
+        ]
+        if done:
+            total = sum(done, Counter())
+            return makespan, min(total), total[min(total)]
+        following: dict[State, Counter[int]] = {}
+        for state, costs in paths.items():
+            for labels, after in twin.successors(state):
+                step = sum(price(label) for label in {label for label in labels if label})
+                into = following.setdefault(after, Counter())  # type: ignore[arg-type]
+                for cost, number in costs.items():
+                    into[cost + step] += number
+        paths = following
+    raise AssertionError("the goal is one of the reachable states")
+
+
+@pytest.mark.parametrize("kind", ["agent", "plain"])
+def test_the_same_cost_and_the_same_number_of_plans(kind: Kind) -> None:
+    seen: Counter[str] = Counter()
+    for seed in range(30):
+        loaded, price = priced(seed, kind)
+        model = loaded.model
+        twin = Twin(loaded.domain, loaded.problems[0], loaded.team, model.keeps_idle, 3000)
+        try:
+            last = twin.reachable(128)[-1]
+            parts = (
+                *sorted(last - twin.init, key=str),
+                *(Not(a) for a in sorted(twin.init - last, key=str)),
+            )
+            goal = And(parts)
+            wanted = brute_force(twin, goal, price)
+        except TooLarge:
+            seen["too large"] += 1
+            continue
+        task = task_of(model, loaded.domain, replace(loaded.problems[0], goal=goal))
+        space = search(model, task)
+        assert (*space.cost_of(0), Plans.of(space).count) == wanted, seed
+        init = task.init[None, :]
+        (other,) = plan_spaces(explore(model, init), [(task.goal, init)])
+        assert (*other.cost_of(0), Plans.of(other).count) == wanted, seed
+        seen["costs"] += wanted[1] > 0
+        seen["several plans"] += wanted[2] > 1
+    assert seen["costs"] >= 8
+    assert seen["several plans"] >= 5
+
+
+def test_a_price_that_is_missing() -> None:
+    """Only for actions that can happen at all, and only where prices count."""
+    domain = """(define (domain d) (:types robot place) (:predicates (at ?r - robot ?p - place) (way ?a ?b - place))
+      (:functions (far ?a ?b - place))
+      (:action go :agent ?r - robot :parameters (?a ?b - place) :precondition (and (at ?r ?a) (way ?a ?b))
+        :effect (and (not (at ?r ?a)) (at ?r ?b) (increase (total-cost) (far ?a ?b)))))"""
+    problem = """(define (problem p) (:domain d) (:objects r1 r2 - robot a b c - place)
+      (:init (at r1 a) (at r2 a) (way a b) (= (far a b) 2)) (:goal (at r1 b)))"""
+
+    def loaded(more: str = "", cost: str = "makespan+cost") -> PlanningInstance:
+        read = parse_domain(Source("d", domain))
+        task = parse_problem(Source("p", problem.replace("(way a b)", f"(way a b) {more}")), read)
+        return build(read, [task], ModelOptions(cost=cost))  # type: ignore[arg-type]
+
+    model = loaded().model
+    assert search(model, loaded().tasks[0]).cost_of(0) == (1, 2)
+    assert {show(a) for a in model.statics} == {"(way a b)"}
+    with pytest.raises(BadInput, match=r"the cost \(far b c\) has no whole value"):
+        loaded("(way b c)")
+    assert loaded("(way b c)", "makespan").model.cost == "makespan"

@@ -1,0 +1,1 @@
+"""What several tests need: shipped worlds, random models, naive twins, commands, pages."""

@@ -1,0 +1,78 @@
+"""Candidate tasks that are small enough to list every plan of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from itertools import product
+from random import Random
+
+from coordlang.required.composition_walk import walk
+from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
+from coordlang.tasks.task_file import ListedTask
+from planners.errors import ProvedImpossible
+from planners.joint.states import split_atoms
+from planners.loading import ModelOptions
+from planners.pddl import parse_domain, parse_problem
+from planners.pddl.sexpr import Source
+from planners.search.plan_space import PlanSpace
+from planners.search.plans import Plan
+from tests.support import naive
+from tests.support.random_models import graph_text
+
+#: More plans of one task are not listed.
+MOST = 40
+
+
+@cache
+def on_graph(seed: int, robots: int) -> Candidates | None:
+    """Robots on a random graph: all pairs of states, or one task with a partial goal.  None for a
+    useless draw.
+    """
+    text, problem = graph_text(Random(seed), robots)
+    domain = parse_domain(Source("domain.pddl", text))
+    goal = parse_problem(Source("problem.pddl", problem), domain)
+    try:
+        candidates = (all_pairs if seed % 2 else from_problems)(domain, [goal], ModelOptions())
+    except ProvedImpossible:
+        return None
+    return candidates if 0 < candidates.count <= 140 else None
+
+
+def some_tasks(candidates: Candidates, random: Random, number: int) -> Candidates:
+    """A few pairs of states, goals sometimes partial."""
+    key = candidates.model.codec.key
+    tasks = []
+    for _ in range(number):
+        init, goal = (
+            tuple(split_atoms(key(row)))
+            for row in candidates.rows[random.sample(range(len(candidates.rows)), 2)]
+        )
+        tasks.append(ListedTask(init, goal[: random.randint(1, len(goal))]))
+    return from_listed(candidates.loaded.domain, candidates.loaded.problems, tasks)
+
+
+def requiring(candidates: Candidates) -> bool:
+    return any(walk(space).requires[space.starts].any() for space in candidates.spaces)
+
+
+def states_of(spaces: tuple[PlanSpace, ...]) -> int:
+    return len({int(s) for space in spaces for s in space.state})
+
+
+def listed(
+    candidates: Candidates,
+) -> Iterator[tuple[PlanSpace, int, list[Plan], list[tuple[int, ...]]]]:
+    """Each task with its plans in their order and the states that they pass through."""
+    for space in candidates.spaces:
+        for task in range(len(space.starts)):
+            plans = naive.listed(space, task, MOST)
+            yield space, task, plans, [naive.states(space, task, plan) for plan in plans]
+
+
+def partitions(states: list[int], size: int) -> Iterator[dict[int, int]]:
+    for words in product(range(size), repeat=len(states)):
+        if [words.index(w) for w in range(size) if w in words] == sorted(
+            words.index(w) for w in set(words)
+        ):
+            yield dict(zip(states, words, strict=True))

@@ -1,0 +1,42 @@
+"""Two robots that trade the two rooms of a hall, in one file or factored."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+DOMAIN = """(define (domain hall)
+  (:requirements :typing)
+  (:types robot room)
+  (:predicates (at ?r - robot ?x - room) (door ?x ?y - room))
+  (:action go :agent ?r - robot :parameters (?x ?y - room)
+    :precondition (and (at ?r ?x) (door ?x ?y))
+    :effect (and (at ?r ?y) (not (at ?r ?x)))))
+"""
+PROBLEM = """(define (problem two) (:domain hall)
+  (:objects r1 r2 - robot a b - room)
+  (:init (at r1 a) (at r2 b) (door a b) (door b a))
+  (:goal (and (at r1 b) (at r2 a))))
+"""
+
+
+def factored(folder: Path) -> Path:
+    """The hall as a file for each robot, which has a type of its own."""
+    folder.mkdir()
+    for robot in ("r1", "r2"):
+        domain = DOMAIN.replace(
+            "(:types robot room)", f"(:types {robot}kind - robot robot room)"
+        ).replace(
+            "(:action go :agent ?r - robot :parameters (?x",
+            f"(:action go-{robot} :parameters (?r - {robot}kind ?x",
+        )
+        (folder / f"domain-{robot}.pddl").write_text(domain)
+        problem = PROBLEM.replace("r1 r2 - robot", f"{robot} - {robot}kind")
+        facts = [
+            f"(at {other} {room})"
+            for other, room in (("r1", "a"), ("r2", "b"), ("r1", "b"), ("r2", "a"))
+            if other != robot
+        ]
+        for fact in facts:
+            problem = problem.replace(fact, "")
+        (folder / f"problem-{robot}.pddl").write_text(problem)
+    return folder
