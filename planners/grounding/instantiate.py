@@ -73,6 +73,12 @@ class GroundAction:
     def label(self) -> str:
         return label(self.schema, self.args)
 
+    def part_of(self, robot: int) -> str | None:
+        """The label of a robot in it; None if the robot idles or does not take part."""
+        if self.parts:
+            return self.parts[robot]
+        return self.label if robot in self.owners else None
+
 
 def label(name: str, args: Iterable[str]) -> str:
     """PDDL syntax of a ground atom or action: ``(move r1 a b)``."""

@@ -79,6 +79,10 @@ class StateCodec:
             for bit in bits(int(row[block]))
         ]
 
+    def fact_bits(self, row: Rows) -> int:
+        """The facts that are true in a state as one number: bit k says whether fact k is."""
+        return int.from_bytes(self.facts_part(row).astype("<u8").tobytes(), "little")
+
     def decode(self, row: Rows) -> list[str]:
         """The texts of the true atoms of a state, remembered subactions too, sorted."""
         atoms = [self.facts.texts[number] for number in self.true_facts(row)]

@@ -35,7 +35,14 @@ Atoms = Literal["exact", "own"]
 class RobotChoices:
     """One robot's choices.
 
-    An automaton that accepts its subplans, and says what the robot knows in each state.
+    Parameters
+    ----------
+    robot
+        The robot's number.
+    automaton
+        Accepts its subplans, and has for each state what the robot knows there.
+    atoms
+        How this knowledge was found.
     """
 
     robot: int
@@ -45,10 +52,20 @@ class RobotChoices:
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """All robots' choices under one sentence (``words``: word numbers) of one task.
+    """All robots' choices under one sentence of one task.
 
-    ``fits`` are the plans with the sentence.  ``mixtures`` holds every combination of the choices,
-    or is None where there are too many to walk.
+    Parameters
+    ----------
+    task_language
+        The language and the task.
+    words
+        The word numbers of the sentence.
+    fits
+        The plans with the sentence.
+    robots
+        Each robot's choices.
+    mixtures
+        Every combination of the choices; None where there are too many to walk.
     """
 
     task_language: TaskLanguage
@@ -65,6 +82,10 @@ class Choices:
         """
         return self.task_language.covered if self.mixtures is None else self.mixtures.holds
 
+    def of(self, robots: Sequence[int] | None) -> tuple[RobotChoices, ...]:
+        """The choices of the robots with these numbers; of all robots for None."""
+        return self.robots if robots is None else tuple(self.robots[robot] for robot in robots)
+
 
 def choices(
     task_language: TaskLanguage,
@@ -75,51 +96,61 @@ def choices(
     """The choices of every robot under a sentence.
 
     What is known in a state is exact (`coordlang.use.choices.automaton.determinise`) where all
-    combinations of choices can be walked with at most ``most`` joint moves (None: as many as the
-    memory holds) and all of them are optimal.  Elsewhere only the atoms are known that the robot's
-    own subactions alone change.
+    combinations of choices can be walked with at most ``most`` joint moves and all of them are
+    optimal.  Elsewhere only the atoms are known that the robot's own subactions alone change.
 
-    ``index``: see `coordlang.use.choices.mixtures.mix`.  Raises
-    `coordlang.use.sentence.fitting_plans.NoPlanFits`, and `OutOfMemory` if the automata, or with
-    ``most=None`` the combinations, do not fit into the memory.
+    Parameters
+    ----------
+    task_language
+        The language and the task.
+    words
+        The word numbers of the sentence.
+    index
+        See `coordlang.use.choices.mixtures.walk_mixtures`.
+    most
+        The most joint moves of a walk; None: as many as the memory holds.
+
+    Raises
+    ------
+    NoPlanFits
+        If no optimal plan has the sentence.
+    OutOfMemory
+        If the automata, or with ``most=None`` the combinations, do not fit into the memory.
     """
     fits = task_language.plans_with(words)
-    robots = range(len(task_language.model.robots))
-    plain = [determinise(fits, robot) for robot in robots]
+    subplans = [determinise(fits, robot) for robot in range(len(task_language.model.robots))]
     try:
-        mixtures = walk_mixtures(task_language, fits, plain, words, index, most)
+        mixtures = walk_mixtures(task_language, fits, subplans, words, index, most)
     except OutOfMemory:
         if most is None:
             raise
         mixtures = None
-    own = tuple(
-        _with_knowledge(task_language, plain[robot], robot, mixtures, most) for robot in robots
+    robots = tuple(
+        _with_knowledge(task_language, automaton, robot, mixtures, most)
+        for robot, automaton in enumerate(subplans)
     )
-    return Choices(task_language, tuple(words), fits, own, mixtures)
+    return Choices(task_language, tuple(words), fits, robots, mixtures)
 
 
 def _with_knowledge(
     task_language: TaskLanguage,
-    plain: Automaton,
+    automaton: Automaton,
     robot: int,
     mixtures: Mixtures | None,
     most: int | None,
 ) -> RobotChoices:
+    """A robot's subplans with what it knows on the way."""
     if mixtures is not None and mixtures.space is not None:
         with suppress(OutOfMemory):  # the combinations are checked all the same
-            return RobotChoices(
-                robot, determinise(mixtures.space, robot, _truth(mixtures.space), most), "exact"
-            )
+            exact = determinise(mixtures.space, robot, _truth(mixtures.space), most)
+            return RobotChoices(robot, exact, "exact")
     own = OwnFacts.of(task_language.model, robot)
-    start = _bits(task_language.space, int(task_language.space.state[task_language.start]))
-    return RobotChoices(robot, with_own_facts(plain, own, start), "own")
+    space = task_language.space
+    start = space.model.codec.fact_bits(space.rows[space.state[task_language.start]])
+    return RobotChoices(robot, with_own_facts(automaton, own, start), "own")
 
 
 def _truth(space: PlanSpace) -> dict[int, int]:
     """The true facts of each state that the space passes through, as bits."""
-    return {state: _bits(space, state) for state in set(space.state.tolist())}
-
-
-def _bits(space: PlanSpace, state: int) -> int:
-    words = space.rows[state][: space.model.codec.fact_blocks]
-    return int.from_bytes(words.astype("<u8").tobytes(), "little")
+    codec = space.model.codec
+    return {state: codec.fact_bits(space.rows[state]) for state in set(space.state.tolist())}

@@ -20,12 +20,11 @@ def to_dot(choices: Choices, robots: Sequence[int] | None = None) -> str:
     In a state stand its number, how many own subplans are left, and the atoms known to be true that
     tell it from the other states of its step.
     """
-    chosen = choices.robots if robots is None else [choices.robots[robot] for robot in robots]
     lines = [
         "digraph choices {",
         "  rankdir=LR; node [shape=box, style=rounded, fontsize=10]; edge [fontsize=10];",
     ]
-    for own in chosen:
+    for own in choices.of(robots):
         lines += _cluster(choices, own)
     return "\n".join([*lines, "}"]) + "\n"
 
@@ -36,29 +35,29 @@ def distinguishing(choices: Choices, own: RobotChoices, states: range) -> list[l
     Without those known to be true in all of them.
     """
     known = own.automaton.known[states.start : states.stop]
-    everywhere = reduce(and_, (true for true, _ in known))
+    everywhere = reduce(and_, (knowledge.true for knowledge in known))
     facts = choices.task_language.model.codec.facts.texts
     return [
-        [text for bit, text in enumerate(facts) if (true & ~everywhere) >> bit & 1]
-        for true, _ in known
+        [text for bit, text in enumerate(facts) if (knowledge.true & ~everywhere) >> bit & 1]
+        for knowledge in known
     ]
 
 
 def _cluster(choices: Choices, own: RobotChoices) -> list[str]:
     model, automaton = choices.task_language.model, own.automaton
-    name, labels = model.robots[own.robot], model.labels[own.robot]
+    name = model.robots[own.robot]
     title = f"{name}: {automaton.count:,} subplan{'s' * (automaton.count != 1)}"
     lines = [f"  subgraph cluster_{own.robot} {{", f"    label={quoted(title)};"]
     for step, states in enumerate(automaton.layers):
         for state, atoms in zip(states, distinguishing(choices, own, states), strict=True):
             text = "\n".join([f"{state}: {automaton.left[state]:,} left", *atoms])
-            final = ", peripheries=2" if step == len(automaton.layers) - 1 else ""
+            final = ", peripheries=2" if step == automaton.steps else ""
             lines.append(f"    r{own.robot}s{state} [label={quoted(text)}{final}];")
         lines.append(
             "    {rank=same; " + " ".join(f"r{own.robot}s{state};" for state in states) + "}"
         )
     for state in range(len(automaton)):
         for label, to in automaton.moves(state):
-            text = labels[label] if label else IDLE
+            text = model.label_text(own.robot, label) or IDLE
             lines.append(f"    r{own.robot}s{state} -> r{own.robot}s{to} [label={quoted(text)}];")
     return [*lines, "  }"]

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from functools import reduce
+from operator import or_
 from typing import Any
 
 import msgspec
 
 from coordlang.tasks.candidates import describe
-from coordlang.use.choices.automaton import Automaton
 from coordlang.use.choices.choices import Choices, RobotChoices
 from coordlang.use.choices.monitor import FORMAT, IDLE, VERSION, Monitor
 from coordlang.use.choices.record import ChoicesFile, RobotRecord, StateRecord
+from planners.joint.model import JointModel
 from planners.search.plan_file import json_count
 from planners.search.plans import Plans
 
@@ -19,7 +21,6 @@ from planners.search.plans import Plans
 def to_record(choices: Choices, robots: Sequence[int] | None = None) -> ChoicesFile:
     """The content of a choices file, of all robots or of those with these numbers."""
     task_language = choices.task_language
-    chosen = choices.robots if robots is None else [choices.robots[robot] for robot in robots]
     return ChoicesFile(
         format=FORMAT,
         version=VERSION,
@@ -31,7 +32,7 @@ def to_record(choices: Choices, robots: Sequence[int] | None = None) -> ChoicesF
         covered=task_language.covered,
         guaranteed=choices.guaranteed,
         combinations_walked=choices.mixtures.nodes if choices.mixtures is not None else None,
-        choices=[_robot(choices, own) for own in chosen],
+        choices=[_robot(choices, own) for own in choices.of(robots)],
     )
 
 
@@ -57,36 +58,34 @@ def monitor(choices: Choices, robot: str) -> Monitor:
 
 def _robot(choices: Choices, own: RobotChoices) -> RobotRecord:
     model, automaton = choices.task_language.model, own.automaton
-    ever = 0
-    for true, possible in automaton.known:
-        ever |= true | ~possible
     texts = model.codec.facts.texts
-    facts = [bit for bit in range(len(texts)) if ever >> bit & 1]
-    number = {bit: n for n, bit in enumerate(facts)}
-    steps = [step for step, states in enumerate(automaton.layers) for _ in states]
+    sometimes_known = reduce(or_, (known.true | ~known.possible for known in automaton.known))
+    facts = [fact for fact in range(len(texts)) if sometimes_known >> fact & 1]
     return RobotRecord(
         robot=model.robots[own.robot],
-        steps=len(automaton.layers) - 1,
+        steps=automaton.steps,
         subplans=json_count(automaton.count),
         atoms=own.atoms,
-        facts=[texts[bit] for bit in facts],
-        others=[text for bit, text in enumerate(texts) if bit not in number],
+        facts=[texts[fact] for fact in facts],
+        others=[text for fact, text in enumerate(texts) if not sometimes_known >> fact & 1],
         states=[
-            _state(automaton, state, step, model.labels[own.robot], number)
-            for state, step in enumerate(steps)
+            _state(model, own, facts, step, state)
+            for step, states in enumerate(automaton.layers)
+            for state in states
         ],
     )
 
 
 def _state(
-    automaton: Automaton, state: int, step: int, labels: Sequence[str], number: Mapping[int, int]
+    model: JointModel, own: RobotChoices, facts: Sequence[int], step: int, state: int
 ) -> StateRecord:
-    """One state; ``number`` are the numbers of facts in the file, by their number in the model."""
-    true, possible = automaton.known[state]
+    automaton = own.automaton
+    known = automaton.known[state]
+    moves = automaton.moves(state)
     return StateRecord(
         step=step,
         left=json_count(automaton.left[state]),
-        next={labels[label] if label else IDLE: to for label, to in automaton.moves(state)},
-        true=[n for bit, n in number.items() if true >> bit & 1],
-        unknown=[n for bit, n in number.items() if possible >> bit & ~true >> bit & 1],
+        next={model.label_text(own.robot, label) or IDLE: to for label, to in moves},
+        true=[number for number, fact in enumerate(facts) if known.true >> fact & 1],
+        unknown=[number for number, fact in enumerate(facts) if known.unknown >> fact & 1],
     )

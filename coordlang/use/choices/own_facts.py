@@ -1,30 +1,36 @@
-"""The atoms that a robot's own subactions alone change.
+"""The facts that a robot's own subactions alone change.
 
-What it knows without asking what the others may do.
+The robot knows their values without regard to what the others do.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from coordlang.use.choices.automaton import Automaton, Knowledge, minimised
-from planners.grounding import GroundEffect
+from planners.grounding import GroundAction
 from planners.joint.model import JointModel
 from planners.pddl.lifted import TRUE
 
-#: What a subaction does to an atom, certainly: True adds it, False deletes it, None leaves it as it
-#: is.
-Change = bool | None
+#: What a subaction certainly does to facts: True adds the fact, False deletes it.
+Changes = dict[int, bool]
 
 
 @dataclass(frozen=True, slots=True)
 class OwnFacts:
     """The facts of which every change is certain from the robot's own label.
 
-    ``mask`` has their bits, ``others`` the rest.
+    All as sets of bits: bit k is fact k.
 
-    ``adds`` and ``deletes`` have the bits that each label number changes.
+    Parameters
+    ----------
+    mask
+        These facts.
+    others
+        The other facts.
+    adds, deletes
+        For each label number the own facts that it adds and deletes.
     """
 
     mask: int
@@ -34,40 +40,48 @@ class OwnFacts:
 
     @classmethod
     def of(cls, model: JointModel, robot: int) -> OwnFacts:
-        """Read off the ground actions, without regard to what is reachable.
+        """Determine them from the ground actions, without regard to what is reachable.
 
         A fact is own if no action without this robot changes it, no conditional effect does, and
         two (joint) actions with the same own part change it in the same way.
         """
-        changes: list[dict[int, Change]] = [{} for _ in model.labels[robot]]
-        foreign = 0
-        number = {text: n for n, text in enumerate(model.labels[robot])}
-        parts: dict[int, list[dict[int, Change]]] = {}
+        others = 0
+        variants: dict[int, list[Changes]] = {}
         for action in model.actions:
-            done, unsure = _changes(model, action.effects)
-            foreign |= unsure
-            if robot not in action.owners:
-                foreign |= _bits(done)
-                continue
-            own = action.parts[robot] if model.is_joint_action else action.label
-            parts.setdefault(number[own] if own is not None else 0, []).append(done)
-        for label, variants in parts.items():
-            changes[label] = variants[0]
-            for other in variants[1:]:
-                foreign |= _bits({f: c for f, c in other.items() if variants[0].get(f) != c})
-                foreign |= _bits({f: c for f, c in variants[0].items() if other.get(f) != c})
-        mask = ((1 << len(model.codec.facts)) - 1) & ~foreign
-        adds = (_bits({f: c for f, c in change.items() if c}) & mask for change in changes)
-        deletes = (
-            _bits({f: c for f, c in change.items() if c is False}) & mask for change in changes
+            certain, uncertain = _changes(model, action)
+            others |= uncertain
+            if robot in action.owners:
+                label = model.label_number(robot, action.part_of(robot))
+                assert label is not None, action.label
+                variants.setdefault(label, []).append(certain)
+            else:
+                others |= _bits(certain)
+        for changes in variants.values():
+            others |= _bits(_ambiguous(changes))
+        mask = ((1 << len(model.codec.facts)) - 1) & ~others
+        labels = range(len(model.labels[robot]))
+        first = [variants[label][0] if label in variants else {} for label in labels]
+        return cls(
+            mask=mask,
+            others=others,
+            adds=tuple(_bits(fact for fact, adds in own.items() if adds) & mask for own in first),
+            deletes=tuple(
+                _bits(fact for fact, adds in own.items() if not adds) & mask for own in first
+            ),
         )
-        return cls(mask, foreign, tuple(adds), tuple(deletes))
 
 
 def with_own_facts(automaton: Automaton, own: OwnFacts, start: int) -> Automaton:
-    """The least automaton that accepts the same subplans and says the values of the own atoms.
+    """The least automaton that accepts the same subplans and gives the values of the own facts.
 
-    ``start`` has the bits of the facts that are true at first.
+    Parameters
+    ----------
+    automaton
+        The robot's subplans.
+    own
+        The facts that its subactions alone change.
+    start
+        The bits of the facts that are true at first.
     """
     moves: list[list[dict[int, int]]] = []
     known: list[list[Knowledge]] = []
@@ -87,26 +101,30 @@ def with_own_facts(automaton: Automaton, own: OwnFacts, start: int) -> Automaton
     return minimised(moves, known)
 
 
-def _changes(model: JointModel, effects: Sequence[GroundEffect]) -> tuple[dict[int, Change], int]:
-    """What effects certainly do to each fact.
-
-    With the facts that they change under a condition only.
-    """
-    done: dict[int, Change] = {}
-    unsure = 0
-    for effect in effects:
+def _changes(model: JointModel, action: GroundAction) -> tuple[Changes, int]:
+    """What an action certainly does, and the facts that it changes under a condition only."""
+    certain: Changes = {}
+    uncertain = 0
+    for effect in action.effects:
         fact = model.codec.facts.index.get(effect.atom)
         if fact is None:
             continue
         if effect.condition != TRUE:
-            unsure |= 1 << fact
-        elif effect.adds or fact not in done:  # what is both deleted and added counts as added
-            done[fact] = effect.adds
-    return done, unsure
+            uncertain |= 1 << fact
+        elif effect.adds or fact not in certain:  # what is both deleted and added counts as added
+            certain[fact] = effect.adds
+    return certain, uncertain
 
 
-def _bits(changes: dict[int, Change]) -> int:
+def _ambiguous(variants: Sequence[Changes]) -> Iterator[int]:
+    """The facts that variants of one label change in different ways."""
+    first = variants[0]
+    for other in variants[1:]:
+        yield from (fact for fact in {*first, *other} if first.get(fact) != other.get(fact))
+
+
+def _bits(facts: Iterable[int]) -> int:
     found = 0
-    for fact in changes:
+    for fact in facts:
         found |= 1 << fact
     return found

@@ -36,13 +36,12 @@ from unified_planning.model import ProblemKind
 from unified_planning.model.problem_kind_versioning import LATEST_PROBLEM_KIND_VERSION
 from unified_planning.plans import PlanKind
 
-from coordlang.language.file import read_language
-from coordlang.language.recorded import options_of
 from coordlang.language.words import Language
 from coordlang.use.sentence.fitting_plans import NoPlanFits
 from coordlang.use.sentence.plan_sentence import NotAPlan, NotOptimal, sentence_of_plan
 from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
 from coordlang.use.unified import NAME
+from coordlang.use.unified.options import PLAN_KINDS, EngineOptions
 from coordlang.use.unified.plans import NoSteps, of_up, to_up
 from coordlang.use.unified.translation import Subactions, Translated, translate
 from planners.check.validate import validate
@@ -56,9 +55,9 @@ from planners.errors import (
     UsageError,
 )
 from planners.limits import time_limit
-from planners.loading import ModelOptions, build
-from planners.pddl.robots import RobotSelection
+from planners.loading import build
 from planners.search.optimal_plans import search
+from planners.search.plan_file import Texts
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans
 
@@ -82,12 +81,11 @@ _FEATURES = {
     "multi_agent": ("AGENT_SPECIFIC_PRIVATE_GOAL", "AGENT_SPECIFIC_PUBLIC_GOAL"),
     "quality_metrics": ("MAKESPAN",),
 }
-_PLANS = (PlanKind.PARTIAL_ORDER_PLAN, PlanKind.SEQUENTIAL_PLAN, PlanKind.TIME_TRIGGERED_PLAN)
 
 
 @dataclass(frozen=True, slots=True)
 class _Solved:
-    """The plans that are asked for."""
+    """The optimal plans of a problem, under the sentence if one is given."""
 
     found: Translated
     space: PlanSpace
@@ -108,11 +106,17 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
     cost, remember_actions
         As on the command line.
     language, sentence
-        A language (or the name of its file) and a sentence: only plans that fit.  The language
-        brings robots and cost.
+        A language (or the name of its file) and a sentence: only plans with this sentence.  The
+        language brings robots and cost.
     plan_kind
         The kind of the plans, a `PlanKind`: partial-order (default), sequential or time-triggered.
         Where each action is a whole step, or there is one robot, sequential is the default.
+
+    Raises
+    ------
+    UPUsageError
+        For a value that there is not, here or, if it contradicts the problem or the language, when
+        a problem is solved.
     """
 
     def __init__(
@@ -131,26 +135,17 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         Engine.__init__(self)
         OneshotPlannerMixin.__init__(self)
         AnytimePlannerMixin.__init__(self)
-        if sentence is not None and language is None:
-            raise UPUsageError("a sentence needs its language")
-        if plan_kind is not None and plan_kind not in _PLANS:
-            raise UPUsageError(
-                f"{plan_kind}: plans are partial-order, sequential or time-triggered"
-            )
-        self._robots = [r if isinstance(r, str) else r.name for r in robots]
-        self._robot_type = (
-            robot_type if robot_type is None or isinstance(robot_type, str) else robot_type.name
+        self._options = EngineOptions.of(
+            robots=robots,
+            robot_type=robot_type,
+            unowned=unowned,
+            subactions=subactions,
+            cost=cost,
+            remember_actions=remember_actions,
+            language=language,
+            sentence=sentence,
+            plan_kind=plan_kind,
         )
-        self._unowned, self._cost, self._remember = unowned, cost, remember_actions
-        self._subactions, self._sentence, self._plan_kind = subactions, sentence, plan_kind
-        try:
-            self._language = (
-                language
-                if language is None or isinstance(language, Language)
-                else read_language(language)
-            )
-        except BadInput as error:
-            raise UPUsageError(str(error)) from None
 
     @property
     def name(self) -> str:
@@ -174,7 +169,7 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
 
     @staticmethod
     def supports_plan(plan_kind: PlanKind) -> bool:
-        return plan_kind in _PLANS
+        return plan_kind in PLAN_KINDS
 
     @staticmethod
     def satisfies(optimality_guarantee: OptimalityGuarantee) -> bool:
@@ -251,51 +246,35 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
             raise UPUsageError(str(error)) from error
 
     def _search(self, problem: Any) -> _Solved:
-        found = translate(problem, self._subactions)
-        if self._language is None:
-            loaded = build(found.domain, [found.problem], self._options(found))
+        found = translate(problem, self._options.subactions)
+        if self._options.language is None:
+            loaded = build(found.domain, [found.problem], self._options.model_options(found))
             return _Solved(found, search(loaded.model, loaded.tasks[0]), None)
-        task_language = self._speak(found)
-        space = (
-            task_language.space
-            if self._sentence is None
-            else task_language.plans_with(task_language.words_of(self._sentence))
-        )
-        return _Solved(found, space, task_language)
+        task_language = self._language_in(found)
+        words = self._options.sentence
+        if words is None:
+            return _Solved(found, task_language.space, task_language)
+        fits = task_language.plans_with(task_language.words_of(words))
+        return _Solved(found, fits, task_language)
 
-    def _speak(self, found: Translated) -> TaskLanguage:
+    def _language_in(self, found: Translated) -> TaskLanguage:
         """The language in this problem.
 
         Texts are not compared, because the problem has none of its own.
         """
-        assert self._language is not None
+        language = self._options.language
+        assert language is not None
         provenance = replace(
-            self._language.provenance,
-            domain=_without(self._language.provenance.domain, "sha256"),
-            model=_without(self._language.provenance.model, "problem_sha256", "world_sha256"),
+            language.provenance,
+            domain=_without(language.provenance.domain, "sha256"),
+            model=_without(language.provenance.model, "problem_sha256", "world_sha256"),
         )
-        language = replace(self._language, provenance=provenance)
-        return language_in_task(language, found.domain, found.problem, self._options(found))
-
-    def _options(self, found: Translated) -> ModelOptions:
-        names = {o.name: name for name, o in found.objects.items()}
-        robots = tuple(names.get(robot, robot) for robot in self._robots)
-        if self._language is not None:
-            remember = self._remember or None
-            return options_of(
-                self._language,
-                robots=robots,
-                unowned=self._unowned,
-                cost=self._cost,
-                remember_actions=remember,
-            )
-        kind = (
-            None
-            if self._robot_type is None
-            else found.types.get(self._robot_type, self._robot_type)
+        return language_in_task(
+            replace(language, provenance=provenance),
+            found.domain,
+            found.problem,
+            self._options.model_options(found),
         )
-        choice = RobotSelection(robots, kind, self._unowned or "error")  # type: ignore[arg-type]
-        return ModelOptions(choice, self._cost or "makespan", self._remember)  # type: ignore[arg-type]
 
     def _done(self, problem: Any) -> PlanGenerationResultStatus:
         """Optimal, unless a metric that is not ours was to be ignored (`skip_checks`)."""
@@ -313,9 +292,8 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
     ) -> PlanGenerationResult:
         plan = plans.unrank(number)
         whole = plans.space.model.is_joint_action or len(plans.space.model.robots) == 1
-        kind = self._plan_kind or (
-            PlanKind.SEQUENTIAL_PLAN if whole else PlanKind.PARTIAL_ORDER_PLAN
-        )
+        default = PlanKind.SEQUENTIAL_PLAN if whole else PlanKind.PARTIAL_ORDER_PLAN
+        kind = self._options.plan_kind or default
         messages = []
         if solved.task_language is not None and not solved.task_language.covered:
             text = "the language does not cover this task: it guarantees nothing here"
@@ -337,37 +315,44 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
     def _validate(self, problem: Any, plan: Any) -> ValidationResult:
         """By the rules of joint steps (`planners.check.validate`).
 
-        Under a sentence the plan must be optimal and fit, too.
+        Under a sentence the plan must be optimal and have it, too.
         """
         try:
-            found = translate(problem, self._subactions)
-            loaded = build(found.domain, [found.problem], self._options(found))
+            found = translate(problem, self._options.subactions)
+            loaded = build(found.domain, [found.problem], self._options.model_options(found))
             steps = of_up(found, loaded.model, loaded.team, plan)
+            texts = [step for step, _ in steps]
+            verdict = validate(found.domain, found.problem, loaded.team, texts)
+            wrong_sentence = self._wrong_sentence(found, texts) if verdict.valid else None
         except NoSteps as error:
             return self._invalid(str(error), FailedValidationReason.MUTEX_CONFLICT)
         except CoordlangError as error:
             raise UPUsageError(str(error)) from error
-        verdict = validate(found.domain, found.problem, loaded.team, [texts for texts, _ in steps])
-        if not verdict.valid and verdict.step == len(steps):
+        if verdict.valid:
+            if wrong_sentence is not None:
+                return self._invalid(wrong_sentence, None)
+            metrics = {"makespan": str(len(steps))}
+            return ValidationResult(ValidationResultStatus.VALID, self.name, metrics=metrics)
+        assert verdict.step is not None
+        if verdict.step == len(steps):
             return self._invalid(verdict.reason, FailedValidationReason.UNSATISFIED_GOALS)
-        if not verdict.valid:
-            assert verdict.step is not None
-            action = next(iter(steps[verdict.step][1]), None)
-            reason = f"step {verdict.step + 1}: {verdict.reason}"
-            return self._invalid(reason, FailedValidationReason.INAPPLICABLE_ACTION, action)
-        if self._sentence is not None:
-            task_language = self._speak(found)
-            try:
-                said = sentence_of_plan(task_language, [texts for texts, _ in steps])
-            except (NotAPlan, NotOptimal) as error:
-                return self._invalid(str(error), None)
-            if said != task_language.words_of(self._sentence):
-                return self._invalid(
-                    f'the sentence of this plan is "{task_language.text(said)}"', None
-                )
-        return ValidationResult(
-            ValidationResultStatus.VALID, self.name, metrics={"makespan": str(len(steps))}
-        )
+        action = next(iter(steps[verdict.step][1]), None)
+        reason = f"step {verdict.step + 1}: {verdict.reason}"
+        return self._invalid(reason, FailedValidationReason.INAPPLICABLE_ACTION, action)
+
+    def _wrong_sentence(self, found: Translated, plan: Sequence[Texts]) -> str | None:
+        """Why a plan has another sentence than the one given, or none; None if all is well."""
+        if self._options.sentence is None:
+            return None
+        task_language = self._language_in(found)
+        wanted = task_language.words_of(self._options.sentence)
+        try:
+            words = sentence_of_plan(task_language, plan)
+        except (NotAPlan, NotOptimal) as error:
+            return str(error)
+        if words == wanted:
+            return None
+        return f'the sentence of this plan is "{task_language.text(words)}"'
 
     def _invalid(
         self, why: str, reason: FailedValidationReason | None, action: Any = None

@@ -10,7 +10,7 @@ different joint plans may become equal.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -106,30 +106,35 @@ def _instance(found: Translated, text: str) -> Any:
     )
 
 
-def _steps(plan: Any) -> Sequence[Sequence[Any]]:
+def _steps(plan: Any) -> list[list[Any]]:
+    """The actions of a unified-planning plan, step by step."""
     from unified_planning.plans import PlanKind
 
     if plan.kind == PlanKind.SEQUENTIAL_PLAN:
         return [[action] for action in plan.actions]
-    steps: dict[Any, list[Any]] = defaultdict(list)
     if plan.kind == PlanKind.TIME_TRIGGERED_PLAN:
+        steps: dict[Any, list[Any]] = defaultdict(list)
         for start, action, _ in plan.timed_actions:
             steps[start].append(action)
         return [steps[start] for start in sorted(steps)]
-    following = plan.get_adjacency_list
-    before: dict[Any, int] = dict.fromkeys(following, 0)
+    return _layers(plan.get_adjacency_list)
+
+
+def _layers(following: Mapping[Any, Sequence[Any]]) -> list[list[Any]]:
+    """The actions of a partial order, each as early as its predecessors allow."""
+    open_before: dict[Any, int] = dict.fromkeys(following, 0)
     for actions in following.values():
         for action in actions:
-            before[action] = before.get(action, 0) + 1
-    layer = [action for action, count in before.items() if not count]
+            open_before[action] = open_before.get(action, 0) + 1
+    layer = [action for action, count in open_before.items() if not count]
     layers = []
     while layer:
         layers.append(layer)
         after = []
         for action in layer:
             for later in following.get(action, ()):
-                before[later] -= 1
-                if not before[later]:
+                open_before[later] -= 1
+                if not open_before[later]:
                     after.append(later)
         layer = after
     return layers
@@ -137,11 +142,13 @@ def _steps(plan: Any) -> Sequence[Sequence[Any]]:
 
 def _parts(model: JointModel, team: Team, found: Translated, text: str) -> list[tuple[int, str]]:
     """Which robots do what in a ground action."""
-    if model.is_joint_action:
-        parts = next((a.parts for a in model.actions if a.label == text), None)
-        if parts is None:
-            return [(robot, text) for robot in range(len(model.robots))]
-        return [(robot, part) for robot, part in enumerate(parts) if part is not None]
-    name, *args = text[1:-1].split()
-    schema = next(s for s in found.domain.schemas if s.name == name)
-    return [(robot, text) for robot in team.owners(schema, tuple(args))]
+    if not model.is_joint_action:
+        name, *args = text[1:-1].split()
+        schema = next(s for s in found.domain.schemas if s.name == name)
+        return [(robot, text) for robot in team.owners(schema, tuple(args))]
+    robots = range(len(model.robots))
+    action = next((action for action in model.actions if action.label == text), None)
+    if action is None:  # it can never be applied, so the plan is refused for that
+        return [(robot, text) for robot in robots]
+    parts = ((robot, action.part_of(robot)) for robot in robots)
+    return [(robot, part) for robot, part in parts if part is not None]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from coordlang.use.unified.names import Names
-from planners.errors import Unsupported
+from planners.errors import Unsupported, UsageError
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.sexpr import Source
@@ -21,7 +21,13 @@ from planners.pddl.sexpr import Source
 #: "(move ?b ?a)"}}``.
 Subactions = Mapping[str, Mapping[str, str | None]]
 
+#: Action schema -> the actions that it stands for, by agent (None where there are no agents).
+Schemas = dict[str, dict[str | None, Any]]
+
 _AGENT = "?agent"
+#: Kinds of unified-planning's expressions -> their PDDL operators.
+_QUANTIFIERS = {"exists": "exists", "forall": "forall"}
+_CONNECTIVES = {"and": "and", "or": "or", "not": "not", "implies": "imply"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +41,7 @@ class Translated:
 
     domain: Domain
     problem: Problem
-    schemas: dict[str, dict[str | None, Any]]
+    schemas: Schemas
     objects: dict[str, Any]
     agents: dict[str, Any]
     types: dict[str, str]
@@ -55,6 +61,7 @@ def translate(problem: Any, subactions: Subactions | None = None) -> Translated:
 
     Raises `Unsupported` for anything else, `BadInput` for a problem without a robot.
     """
+    _check_subactions(problem, subactions or {})
     writer = _Writer(problem)
     domain_text, problem_text, schemas = writer.write(subactions or {})
     name = problem.name or "unnamed"
@@ -67,6 +74,23 @@ def translate(problem: Any, subactions: Subactions | None = None) -> Translated:
         agents={writer.objects.of(("agent", a.name), a.name): a for a in writer.agents},
         types={t.name: writer.type_name(t) for t in problem.user_types},
     )
+
+
+def _check_subactions(problem: Any, subactions: Subactions) -> None:
+    """Raise `UsageError` for subactions that no action of the problem can have."""
+    agents = getattr(problem, "agents", None)
+    if subactions and agents:
+        raise UsageError(
+            "subactions are given for a problem with agents: its actions are the agents' own",
+            remedy="Leave out subactions.",
+        )
+    names = {action.name for action in getattr(problem, "actions", ())}
+    for name in subactions:
+        if name not in names:
+            raise UsageError(
+                f"subactions: the problem has no action {name!r}",
+                remedy=f"Its actions are {', '.join(sorted(names))}.",
+            )
 
 
 class _Writer:
@@ -91,45 +115,34 @@ class _Writer:
         self.declared: dict[str, str] = {}
         self.apart = False
 
-    def write(self, subactions: Subactions) -> tuple[str, str, dict[str, dict[str | None, Any]]]:
+    def write(self, subactions: Subactions) -> tuple[str, str, Schemas]:
+        """Domain, problem, and what the schemas stand for."""
         for fluent in self.problem.ma_environment.fluents if self.agents else self.problem.fluents:
             self.predicate(fluent, None)
         if self.agents:
             actions, schemas = self.agent_actions()
         else:
-            actions, schemas = [], {}
-            for action in self.problem.actions:
-                name = self.actions.of(action.name, action.name)
-                parts = subactions.get(action.name, {})
-                comments = [
-                    f"  ; subaction {robot} {text or 'idle'}" for robot, text in parts.items()
-                ]
-                actions.append("\n".join([f"(:action {name}", *comments, *self.body(action, None)]))
-                schemas[name] = {None: action}
-        facts = self.facts()
-        goals = [self.text(goal, None) for goal in self.problem.goals]
-        for agent in self.agents:
-            goals += [self.text(g, agent) for g in (*agent.public_goals, *agent.private_goals)]
-        objects = [
-            f"  {self.objects.of(o.name, o.name)} - {self.type_name(o.type)}"
-            for o in self.problem.all_objects
-        ]
-        objects += [f"  {self.agent_name(a)} - {self.own_type(a)}" for a in self.agents]
-        # Constants, because actions may name objects.
+            actions, schemas = self.plain_actions(subactions)
+        facts, goals = self.facts(), self.goals()  # they may declare further predicates
+        # Objects are constants, because actions may name them.
         domain = [
             "(define (domain up)",
             "(:types",
             *self.type_lines(),
             ")",
             "(:constants",
-            *objects,
+            *self.object_lines(),
             ")",
             "(:predicates",
+            *(f"  {line}" for line in self.declared.values()),
+            ")",
+            *actions,
+            ")",
+            "",
         ]
-        domain += [f"  {line}" for line in self.declared.values()]
-        domain += [")", *actions, ")", ""]
-        task = ["(define (problem up-task) (:domain up)", "(:init"]
-        task += [
+        problem = [
+            "(define (problem up-task) (:domain up)",
+            "(:init",
             *(f"  {fact}" for fact in facts),
             ")",
             "(:goal (and",
@@ -137,16 +150,44 @@ class _Writer:
             ")))",
             "",
         ]
-        return "\n".join(domain), "\n".join(task), schemas
+        return "\n".join(domain), "\n".join(problem), schemas
 
-    def agent_actions(self) -> tuple[list[str], dict[str, dict[str | None, Any]]]:
+    def goals(self) -> list[str]:
+        """The goals of the problem and of its agents."""
+        goals = [self.text(goal, None) for goal in self.problem.goals]
+        for agent in self.agents:
+            goals += [self.text(g, agent) for g in (*agent.public_goals, *agent.private_goals)]
+        return goals
+
+    def object_lines(self) -> list[str]:
+        """The objects and agents with their types."""
+        objects = [
+            f"  {self.objects.of(o.name, o.name)} - {self.type_name(o.type)}"
+            for o in self.problem.all_objects
+        ]
+        return [*objects, *(f"  {self.agent_name(a)} - {self.own_type(a)}" for a in self.agents)]
+
+    def plain_actions(self, subactions: Subactions) -> tuple[list[str], Schemas]:
+        """The actions of a problem without agents."""
+        actions: list[str] = []
+        schemas: Schemas = {}
+        for action in self.problem.actions:
+            name = self.actions.of(action.name, action.name)
+            parts = subactions.get(action.name, {})
+            comments = [f"  ; subaction {robot} {text or 'idle'}" for robot, text in parts.items()]
+            actions.append("\n".join([f"(:action {name}", *comments, *self.body(action, None)]))
+            schemas[name] = {None: action}
+        return actions, schemas
+
+    def agent_actions(self) -> tuple[list[str], Schemas]:
         """Equal actions of several agents become one schema."""
         groups: dict[tuple[str, ...], dict[str | None, Any]] = {}
         for agent in self.agents:
             for action in agent.actions:
                 key = (action.name, *self.body(action, agent))
                 groups.setdefault(key, {})[self.agent_name(agent)] = action
-        actions, schemas = [], {}
+        actions: list[str] = []
+        schemas: Schemas = {}
         by_name = {self.agent_name(agent): agent for agent in self.agents}
         self.apart = any(len(members) < len(self.agents) for members in groups.values())
         for key, members in groups.items():
@@ -217,26 +258,30 @@ class _Writer:
         if node.is_bool_constant():
             return "(and)" if node.is_true() else "(or)"
         if node.is_fluent_exp():
-            fluent = node.fluent()
-            own = agent if agent is not None and fluent in agent.fluents else None
-            whose = [] if own is None else [_AGENT if inside else self.agent_name(own)]
-            args = [self.term(arg) for arg in node.args]
-            return f"({' '.join((self.predicate(fluent, own), *whose, *args))})"
+            return self.atom(node, agent, inside=inside)
         if node.is_dot():
-            other = self.problem.agent(node.agent())
-            return self.text(node.arg(0), other)
+            return self.text(node.arg(0), self.problem.agent(node.agent()))
         if node.is_equals():
             return f"(= {self.term(node.arg(0))} {self.term(node.arg(1))})"
         parts = [self.text(arg, agent, inside=inside) for arg in node.args]
         if node.is_iff():
             return f"(and (imply {parts[0]} {parts[1]}) (imply {parts[1]} {parts[0]}))"
-        if node.is_exists() or node.is_forall():
-            quantifier = "exists" if node.is_exists() else "forall"
-            return f"({quantifier} ({self.variables(node.variables())}) {parts[0]})"
-        for test, word in (("and", "and"), ("or", "or"), ("not", "not"), ("implies", "imply")):
-            if getattr(node, f"is_{test}")():
-                return f"({' '.join((word, *parts))})"
+        for kind, operator in _QUANTIFIERS.items():
+            if getattr(node, f"is_{kind}")():
+                return f"({operator} ({self.variables(node.variables())}) {parts[0]})"
+        for kind, operator in _CONNECTIVES.items():
+            if getattr(node, f"is_{kind}")():
+                return f"({' '.join((operator, *parts))})"
         raise Unsupported(f"the expression {node}")
+
+    def atom(self, node: Any, agent: Any, *, inside: bool) -> str:
+        """A fluent with its arguments."""
+        fluent = node.fluent()
+        own = agent if agent is not None and fluent in agent.fluents else None
+        args = [self.term(arg) for arg in node.args]
+        if own is not None:
+            args.insert(0, _AGENT if inside else self.agent_name(own))
+        return f"({' '.join((self.predicate(fluent, own), *args))})"
 
     def term(self, node: Any) -> str:
         if node.is_object_exp():
@@ -260,7 +305,7 @@ class _Writer:
         return f"?{self.variable_names.of((variable.name,), f'any-{variable.name}')}"
 
     def predicate(self, fluent: Any, owner: Any) -> str:
-        """The predicate of a fluent; agents' fluents with equal name and parameters share one."""
+        """The predicate of a fluent; agents' own fluents with equal name and parameters share one."""
         if not fluent.type.is_bool_type():
             raise Unsupported(
                 f"fluent {fluent.name!r} of type {fluent.type}: only Boolean fluents are supported",

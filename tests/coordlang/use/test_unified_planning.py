@@ -180,7 +180,7 @@ def test_an_optimal_plan() -> None:
     assert result.metrics == {"makespan": "6", "plans": "2"}
     assert isinstance(result.plan, PartialOrderPlan)
     assert verdict(problem, result.plan).status == Validity.VALID
-    kinds = {kind: solve(problem, plan_kind=kind).plan for kind in engine_module._PLANS}
+    kinds = {kind: solve(problem, plan_kind=kind).plan for kind in engine_module.PLAN_KINDS}
     assert {kind: plan.kind for kind, plan in kinds.items()} == {kind: kind for kind in kinds}
     assert all(verdict(problem, plan).status == Validity.VALID for plan in kinds.values())
 
@@ -486,7 +486,7 @@ def test_a_language_file_for_the_problem_that_the_library_read(
     result = solve(problem, language=str(file))
     assert result.status == Status.SOLVED_OPTIMALLY
     assert "does not cover this task" in str(result.log_messages)
-    with pytest.raises(UPUsageError, match="not declared"):
+    with pytest.raises(UPUsageError, match="unknown predicate"):
         solve(crossing(), language=str(file))
 
 
@@ -568,11 +568,26 @@ def test_the_factory_finds_the_engine_for_several_agents() -> None:
         ({"robot_type": "cheese"}, "cheese"),
         ({"language": "missing.json"}, "no such file"),
         ({"plan_kind": PlanKind.STN_PLAN}, "partial-order"),
+        ({"cost": "bogus"}, "bogus"),
+        ({"cost": ""}, "cost"),
+        ({"unowned": "bogus"}, "bogus"),
+        ({"unowned": ""}, "unowned"),
+        ({"remember_actions": "no"}, "remember_actions"),
+        ({"robots": "R1"}, "sequence"),
+        ({"robots": (1,)}, "no object or type"),
+        ({"robots": ("R1",), "robot_type": "cheese"}, "not both"),
+        ({"subactions": {"swapp": {"R1": "(move ?a)"}}}, "no action 'swapp'"),
     ],
 )
 def test_wrong_parameters(params: dict[str, Any], message: str) -> None:
     with pytest.raises(UPUsageError, match=message):
         solve(crossing(), **params)
+
+
+@pytest.mark.parametrize("params", [{"cost": "bogus"}, {"unowned": "nobody"}])
+def test_a_wrong_option_is_refused_when_the_engine_is_made(params: dict[str, Any]) -> None:
+    with pytest.raises(UPUsageError):
+        up.OneshotPlanner(name="coordlang", params=params)
 
 
 def test_who_the_robots_are() -> None:
