@@ -27,7 +27,7 @@ PLAN_KINDS = (
 
 @dataclass(frozen=True, slots=True)
 class EngineOptions:
-    """The parameters of `coordlang.use.unified.engine.CoordlangEngine`, names in place of objects."""
+    """The parameters of the engine (`CoordlangEngine`), with names in place of objects."""
 
     robots: tuple[str, ...] = ()
     robot_type: str | None = None

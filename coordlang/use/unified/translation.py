@@ -305,7 +305,7 @@ class _Writer:
         return f"?{self.variable_names.of((variable.name,), f'any-{variable.name}')}"
 
     def predicate(self, fluent: Any, owner: Any) -> str:
-        """The predicate of a fluent; agents' own fluents with equal name and parameters share one."""
+        """The predicate of a fluent; own fluents of agents with one signature share one."""
         if not fluent.type.is_bool_type():
             raise Unsupported(
                 f"fluent {fluent.name!r} of type {fluent.type}: only Boolean fluents are supported",
