@@ -37,6 +37,7 @@ class TaskCoordination(Presented):
         return self.required
 
     def facts(self) -> Mapping[str, object]:
+        """Return the main facts, as a notebook shows them."""
         return {
             "problem": self.problem,
             "makespan": self.makespan,
@@ -93,6 +94,7 @@ class Coordination(Presented):
         return self.tasks[number]
 
     def facts(self) -> Mapping[str, object]:
+        """Return the main facts, as a notebook shows them."""
         requiring = sum(task.required for task in self.tasks)
         return {"tasks": len(self.tasks), "requiring": requiring}
 

@@ -59,6 +59,7 @@ class WordsExplained(Presented):
         return dict(zip(self.mapped.words, self.mapped.states, strict=True))
 
     def facts(self) -> Mapping[str, object]:
+        """Return the main facts, as a notebook shows them."""
         return self.formulas
 
     def data(self) -> dict[str, Any]:
@@ -165,6 +166,7 @@ class Explanation(Presented):
         return self.words.used.covered
 
     def facts(self) -> Mapping[str, object]:
+        """Return the main facts, as a notebook shows them."""
         return {"formulas": self.formulas, "covered": self.covered}
 
     def data(self) -> dict[str, Any]:

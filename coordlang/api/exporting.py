@@ -134,6 +134,7 @@ class ExportedTask(Presented):
             raise
 
     def facts(self) -> Mapping[str, object]:
+        """Return the main facts, as a notebook shows them."""
         return {"form": self.form, "actions": self.actions, "cost": self.cost}
 
     def data(self) -> dict[str, Any]:
@@ -169,6 +170,7 @@ class ExportedFormula(Presented):
     covered: bool
 
     def facts(self) -> Mapping[str, object]:
+        """Return the main facts, as a notebook shows them."""
         return {"over_words": self.over_words, "symbols": len(self.symbols)}
 
     def __str__(self) -> str:

@@ -124,6 +124,7 @@ class BuiltLanguage(Presented):
         }
 
     def facts(self) -> Mapping[str, object]:
+        """Return the main facts, as a notebook shows them."""
         return {
             "words": self.guarantee.size,
             "lower_bound": self.guarantee.lower_bound,
@@ -254,6 +255,7 @@ class Verification(Presented):
         }
 
     def facts(self) -> Mapping[str, object]:
+        """Return the main facts, as a notebook shows them."""
         found: dict[str, object] = {"holds": self.holds, "words": self.words, "tasks": self.tasks}
         if self.certificate:
             found["lower_bound"] = self.lower_bound
@@ -273,8 +275,9 @@ def verify(
     progress: Progress | None = None,
     **model: Unpack[ModelKeywords],
 ) -> Verification:
-    """Check by definition that a language is a coordination language: all plans of one sentence mix
-    freely.
+    """Check by definition that a language is a coordination language.
+
+    All plans of one sentence then mix freely.
 
     Parameters
     ----------

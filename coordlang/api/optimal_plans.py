@@ -86,6 +86,7 @@ class OptimalPlans(Presented):
         return to_json(self._plans, [self._known(plan) for plan in listed])
 
     def facts(self) -> Mapping[str, object]:
+        """Return the main facts, as a notebook shows them."""
         return {"count": self.count, "makespan": self.makespan, "robots": self.robots}
 
     def _repr_html_(self) -> str:

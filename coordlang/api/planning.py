@@ -84,6 +84,7 @@ class Inspected(Presented):
         return asdict(self.inspection) | (asdict(self.reachable) if self.reachable else {})
 
     def facts(self) -> Mapping[str, object]:
+        """Return the main facts, as a notebook shows them."""
         found = self.inspection
         return {"domain": found.domain, "problem": found.problem, "robots": found.robots}
 
@@ -222,6 +223,7 @@ class CrossCheck(Presented):
         }
 
     def facts(self) -> Mapping[str, object]:
+        """Return the main facts, as a notebook shows them."""
         return {"agree": self.agree, "cost": self.cost, "fast_downward": self.fast_downward}
 
 

@@ -103,6 +103,7 @@ class RobotsChoices(Presented):
         return to_dot(self.found, self.chosen)
 
     def facts(self) -> Mapping[str, object]:
+        """Return the main facts, as a notebook shows them."""
         return {
             "sentence": self.sentence,
             "subplans": self.subplans,

@@ -46,7 +46,7 @@ NODES_DRAWN = 200
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Said(Presented):
-    """The sentence of each plan; ``covered``: is the task one that the language guarantees?"""
+    """The sentence of each plan; ``covered`` says whether the language guarantees the task."""
 
     sentences: tuple[str, ...]
     covered: bool
@@ -65,6 +65,7 @@ class Said(Presented):
         return iter(self.sentences)
 
     def facts(self) -> Mapping[str, object]:
+        """Return the main facts, as a notebook shows them."""
         return {"sentences": self.sentences, "covered": self.covered}
 
     def data(self) -> dict[str, Any]:
@@ -146,6 +147,7 @@ class SentencePlans(OptimalPlans):
         return open_plans_data(self._open, [self._known(plan) for plan in listed], graph)
 
     def facts(self) -> Mapping[str, object]:
+        """Return the main facts, as a notebook shows them."""
         return {"sentence": self.sentence, **super().facts(), "covered": self.covered}
 
     def _repr_html_(self) -> str:
@@ -240,6 +242,7 @@ class PlanUnderSentence(Presented):
         return len(self.steps)
 
     def facts(self) -> Mapping[str, object]:
+        """Return the main facts, as a notebook shows them."""
         return {
             "sentence": self.sentence,
             "makespan": self.cost[0],

@@ -22,7 +22,7 @@ def main() -> NoReturn:
     sys.exit(run(sys.argv[1:]))
 
 
-def run(arguments: list[str]) -> int:
+def run(arguments: list[str]) -> int:  # noqa: C901 - one clause for each way to end
     """Run one command; the exit code.  No traceback reaches a user without ``--debug``."""
     debug = "--debug" in arguments
     try:

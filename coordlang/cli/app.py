@@ -202,6 +202,7 @@ class GivenOptions:
         self.remember_actions = remember_actions
 
     def options(self) -> ModelOptions:
+        """The options of the joint model, as the flags of the command line say."""
         from planners.loading import ModelOptions
         from planners.pddl.robots import RobotSelection
 

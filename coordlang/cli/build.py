@@ -89,7 +89,7 @@ if TYPE_CHECKING:
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as one JSON object.")
 @model_options
 @limits
-def command(
+def command(  # noqa: C901 - each option that excludes another has its check
     pddl: PlanningFiles,
     tasks: str | None,
     method: str,

@@ -90,8 +90,9 @@ def command(
     output: str | None,
     given: GivenOptions,
 ) -> int:
-    """Say which subplans each robot may follow under SENTENCE ("w1 w0"), whatever the others choose
-    from theirs.
+    """Say which subplans each robot may follow under SENTENCE ("w1 w0").
+
+    Whatever the others choose from theirs, together they follow an optimal plan.
 
     With --did and the detours: what one robot may do next, and whether the detours can still be
     had, all at once.

@@ -27,8 +27,9 @@ if TYPE_CHECKING:
 @model_options
 @limits
 def command(pddl: PlanningFiles, as_json: bool, given: GivenOptions) -> None:
-    """Say which tasks require coordination, and show how robots that follow different optimal plans
-    miscoordinate.
+    """Say which tasks require coordination.
+
+    Show how robots that follow different optimal plans miscoordinate.
     """
     from coordlang.cli.miscoordination import show
     from coordlang.required.miscoordination import miscoordination

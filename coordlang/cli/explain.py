@@ -55,8 +55,9 @@ def command(
     as_json: bool,
     given: GivenOptions,
 ) -> int:
-    """Show a language: each word as a short formula, and with --task what the sentences of a task
-    ask of each robot.
+    """Show each word of a language as a short formula.
+
+    With --task also show what the sentences of a task demand of each robot.
     """
     from coordlang.explanation.descriptions import describe_words
     from coordlang.explanation.words import all_covers, mapped_states

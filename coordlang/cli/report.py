@@ -55,8 +55,10 @@ def command(
     seed: int,
     given: GivenOptions,
 ) -> None:
-    """Write a self-contained HTML page that shows LANGUAGE: its words, and its sentences and plans
-    in the tasks of PROBLEM.. and in some of its candidate tasks.
+    """Write a self-contained HTML page that shows LANGUAGE.
+
+    It has the words, and the sentences and plans in the tasks of PROBLEM.. and in some of the
+    candidate tasks.
     """
     from coordlang.language.file import read_language
     from coordlang.language.recorded import check_source

@@ -80,8 +80,9 @@ def command(
     output: str | None,
     given: GivenOptions,
 ) -> int:
-    """Understand a sentence ("w1 w0"): the optimal plans that it leaves open, counted, listed,
-    sampled or drawn.
+    """Understand a sentence ("w1 w0").
+
+    The optimal plans that it leaves open are counted, listed, sampled or drawn.
 
     --format dot and svg draw them as one DAG, whose paths they are; json has both the listed plans
     and the DAG.

@@ -44,7 +44,7 @@ from coordlang.cli.app import (
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
 @model_options
 @limits
-def command(
+def command(  # noqa: C901 - each option that excludes another has its check
     language: str,
     pddl: PlanningFiles,
     tasks: str | None,
@@ -53,8 +53,9 @@ def command(
     as_json: bool,
     given: GivenOptions,
 ) -> int:
-    """Check by definition that LANGUAGE is a coordination language: all plans of one sentence mix
-    freely.
+    """Check by definition that LANGUAGE is a coordination language.
+
+    All plans of one sentence then mix freely.
 
     Exit 0: it is.  1: it is not, and two plans that miscoordinate are shown.
     """

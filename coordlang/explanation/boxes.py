@@ -36,6 +36,7 @@ class Points:
         object.__setattr__(self, "offset", np.cumsum(sizes) - sizes)
 
     def one_hot(self, points: Ints) -> Bits:
+        """Points with one column for each value of each variable."""
         bits = np.zeros((len(points), sum(self.sizes)), np.bool_)
         bits[np.arange(len(points))[:, None], points + self.offset] = True
         return bits

@@ -63,8 +63,9 @@ def _apart(formulas: dict[str, Cover]) -> WordDescriptions:
 
 
 def _in_order(mapped: MappedStates, formulas: dict[str, Cover]) -> WordDescriptions:
-    """Always next: the word with the shortest formula against the words still to come (of the few
-    that look shortest).
+    """One word after another, each with its formula against the words still to come.
+
+    Next is the word with the shortest formula, of the few that look shortest.
     """
     left = dict(formulas)
     rules: list[tuple[str, Cover | None]] = []

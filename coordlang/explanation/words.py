@@ -18,8 +18,7 @@ from planners.tables import Ints, Rows, find_rows, unique_rows
 
 @dataclass(frozen=True, slots=True)
 class MappedStates:
-    """The states that formulas must be exact on: their values and word numbers, ``states`` in each
-    word.
+    """The states that formulas must be exact on: their values and word numbers.
 
     For all other states the formulas say nothing: several may be true there, or none.
     """
@@ -30,6 +29,7 @@ class MappedStates:
 
     @property
     def states(self) -> list[int]:
+        """How many states each word has."""
         return [int(n) for n in np.bincount(self.word, minlength=len(self.words))]
 
 

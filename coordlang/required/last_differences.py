@@ -70,10 +70,12 @@ class SeparationWalk:
 
     @property
     def nodes(self) -> int:
+        """How many nodes the walk has."""
         return sum(len(layer.x) for layer in self._layers)
 
     @property
     def edges(self) -> int:
+        """How many edges the walk has."""
         return sum(len(layer.source) for layer in self._layers)
 
     def unseparated(self, word: Ints, random: np.random.Generator) -> Iterator[Constraint]:

@@ -48,10 +48,12 @@ class Candidates:
 
     @property
     def model(self) -> JointModel:
+        """The joint model of the tasks."""
         return self.loaded.model
 
     @property
     def count(self) -> int:
+        """How many tasks there are."""
         return sum(len(space.starts) for space in self.spaces)
 
     @property

@@ -144,7 +144,7 @@ class _Search:
             else coordinated.expected(self.words)
         )
 
-    def _add(self, state: int, word: int) -> bool:
+    def _add(self, state: int, word: int) -> bool:  # noqa: C901 - one step, undone where it does not pay
         """Give a state a further word if that is a language and leaves more plans open."""
         self.tried += 1
         old = self.words[state]

@@ -73,4 +73,5 @@ class Outcome:
 
     @property
     def size(self) -> int:
+        """How many words the partition has."""
         return len(set(self.partition.values()))

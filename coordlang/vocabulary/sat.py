@@ -90,6 +90,7 @@ class PartitionProblem:
         return {s: next(w for w, v in enumerate(own) if v in true) for s, own in self._word.items()}
 
     def delete(self) -> None:
+        """Free the solver."""
         self._solver.delete()
 
     def _new(self) -> int:
@@ -180,10 +181,12 @@ class PartitionProblems(Generic[Requirement]):
         return kept.colouring
 
     def drop(self, size: int) -> None:
+        """Free the problem with this number of words."""
         if (kept := self._kept.pop(size, None)) is not None:
             kept.colouring.delete()
 
     def drop_all(self) -> None:
+        """Free all problems."""
         for size in list(self._kept):
             self.drop(size)
 

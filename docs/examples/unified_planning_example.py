@@ -1,5 +1,4 @@
-"""Two robots modelled in unified-planning: all their plans, a language for them, planning under a
-sentence.
+"""Two robots modelled in unified-planning: their plans, a language, planning under a sentence.
 
 Run it as a script, or cell by cell (``# %%``) in an editor or as a notebook.
 """

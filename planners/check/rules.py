@@ -73,6 +73,7 @@ class Instance:
 
     @property
     def text(self) -> str:
+        """The subaction as PDDL text."""
         return _text_of(self.name)
 
 
@@ -104,6 +105,7 @@ class Rules:
     def of(
         cls, domain: Domain, problem: Problem, team: Team, allow_idle: Sequence[bool] | None = None
     ) -> Rules:
+        """The rules of a problem's joint steps; ``allow_idle`` says which robots may idle."""
         idle = tuple(allow_idle) if allow_idle is not None else (True,) * len(team.robots)
         schemas = {schema.name: schema for schema in domain.schemas}
         return cls(

@@ -41,6 +41,7 @@ class Choosers:
 
 
 def choosers_of(model: JointModel) -> Choosers:
+    """Who chooses what in a joint model, at what second cost."""
     actions = model.actions
     seconds = tuple(second_cost(model, action) for action in actions)
     if model.is_joint_action:
@@ -79,6 +80,7 @@ def _covered_by(
 
 
 def second_cost(model: JointModel, action: GroundAction) -> int:
+    """The second component of an action's cost (0 under ``makespan``)."""
     if model.cost == "makespan+cost":
         return action.cost
     if model.cost == "makespan":
@@ -90,8 +92,8 @@ def second_cost(model: JointModel, action: GroundAction) -> int:
     )
 
 
-def clashes(actions: Sequence[GroundAction]) -> tuple[frozenset[int], ...]:
-    """For each action the others that cannot share a joint step with it (design.md, section 4).
+def clashes(actions: Sequence[GroundAction]) -> tuple[frozenset[int], ...]:  # noqa: C901 - one loop for each reason to clash
+    """For each action the others that cannot share a joint step with it (docs/pddl.md).
 
     In terms of literals ``(atom, value)``: two actions interfere when one writes the contrary of
     what the other writes or reads; the latter is forgiven when a positive formula links them.

@@ -23,6 +23,7 @@ def leaves(formulas: Iterable[Formula]) -> Iterator[tuple[Leaf, bool]]:
 
 
 def conjuncts(formula: Formula) -> tuple[Formula, ...]:
+    """The parts of a conjunction, else the formula itself."""
     return formula.parts if isinstance(formula, And) else (formula,)
 
 
@@ -44,6 +45,7 @@ def put(formula: Formula, value: Callable[[Leaf], Formula]) -> Formula:
 
 
 def joined(kind: type[And] | type[Or], parts: Iterable[Formula]) -> Formula:
+    """A conjunction or disjunction of parts, with truth values simplified away."""
     neutral, decisive = (TRUE, FALSE) if kind is And else (FALSE, TRUE)
     kept: list[Formula] = []
     for part in parts:

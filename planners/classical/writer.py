@@ -22,9 +22,11 @@ class Writer:
         self._places = 0
 
     def fact(self, atom: Atom) -> int:
+        """The number of a fact; a new fact gets the next one."""
         return self.facts.setdefault(atom, len(self.facts))
 
     def conditions(self, known: Known) -> tuple[Condition, ...]:
+        """Truth values of facts as conditions, sorted by number."""
         return tuple(sorted((self.fact(atom), value) for atom, value in known.items()))
 
     def action(
@@ -132,6 +134,7 @@ def own_fact(kind: str, *args: str) -> Atom:
 
 
 def fact_atoms(model: JointModel) -> list[Atom]:
+    """The fluent atoms of a model in the order of their numbers."""
     numbers = model.codec.facts.index
     return sorted(numbers, key=numbers.__getitem__)
 
@@ -150,5 +153,6 @@ def goal_formula(model: JointModel, goal: Goal) -> Formula:
 
 
 def state_reader(model: JointModel) -> Callable[[Leaf], Formula]:
+    """How formulas read a state: an atom that no state has is false."""
     facts = model.codec.facts.index
     return lambda leaf: leaf if leaf in facts else FALSE

@@ -71,6 +71,7 @@ class GroundAction:
 
     @property
     def label(self) -> str:
+        """The action in PDDL syntax."""
         return label(self.schema, self.args)
 
     def part_of(self, robot: int) -> str | None:

@@ -26,7 +26,7 @@ class Evaluator:
     facts: FactTable
     subactions: dict[StepAtom, tuple[int, int]]
 
-    def holds(
+    def holds(  # noqa: C901 - one case for each kind of formula
         self, formula: Formula, rows: Rows, which: Ints, labels: Labels | None = None
     ) -> NDArray[np.bool_]:
         """Whether ``formula`` holds in ``rows[which[k]]`` when the robots do ``labels[k]``.

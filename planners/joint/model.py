@@ -123,6 +123,7 @@ class JointModel:
 
     @property
     def remembers(self) -> bool:
+        """Whether states remember each robot's last subaction."""
         return self.codec.memory is not None
 
     def successors(self, rows: Rows) -> Steps:

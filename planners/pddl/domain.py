@@ -303,7 +303,7 @@ def _fields(document: Document, item: Group) -> dict[str, tuple[Expression, ...]
     return fields
 
 
-def _parameter_items(
+def _parameter_items(  # noqa: C901 - one case for each place of the agent
     document: Document, fields: dict[str, tuple[Expression, ...]]
 ) -> tuple[tuple[Expression, ...], str | None]:
     """The full typed list of parameters, the agent's first unless it stands among them.

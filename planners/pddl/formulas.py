@@ -33,7 +33,7 @@ _TEMPORAL = frozenset(
 )
 
 
-def read_formula(names: Names, item: Expression) -> Formula:
+def read_formula(names: Names, item: Expression) -> Formula:  # noqa: C901 - one case for each connective
     """A precondition, condition or goal.
 
     ``(name ..)`` is an atom when ``name`` is a declared predicate, else a literal about the same
@@ -91,7 +91,7 @@ def read_effects(names: Names, item: Expression) -> tuple[tuple[Effect, ...], in
     return tuple(effects), costs[0] if costs else None
 
 
-def _collect(
+def _collect(  # noqa: C901 - one case for each kind of effect
     names: Names,
     item: Expression,
     variables: tuple[Variable, ...],

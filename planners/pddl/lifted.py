@@ -23,6 +23,8 @@ class Variable:
 
 @dataclass(frozen=True, slots=True)
 class Truth:
+    """Truth or falsity."""
+
     value: bool
 
 
@@ -44,33 +46,45 @@ class StepAtom:
 
 @dataclass(frozen=True, slots=True)
 class Equal:
+    """Equality of two terms."""
+
     left: Term
     right: Term
 
 
 @dataclass(frozen=True, slots=True)
 class Not:
+    """Negation."""
+
     part: Formula
 
 
 @dataclass(frozen=True, slots=True)
 class And:
+    """Conjunction; true without parts."""
+
     parts: tuple[Formula, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Or:
+    """Disjunction; false without parts."""
+
     parts: tuple[Formula, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Forall:
+    """Universal quantification over typed variables."""
+
     variables: tuple[Variable, ...]
     part: Formula
 
 
 @dataclass(frozen=True, slots=True)
 class Exists:
+    """Existential quantification over typed variables."""
+
     variables: tuple[Variable, ...]
     part: Formula
 

@@ -124,6 +124,7 @@ class Names:
         return tuple(variables)
 
     def check_types(self, entry: Typed) -> None:
+        """Raise `BadInput` if a type of the entry is not declared."""
         for name in entry.types:
             if name not in self.types and name != "object":
                 raise self.document.fail(

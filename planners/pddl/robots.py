@@ -78,7 +78,7 @@ def objects_of(domain: Domain, problem: Problem, types: Sequence[str]) -> tuple[
     return tuple(sorted(found, key=natural))
 
 
-def find_team(domain: Domain, problem: Problem, choice: RobotSelection) -> Team:
+def find_team(domain: Domain, problem: Problem, choice: RobotSelection) -> Team:  # noqa: C901 - one case for each way to tell who acts
     """The robots: from subaction comments, ``:agent``, the user's choice, or by detection.
 
     Raises

@@ -47,6 +47,7 @@ class Source:
 
     @property
     def sha256(self) -> str:
+        """The hash of the text."""
         return sha256(self.text.encode()).hexdigest()
 
 
@@ -61,6 +62,7 @@ class JoinedSource(Source):
         self._starts = [0, *accumulate(len(part.text) + 1 for part in parts)][:-1]
 
     def position(self, offset: int) -> Position:
+        """The position of an offset, in the text that it lies in."""
         number = bisect_right(self._starts, offset) - 1
         return self._parts[number].position(offset - self._starts[number])
 
@@ -146,7 +148,7 @@ def read_source(path: str | Path) -> Source:
         return Source(name, data.decode("latin-1"))
 
 
-def parse(source: Source) -> Document:
+def parse(source: Source) -> Document:  # noqa: C901 - one case for each kind of token
     """Read the one top-level expression of ``source``.
 
     Raises `BadInput` for unbalanced parentheses, text outside of them, or nesting beyond

@@ -26,6 +26,7 @@ class EdgeIndex:
 
     @classmethod
     def of(cls, space: PlanSpace) -> EdgeIndex:
+        """The index of all edges of a plan space."""
         prefix = space.sources
         radix, keys = [], []
         for robot in range(space.labels.shape[1]):

@@ -51,10 +51,12 @@ class Plans:
 
     @classmethod
     def of(cls, space: PlanSpace, task: int = 0) -> Plans:
+        """The plans of one task of a plan space, counted."""
         return cls(space, int(space.starts[task]), counts(space))
 
     @property
     def count(self) -> int:
+        """How many plans there are, exactly."""
         return self.counted[self.start]
 
     def __iter__(self) -> Iterator[Plan]:

@@ -38,10 +38,12 @@ SHOWN = 100
 def units(settings: Settings) -> list[Unit]:
     # The most flexible language takes long, and is kept: `flexibility`, which starts sooner, builds
     # it.
+    """The pieces of work, with all their parameters."""
     return compared_units("communication", settings, effort=1.5, flexible=1.5)
 
 
 def run(unit: Unit, settings: Settings) -> Result:
+    """One piece of work, as JSON data."""
     world = WORLDS[unit.parameters["world"]]
     if "orders" in unit.parameters:
         candidates = world.candidates(settings.domains)
@@ -86,6 +88,7 @@ def measures(tasks: Sequence[SentenceCounts]) -> Result:
 
 
 def section(records: Sequence[Record]) -> Section:
+    """The results, as this section of the page."""
     found = Compared.of(records)
     row, mine = found.row, found.languages
     blocks: list[str | Figure] = [f"{_DEFINITION}{row}.", _table(mine)]

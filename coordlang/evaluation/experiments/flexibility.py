@@ -32,10 +32,12 @@ from coordlang.language.flexibility import flexibility
 
 
 def units(settings: Settings) -> list[Unit]:
+    """The pieces of work, with all their parameters."""
     return compared_units("flexibility", settings, effort=2.0, flexible=60.0)
 
 
 def run(unit: Unit, settings: Settings) -> Result:
+    """One piece of work, as JSON data."""
     world = WORLDS[unit.parameters["world"]]
     if "orders" in unit.parameters:
         candidates = world.candidates(settings.domains)
@@ -80,6 +82,7 @@ def measures(tasks: Sequence[SentenceCounts]) -> Result:
 
 
 def section(records: Sequence[Record]) -> Section:
+    """The results, as this section of the page."""
     found = Compared.of(records)
     row, mine = found.row, found.languages
     blocks: list[str | Figure] = [_DEFINITION.format(row=row), _table(mine)]

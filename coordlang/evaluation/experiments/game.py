@@ -43,6 +43,7 @@ LIKED = (1, 2, 3, 4, 5)
 
 
 def units(settings: Settings) -> list[Unit]:
+    """The pieces of work, with all their parameters."""
     found = []
     for name in (ROW, *(world.name for world in OTHERS[: 1 if settings.quick else None])):
         for method in METHODS:
@@ -52,6 +53,7 @@ def units(settings: Settings) -> list[Unit]:
 
 
 def run(unit: Unit, settings: Settings) -> Result:
+    """One piece of work, as JSON data."""
     world = WORLDS[unit.parameters["world"]]
     candidates, language = language_for(world, unit.parameters["method"], settings)
     # A task's game depends on its numbers of plans alone; a language makes few different ones.
@@ -148,6 +150,7 @@ def expected_widest_first(sizes: Sequence[int], liked: int) -> Fraction:
 
 
 def section(records: Sequence[Record]) -> Section:
+    """The results, as this section of the page."""
     found = done(records)
     blocks: list[str | Figure] = [_DEFINITION]
     for name in dict.fromkeys(r.unit.parameters["world"] for r in found):

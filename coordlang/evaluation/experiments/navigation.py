@@ -47,6 +47,7 @@ UNFINISHED = {
 
 
 def units(settings: Settings) -> list[Unit]:
+    """The pieces of work, with all their parameters."""
     found = []
     for name, (world, _, _) in WAREHOUSES.items():
         if settings.quick and name not in ("open 3x3", "ring 3x4"):
@@ -75,6 +76,7 @@ def units(settings: Settings) -> list[Unit]:
 
 
 def run(unit: Unit, settings: Settings) -> Result:
+    """One piece of work, as JSON data."""
     asked = unit.parameters
     if "world" in asked:
         candidates, language = language_for(WORLDS[asked["world"]], asked["method"], settings)
@@ -97,6 +99,7 @@ def run(unit: Unit, settings: Settings) -> Result:
 
 
 def section(records: Sequence[Record]) -> Section:
+    """The results, as this section of the page."""
     found = done(records)
     mine = [r for r in found if "warehouse" in r.unit.parameters]
     others = [r for r in found if "world" in r.unit.parameters]

@@ -30,6 +30,7 @@ METHODS = ("greedy", "separating", "minimal")
 
 
 def units(settings: Settings) -> list[Unit]:
+    """The pieces of work, with all their parameters."""
     row = QUICK_ROW if settings.quick else ROW
     found = []
     for heuristic in ("manhattan", "relaxed", "blind"):
@@ -52,6 +53,7 @@ def _unit(world: str, heuristic: str, method: str, samples: int | None) -> Unit:
 
 
 def run(unit: Unit, settings: Settings) -> Result:
+    """One piece of work, as JSON data."""
     world = WORLDS[unit.parameters["world"]]
     candidates, language = language_for(world, unit.parameters["method"], settings)
     terrain = ExpandedStates(candidates.model, language.partition(candidates.model))
@@ -89,6 +91,7 @@ def expansions(
 
 
 def section(records: Sequence[Record]) -> Section:
+    """The results, as this section of the page."""
     found = done(records)
     row = records[0].unit.parameters["world"]
     mine = [r for r in found if r.unit.parameters["world"] == row]

@@ -68,6 +68,7 @@ def _at(cells: Sequence[str]) -> tuple[str, ...]:
 
 
 def units(settings: Settings) -> list[Unit]:
+    """The pieces of work, with all their parameters."""
     methods = ("greedy",) if settings.quick else METHODS
     found = [
         Unit(
@@ -87,6 +88,7 @@ def units(settings: Settings) -> list[Unit]:
 
 
 def run(unit: Unit, settings: Settings) -> Result:
+    """One piece of work, as JSON data."""
     asked = unit.parameters
     if asked["world"] == "corridor":
         candidates, language = language_for(CORRIDOR, asked["method"], settings, trading_rooms())
@@ -206,6 +208,7 @@ def _ends(spoken: TaskLanguage) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def section(records: Sequence[Record]) -> Section:
+    """The results, as this section of the page."""
     found = done(records)
     mine = [r for r in found if r.unit.parameters["world"] == "corridor"]
     others = [r for r in found if r.unit.parameters["world"] != "corridor"]

@@ -44,6 +44,7 @@ _SLOW = {"GW4": 60.0, "GW3": 10.0, "GWB4": 8.0, "GWB3": 8.0}
 
 
 def units(settings: Settings) -> list[Unit]:
+    """The pieces of work, with all their parameters."""
     found = []
     for world in (*ROWS, *OTHERS):
         if settings.quick and world.name not in QUICK:
@@ -72,6 +73,7 @@ def units(settings: Settings) -> list[Unit]:
 
 
 def run(unit: Unit, settings: Settings) -> Result:
+    """One piece of work, as JSON data."""
     asked = unit.parameters
     candidates = WORLDS[asked["world"]].candidates(settings.domains)
     if asked["column"] == "orders":
@@ -132,6 +134,7 @@ def pairs_of_plans(candidates: Candidates) -> int:
 
 
 def section(records: Sequence[Record]) -> Section:
+    """The results, as this section of the page."""
     of: dict[str, dict[str, Record]] = {}
     for record in done(records):
         of.setdefault(record.unit.parameters["world"], {})[record.unit.parameters["column"]] = (

@@ -91,6 +91,7 @@ def _only(candidates: Candidates, language: Language) -> Sayings:
 def warehouse_trials(
     candidates: Candidates, language: Language, every: Sequence[Delivery]
 ) -> Trials:
+    """Trials of deliveries in a warehouse, with a human in the way."""
     sayings = _only(candidates, language)
     model = candidates.model
     corners = {cell for delivery in every for cell in delivery.start}

@@ -179,6 +179,7 @@ class Monitor:
 
     @property
     def finished(self) -> bool:
+        """Whether the robot has done all its steps."""
         return not self._next[self._position[0]]
 
     @property

@@ -45,6 +45,7 @@ class TaskLanguage:
 
     @property
     def model(self) -> JointModel:
+        """The joint model of the task."""
         return self.space.model
 
     def words_of(self, text: str | Sequence[str]) -> tuple[int, ...]:

@@ -149,6 +149,7 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
 
     @property
     def name(self) -> str:
+        """The name of the engine in unified-planning."""
         return NAME
 
     @staticmethod
@@ -165,22 +166,27 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
 
     @staticmethod
     def supports(problem_kind: ProblemKind) -> bool:
+        """Whether problems of this kind can be planned for."""
         return bool(problem_kind <= CoordlangEngine.supported_kind())
 
     @staticmethod
     def supports_plan(plan_kind: PlanKind) -> bool:
+        """Whether plans of this kind can be validated."""
         return plan_kind in PLAN_KINDS
 
     @staticmethod
     def satisfies(optimality_guarantee: OptimalityGuarantee) -> bool:
+        """Every plan is optimal."""
         return True
 
     @staticmethod
     def ensures(anytime_guarantee: AnytimeGuarantee) -> bool:
+        """Optimal plans one after another are ensured, improving plans are not."""
         return bool(anytime_guarantee == AnytimeGuarantee.OPTIMAL_PLANS)
 
     @staticmethod
     def get_credits(**kwargs: Any) -> Credits | None:
+        """None: nothing is printed."""
         return None
 
     # Planning.

@@ -438,10 +438,10 @@ def _run(case: Case, command: Command, folder: Path) -> None:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_odd(name: str, coordlang: Command, tmp_path: Path) -> None:  # noqa: F811
+def test_odd(name: str, coordlang: Command, tmp_path: Path) -> None:
     _run(CASES[name], coordlang, tmp_path)
 
 
 @pytest.mark.parametrize("name", ONCE_WRONG)
-def test_once_wrong(name: str, coordlang: Command, tmp_path: Path) -> None:  # noqa: F811
+def test_once_wrong(name: str, coordlang: Command, tmp_path: Path) -> None:
     _run(ONCE_WRONG[name], coordlang, tmp_path)
