@@ -29,9 +29,10 @@ class EdgeIndex:
         """The index of all edges of a plan space."""
         prefix = space.sources
         radix, keys = [], []
-        for robot in range(space.labels.shape[1]):
-            size = int(space.labels[:, robot].max(initial=0)) + 1
-            code = prefix * size + space.labels[:, robot]
+        for robot in range(space.robots):
+            labels = space.robot_labels(robot)
+            size = int(labels.max(initial=0)) + 1
+            code = prefix * size + labels
             fresh = np.ones(len(code), np.bool_)
             fresh[1:] = code[1:] != code[:-1]
             radix.append(size)

@@ -14,7 +14,7 @@ from planners.joint.model import Goal, JointModel, PlanningTask, Steps
 from planners.limits import reaching
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import Space, blocks
-from planners.tables import Bools, Ints, Rows, find_rows, ranges, unique_rows
+from planners.tables import Bools, Ints, Rows, find_rows, unique_rows
 
 #: (goal, state) pairs handled in one plan space when many tasks are asked for.
 _BATCH = 2_000_000
@@ -264,7 +264,7 @@ def distances(space: Space, reached: Bools) -> Ints:
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import dijkstra
 
-    source = np.repeat(np.arange(len(space)), np.diff(space.first))
+    source = space.sources
     result = np.empty(reached.shape, np.int64)
     size = max(1, len(space))
     for start in range(0, len(reached), size):
@@ -289,13 +289,11 @@ def _second_costs(space: Space, distance: Ints) -> tuple[Ints, PlanSpace]:
     goal, state, layer = goal[order], state[order], layer[order]
     node = np.full(distance.shape, -1)
     node[goal, state] = np.arange(len(goal))
-    counts = space.first[state + 1] - space.first[state]
-    step = ranges(space.first[state], counts)
-    source = np.repeat(np.arange(len(goal)), counts)
-    after = distance[goal[source], space.target[step]]
+    source, step = space.steps_from(state)
+    after = distance[goal[source], space.targets(step)]
     keep = (after == layer[source] - 1) & (layer[source] > 0)
     source, step = source[keep], step[keep]
-    target = node[goal[source], space.target[step]]
+    target = node[goal[source], space.targets(step)]
     cost = space.cost[step]
     value = np.where(layer == 0, 0, _FAR)
     if cost.any():

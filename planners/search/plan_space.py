@@ -81,6 +81,11 @@ class PlanSpace:
         )
         return [slice(int(a), int(b)) for a, b in pairwise(bounds)]
 
+    @property
+    def robots(self) -> int:
+        """The number of robots: of columns of labels."""
+        return int(self.labels.shape[1])
+
     def cost_of(self, task: int) -> tuple[int, int]:
         """The optimal cost of a task: (makespan, second component)."""
         return int(self.layer[self.starts[task]]), int(self.second[task])

@@ -22,17 +22,14 @@ def counts(space: PlanSpace) -> list[int]:
     Plans are different sequences of joint *actions*; they may pass through the same states.
     O(edges) additions: in 64 bits as long as they fit, then in Python integers.
     """
-    values = np.zeros(len(space), np.int64)
-    for number, span in enumerate(space.layers):
-        if number == 0:
-            values[span] = 1
-            continue
-        low, high = int(space.first[span.start]), int(space.first[span.stop])
-        addends = values[space.target[low:high]]
+    values = np.ones(len(space), np.int64)
+    for nodes, edges in zip(space.layers[1:], space.edges_by_layer(), strict=True):
+        addends = values[edges.target]
         if values.dtype != object and addends.astype(np.float64).sum() > 2.0**62:
             values = values.astype(object)
             addends = addends.astype(object)
-        values[span] = np.add.reduceat(addends, space.first[span] - low)
+        first = np.searchsorted(edges.source, np.arange(nodes.start, nodes.stop))
+        values[nodes] = np.add.reduceat(addends, first)
     return [int(v) for v in values]
 
 
@@ -63,7 +60,7 @@ class Plans:
         """All plans, lazily: memory is one plan."""
         plan: list[tuple[int, ...]] = []
         # One iterator of edges for each step of the current plan.
-        open_edges = [iter(self._edges(self.start))]
+        open_edges = [iter(self.space.out_edges(self.start))]
         if self.space.layer[self.start] == 0:
             yield ()
             return
@@ -74,13 +71,13 @@ class Plans:
                 if plan:
                     plan.pop()
                 continue
-            plan.append(self._labels(edge))
-            target = int(self.space.target[edge])
+            plan.append(self.space.labels_of(edge))
+            target = self.space.target_of(edge)
             if self.space.layer[target] == 0:
                 yield tuple(plan)
                 plan.pop()
             else:
-                open_edges.append(iter(self._edges(target)))
+                open_edges.append(iter(self.space.out_edges(target)))
 
     def unrank(self, rank: int) -> Plan:
         """The plan at a position of the order; raises `IndexError` outside ``0 .. count - 1``."""
@@ -89,12 +86,12 @@ class Plans:
         plan = []
         node = self.start
         while self.space.layer[node] > 0:
-            edges = self._edges(node)
-            sums = list(accumulate((self.counted[self.space.target[e]] for e in edges), initial=0))
+            edges = self.space.out_edges(node)
+            sums = list(accumulate((self.counted[self.space.target_of(e)] for e in edges), initial=0))
             position = bisect_right(sums, rank) - 1
             rank -= sums[position]
-            plan.append(self._labels(edges[position]))
-            node = int(self.space.target[edges[position]])
+            plan.append(self.space.labels_of(edges[position]))
+            node = self.space.target_of(edges[position])
         return tuple(plan)
 
     def rank(self, plan: Plan) -> int | None:
@@ -103,9 +100,9 @@ class Plans:
             return None
         rank, node = 0, self.start
         for step in plan:
-            for edge in self._edges(node):
-                target = int(self.space.target[edge])
-                if self._labels(edge) == tuple(step):
+            for edge in self.space.out_edges(node):
+                target = self.space.target_of(edge)
+                if self.space.labels_of(edge) == tuple(step):
                     break
                 rank += self.counted[target]
             else:
@@ -121,16 +118,8 @@ class Plans:
 
     def states(self, plan: Plan) -> list[int]:
         """The state numbers (in ``space.rows``) that a plan passes through, first to last."""
-        node = self.start
-        states = [int(self.space.state[node])]
-        for step in plan:
-            edge = next(e for e in self._edges(node) if self._labels(e) == tuple(step))
-            node = int(self.space.target[edge])
-            states.append(int(self.space.state[node]))
-        return states
-
-    def _edges(self, node: int) -> range:
-        return range(int(self.space.first[node]), int(self.space.first[node + 1]))
-
-    def _labels(self, edge: int) -> tuple[int, ...]:
-        return tuple(int(label) for label in self.space.labels[edge])
+        path = self.space.path_with(self.start, plan)
+        if path is None:
+            raise ValueError("this is no optimal plan of the task")
+        found: list[int] = self.space.state[self.space.nodes_on(self.start, path)].tolist()
+        return found

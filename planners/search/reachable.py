@@ -10,7 +10,7 @@ import numpy as np
 from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Steps
 from planners.limits import reaching
-from planners.tables import Ints, Rows, find_rows, unique_rows
+from planners.tables import Ints, Rows, find_rows, ranges, unique_rows
 
 #: States expanded at a time, and the joint steps that this should give: they bound the memory of
 #: one expansion.
@@ -36,6 +36,21 @@ class Space:
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    @property
+    def sources(self) -> Ints:
+        """The state that each step leads out of."""
+        return np.repeat(np.arange(len(self)), np.diff(self.first))
+
+    def steps_from(self, states: Ints) -> tuple[Ints, Ints]:
+        """All steps out of many states: for each its position in ``states``, and its number."""
+        counts = self.first[states + 1] - self.first[states]
+        return np.repeat(np.arange(len(states)), counts), ranges(self.first[states], counts)
+
+    def targets(self, steps: Ints) -> Ints:
+        """The states that these steps lead to."""
+        found: Ints = self.target[steps]
+        return found
 
     def numbers(self, rows: Rows) -> Ints:
         """The numbers of states given as rows, -1 for those that are not reachable."""
