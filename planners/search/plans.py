@@ -87,7 +87,9 @@ class Plans:
         node = self.start
         while self.space.layer[node] > 0:
             edges = self.space.out_edges(node)
-            sums = list(accumulate((self.counted[self.space.target_of(e)] for e in edges), initial=0))
+            sums = list(
+                accumulate((self.counted[self.space.target_of(e)] for e in edges), initial=0)
+            )
             position = bisect_right(sums, rank) - 1
             rank -= sums[position]
             plan.append(self.space.labels_of(edges[position]))
