@@ -22,7 +22,7 @@ from coordlang.vocabulary import EXACT, METHODS, Job, Outcome, greedy
 from coordlang.vocabulary.enlarging import enlarge
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Assignment, Evidence
-from coordlang.vocabulary.minimal import refute
+from coordlang.vocabulary.minimal import refuting_clauses
 from planners.errors import UsageError
 from planners.limits import run_until_stopped
 
@@ -254,7 +254,7 @@ def certificate_of(built: Built) -> Certificate:
     finds reasons.  As long as that takes: not anytime.
     """
     refuted = built.language.guarantee.lower_bound - 1
-    evidence = built.evidence or (refute(built.job, refuted) if refuted else {})
+    evidence = built.evidence or (refuting_clauses(built.job, refuted) if refuted else {})
     return certify(built.job.candidates, evidence, refuted)
 
 

@@ -9,13 +9,8 @@ from itertools import combinations
 import numpy as np
 
 from coordlang.language.warping import Clause, Pair
-from coordlang.vocabulary.sat import (
-    PartitionProblem,
-    Undecided,
-    most_constrained_first,
-    reduce,
-    solved,
-)
+from coordlang.vocabulary.clauses import most_constrained_first, without_implied
+from coordlang.vocabulary.sat import PartitionProblem, Undecided, satisfiable
 
 #: Conflicts after which the checking solver comes back.
 _SLICE = 10_000
@@ -126,7 +121,7 @@ def core(clauses: Iterable[Clause], size: int) -> list[Clause]:
 
     Raises `ValueError` if it finds that they do not refute it.
     """
-    every = reduce(clauses)
+    every = without_implied(clauses)
     try:
         small = _in_the_way(every, size)
     except Undecided:
@@ -146,9 +141,9 @@ def _in_the_way(clauses: Sequence[Clause], size: int) -> list[Clause]:
     bounds = np.cumsum([0, *(len(clause) for clause in clauses)])[:-1]
     words = np.zeros(max(states, default=0) + 1, np.int64)
     kept: list[Clause] = []
-    colouring = PartitionProblem(states, size)
+    problem = PartitionProblem(states, size)
     try:
-        while (partition := colouring.solve(_EASY)) is not None:
+        while (partition := problem.solve(_EASY)) is not None:
             words[list(partition)] = list(partition.values())
             apart = words[pairs[:, 0]] != words[pairs[:, 1]]
             broken = (
@@ -157,10 +152,10 @@ def _in_the_way(clauses: Sequence[Clause], size: int) -> list[Clause]:
             if not len(broken):
                 raise ValueError(f"the clauses leave a partition into {size} words")
             for number in broken[:_AT_ONCE].tolist():
-                colouring.add(clauses[number])
+                problem.separate_one(clauses[number])
                 kept.append(clauses[number])
     finally:
-        colouring.delete()
+        problem.close()
     return kept
 
 
@@ -174,7 +169,7 @@ def _used(clauses: Sequence[Clause], size: int) -> list[Clause]:
         select = [cnf.variables + 1 + n for n in range(len(clauses))]
         for variable, clause in zip(select, asked, strict=True):
             sat.add_clause([*clause, -variable])
-        if solved(sat, select, _CONFLICTS):
+        if satisfiable(sat, select, _CONFLICTS):
             raise AssertionError("a subset of the clauses refuted the words a moment ago")
         needed = set(sat.get_core() or ())
     return [clause for clause, variable in zip(clauses, select, strict=True) if variable in needed]

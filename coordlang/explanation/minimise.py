@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coordlang.explanation.boxes import Bits, Points, conflicting, expand
-from coordlang.vocabulary.sat import Undecided, solved
+from coordlang.vocabulary.sat import Undecided, satisfiable
 
 #: Array elements looked at in expansions; decides how many passes are made.
 _WORK = 300_000_000
@@ -183,7 +183,7 @@ def _fewer(points: Points, number: int, needed: Sequence[int]) -> Bits | None:
         for t, i in enumerate(needed):
             solver.add_clause([first + t * len(on) + i + 1])
         try:
-            answer = solved(solver, conflicts=_CONFLICTS)
+            answer = satisfiable(solver, conflicts=_CONFLICTS)
         except Undecided:
             return None
         if not answer:

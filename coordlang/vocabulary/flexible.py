@@ -19,11 +19,11 @@ import numpy as np
 from coordlang.language.flexibility import Flexibility, Floats, flexibility
 from coordlang.language.warping import Clause, pair, separation_clause
 from coordlang.required.composition_walk import walk
+from coordlang.vocabulary.clauses import without_implied
 from coordlang.vocabulary.counterexamples import counterexamples
 from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from coordlang.vocabulary.job import Assignment, Job, Outcome
 from coordlang.vocabulary.objective import Objective
-from coordlang.vocabulary.sat import reduce
 from coordlang.vocabulary.symmetry import symmetry_group
 from planners.errors import OutOfMemory
 from planners.limits import run_until_stopped
@@ -187,7 +187,7 @@ class _Clauses:
                 for example in counterexamples(space, index, word[space.state], _MOST, starts)
             }
             if found:
-                for clause in reduce(clause for clause in found if clause):
+                for clause in without_implied(clause for clause in found if clause):
                     self.add(clause)
                 return True
             self._position = (self._position + 1) % len(self._parts)

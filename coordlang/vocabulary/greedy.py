@@ -11,11 +11,14 @@ from coordlang.vocabulary.job import Job, Outcome
 def greedy(job: Job) -> Outcome:
     """The greedy partition of a job's states in their own order."""
     return Outcome(
-        fill(job.states, separations(job.first_differences.divergences)), job.lower_bound
+        greedy_partition(job.states, separations(job.first_differences.divergences)),
+        job.lower_bound,
     )
 
 
-def fill(states: Sequence[int], constraints: Sequence[tuple[Separation, ...]]) -> dict[int, int]:
+def greedy_partition(
+    states: Sequence[int], constraints: Sequence[tuple[Separation, ...]]
+) -> dict[int, int]:
     """A partition of ``states`` that satisfies every constraint: state -> word number, from 0.
 
     A constraint is a tuple of alternatives, at least one of which must hold; each is a set of pairs

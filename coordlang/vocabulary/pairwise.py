@@ -21,8 +21,9 @@ import numpy as np
 from coordlang.language.warping import Clause, separation_clause
 from coordlang.required.composition_walk import walk
 from coordlang.required.miscoordination import Inseparable, inseparable, separable
+from coordlang.vocabulary.clauses import most_constrained_first, without_implied
 from coordlang.vocabulary.counterexamples import counterexamples
-from coordlang.vocabulary.sat import PartitionProblem, most_constrained_first, reduce
+from coordlang.vocabulary.sat import PartitionProblem
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 
@@ -128,25 +129,25 @@ def _words(
 
     New clauses are added to the list.
     """
-    colouring = PartitionProblem(most_constrained_first(states, clauses), size)
+    problem = PartitionProblem(most_constrained_first(states, clauses), size)
     try:
         for clause in clauses:
-            colouring.add(clause)
+            problem.separate_one(clause)
         word = np.zeros(
             max(len(view.rows) for view, _, _ in searched) if searched else max(states) + 1,
             np.int64,
         )
-        while (partition := colouring.solve()) is not None:
+        while (partition := problem.solve()) is not None:
             word[list(partition)] = list(partition.values())
             fresh = _violated(searched, word)
             if not fresh:
                 return partition
             for clause in fresh:
-                colouring.add(clause)
+                problem.separate_one(clause)
             clauses += fresh
         return None
     finally:
-        colouring.delete()
+        problem.close()
 
 
 def _violated(
@@ -158,7 +159,7 @@ def _violated(
             clause = separation_clause(example.states, word.tolist())
             assert clause, "the plans have one sentence, and none of them is the other"
             found.add(clause)
-    return reduce(found)
+    return without_implied(found)
 
 
 def together(languages: Sequence[PairLanguage]) -> dict[int, int]:

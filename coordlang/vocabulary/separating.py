@@ -1,40 +1,34 @@
 """The least partition that satisfies Theorem 3, with proof, by SAT.
 
-Theorem 3 in full, alpha or beta; with ``alpha_only`` alpha.
-
-Between `greedy`, which satisfies alpha, and `minimal`, which is least among all languages:
-separating words tell RC plans apart where they part or where they meet, so a sentence can be
-understood without looking at whole plans.
+Alpha or beta, or with ``alpha_only`` alpha.  Between `greedy`, which satisfies alpha, and
+`minimal`, which is least among all languages: separating words tell RC plans apart where they part
+or where they meet, so a sentence can be understood without looking at whole plans.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
+from typing import Protocol
 
 import numpy as np
 
 from coordlang.language.warping import Pair, pair
 from coordlang.required.divergences import Separation, separations
 from coordlang.required.last_differences import Constraint, SeparationWalk, ordered
-from coordlang.vocabulary.greedy import fill
+from coordlang.vocabulary.clauses import most_constrained_first
+from coordlang.vocabulary.greedy import greedy_partition
 from coordlang.vocabulary.job import Assignment, Job, Outcome
-from coordlang.vocabulary.sat import (
-    PartitionProblem,
-    PartitionProblems,
-    SolverBudget,
-    Undecided,
-    close_bounds,
-    most_constrained_first,
-)
+from coordlang.vocabulary.problems_by_size import ProblemsBySize, SolverBudget, close_bounds
+from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from coordlang.vocabulary.symmetry import symmetry_group
 from planners.errors import OutOfMemory
 from planners.limits import run_until_stopped
 
-#: Partitions filled greedily, for a first upper bound, before SAT takes over.
-_FILLED = 20
-#: Constraints of one walk up to which all are written down.
-_WRITTEN = 200_000
+#: Greedy partitions, each under the constraints that the one before broke, before SAT takes over.
+_GREEDY_ROUNDS = 20
+#: Constraints of one walk up to which all of them are listed.
+_LISTED = 200_000
 #: What a short search may spend on one number of words.
 _SHORT = SolverBudget(20, 2_000)
 
@@ -45,21 +39,16 @@ def separating(job: Job) -> Outcome:
     ``figures["separating_lower_bound"]`` is the proved bound on separating partitions; other
     languages may have fewer words.  Anytime, like `minimal`.
     """
-    return _searched(job, _AlphaOnly(job) if job.alpha_only else _AlphaOrBeta(job), _Search.run)
+    source = _Alpha(job) if job.alpha_only else _AlphaOrBeta(job)
+    return _searched(job, _Search(job, source), _Search.run)
 
 
-def quickly(job: Job) -> Outcome:
-    """A separating partition with fewer words than the job's incumbent, or the incumbent.
+def short_separating_search(job: Job) -> Outcome:
+    """A separating partition with fewer words than the job's incumbent, if it is found quickly.
 
-    As far as a short search finds one.
+    Else the incumbent.
     """
-    return _searched(job, _AlphaOrBeta(job), _short)
-
-
-def _short(search: _Search) -> None:
-    search.prepare()
-    while search.lower < search.upper and search.decide(search.lower, _SHORT):
-        pass
+    return _searched(job, _Search(job, _AlphaOrBeta(job)), _Search.run_shortly)
 
 
 def _searched(job: Job, search: _Search, run: Callable[[_Search], None]) -> Outcome:
@@ -72,53 +61,81 @@ def _searched(job: Job, search: _Search, run: Callable[[_Search], None]) -> Outc
     return Outcome(search.best, job.lower_bound, search.figures(), stopped)
 
 
+class _Source(Protocol):
+    """Where the constraints of separating partitions come from.
+
+    ``known`` are those that are listed, ``apart`` states that need words of their own.
+    """
+
+    known: list[Constraint]
+    apart: Sequence[int]
+
+    def prepare(self) -> None:
+        """List constraints."""
+
+    def greedy_partition(self) -> Assignment | None:
+        """A separating partition, None if none was found."""
+
+    def broken(self, partition: Assignment) -> list[Constraint]:
+        """Constraints that a partition breaks, none of them known yet; empty: it is separating."""
+
+    def figures(self) -> Mapping[str, float]:
+        """The work done."""
+
+
 class _Search:
     """Closes in on the least number of words from below.
 
-    Subclasses know where constraints come from.
+    ``lower`` words are proved to be needed, ``best`` is separating (or the incumbent).
     """
 
-    def __init__(self, job: Job) -> None:
-        self._job = job
+    def __init__(self, job: Job, source: _Source) -> None:
+        self._job, self._source = job, source
         self.lower = job.lower_bound
         self.best: Assignment | None = job.incumbent
-        self._constraints: list[Constraint] = []
-        self._problems = PartitionProblems(self._start, _require)
+        self._problems = ProblemsBySize(self._start, _require)
         self._rounds = 0
-        #: States that need words of their own; naming these first leaves fewest symmetries to
-        #: search.
-        self._first: list[int] = []
 
     @property
     def upper(self) -> int:
+        """The number of words known to suffice."""
         return len(set(self.best.values())) if self.best is not None else len(self._job.states) + 1
 
     def run(self) -> None:
+        """Close the bounds."""
         if not self._job.first_differences.requiring:
             self.best = dict.fromkeys(self._job.states, 0)
             return
-        self.prepare()
+        self._prepare()
         close_bounds(lambda: (self.lower, self.upper), self.decide)
 
-    def prepare(self) -> None:
-        raise NotImplementedError
+    def run_shortly(self) -> None:
+        """Close the bounds from below, as far as each number of words is decided quickly."""
+        self._prepare()
+        while self.lower < self.upper and self.decide(self.lower, _SHORT):
+            pass
 
-    def _broken(self, partition: Assignment) -> Iterable[Constraint]:
-        """Constraints that a partition breaks, none of them known yet; empty: it is separating."""
-        raise NotImplementedError
+    def _prepare(self) -> None:
+        self._source.prepare()
+        self.lower = max(self.lower, len(self._source.apart))
+        partition = self._source.greedy_partition()
+        if partition is not None and len(set(partition.values())) < self.upper:
+            self._job.check(partition)
+            self.best = partition
 
-    def decide(self, size: int, effort: SolverBudget) -> bool:
+    def decide(self, size: int, budget: SolverBudget) -> bool:
         """Find a separating partition with ``size`` words, or prove that there is none.
 
-        False: not with this effort.
+        False: not with this budget.
         """
-        for _ in range(effort.rounds):
+        known = self._source.known
+        for _ in range(budget.rounds):
             self._job.progress(
                 f"trying {size} words, {self.lower} to {self.upper} needed: round {self._rounds}, "
-                f"{len(self._constraints):,} constraints"
+                f"{len(known):,} constraints"
             )
             try:
-                partition = self._problems.of(size, self._constraints).solve(effort.conflicts)
+                partition = self._problems.under(size, known).solve(budget.conflicts)
             except Undecided:
                 return False
             self._rounds += 1
@@ -126,112 +143,143 @@ class _Search:
                 self._problems.drop(size)
                 self.lower = size + 1
                 return True
-            fresh = list(self._broken(partition))
-            if not fresh:
+            broken = self._source.broken(partition)
+            if not broken:
                 self._problems.drop(size)
                 self._job.check(partition)
                 self.best = partition
                 return True
-            self._constraints += fresh
+            known += broken
         return False
 
     def _start(self, size: int, known: Sequence[Constraint]) -> PartitionProblem:
-        order = most_constrained_first(self._job.states, (s.pairs for c in known for s in c))
+        # Naming the words of states that need words of their own first leaves fewest symmetries.
+        first = self._source.apart
+        order = _most_constrained_first(self._job.states, known)
+        states = [*first, *(state for state in order if state not in set(first))]
         # On these problems quicker than the other solver, by a third and more.
-        colouring = PartitionProblem(
-            [*self._first, *(s for s in order if s not in set(self._first))], size, "glucose4"
-        )
+        problem = PartitionProblem(states, size, "glucose4")
         for constraint in known:
-            _require(colouring, constraint)
-        return colouring
+            _require(problem, constraint)
+        return problem
 
     def close(self) -> None:
         """Give back what the solvers hold."""
-        self._problems.drop_all()
+        self._problems.close()
 
     def figures(self) -> dict[str, float]:
+        """The work done."""
         return {
             "separating_lower_bound": self.lower,
             "rounds": self._rounds,
-            "constraints": len(self._constraints),
+            "constraints": len(self._source.known),
+            **self._source.figures(),
         }
 
 
-class _AlphaOnly(_Search):
-    """All constraints are known; with two robots they are the edges of a graph to colour."""
+class _Alpha:
+    """The constraints of alpha: all are listed.
 
-    def prepare(self) -> None:
-        self._constraints = separations(self._job.first_differences.divergences)
-        edges = {p for c in self._constraints if len(c) == 1 for p in c[0].pairs}
-        self._first = _clique(edges)
-        self.lower = max(self.lower, len(self._first))
-        if all(len(c) == 1 for c in self._constraints):
-            coloured = _dsatur(self._job.states, edges)
-        else:
-            coloured = fill(
-                most_constrained_first(self._job.states, [frozenset(edges)]), self._constraints
-            )
-        if len(set(coloured.values())) < self.upper:
-            self._job.check(coloured)
-            self.best = coloured
-
-    def _broken(self, partition: Assignment) -> Iterable[Constraint]:
-        return ()
-
-
-class _AlphaOrBeta(_Search):
-    """All constraints where they are few: the more the solver knows, the shorter its proofs.
-
-    Else they are asked of the composition walks, with their images under the model's symmetries.
+    With two robots they are the edges of a graph to colour.
     """
 
+    def __init__(self, job: Job) -> None:
+        self._job = job
+        self.known: list[Constraint] = []
+        self.apart: Sequence[int] = ()
+        self._edges: set[Pair] = set()
+
     def prepare(self) -> None:
-        job = self._job
+        """List the constraints."""
+        self.known = separations(self._job.first_differences.divergences)
+        self._edges = {p for c in self.known if len(c) == 1 for p in c[0].pairs}
+        self.apart = _clique(self._edges)
+
+    def greedy_partition(self) -> Assignment:
+        """A separating partition."""
+        if all(len(constraint) == 1 for constraint in self.known):
+            return _dsatur(self._job.states, self._edges)
+        order = most_constrained_first(self._job.states, [frozenset(self._edges)])
+        return greedy_partition(order, self.known)
+
+    def broken(self, partition: Assignment) -> list[Constraint]:
+        """Nothing: all constraints are known."""
+        return []
+
+    def figures(self) -> Mapping[str, float]:
+        """Nothing: there is no walk."""
+        return {}
+
+
+class _AlphaOrBeta:
+    """The constraints of alpha or beta: listed where they are few, so that proofs are short.
+
+    Else those that a partition breaks are found by walks, with their images under the model's
+    symmetries.
+    """
+
+    def __init__(self, job: Job) -> None:
+        self._job = job
+        self.known: list[Constraint] = []
+        self.apart: Sequence[int] = ()
+        self._met: set[Constraint] = set()
+        self._walks: list[SeparationWalk] = []
+        self._permutations: list[list[int]] = []
         self._random = np.random.default_rng(job.seed)
-        self._symmetries = symmetry_group(job.candidates).permutations
+
+    def prepare(self) -> None:
+        """List the constraints where they are few."""
+        job = self._job
+        self._permutations = symmetry_group(job.candidates).permutations
         job.progress("walking to the last differences")
         self._walks = [SeparationWalk(space) for space in job.candidates.spaces]
-        every = [walk.every(_WRITTEN) for walk in self._walks]
-        self._known: set[Constraint] = set().union(*(few for few in every if few is not None))
-        self._constraints = sorted(self._known, key=lambda c: [sorted(s.pairs) for s in c])
-        self.fill()
+        for walk in self._walks:
+            self._met.update(walk.every(_LISTED) or ())
+        self.known = sorted(self._met, key=lambda c: [sorted(s.pairs) for s in c])
 
-    def fill(self) -> None:
-        """A first separating partition, greedily: broken constraints in, until none is."""
-        job = self._job
-        for _ in range(_FILLED):
-            filled = fill(
-                most_constrained_first(job.states, (s.pairs for c in self._constraints for s in c)),
-                self._constraints,
-            )
-            fresh = list(self._broken(filled))
-            if not fresh:
-                if len(set(filled.values())) < self.upper:
-                    job.check(filled)
-                    self.best = filled
-                return
-            self._constraints += fresh
+    def greedy_partition(self) -> Assignment | None:
+        """A separating partition: constraints that the last one broke in, until it breaks none."""
+        states = self._job.states
+        for _ in range(_GREEDY_ROUNDS):
+            order = _most_constrained_first(states, self.known)
+            partition = greedy_partition(order, self.known)
+            broken = self.broken(partition)
+            if not broken:
+                return partition
+            self.known += broken
+        return None
 
-    def _broken(self, partition: Assignment) -> Iterator[Constraint]:
+    def broken(self, partition: Assignment) -> list[Constraint]:
+        """Constraints that a partition breaks, and their images, as far as they are new."""
         word = np.zeros(len(self._job.candidates.rows), np.int64)
         word[list(partition)] = list(partition.values())
-        for walk in self._walks:
-            for constraint in walk.unseparated(word, self._random):
-                for image in (constraint, *(_image(constraint, s) for s in self._symmetries)):
-                    if image not in self._known:
-                        self._known.add(image)
-                        yield image
+        return [
+            constraint
+            for walk in self._walks
+            for broken in walk.unseparated(word, self._random)
+            for constraint in self._new_images(broken)
+        ]
 
-    def figures(self) -> dict[str, float]:
-        walks = getattr(self, "_walks", [])
-        return super().figures() | {
-            "walk_nodes": sum(walk.nodes for walk in walks),
-            "walk_edges": sum(walk.edges for walk in walks),
+    def _new_images(self, constraint: Constraint) -> Iterator[Constraint]:
+        for image in (constraint, *(_image(constraint, to) for to in self._permutations)):
+            if image not in self._met:
+                self._met.add(image)
+                yield image
+
+    def figures(self) -> Mapping[str, float]:
+        """The work of the walks."""
+        return {
+            "walk_nodes": sum(walk.nodes for walk in self._walks),
+            "walk_edges": sum(walk.edges for walk in self._walks),
         }
 
 
-def _require(colouring: PartitionProblem, constraint: Constraint) -> None:
-    colouring.choose([s.pairs for s in constraint])
+def _most_constrained_first(states: Sequence[int], known: Sequence[Constraint]) -> list[int]:
+    return most_constrained_first(states, (s.pairs for constraint in known for s in constraint))
+
+
+def _require(problem: PartitionProblem, constraint: Constraint) -> None:
+    problem.separate_all_of_one([s.pairs for s in constraint])
 
 
 def _image(constraint: Constraint, permutation: Sequence[int]) -> Constraint:

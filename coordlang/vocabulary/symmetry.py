@@ -10,11 +10,13 @@ failing tuple of plans fails too, so the image of a necessary clause is necessar
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from coordlang.language.warping import Clause, pair
 from coordlang.tasks.candidates import Candidates
 from coordlang.vocabulary.symmetry_check import SymmetryCheck
 from coordlang.vocabulary.symmetry_graph import Renaming, automorphism_generators, joined_order
@@ -63,7 +65,7 @@ class Symmetry:
         return tuple(image)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class SymmetryGroup:
     """A group of symmetries of a model and its candidate tasks.
 
@@ -79,10 +81,15 @@ class SymmetryGroup:
     symmetries: tuple[Symmetry, ...]
     dropped: int = 0
 
-    @property
+    @cached_property
     def permutations(self) -> list[list[int]]:
         """Where the symmetries take each state number."""
         return [symmetry.states.tolist() for symmetry in self.symmetries]
+
+    def images(self, clause: Clause) -> Iterator[tuple[Clause, Symmetry]]:
+        """The image of a clause under each symmetry."""
+        for symmetry, to in zip(self.symmetries, self.permutations, strict=True):
+            yield frozenset(pair(to[a], to[b]) for a, b in clause), symmetry
 
 
 def symmetry_group(candidates: Candidates, largest: int = LARGEST_GROUP) -> SymmetryGroup:

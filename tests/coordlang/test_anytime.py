@@ -105,7 +105,7 @@ def test_a_better_partition_found_on_the_way_is_kept(monkeypatch: pytest.MonkeyP
     def late(*_: object) -> bool:
         raise OutOfTime("late")
 
-    monkeypatch.setattr(sys.modules["coordlang.vocabulary.separating"]._AlphaOrBeta, "decide", late)
+    monkeypatch.setattr(sys.modules["coordlang.vocabulary.separating"]._Search, "decide", late)
     built = build_language(all_tasks("grid", "gw2-2x3"), "minimal")
     assert isinstance(built.stopped, OutOfTime)
     assert (
@@ -139,15 +139,15 @@ def test_the_language_is_written_without_its_certificate(
 
 def test_the_solver_hears_the_clock() -> None:
     """Eleven pigeons in ten holes take the solver very long."""
-    colouring = PartitionProblem([0], 1)
+    problem = PartitionProblem([0], 1)
     hole = [[100 + 10 * pigeon + h for h in range(10)] for pigeon in range(11)]
     for pigeon in range(11):
-        colouring._solver.add_clause(hole[pigeon])
+        problem._solver.add_clause(hole[pigeon])
         for other in range(pigeon):
             for h in range(10):
-                colouring._solver.add_clause([-hole[pigeon][h], -hole[other][h]])
+                problem._solver.add_clause([-hole[pigeon][h], -hole[other][h]])
     begin = time.monotonic()
     with pytest.raises(OutOfTime), time_limit(1):
-        colouring.solve()
-    colouring.delete()
+        problem.solve()
+    problem.close()
     assert time.monotonic() - begin < 20

@@ -12,7 +12,7 @@ import numpy as np
 
 from coordlang.required.divergences import first_differences, separations, states_on_plans
 from coordlang.tasks.candidates import Candidates
-from coordlang.vocabulary.greedy import fill
+from coordlang.vocabulary.greedy import greedy_partition
 from planners.tables import Ints, find_rows
 
 #: Random orders of the states that experiments try.
@@ -38,7 +38,7 @@ def greedy_in_orders(
     for number in range(1, randoms + 1):
         orders[f"random {number}"] = random.sample(states, len(states))
     for name, order in orders.items():
-        filled = fill(order, constraints)
+        filled = greedy_partition(order, constraints)
         words = np.zeros(len(candidates.rows), np.int64)
         words[list(filled)] = list(filled.values())
         yield name, words

@@ -23,7 +23,7 @@ from coordlang.certificate.file import WarpingPath
 from coordlang.required.miscoordination import inseparable
 from coordlang.tasks.candidates import all_pairs, from_listed, from_problems
 from coordlang.tasks.task_file import read_task_file
-from coordlang.vocabulary.minimal import refute
+from coordlang.vocabulary.minimal import refuting_clauses
 from planners.errors import BadInput, ProvedImpossible, Refuted
 from planners.loading import ModelOptions
 from planners.pddl import read_domain, read_problem
@@ -147,7 +147,7 @@ def test_other_methods(method: str) -> None:
 def test_nothing_to_refute() -> None:
     built = build_language(all_tasks("grid", "gw1-2x2"), "greedy")
     with pytest.raises(ValueError, match="there is a language with 3 words"):
-        refute(built.job, 3)
+        refuting_clauses(built.job, 3)
     with pytest.raises(ValueError, match="leave a partition into 1 words"):
         core([], 1)
     assert encode([frozenset({(0, 1)})], 1).refuted()

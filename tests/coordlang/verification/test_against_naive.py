@@ -14,7 +14,7 @@ from coordlang.required.divergences import first_differences, separations
 from coordlang.required.miscoordination import inseparable, miscoordination
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.verification.by_definition import verify
-from coordlang.vocabulary.greedy import fill
+from coordlang.vocabulary.greedy import greedy_partition
 from planners.errors import ProvedImpossible
 from planners.joint.model import FullState
 from planners.search.plan_space import PlanSpace
@@ -168,7 +168,7 @@ def test_greedy_is_a_language_and_merging_is_judged_right(robots: int, most: int
         listable(candidates, most)
         assume(all(inseparable(space) is None for space in candidates.spaces))
         found = first_differences(candidates.spaces)
-        partition = fill(range(len(candidates.rows)), separations(found.divergences))
+        partition = greedy_partition(range(len(candidates.rows)), separations(found.divergences))
         word = np.array([partition[s] for s in range(len(candidates.rows))])
         names = tuple(f"w{n}" for n in range(int(word.max()) + 1))
         assert verify(Partition(names, candidates.rows, word, 0), candidates.spaces).holds

@@ -14,7 +14,9 @@ from coordlang.language.sentences import sentence
 from coordlang.language.warping import Clause, pair, separation_clause, warping_clause
 from coordlang.required.miscoordination import inseparable
 from coordlang.tasks.candidates import all_pairs, from_problems
-from coordlang.vocabulary.sat import PartitionProblem, PartitionProblems, reduce
+from coordlang.vocabulary.clauses import without_implied
+from coordlang.vocabulary.problems_by_size import ProblemsBySize
+from coordlang.vocabulary.sat import PartitionProblem
 from planners.errors import ProvedImpossible
 from tests.support import naive
 from tests.support.candidates import states_of
@@ -86,11 +88,11 @@ def test_separation_clause_of_three_plans() -> None:
 )
 def test_colouring_against_trying_all(size: int, drawn: list[set[tuple[int, int]]]) -> None:
     clauses = [frozenset(pair(a, b) for a, b in clause if a != b) for clause in drawn]
-    colouring = PartitionProblem([2, 0, 1, 4, 3], size)
+    problem = PartitionProblem([2, 0, 1, 4, 3], size)
     for clause in clauses:
-        colouring.add(clause)
-    found = colouring.solve()
-    colouring.delete()
+        problem.separate_one(clause)
+    found = problem.solve()
+    problem.close()
 
     def holds(word: tuple[int, ...] | dict[int, int]) -> bool:
         return all(any(word[a] != word[b] for a, b in clause) for clause in clauses)
@@ -128,15 +130,15 @@ def test_one_of_symmetric_partitions(
         for clause in drawn
         for s in [range(5), *group]
     }
-    plain, led = PartitionProblem(range(5), size), PartitionProblem(range(5), size)
-    for colouring in (plain, led):
+    plain, leading = PartitionProblem(range(5), size), PartitionProblem(range(5), size)
+    for problem in (plain, leading):
         for clause in sorted(clauses, key=sorted):
-            colouring.add(clause)
-    led.add_lex_leaders(group, pairs)
-    found = led.solve()
+            problem.separate_one(clause)
+    leading.add_lex_leaders(group, pairs)
+    found = leading.solve()
     assert (found is None) == (plain.solve() is None)
-    for colouring in (plain, led):
-        colouring.delete()
+    for problem in (plain, leading):
+        problem.close()
     if found is not None:
         images = [[found[s[a]] != found[s[b]] for a, b in pairs] for s in [range(5), *group]]
         assert images[0] == max(images)
@@ -147,41 +149,41 @@ def test_problems_are_kept_and_learn_what_is_new() -> None:
 
     def start(size: int, known: Sequence[Clause]) -> PartitionProblem:
         started.append(len(known))
-        colouring = PartitionProblem([0, 1, 2], size)
+        problem = PartitionProblem([0, 1, 2], size)
         for clause in known:
-            colouring.add(clause)
-        return colouring
+            problem.separate_one(clause)
+        return problem
 
-    problems = PartitionProblems(start, PartitionProblem.add)
+    problems = ProblemsBySize(start, PartitionProblem.separate_one)
     known: list[Clause] = [frozenset({(0, 1)}), frozenset({(0, 1), (1, 2)})]
-    first = problems.of(2, known)
+    first = problems.under(2, known)
     assert first.solve() is not None
     known.append(frozenset({(1, 2)}))
-    assert problems.of(2, known) is first
+    assert problems.under(2, known) is first
     assert (found := first.solve()) is not None
     assert found[0] == found[2] != found[1]
     known.append(frozenset({(0, 2)}))
-    assert problems.of(2, known) is first
+    assert problems.under(2, known) is first
     assert first.solve() is None
     known.append(frozenset({(0, 2), (1, 2)}))
-    assert problems.of(2, known) is not first, "more than twice what it started with: afresh"
-    assert problems.of(3, known).solve() is not None
+    assert problems.under(2, known) is not first, "more than twice what it started with: afresh"
+    assert problems.under(3, known).solve() is not None
     assert started == [2, 5, 5]
-    problems.drop_all()
-    assert problems.of(2, known).solve() is None
+    problems.close()
+    assert problems.under(2, known).solve() is None
     assert started == [2, 5, 5, 5]
-    problems.drop_all()
+    problems.close()
 
 
-def test_reduce_drops_what_is_implied() -> None:
+def test_without_what_is_implied() -> None:
     short, long, other = (
         frozenset({(0, 1)}),
         frozenset({(0, 1), (1, 2)}),
         frozenset({(1, 2), (2, 3)}),
     )
-    assert reduce([long, short, other, short]) == [short, other]
-    assert reduce([long, short, other], 1) == [short, other], "short ones first"
-    assert reduce([long, short, other], 0) == [short, long, other]
+    assert without_implied([long, short, other, short]) == [short, other]
+    assert without_implied([long, short, other], 1) == [short, other], "short ones first"
+    assert without_implied([long, short, other], 0) == [short, long, other]
 
 
 @pytest.mark.parametrize(("robots", "most", "examples"), [(2, 40, 140), (3, 14, 70)])

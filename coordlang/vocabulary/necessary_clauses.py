@@ -1,0 +1,90 @@
+"""Clauses that every language satisfies: those of counterexamples, with their images."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+from coordlang.language.warping import Clause, separation_clause
+from coordlang.vocabulary.clauses import without_implied
+from coordlang.vocabulary.counterexamples import Counterexample, counterexamples
+from coordlang.vocabulary.job import Evidence
+from coordlang.vocabulary.symmetry import SymmetryGroup
+from planners.search.edge_index import EdgeIndex
+from planners.search.plan_space import PlanSpace
+from planners.tables import Ints
+
+#: Counterexamples taken at a time.
+_AT_A_TIME = 200
+
+
+@dataclass(frozen=True, slots=True)
+class TaskPart:
+    """Some of the tasks of a plan space, searched for counterexamples together.
+
+    Attributes
+    ----------
+    space
+        The plan space; ``index`` finds its edges.
+    starts
+        The nodes where the tasks start, sorted.
+    """
+
+    space: PlanSpace
+    index: EdgeIndex
+    starts: Ints
+
+    def violated(self, word: Ints) -> dict[Clause, Counterexample]:
+        """Clauses that a partition violates, each with the plans that it comes from.
+
+        Parameters
+        ----------
+        word
+            (states) the word of each state number.
+
+        Returns
+        -------
+        dict[Clause, Counterexample]
+            Empty if the partition is a language for these tasks.
+        """
+        words = word.tolist()
+        found: dict[Clause, Counterexample] = {}
+        nodes = word[self.space.state]
+        for example in counterexamples(self.space, self.index, nodes, _AT_A_TIME, self.starts):
+            clause = separation_clause(example.states, words)
+            assert clause, "the plans have one sentence, and none of them is the other"
+            found.setdefault(clause, example)
+        return found
+
+
+class NecessaryClauses:
+    """A growing list of necessary clauses with all their images under a group of symmetries.
+
+    Attributes
+    ----------
+    clauses
+        In the order in which they were met.
+    evidence
+        Why each of them is necessary.
+    """
+
+    def __init__(self, group: SymmetryGroup) -> None:
+        self.group = group
+        self.clauses: list[Clause] = []
+        self.evidence: dict[Clause, Evidence] = {}
+
+    def add(self, found: Mapping[Clause, Counterexample], space: PlanSpace) -> None:
+        """Add clauses that plans of a space give; those that others of them imply are left out."""
+        for clause in without_implied(found):
+            evidence = Evidence(space, found[clause], None)
+            self._add([(clause, evidence)])
+            self._add(
+                (image, replace(evidence, symmetry=symmetry))
+                for image, symmetry in self.group.images(clause)
+            )
+
+    def _add(self, clauses: Iterable[tuple[Clause, Evidence]]) -> None:
+        for clause, evidence in clauses:
+            if clause not in self.evidence:
+                self.evidence[clause] = evidence
+                self.clauses.append(clause)
