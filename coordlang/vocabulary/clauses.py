@@ -1,4 +1,4 @@
-"""Sets of clauses "one of these pairs of states must be separated": what is implied, what is frequent.
+"""Sets of clauses "one of these pairs of states must be separated": implied, frequent pairs.
 
 A clause with fewer pairs asks for more: it implies every clause that holds its pairs.
 """
