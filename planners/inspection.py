@@ -15,19 +15,10 @@ from planners.grounding import GroundAction
 from planners.joint.interference import footprint
 from planners.joint.model import JointModel, show
 from planners.loading import PlanningInstance
+from planners.pddl.formula_tree import formula_text
 from planners.pddl.lifted import (
-    And,
-    Atom,
     Domain,
-    Equal,
-    Exists,
-    Forall,
-    Formula,
-    Not,
-    Or,
     StepAtom,
-    Truth,
-    Variable,
 )
 from planners.tables import Rows, find_rows, unique_rows
 
@@ -106,7 +97,7 @@ def inspect(loaded: PlanningInstance) -> Inspection:
         statics=_counted(a.predicate for a in model.statics),
         never=tuple(sorted(set(domain.predicates) - possible)),
         facts=len(model.codec.facts),
-        goal=unparse(loaded.problems[0].goal),
+        goal=formula_text(loaded.problems[0].goal),
     )
 
 
@@ -206,33 +197,6 @@ def _costs(domain: Domain, cost: str) -> str:
     if cost == "makespan+cost":
         return f"used as the second component ({', '.join(declared)})"
     return f"declared ({', '.join(declared)}) and ignored: --cost makespan+cost uses them"
-
-
-def unparse(formula: Formula) -> str:
-    """A lifted formula as PDDL text."""
-    match formula:
-        case Atom() | StepAtom():
-            return show(formula)
-        case Equal(left, right):
-            return f"(= {left} {right})"
-        case Truth(value):
-            return "()" if value else "(or)"
-        case Not(part):
-            return f"(not {unparse(part)})"
-        case And(parts) | Or(parts):
-            name = "and" if isinstance(formula, And) else "or"
-            return f"({' '.join((name, *map(unparse, parts)))})"
-        case Forall(variables, part) | Exists(variables, part):
-            name = "forall" if isinstance(formula, Forall) else "exists"
-            return f"({name} ({' '.join(map(_typed, variables))}) {unparse(part)})"
-    raise AssertionError(formula)
-
-
-def _typed(variable: Variable) -> str:
-    types = (
-        variable.types[0] if len(variable.types) == 1 else f"(either {' '.join(variable.types)})"
-    )
-    return f"{variable.name} - {types}"
 
 
 def _counted(names: Iterable[str]) -> dict[str, int]:

@@ -13,8 +13,9 @@ from planners.grounding import ground_goal
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask, show
 from planners.joint.states import split_atoms
 from planners.loading import ModelOptions, PlanningInstance, build
+from planners.pddl.formula_tree import conjuncts, formula_text
 from planners.pddl.formulas import read_formula
-from planners.pddl.lifted import And, Atom, Domain, Formula, Not, Or, Problem, Truth
+from planners.pddl.lifted import And, Atom, Domain, Formula, Problem
 from planners.pddl.names import Names
 from planners.pddl.robots import fluent_predicates
 from planners.pddl.sexpr import Source, parse
@@ -81,31 +82,13 @@ def goal_text(model: JointModel, goal: Goal) -> str:
     """A goal as PDDL text."""
     if isinstance(goal, FullState):
         return " ".join(model.codec.facts.texts[fact] for fact in goal.facts)
-    return " ".join(
-        formula_text(part) for part in (goal.parts if isinstance(goal, And) else (goal,))
-    )
+    return " ".join(goal_atoms(goal)) or "(and)"
 
 
 def goal_atoms(goal: Goal) -> tuple[str, ...]:
     """The parts of a goal formula as a task file lists them."""
     assert not isinstance(goal, FullState)
-    parts = goal.parts if isinstance(goal, And) else (goal,)
-    return tuple(formula_text(p) for p in parts if p != Truth(True))
-
-
-def formula_text(formula: Formula) -> str:
-    """A ground formula as PDDL text."""
-    match formula:
-        case Atom():
-            return show(formula)
-        case Not(part):
-            return f"(not {formula_text(part)})"
-        case And(parts) | Or(parts):
-            name = "and" if isinstance(formula, And) else "or"
-            return "(" + " ".join((name, *map(formula_text, parts))) + ")"
-        case Truth(value):
-            return "(and)" if value else "(or)"
-    raise AssertionError(formula)
+    return tuple(map(formula_text, conjuncts(goal)))
 
 
 def ground_task(

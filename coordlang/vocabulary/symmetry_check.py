@@ -6,7 +6,7 @@ conditions, effects and costs, facts, states and tasks.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,8 @@ from coordlang.tasks.candidates import Candidates
 from coordlang.vocabulary.symmetry_graph import Renaming
 from planners.grounding import GroundAction
 from planners.joint.model import FullState, Goal
-from planners.pddl.lifted import And, Atom, Not, Or, StepAtom, Truth
+from planners.pddl.formula_tree import Compound, Leaf, fold
+from planners.pddl.lifted import Atom, Not, StepAtom
 from planners.search.plan_space import PlanSpace
 from planners.tables import Ints, find_rows
 
@@ -98,18 +99,21 @@ class _AtomNumbers:
 
     def form(self, formula: Goal) -> _Form:
         """A goal, or a ground formula in negation normal form, over numbers."""
-        match formula:
-            case FullState(facts):
-                return ("FullState", frozenset(facts))
-            case Atom() | StepAtom():
-                return self._number.setdefault(formula, len(self._number))
-            case Not(Atom() | StepAtom() as atom):
-                return ~self._number.setdefault(atom, len(self._number))
-            case And(parts) | Or(parts):
-                return (type(formula).__name__, frozenset([self.form(part) for part in parts]))
-            case Truth(value):
-                return str(value)
-        raise AssertionError(formula)
+        if isinstance(formula, FullState):
+            return ("FullState", frozenset(formula.facts))
+        return fold(formula, self._leaf, self._compound)
+
+    def _leaf(self, leaf: Leaf) -> _Form:
+        if isinstance(leaf, Atom | StepAtom):
+            return self._number.setdefault(leaf, len(self._number))
+        return str(leaf)
+
+    def _compound(self, kind: Compound, parts: Iterator[_Form]) -> _Form:
+        if isinstance(kind, Not):
+            number = next(parts)
+            assert isinstance(number, int), "a formula that is not in negation normal form"
+            return ~number
+        return (type(kind).__name__, frozenset(parts))
 
     def images(self, renaming: Renaming) -> list[int]:
         """The number of each atom's image; a number that no atom has where there is none."""

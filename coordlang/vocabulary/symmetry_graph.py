@@ -18,7 +18,8 @@ import numpy as np
 
 from coordlang.tasks.candidates import Candidates
 from planners.joint.model import FullState, Goal, JointModel
-from planners.pddl.lifted import And, Atom, Domain, Formula, Not, Or, Problem
+from planners.pddl.formula_tree import fold
+from planners.pddl.lifted import Atom, Domain, Formula, Not, Problem
 from planners.pddl.robots import fluent_predicates, natural
 from planners.search.plan_space import PlanSpace
 
@@ -151,15 +152,17 @@ class _ModelGraph:
         return self._formulas[goal]
 
     def _formula(self, formula: Formula) -> int:
-        match formula:
-            case Atom(predicate, args):
-                return self._instance(("atom", predicate), args)
-            case Not(part):
-                return self._graph.vertex("not", [self._formula(part)])
-            case And(parts) | Or(parts):
-                colour = type(formula).__name__
-                return self._graph.vertex(colour, [self._formula(part) for part in parts])
-        return self._graph.vertex(formula)
+        return fold(
+            formula,
+            lambda leaf: (
+                self._instance(("atom", leaf.predicate), leaf.args)
+                if isinstance(leaf, Atom)
+                else self._graph.vertex(leaf)
+            ),
+            lambda kind, parts: self._graph.vertex(
+                "not" if isinstance(kind, Not) else type(kind).__name__, [*parts]
+            ),
+        )
 
     def renamings(self) -> list[Renaming]:
         """Generators of the automorphism group, as renamings of objects; none is the identity."""

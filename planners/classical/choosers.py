@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
-from planners.classical.formulas import conjuncts, leaves
 from planners.grounding import GroundAction
 from planners.joint.model import JointModel
-from planners.pddl.lifted import Atom, Not, StepAtom
+from planners.pddl.formula_tree import forbidden_steps, literals
+from planners.pddl.lifted import Atom, StepAtom
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,15 +108,16 @@ def clashes(actions: Sequence[GroundAction]) -> tuple[frozenset[int], ...]:  # n
         for effect in action.effects:
             if effect.adds or effect.atom not in adds:
                 writers[effect.atom, effect.adds].add(n)
-        for leaf, positive in leaves((action.precondition, *(e.condition for e in action.effects))):
-            if isinstance(leaf, Atom):
-                readers[leaf, positive].add(n)
-            elif positive and leaf in number:
-                named.add(frozenset((n, number[leaf])))
+        for condition in (action.precondition, *(e.condition for e in action.effects)):
+            for leaf, positive in literals(condition):
+                if isinstance(leaf, Atom):
+                    readers[leaf, positive].add(n)
+                elif positive and leaf in number:
+                    named.add(frozenset((n, number[leaf])))
         named |= {frozenset((n, number[link])) for link in action.links if link in number}
-        for part in conjuncts(action.precondition):
-            if isinstance(part, Not) and isinstance(part.part, StepAtom) and part.part in number:
-                forbidden.add(frozenset((n, number[part.part])))
+        for step in forbidden_steps(action.precondition):
+            if step in number:
+                forbidden.add(frozenset((n, number[step])))
     pairs = set(forbidden)
     for (atom, value), changing in writers.items():
         pairs |= {frozenset(p) for p in product(changing, writers.get((atom, not value), ()))}

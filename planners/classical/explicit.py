@@ -5,10 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from planners.classical.choosers import Choosers
-from planners.classical.formulas import Leaf, joined, leaves, literals_of, negated, put
 from planners.classical.task import Known
-from planners.classical.writer import Writer, fact_atoms, goal_formula, own_fact, state_reader
+from planners.classical.writer import (
+    Writer,
+    fact_atoms,
+    goal_formula,
+    known_literals,
+    own_fact,
+    state_reader,
+)
 from planners.joint.model import Goal, JointModel
+from planners.pddl.formula_tree import GroundLeaf, joined, literals, negated, substituted
 from planners.pddl.lifted import FALSE, TRUE, And, Atom, Formula, StepAtom, Truth
 
 
@@ -28,7 +35,7 @@ def explicit(team: Choosers, model: JointModel, goal: Goal, step_cost: int, limi
             out.action(_name(team, step), known, adds, deletes, cost)
             if len(out.actions) > limit:
                 raise TooManyError
-    found = literals_of(wanted := goal_formula(model, goal))
+    found = known_literals(wanted := goal_formula(model, goal))
     if found and not found[1]:
         out.goal = out.conditions(found[0])
         return out
@@ -83,28 +90,30 @@ def _cases_of(
     chosen = {StepAtom(team.actions[n].schema, team.actions[n].args) for n in step}
     on_state = state_reader(model)
 
-    def value(leaf: Leaf) -> Formula:
+    def value(leaf: GroundLeaf) -> Formula:
         return Truth(leaf in chosen) if isinstance(leaf, StepAtom) else on_state(leaf)
 
     effects = [
         effect for n in step for effect in team.actions[n].effects if on_state(effect.atom) != FALSE
     ]
-    conditions = [put(effect.condition, value) for effect in effects]
-    wanted = [put(team.actions[n].precondition, value) for n in step]
+    conditions = [substituted(effect.condition, value) for effect in effects]
+    wanted = [substituted(team.actions[n].precondition, value) for n in step]
     wanted += [
-        negated(put(team.actions[other].precondition, value))
+        negated(substituted(team.actions[other].precondition, value))
         for n in step
         for other in team.covered_by[n]
     ]
     for known in _split({}, wanted, conditions):
         fired = [
-            e for e, c in zip(effects, conditions, strict=True) if put(c, _lookup(known)) == TRUE
+            e
+            for e, c in zip(effects, conditions, strict=True)
+            if substituted(c, _lookup(known)) == TRUE
         ]
         adds = {e.atom for e in fired if e.adds}
         yield known, adds, {e.atom for e in fired if not e.adds} - adds
 
 
-def _lookup(known: Known) -> Callable[[Leaf], Formula]:
+def _lookup(known: Known) -> Callable[[GroundLeaf], Formula]:
     return lambda leaf: Truth(known[leaf]) if isinstance(leaf, Atom) and leaf in known else leaf
 
 
@@ -115,20 +124,20 @@ def _split(
 
     Each is a conjunction of literals.
     """
-    found = literals_of(joined(And, (put(f, _lookup(known)) for f in formulas)))
+    found = known_literals(joined(And, (substituted(f, _lookup(known)) for f in formulas)))
     if found is None:
         return
-    literals, rest = found
-    known = {**known, **literals}
-    if literals and rest:
+    new, rest = found
+    known = {**known, **new}
+    if new and rest:
         yield from _split(known, rest, conditions)
         return
     open_formulas = rest or [
-        c for c in (put(c, _lookup(known)) for c in conditions) if not isinstance(c, Truth)
+        c for c in (substituted(c, _lookup(known)) for c in conditions) if not isinstance(c, Truth)
     ]
     if not open_formulas:
         yield dict(known)
         return
-    atom = next(leaf for leaf, _ in leaves(open_formulas[:1]) if isinstance(leaf, Atom))
+    *_, atom = (leaf for leaf, _ in literals(open_formulas[0]) if isinstance(leaf, Atom))
     for value in (True, False):
         yield from _split({**known, atom: value}, rest, conditions)

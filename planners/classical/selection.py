@@ -5,9 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from planners.classical.choosers import Choosers
-from planners.classical.formulas import Leaf, conjuncts, joined, literals_of, negated, put
-from planners.classical.writer import Writer, fact_atoms, goal_formula, own_fact, state_reader
+from planners.classical.writer import (
+    Writer,
+    fact_atoms,
+    goal_formula,
+    known_literals,
+    own_fact,
+    state_reader,
+)
 from planners.joint.model import Goal, JointModel
+from planners.pddl.formula_tree import GroundLeaf, conjuncts, joined, negated, substituted
 from planners.pddl.lifted import FALSE, TRUE, And, Atom, Formula, Not, Or, StepAtom
 
 
@@ -76,7 +83,7 @@ class _Choice:
     come before all adds of the step.
     """
 
-    def __init__(self, team: Choosers, number: int, value: Callable[[Leaf], Formula]) -> None:
+    def __init__(self, team: Choosers, number: int, value: Callable[[GroundLeaf], Formula]) -> None:
         action = team.actions[number]
         self.number, self.label, self.robot = number, action.label, team.owners[number][0]
         self.chosen = _chosen(team, self.robot, self.label)
@@ -85,18 +92,20 @@ class _Choice:
         for part in conjuncts(action.precondition):
             if isinstance(part, Not) and isinstance(part.part, StepAtom):
                 continue  # among the clashes
-            (later if isinstance(part, And | Or | StepAtom) else now).append(put(part, value))
+            (later if isinstance(part, And | Or | StepAtom) else now).append(
+                substituted(part, value)
+            )
         later += [
-            negated(put(team.actions[other].precondition, value))
+            negated(substituted(team.actions[other].precondition, value))
             for other in team.covered_by[number]
         ]
-        found = literals_of(joined(And, now))
+        found = known_literals(joined(And, now))
         self.literals = None if found is None else found[0]
         self.checks = joined(And, later)
         by_condition: dict[Formula, tuple[set[Atom], set[Atom]]] = {TRUE: (set(), set())}
         for effect in action.effects:
             if value(effect.atom) != FALSE:
-                sets = by_condition.setdefault(put(effect.condition, value), (set(), set()))
+                sets = by_condition.setdefault(substituted(effect.condition, value), (set(), set()))
                 sets[0 if effect.adds else 1].add(effect.atom)
         by_condition.pop(FALSE, None)
         self.adds, self.deletes = by_condition.pop(TRUE)
@@ -112,7 +121,7 @@ class _Choice:
         return own_fact("condition holds", *self.chosen.args, str(group))
 
 
-def _of_choices(team: Choosers, model: JointModel) -> Callable[[Leaf], Formula]:
+def _of_choices(team: Choosers, model: JointModel) -> Callable[[GroundLeaf], Formula]:
     """The meaning of leaves on the plain facts.
 
     That a subaction is done means that its first owner has chosen it.
@@ -238,7 +247,7 @@ def _pass(out: Writer, name: str, here: Atom, after: Atom, mark: Atom) -> None:
 def _set_goal(out: Writer, formula: Formula, here: Atom) -> None:
     """The goal counts between two steps (``here``)."""
     out.init = {out.fact(here)}
-    found = literals_of(formula)
+    found = known_literals(formula)
     if found and not found[1]:
         out.goal = out.conditions({here: True, **found[0]})
         return

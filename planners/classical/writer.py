@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
 
-from planners.classical.formulas import Leaf, literals_of, negated, put
 from planners.classical.task import ClassicalAction, Condition, Known
 from planners.joint.model import FullState, Goal, JointModel
+from planners.pddl.formula_tree import GroundLeaf, conjuncts, negated, signed, substituted
 from planners.pddl.lifted import FALSE, And, Atom, Formula, Not, Or
 
 
@@ -90,7 +90,7 @@ class Writer:
         self, name: str, formula: And, start: Atom, end: Atom, known: Known, gain: tuple[Atom, ...]
     ) -> None:
         """Of what must hold all literals are tested at once."""
-        found = literals_of(formula)
+        found = known_literals(formula)
         if found is None or any(
             known.get(atom, value) != value for atom, value in found[0].items()
         ):
@@ -111,12 +111,30 @@ class Writer:
         self, name: str, literal: Formula, start: Atom, gain: tuple[Atom, ...], known: Known
     ) -> None:
         """An action that is possible exactly if a literal (or truth value) holds."""
-        found = literals_of(literal)
+        found = known_literals(literal)
         if found is None or any(
             known.get(atom, value) != value for atom, value in found[0].items()
         ):
             return
         self.action(name, {**known, **found[0], start: True}, gain, (start,))
+
+
+def known_literals(formula: Formula) -> tuple[dict[Atom, bool], list[Formula]] | None:
+    """The values of facts that a ground formula demands, and its other conjuncts.
+
+    None if it contradicts itself at once.
+    """
+    known: dict[Atom, bool] = {}
+    rest: list[Formula] = []
+    for part in conjuncts(formula):
+        atom, positive = signed(part)
+        if part == FALSE:
+            return None
+        if not isinstance(atom, Atom):
+            rest.append(part)
+        elif known.setdefault(atom, positive) != positive:
+            return None
+    return known, rest
 
 
 def _ordered(atoms: Iterable[Atom]) -> list[Atom]:
@@ -149,10 +167,10 @@ def goal_formula(model: JointModel, goal: Goal) -> Formula:
     if isinstance(goal, FullState):
         values = state_literals(model, set(goal.facts))
         return And(tuple(atom if value else Not(atom) for atom, value in values.items()))
-    return put(goal, state_reader(model))
+    return substituted(goal, state_reader(model))
 
 
-def state_reader(model: JointModel) -> Callable[[Leaf], Formula]:
+def state_reader(model: JointModel) -> Callable[[GroundLeaf], Formula]:
     """How formulas read a state: an atom that no state has is false."""
     facts = model.codec.facts.index
     return lambda leaf: leaf if leaf in facts else FALSE

@@ -9,7 +9,6 @@ from planners.grounding.instantiate import (
     GroundEffect,
     ground_actions,
     ground_goal,
-    label,
 )
 
-__all__ = ["FEWER", "GroundAction", "GroundEffect", "ground_actions", "ground_goal", "label"]
+__all__ = ["FEWER", "GroundAction", "GroundEffect", "ground_actions", "ground_goal"]

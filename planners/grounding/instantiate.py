@@ -12,6 +12,7 @@ from itertools import product
 from planners.errors import BadInput, Unsupported
 from planners.grounding.reachability import reachable_arguments
 from planners.limits import reaching
+from planners.pddl.formula_tree import distinct, joined, label, literals, negated, required_atoms
 from planners.pddl.formulas import MAX_COST
 from planners.pddl.lifted import (
     FALSE,
@@ -79,11 +80,6 @@ class GroundAction:
         if self.parts:
             return self.parts[robot]
         return self.label if robot in self.owners else None
-
-
-def label(name: str, args: Iterable[str]) -> str:
-    """PDDL syntax of a ground atom or action: ``(move r1 a b)``."""
-    return "(" + " ".join((name, *args)) + ")"
 
 
 def ground_actions(
@@ -205,14 +201,14 @@ class _Grounder:
                 return self.formula(part, binding, not positive, acting)
             case And(parts) | Or(parts):
                 ground = (self.formula(part, binding, positive, acting) for part in parts)
-                return _join(ground, conjunction=isinstance(f, And) == positive)
+                return distinct(joined(And if isinstance(f, And) == positive else Or, ground))
             case Forall(variables, part) | Exists(variables, part):
                 guards = self._guards_of(f)
                 ground = (
                     self.formula(part, inner, positive, acting)
                     for inner in self._bindings(variables, binding, guards)
                 )
-                return _join(ground, conjunction=isinstance(f, Forall) == positive)
+                return distinct(joined(And if isinstance(f, Forall) == positive else Or, ground))
         raise AssertionError(f)
 
     def _step_atom(
@@ -254,18 +250,13 @@ class _Grounder:
         False under ``exists``, true under ``forall``.
         """
         if id(f) not in self._guards:
-            part = f.part if isinstance(f, Exists) else _negated(f.part)
+            part = f.part if isinstance(f, Exists) else negated(f.part)
             self._guards[id(f)] = f, self._static_atoms(part)
         return self._guards[id(f)][1]
 
     def _static_atoms(self, f: Formula) -> tuple[Atom, ...]:
         """The static atoms among the parts that must all hold."""
-        match f:
-            case Atom(predicate, args) if args and predicate not in self._fluents:
-                return (f,)
-            case And(parts):
-                return tuple(atom for part in parts for atom in self._static_atoms(part))
-        return ()
+        return tuple(a for a in required_atoms(f) if a.args and a.predicate not in self._fluents)
 
     def _bindings(
         self, variables: tuple[Variable, ...], binding: Binding, guards: tuple[Atom, ...] = ()
@@ -374,41 +365,6 @@ class _Grounder:
         return int(value)
 
 
-def _negated(f: Formula) -> Formula:
-    """The negation, as far as a conjunction comes of it."""
-    match f:
-        case Not(part):
-            return part
-        case Or(parts):
-            return And(tuple(map(_negated, parts)))
-    return Not(f)
-
-
-def _join(parts: Iterable[Formula], *, conjunction: bool) -> Formula:
-    """A flat conjunction or disjunction with truth values simplified away."""
-    neutral, absorbing = (TRUE, FALSE) if conjunction else (FALSE, TRUE)
-    kind = And if conjunction else Or
-    kept: dict[Formula, None] = {}
-    for part in parts:
-        if part == absorbing:
-            return absorbing
-        if part == neutral:
-            continue
-        for inner in part.parts if isinstance(part, kind) else (part,):
-            kept[inner] = None
-    if not kept:
-        return neutral
-    return next(iter(kept)) if len(kept) == 1 else kind(tuple(kept))
-
-
 def _step_atoms(schema: Schema) -> Iterator[StepAtom]:
-    todo: list[Formula] = [schema.precondition, *(e.condition for e in schema.effects)]
-    while todo:
-        formula = todo.pop()
-        match formula:
-            case StepAtom():
-                yield formula
-            case Not(part) | Forall(_, part) | Exists(_, part):
-                todo.append(part)
-            case And(parts) | Or(parts):
-                todo += parts
+    for formula in (schema.precondition, *(e.condition for e in schema.effects)):
+        yield from (leaf for leaf, _ in literals(formula) if isinstance(leaf, StepAtom))

@@ -11,7 +11,8 @@ from itertools import combinations, product
 
 from planners.errors import BadInput
 from planners.grounding.instantiate import GroundAction
-from planners.pddl.lifted import TRUE, And, Constraint, Domain, Formula, Not, Or, Problem, StepAtom
+from planners.pddl.formula_tree import conjuncts
+from planners.pddl.lifted import And, Constraint, Domain, Formula, Not, Or, Problem, StepAtom
 from planners.pddl.robots import objects_of
 
 #: (constraint, binding of its parameters) -> the ground actions that match.
@@ -115,9 +116,7 @@ def _bound(
                 parts.append(_some(helpers, 1))
     if not parts and not links:
         return action
-    own = action.precondition
-    before = own.parts if isinstance(own, And) else () if own == TRUE else (own,)
-    after = (*before, *parts)
+    after = (*conjuncts(action.precondition), *parts)
     return replace(
         action, precondition=And(after) if len(after) != 1 else after[0], links=frozenset(links)
     )

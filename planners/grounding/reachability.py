@@ -18,7 +18,8 @@ from threading import current_thread, main_thread
 from typing import TYPE_CHECKING, Any
 
 from planners.errors import CoordlangError
-from planners.pddl.lifted import And, Atom, Domain, Formula, Schema, Variable
+from planners.pddl.formula_tree import required_atoms
+from planners.pddl.lifted import Atom, Domain, Formula, Schema, Variable
 from planners.pddl.robots import natural
 
 if TYPE_CHECKING:
@@ -247,11 +248,7 @@ class _Core:
 
     def _positive(self, formula: Formula, variables: dict[str, Any]) -> list[Any]:
         """The atoms that the formula surely requires."""
-        if isinstance(formula, Atom):
-            return [self._atom(formula, variables)]
-        if isinstance(formula, And):
-            return [atom for part in formula.parts for atom in self._positive(part, variables)]
-        return []
+        return [self._atom(atom, variables) for atom in required_atoms(formula)]
 
     def _all(self, atoms: list[Any]) -> Any:
         if not atoms:

@@ -10,12 +10,13 @@ import numpy as np
 from planners.errors import OutOfMemory
 from planners.grounding import GroundAction
 from planners.joint.conditions import Evaluator, Labels, speaks_of_step
-from planners.joint.interference import compatible, conflict, conjuncts
-from planners.joint.model import Cost, Steps, show
+from planners.joint.interference import compatible, conflict
+from planners.joint.model import Cost, Steps
 from planners.joint.operators import Operators
 from planners.joint.states import StateCodec
 from planners.limits import memory_left
-from planners.pddl.lifted import Atom, Formula, Not, StepAtom
+from planners.pddl.formula_tree import conjuncts, formula_text, signed
+from planners.pddl.lifted import Atom, Formula, StepAtom
 from planners.tables import Bools, Ints, Rows, ranges, spans
 
 #: Joint steps composed at a time, before compatibility is looked up.
@@ -269,9 +270,7 @@ def cost_of(action: GroundAction, cost: Cost) -> int:
 
 
 def _text(formula: Formula) -> str:
-    match formula:
-        case Atom() | StepAtom():
-            return show(formula)
-        case Not(part):
-            return f"(not {_text(part)})"
+    literal, _ = signed(formula)
+    if isinstance(literal, Atom | StepAtom):
+        return formula_text(formula)
     return "a formula of its precondition"

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planners.joint.facts import FactTable
-from planners.joint.interference import conjuncts
 from planners.joint.states import test_bits
-from planners.pddl.lifted import TRUE, And, Atom, Formula, Not, Or, StepAtom, Truth
-from planners.tables import Ints, Rows
+from planners.pddl.formula_tree import Compound, Leaf, conjuncts, fold, literals, signed
+from planners.pddl.lifted import And, Atom, Formula, Not, Or, StepAtom, Truth
+from planners.tables import Bools, Ints, Rows
 
 Labels = NDArray[np.int32]
 
@@ -26,56 +28,41 @@ class Evaluator:
     facts: FactTable
     subactions: dict[StepAtom, tuple[int, int]]
 
-    def holds(  # noqa: C901 - one case for each kind of formula
+    def holds(
         self, formula: Formula, rows: Rows, which: Ints, labels: Labels | None = None
-    ) -> NDArray[np.bool_]:
+    ) -> Bools:
         """Whether ``formula`` holds in ``rows[which[k]]`` when the robots do ``labels[k]``.
 
         One entry for each ``k``.
         """
-        match formula:
-            case Truth(value):
-                return np.full(len(which), value)
-            case Atom():
-                number = self.facts.index.get(formula)
-                if number is None:
-                    return np.zeros(len(which), np.bool_)
-                return test_bits(rows, which, np.full(len(which), number))
-            case StepAtom():
-                assert labels is not None, (
-                    "a formula about the joint step where only the state is known"
-                )
-                where = self.subactions.get(formula)
-                if where is None:
-                    return np.zeros(len(which), np.bool_)
-                robot, label = where
-                chosen: NDArray[np.bool_] = labels[:, robot] == label
-                return chosen
-            case Not(part):
-                return ~self.holds(part, rows, which, labels)
-            case And(parts):
-                result = np.ones(len(which), np.bool_)
-                for part in parts:
-                    result &= self.holds(part, rows, which, labels)
-                return result
-            case Or(parts):
-                result = np.zeros(len(which), np.bool_)
-                for part in parts:
-                    result |= self.holds(part, rows, which, labels)
-                return result
-        raise AssertionError(formula)
+        count = len(which)
+
+        def leaf(found: Leaf) -> Bools:
+            match found:
+                case Truth(value):
+                    return np.full(count, value)
+                case Atom() if (number := self.facts.index.get(found)) is not None:
+                    return test_bits(rows, which, np.full(count, number))
+                case StepAtom() if (subaction := self.subactions.get(found)) is not None:
+                    assert labels is not None, "a formula about the joint step without labels"
+                    robot, label = subaction
+                    return np.asarray(labels[:, robot] == label)
+            return np.zeros(count, np.bool_)
+
+        def compound(kind: Compound, parts: Iterator[Bools]) -> Bools:
+            if isinstance(kind, Not):
+                return ~next(parts)
+            assert isinstance(kind, And | Or), "a quantifier in a ground formula"
+            if isinstance(kind, And):
+                return reduce(np.logical_and, parts, np.ones(count, np.bool_))
+            return reduce(np.logical_or, parts, np.zeros(count, np.bool_))
+
+        return fold(formula, leaf, compound)
 
 
 def speaks_of_step(formula: Formula) -> bool:
     """Whether a formula mentions any subaction of the joint step."""
-    match formula:
-        case StepAtom():
-            return True
-        case Not(part):
-            return speaks_of_step(part)
-        case And(parts) | Or(parts):
-            return any(speaks_of_step(part) for part in parts)
-    return False
+    return any(isinstance(leaf, StepAtom) for leaf, _ in literals(formula))
 
 
 def split_condition(
@@ -86,17 +73,16 @@ def split_condition(
     Negative step literals are left out (the compatibility table has them), and negative literals on
     facts that are never true.
     """
-    literals: list[tuple[int, bool]] = []
+    known: list[tuple[int, bool]] = []
     rest: list[Formula] = []
     for part in conjuncts(precondition):
-        positive = not isinstance(part, Not)
-        inner = part.part if isinstance(part, Not) else part
+        inner, positive = signed(part)
         if isinstance(inner, StepAtom) and not positive:
             continue
         if isinstance(inner, Atom) and inner in evaluator.facts:
-            literals.append((evaluator.facts.index[inner], positive))
+            known.append((evaluator.facts.index[inner], positive))
         elif isinstance(inner, Atom) and not positive:
             continue
-        elif part != TRUE:
+        else:
             rest.append(part)
-    return literals, rest
+    return known, rest

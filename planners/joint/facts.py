@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
-from planners.grounding import label
+from planners.pddl.formula_tree import label
 from planners.pddl.lifted import Atom
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.grounding import GroundAction, label
-from planners.pddl.lifted import And, Atom, Formula, Not, Or, StepAtom
+from planners.grounding import GroundAction
+from planners.pddl.formula_tree import Leaf, forbidden_steps, label, literals
+from planners.pddl.lifted import Atom, StepAtom
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,42 +33,20 @@ class Footprint:
 
 def footprint(action: GroundAction) -> Footprint:
     """The `Footprint` of a ground action."""
-    literals = [*_literals(action.precondition)]
-    for effect in action.effects:
-        literals += _literals(effect.condition)
+    conditions = (action.precondition, *(effect.condition for effect in action.effects))
+    signs: dict[bool, set[Leaf]] = {True: set(), False: set()}
+    for condition in conditions:
+        for leaf, positive in literals(condition):
+            signs[positive].add(leaf)
     adds = frozenset(e.atom for e in action.effects if e.adds)
     return Footprint(
-        requires_true=frozenset(a for a, positive in literals if positive and isinstance(a, Atom)),
-        requires_false=frozenset(
-            a for a, positive in literals if not positive and isinstance(a, Atom)
-        ),
+        requires_true=frozenset(a for a in signs[True] if isinstance(a, Atom)),
+        requires_false=frozenset(a for a in signs[False] if isinstance(a, Atom)),
         adds=adds,
         deletes=frozenset(e.atom for e in action.effects if not e.adds) - adds,
-        partners=action.links
-        | {a for a, positive in literals if positive and isinstance(a, StepAtom)},
-        excluded=frozenset(
-            part.part
-            for part in conjuncts(action.precondition)
-            if isinstance(part, Not) and isinstance(part.part, StepAtom)
-        ),
+        partners=action.links | {a for a in signs[True] if isinstance(a, StepAtom)},
+        excluded=frozenset(forbidden_steps(action.precondition)),
     )
-
-
-def conjuncts(formula: Formula) -> tuple[Formula, ...]:
-    """The parts that must all hold."""
-    return formula.parts if isinstance(formula, And) else (formula,)
-
-
-def _literals(formula: Formula) -> Iterable[tuple[Atom | StepAtom, bool]]:
-    match formula:
-        case Atom() | StepAtom():
-            yield formula, True
-        case Not(part):
-            assert isinstance(part, Atom | StepAtom)
-            yield part, False
-        case And(parts) | Or(parts):
-            for part in parts:
-                yield from _literals(part)
 
 
 def conflict(a: GroundAction, b: GroundAction) -> str | None:

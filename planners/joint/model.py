@@ -14,9 +14,10 @@ from typing import Literal, Protocol
 import numpy as np
 
 from planners.errors import Position
-from planners.grounding import GroundAction, label
+from planners.grounding import GroundAction
 from planners.joint.conditions import Evaluator, Labels
 from planners.joint.states import StateCodec
+from planners.pddl.formula_tree import label
 from planners.pddl.lifted import Atom, Formula, StepAtom
 from planners.tables import Bools, Ints, Rows
 

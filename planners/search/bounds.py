@@ -7,14 +7,15 @@ component is bounded by 0).
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from planners.errors import UsageError
 from planners.joint.conditions import split_condition
 from planners.joint.model import FullState, Goal, JointModel
-from planners.pddl.lifted import And, Atom, Formula
+from planners.pddl.formula_tree import required_atoms
+from planners.pddl.lifted import Formula
 from planners.tables import Ints, Rows
 
 #: The value of a state from which the goal is proved unreachable.
@@ -198,13 +199,4 @@ def _goal_facts(model: JointModel, goal: Goal) -> set[int]:
     if isinstance(goal, FullState):
         return set(goal.facts)
     index = model.codec.facts.index
-    return {index[atom] for atom in _atoms(goal) if atom in index}
-
-
-def _atoms(goal: Formula) -> Iterable[Atom]:
-    parts: Sequence[Formula] = goal.parts if isinstance(goal, And) else (goal,)
-    for part in parts:
-        if isinstance(part, And):
-            yield from _atoms(part)
-        elif isinstance(part, Atom):
-            yield part
+    return {index[atom] for atom in required_atoms(goal) if atom in index}

@@ -14,9 +14,9 @@ import pytest
 from generate import Scenario, problem_text
 from gridmap import GridMap, open_grid, ring, three_cells
 
-from planners.joint.interference import conjuncts
 from planners.loading import build
 from planners.pddl import parse_problem, read_domain
+from planners.pddl.formula_tree import conjuncts
 from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import plan_spaces
 from planners.search.plan_space import PlanSpace

@@ -6,10 +6,11 @@ import re
 
 import pytest
 
-from planners.inspection import inspect, unparse
+from planners.inspection import inspect
 from planners.joint.composition import ComposingStepper
 from planners.loading import ModelOptions, PlanningInstance, build, load
 from planners.pddl import parse_domain, parse_problem
+from planners.pddl.formula_tree import formula_text
 from planners.pddl.formulas import read_formula
 from planners.pddl.names import Names
 from planners.pddl.robots import RobotSelection
@@ -152,7 +153,7 @@ def test_unparsed_formulas_read_as_they_were(kind: Kind) -> None:
     for seed in range(40):
         domain = parse_domain(Source("d.pddl", random_model(seed, kind).domain))
         for schema in domain.schemas:
-            document = parse(Source("f", unparse(schema.precondition)))
+            document = parse(Source("f", formula_text(schema.precondition)))
             actions = {s.name: len(s.parameters) for s in domain.schemas}
             scope = {v.name for v in schema.parameters}
             constants, types = frozenset(domain.constants), frozenset(domain.types)

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from coordlang.language.sentences import sentence
-from coordlang.tasks.listed import formula_text
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import BadInput, Position, Refuted
 from planners.joint.model import IDLE, FullState, Goal, JointModel
-from planners.pddl.lifted import And
+from planners.pddl.formula_tree import conjuncts, formula_text
 from planners.search.plan_file import NoSuchAction, Texts, read_plans
 from planners.search.plans import Plan
 from planners.tables import Rows
@@ -186,8 +185,9 @@ def _unmet_goal(task_language: TaskLanguage, row: Rows) -> str:
     goal = _goal(task_language)
     if isinstance(goal, FullState):
         return "the state is not the goal state"
-    parts = goal.parts if isinstance(goal, And) else (goal,)
-    part = next(part for part in parts if not task_language.model.holds(part, row[None, :])[0])
+    part = next(
+        part for part in conjuncts(goal) if not task_language.model.holds(part, row[None, :])[0]
+    )
     return f"the goal is not reached: {formula_text(part)} does not hold"
 
 

@@ -14,9 +14,10 @@ from coordlang.tasks.candidates import Candidates
 from coordlang.tasks.listed import ListedTask, model_of_listed
 from coordlang.use.sentence.fitting_plans import plans_with_sentence
 from planners.errors import BadInput, Position
-from planners.joint.model import Goal, JointModel, PlanningTask
+from planners.joint.model import FullState, Goal, JointModel, PlanningTask
 from planners.loading import ModelOptions
-from planners.pddl.lifted import TRUE, And, Domain, Problem
+from planners.pddl.formula_tree import conjuncts
+from planners.pddl.lifted import Domain, Problem
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.tables import Ints
@@ -144,7 +145,7 @@ def _covers(language: Language, space: PlanSpace, recorded: Sequence[PlanningTas
 
 
 def _literals(goal: Goal) -> frozenset[object]:
-    return frozenset(goal.parts if isinstance(goal, And) else () if goal == TRUE else (goal,))
+    return frozenset((goal,) if isinstance(goal, FullState) else conjuncts(goal))
 
 
 def _atoms(language: Language) -> set[str]:

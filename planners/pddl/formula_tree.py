@@ -1,0 +1,186 @@
+"""Formulas taken apart and put together: one fold, their literals, their text.
+
+`planners.check` has its own, because it checks what is built on this.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import TypeVar
+
+from planners.pddl.lifted import (
+    FALSE,
+    TRUE,
+    And,
+    Atom,
+    Equal,
+    Exists,
+    Forall,
+    Formula,
+    Not,
+    Or,
+    StepAtom,
+    Term,
+    Truth,
+    Variable,
+)
+
+Leaf = Atom | StepAtom | Equal | Truth
+#: What a literal of a ground formula is about.
+GroundLeaf = Atom | StepAtom
+Compound = Not | And | Or | Forall | Exists
+T = TypeVar("T")
+
+
+def fold(
+    formula: Formula, leaf: Callable[[Leaf], T], compound: Callable[[Compound, Iterator[T]], T]
+) -> T:
+    """Compute a value of a formula from the values of its parts, leaves first.
+
+    Parameters
+    ----------
+    formula
+        Lifted or ground.
+    leaf
+        The value of a leaf.
+    compound
+        The value of a compound formula, given those of its parts from left to right (one for
+        ``not``, ``forall`` and ``exists``).  A part is looked at when its value is taken.
+    """
+    match formula:
+        case Not(part) | Forall(_, part) | Exists(_, part):
+            return compound(formula, iter((fold(part, leaf, compound),)))
+        case And(parts) | Or(parts):
+            return compound(formula, (fold(part, leaf, compound) for part in parts))
+    return leaf(formula)
+
+
+def literals(formula: Formula) -> tuple[tuple[Atom | StepAtom | Equal, bool], ...]:
+    """List the literals of the formula's negation normal form, from left to right.
+
+    A literal is a leaf and whether it is positive; quantified variables stay in it.
+    """
+
+    def compound(kind: Compound, parts: Iterator[_Literals]) -> _Literals:
+        found = tuple([literal for part in parts for literal in part])
+        if isinstance(kind, Not):
+            return tuple([(leaf, not positive) for leaf, positive in found])
+        return found
+
+    return fold(formula, lambda leaf: () if isinstance(leaf, Truth) else ((leaf, True),), compound)
+
+
+_Literals = tuple[tuple[Atom | StepAtom | Equal, bool], ...]
+
+
+def conjuncts(formula: Formula) -> tuple[Formula, ...]:
+    """The parts that must all hold; a conjunction among them is taken apart too."""
+    if isinstance(formula, And):
+        return tuple([inner for part in formula.parts for inner in conjuncts(part)])
+    return () if formula == TRUE else (formula,)
+
+
+def required_atoms(formula: Formula) -> tuple[Atom, ...]:
+    """The atoms among the `conjuncts`: false where one of them is."""
+    return tuple([part for part in conjuncts(formula) if isinstance(part, Atom)])
+
+
+def forbidden_steps(precondition: Formula) -> tuple[StepAtom, ...]:
+    """The actions that must not be in the same joint step: negated among the `conjuncts`."""
+    return tuple(
+        [
+            part.part
+            for part in conjuncts(precondition)
+            if isinstance(part, Not) and isinstance(part.part, StepAtom)
+        ]
+    )
+
+
+def signed(formula: Formula) -> tuple[Formula, bool]:
+    """The formula without a ``not`` in front of it, and whether there was none."""
+    return (formula.part, False) if isinstance(formula, Not) else (formula, True)
+
+
+def negated(formula: Formula) -> Formula:
+    """The negation; in negation normal form if a ground formula is."""
+    match formula:
+        case Truth(value):
+            return Truth(not value)
+        case Not(part):
+            return part
+        case And(parts):
+            return Or(tuple(map(negated, parts)))
+        case Or(parts):
+            return And(tuple(map(negated, parts)))
+    return Not(formula)
+
+
+def joined(kind: type[And] | type[Or], parts: Iterable[Formula]) -> Formula:
+    """A flat conjunction or disjunction, with truth values simplified away."""
+    neutral, decisive = (TRUE, FALSE) if kind is And else (FALSE, TRUE)
+    kept: list[Formula] = []
+    for part in parts:
+        if part == decisive:
+            return decisive
+        if isinstance(part, And | Or) and isinstance(part, kind):
+            kept += part.parts
+        elif part != neutral:
+            kept.append(part)
+    if not kept:
+        return neutral
+    return kept[0] if len(kept) == 1 else kind(tuple(kept))
+
+
+def distinct(formula: Formula) -> Formula:
+    """A conjunction or disjunction without a part that stands in it before."""
+    if isinstance(formula, And | Or):
+        return joined(type(formula), dict.fromkeys(formula.parts))
+    return formula
+
+
+def substituted(formula: Formula, value: Callable[[GroundLeaf], Formula]) -> Formula:
+    """A ground formula with a formula for each of its atoms, simplified as by `joined`."""
+
+    def leaf(found: Leaf) -> Formula:
+        return value(found) if isinstance(found, GroundLeaf) else found
+
+    def compound(kind: Compound, parts: Iterator[Formula]) -> Formula:
+        if isinstance(kind, Not):
+            return negated(next(parts))
+        assert isinstance(kind, And | Or), "a quantifier in a ground formula"
+        return joined(type(kind), parts)
+
+    return fold(formula, leaf, compound)
+
+
+def label(name: str, args: Iterable[Term]) -> str:
+    """PDDL text of an atom or action: ``(move r1 a b)``."""
+    return "(" + " ".join((name, *args)) + ")"
+
+
+def formula_text(formula: Formula) -> str:
+    """A formula as PDDL text."""
+    return fold(formula, _leaf_text, _compound_text)
+
+
+def _leaf_text(leaf: Leaf) -> str:
+    match leaf:
+        case Atom(name, args) | StepAtom(name, args):
+            return label(name, args)
+        case Equal(left, right):
+            return label("=", (left, right))
+        case Truth(value):
+            return "()" if value else "(or)"
+
+
+def _compound_text(compound: Compound, parts: Iterator[str]) -> str:
+    match compound:
+        case Forall(variables, _) | Exists(variables, _):
+            declared = f"({' '.join(map(_declaration, variables))})"
+            return label(type(compound).__name__.lower(), (declared, *parts))
+    return label(type(compound).__name__.lower(), parts)
+
+
+def _declaration(variable: Variable) -> str:
+    types = variable.types
+    return f"{variable.name} - {types[0] if len(types) == 1 else label('either', types)}"
