@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from coordlang.use.sentence.plan_dag import DagEdge, DagNode, PlanDag
@@ -30,9 +31,9 @@ class Ink:
 
 
 def inks(dag: PlanDag) -> dict[str, Ink]:
-    """A colour for each word of the sentence, in the order in which they are first said."""
+    """A colour for each word, in the order in which plans come to them."""
     result = {}
-    for number, word in enumerate(dict.fromkeys(dag.sentence)):
+    for number, word in enumerate(dag.words):
         fill = COLOURS[number % len(COLOURS)]
         red, green, blue = (int(fill[k : k + 2], 16) / 255 for k in (1, 3, 5))
         dark = 0.299 * red + 0.587 * green + 0.114 * blue < 0.5
@@ -45,14 +46,16 @@ def node_lines(dag: PlanDag) -> list[list[str]]:
     atoms = [split_atoms(node.key) for node in dag.nodes]
     states = [set(a) for a, node in zip(atoms, dag.nodes, strict=True) if not node.merged]
     always = set.intersection(*states) if len(states) > 1 else set()
-    return [
-        [f"{node.merged:,} more states"]
-        if node.merged
-        else [NO_FACT]
-        if not own
-        else _shortened([_plain(a) for a in own if a not in always], _ATOMS_SHOWN, "atoms")
-        for node, own in zip(dag.nodes, atoms, strict=True)
-    ]
+    return [_state_lines(node, own, always) for node, own in zip(dag.nodes, atoms, strict=True)]
+
+
+def _state_lines(node: DagNode, atoms: Sequence[str], always: Collection[str]) -> list[str]:
+    if node.merged:
+        return [f"{node.merged:,} more states"]
+    if not atoms:
+        return [NO_FACT]
+    lines = [_without_parentheses(atom) for atom in atoms if atom not in always]
+    return _shortened(lines, _ATOMS_SHOWN, "atoms")
 
 
 def edge_lines(dag: PlanDag, edge: DagEdge) -> list[str]:
@@ -80,6 +83,8 @@ def cut_note(dag: PlanDag) -> str | None:
 
 def headline(dag: PlanDag) -> str:
     """What the drawing shows, in a line."""
+    if not dag.sentence:
+        return f"{plans_text(dag.count)}, all optimal plans of the task"
     return f'"{" ".join(dag.sentence)}" leaves {plans_text(dag.count)} open'
 
 
@@ -127,18 +132,16 @@ def quoted(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n") + '"'
 
 
-def _plain(atom: str) -> str:
+def _without_parentheses(atom: str) -> str:
     """An atom without its outer parentheses; a remembered action keeps its own ones."""
     return atom[1:-1]
 
 
 def _shortened(lines: list[str], most: int, noun: str) -> list[str]:
     lines = [_clipped(line) for line in lines]
-    return (
-        lines
-        if len(lines) <= most
-        else [*lines[: most - 1], f"and {len(lines) - most + 1} more {noun}"]
-    )
+    if len(lines) <= most:
+        return lines
+    return [*lines[: most - 1], f"and {len(lines) - most + 1} more {noun}"]
 
 
 def _clipped(text: str) -> str:

@@ -20,7 +20,7 @@ from coordlang.use.sentence.drawing import (
     node_lines,
     plans_text,
 )
-from coordlang.use.sentence.plan_dag import PlanDag
+from coordlang.use.sentence.plan_dag import DagNode, PlanDag
 
 # Pixels.  Text is monospaced, so that its width is known.
 _FONT = 11
@@ -48,6 +48,11 @@ class _Item:
     before: list[int] = field(default_factory=list)
     after: list[int] = field(default_factory=list)
 
+    @property
+    def middle(self) -> float:
+        """The height of its middle on the page."""
+        return self.y + self.height / 2
+
 
 def to_svg(dag: PlanDag) -> str:
     """A self-contained SVG picture.  The same DAG gives the same bytes."""
@@ -55,39 +60,39 @@ def to_svg(dag: PlanDag) -> str:
     texts = [edge_lines(dag, edge) for edge in dag.edges]
     items, columns = _items(dag, lines, texts)
     _place(items, columns)
-    lefts, x = [], float(_MARGIN)
-    for number, column in enumerate(columns):
-        widest = max((items[n].width for n in column), default=0.0)
-        bend = _BEND if number % 2 else 0
-        lefts.append(x + bend)
-        x += widest + 2 * bend
-    height = max(item.y + item.height for item in items) + _MARGIN
-    note = cut_note(dag)
-    title = [headline(dag), dag.task, *([note] if note else [])]
-    width = max(x + _MARGIN, 2 * _MARGIN + _CHAR * 1.2 * max(map(len, title)), _chips_end(dag))
-    body = [*_heading(dag, ink, title), *_column_heads(columns, lefts, items)]
+    lefts, right = _lefts(items, columns)
     centre = {
-        n: lefts[k] + max(items[m].width for m in column) / 2
-        for k, column in enumerate(columns)
+        n: left + _widest(items, column) / 2
+        for column, left in zip(columns, lefts, strict=True)
         for n in column
     }
-    nodes = len(dag.nodes)
-    for number, edge in enumerate(dag.edges):
+    note = cut_note(dag)
+    title = [headline(dag), dag.task, *([note] if note else [])]
+    title_end = 2 * _MARGIN + _CHAR * 1.2 * max(map(len, title))
+    width = max(right + _MARGIN, title_end, _chips_end(dag))
+    height = max(item.y + item.height for item in items) + _MARGIN
+    body = [*_heading(dag, ink, title), *_column_heads(columns, lefts, items)]
+    for number, edge in enumerate(dag.edges, len(dag.nodes)):
         dashed = bool(dag.nodes[edge.source].merged or dag.nodes[edge.target].merged)
-        body += _edge(
-            items, centre, edge.source, nodes + number, edge.target, texts[number], dashed
-        )
+        own = texts[number - len(dag.nodes)]
+        body += _edge(items, centre, edge.source, number, edge.target, own, dashed)
     for number, node in enumerate(dag.nodes):
-        body += _node(
-            items[number],
-            centre[number],
-            node.word,
-            lines[number],
-            plans_text(node.plans),
-            node.key,
-            ink,
-        )
+        body += _node(items[number], centre[number], node, lines[number], ink)
     return "\n".join([*_open(width, height, title[0], dag.task), *body, "</svg>"]) + "\n"
+
+
+def _lefts(items: Sequence[_Item], columns: Sequence[Sequence[int]]) -> tuple[list[float], float]:
+    """The left side of each column, and the right side of the last one."""
+    lefts, x = [], float(_MARGIN)
+    for number, column in enumerate(columns):
+        bend = _BEND if number % 2 else 0
+        lefts.append(x + bend)
+        x += _widest(items, column) + 2 * bend
+    return lefts, x
+
+
+def _widest(items: Sequence[_Item], column: Sequence[int]) -> float:
+    return max((items[n].width for n in column), default=0.0)
 
 
 def _items(
@@ -123,18 +128,20 @@ def _place(items: list[_Item], columns: list[list[int]]) -> None:
     for sweep in range(_SWEEPS):
         forward = sweep % 2 == 0
         for column in columns[1:] if forward else columns[-2::-1]:
-            wanted = {}
-            for n in column:
-                neighbours = items[n].before if forward else items[n].after
-                centres = [items[m].y + items[m].height / 2 for m in neighbours]
-                wanted[n] = (
-                    sum(centres) / len(centres) if centres else items[n].y + items[n].height / 2
-                )
+            wanted = {n: _wanted(items, n, forward) for n in column}
             column.sort(key=lambda n: (wanted[n], n))
             _stack(items, column, [wanted[n] - items[n].height / 2 for n in column])
     top = min(item.y for item in items)
     for item in items:
         item.y += _HEAD + _MARGIN - top
+
+
+def _wanted(items: Sequence[_Item], number: int, forward: bool) -> float:
+    """The mean height of a box's neighbours on one side; where it is, if it has none there."""
+    neighbours = items[number].before if forward else items[number].after
+    if not neighbours:
+        return items[number].middle
+    return sum(items[n].middle for n in neighbours) / len(neighbours)
 
 
 def _stack(items: list[_Item], column: Sequence[int], wanted: Sequence[float]) -> None:
@@ -185,7 +192,7 @@ def _heading(dag: PlanDag, ink: dict[str, Ink], title: Sequence[str]) -> list[st
         _text(_MARGIN, 46, dag.task, colour="#555"),
     ]
     x = float(_MARGIN)
-    for word in dag.sentence:
+    for word in _chips(dag):
         width = _CHAR * len(word) + 2 * _PAD
         out.append(
             f'<rect x="{x:.1f}" y="56" width="{width:.1f}" height="{_BAND}" rx="4" '
@@ -199,7 +206,12 @@ def _heading(dag: PlanDag, ink: dict[str, Ink], title: Sequence[str]) -> list[st
 
 
 def _chips_end(dag: PlanDag) -> float:
-    return 2 * _MARGIN + sum(_CHAR * len(word) + 2 * _PAD + 6 for word in dag.sentence)
+    return 2 * _MARGIN + sum(_CHAR * len(word) + 2 * _PAD + 6 for word in _chips(dag))
+
+
+def _chips(dag: PlanDag) -> tuple[str, ...]:
+    """The words below the title: the sentence, or else all words as a legend."""
+    return dag.sentence or dag.words
 
 
 def _column_heads(
@@ -207,43 +219,39 @@ def _column_heads(
 ) -> list[str]:
     out = []
     for k, (column, left) in enumerate(zip(columns, lefts, strict=True)):
-        centre = left + max((items[n].width for n in column), default=0) / 2
-        name = (
-            f"step {k // 2 + 1}"
-            if k % 2
-            else "start"
-            if k == 0
-            else "end"
-            if k == len(columns) - 1
-            else ""
-        )
+        centre = left + _widest(items, column) / 2
+        name = _column_name(k, len(columns))
         out.append(_text(centre, _HEAD + 10, name, colour="#777", anchor="middle"))
     return out
 
 
+def _column_name(column: int, columns: int) -> str:
+    """What stands over a column: the number of the step over its texts."""
+    if column % 2:
+        return f"step {column // 2 + 1}"
+    if column == 0:
+        return "start"
+    return "end" if column == columns - 1 else ""
+
+
 def _node(
-    item: _Item,
-    centre: float,
-    word: str,
-    lines: Sequence[str],
-    plans: str,
-    key: str,
-    ink: dict[str, Ink],
+    item: _Item, centre: float, node: DagNode, lines: Sequence[str], ink: dict[str, Ink]
 ) -> list[str]:
     left = centre - item.width / 2
+    plans = plans_text(node.plans)
     box = (
         f'x="{left:.1f}" y="{item.y:.1f}" width="{item.width:.1f}" height="{item.height:.1f}" '
         'rx="4"'
     )
-    own = ink.get(word)
-    out = [f"<g><title>{escape(key or lines[0])}</title>"]
+    own = ink.get(node.word)
+    out = [f"<g><title>{escape(node.key or lines[0])}</title>"]
     if own is None:  # several nodes as one
         out.append(f'<rect {box} fill="#ffffff" stroke="#777" stroke-dasharray="5 3"/>')
         out.append(_text(left + _PAD, item.y + 13, plans, colour="#555"))
     else:
         dashes = ' stroke-dasharray="2 2"' if own.again else ""
         out.append(f'<rect {box} fill="{own.fill}"/>')
-        out.append(_text(left + _PAD, item.y + 13, word, colour=own.text, weight="bold"))
+        out.append(_text(left + _PAD, item.y + 13, node.word, colour=own.text, weight="bold"))
         out.append(
             _text(left + item.width - _PAD, item.y + 13, plans, colour=own.text, anchor="end")
         )

@@ -7,13 +7,20 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from coordlang.explanation.demands import words_passed
 from coordlang.tasks.candidates import describe
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
+from planners.tables import Ints
+
+#: Nodes of a DAG in a notebook.
+NODES_SHOWN = 60
 
 if TYPE_CHECKING:
     from coordlang.use.sentence.open_plans import OpenPlans
+    from coordlang.use.sentence.task_language import TaskLanguage
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,12 +66,12 @@ class DagEdge:
 
 @dataclass(frozen=True, slots=True)
 class PlanDag:
-    """The plans that a sentence leaves open, as the paths of a layered graph.
+    """The plans that a sentence leaves open, or all of a task, as the paths of a layered graph.
 
     Parameters
     ----------
     sentence
-        Its words.
+        Its words; empty for all plans of a task, which have different sentences.
     task
         The task in words.
     robots
@@ -88,6 +95,17 @@ class PlanDag:
     cut: int
 
     @property
+    def words(self) -> tuple[str, ...]:
+        """The different words of its nodes, in the order in which plans come to them."""
+        named = self.sentence or tuple(node.word for node in self.nodes if not node.merged)
+        return tuple(dict.fromkeys(named))
+
+    def _repr_svg_(self) -> str:
+        from coordlang.use.sentence.picture import to_svg  # pictures are drawn from this module
+
+        return to_svg(self)
+
+    @property
     def layers(self) -> list[range]:
         """The numbers of the nodes of each step."""
         steps = self.nodes[-1].step + 1
@@ -105,30 +123,47 @@ def plan_dag(open_plans: OpenPlans, most: int | None = None) -> PlanDag:
     least one, and the others of a step are merged into one.
     """
     task_language, space = open_plans.task_language, open_plans.fits
-    names = task_language.partition.words
+    word = task_language.partition.word_of(space.rows)[space.state]
+    return _dag(task_language, space, open_plans.words, words_passed(space, word), most)
+
+
+def task_dag(task_language: TaskLanguage, most: int | None = None) -> PlanDag:
+    """All optimal plans of a task as a DAG, cut as `plan_dag` is."""
+    space, task = task_language.space, [task_language.task]
+    alone = space.with_tasks(space.starts[task], space.second[task])
+    return _dag(task_language, alone, (), np.zeros(len(alone), np.int64), most)
+
+
+def _dag(
+    task_language: TaskLanguage,
+    space: PlanSpace,
+    sentence: Sequence[int],
+    passed: Ints,
+    most: int | None,
+) -> PlanDag:
+    """The plans of a plan space of one task; ``passed`` has the words passed at each node."""
+    names, codec = task_language.partition.words, task_language.model.codec
+    word = task_language.partition.word_of(space.rows)[space.state]
     through = _plans_through(space)
     width = _width(space, most)
-    word = task_language.partition.word_of(space.rows)[space.state]
-    passed = words_passed(space, word).tolist()
     nodes: list[DagNode] = []
     number: dict[int, int] = {}
-    codec = task_language.model.codec
     for step, span in enumerate(reversed(space.layers)):
         here = sorted(range(span.start, span.stop), key=lambda n: (-through[n], n))
         kept = here if len(here) <= width else here[: max(1, width - 1)]
         for node in kept:
             number[node] = len(nodes)
             key = codec.key(space.rows[space.state[node]])
-            nodes.append(DagNode(step, key, names[word[node]], passed[node], through[node]))
+            nodes.append(DagNode(step, key, names[word[node]], int(passed[node]), through[node]))
         others = here[len(kept) :]
         if others:
             number.update(dict.fromkeys(others, len(nodes)))
             nodes.append(DagNode(step, "", "", 0, sum(through[n] for n in others), len(others)))
     return PlanDag(
-        sentence=tuple(names[w] for w in open_plans.words),
+        sentence=tuple(names[w] for w in sentence),
         task=describe(task_language.space, task_language.task),
         robots=task_language.model.robots,
-        count=open_plans.count,
+        count=through[int(space.starts[0])],
         nodes=tuple(nodes),
         edges=_edges(space, number, nodes),
         cut=sum(node.merged for node in nodes),

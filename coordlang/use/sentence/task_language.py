@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from coordlang.language.partition import Partition
 from coordlang.language.recorded import check_source, options_of, recorded_list
 from coordlang.language.words import Language
-from coordlang.tasks.candidates import Candidates
+from coordlang.tasks.candidates import Candidates, describe
 from coordlang.tasks.listed import ListedTask, model_of_listed
 from coordlang.use.sentence.fitting_plans import plans_with_sentence
 from planners.errors import BadInput, Position
@@ -27,9 +28,21 @@ from planners.tables import Ints
 class TaskLanguage:
     """A language with the optimal plans of one task.
 
-    ``space`` may hold further tasks: this one is number ``task`` of ``space.starts``.  ``word`` has
-    the word number of every plan-space node.  ``covered``: is it one of the candidate tasks that
-    the language was built for?  For any other one nothing is guaranteed.
+    Parameters
+    ----------
+    language
+        The language.
+    partition
+        The same as a partition of the model's states.
+    space
+        The optimal plans of the task, and perhaps of further ones.
+    task
+        The number of the task in ``space.starts``.
+    word
+        The word number of every plan-space node.
+    covered
+        Whether it is one of the candidate tasks that the language was built for.  For any other
+        task nothing is guaranteed.
     """
 
     language: Language
@@ -52,27 +65,28 @@ class TaskLanguage:
     def words_of(self, text: str | Sequence[str]) -> tuple[int, ...]:
         """Word numbers of a sentence, ``"w2 w0"`` or ``("w2", "w0")``.
 
-        Raises `BadInput` for an empty sentence, a word that the language does not have, or one that
-        is said twice in a row, which no sentence does.
+        Raises `BadInput` for an empty sentence, a word that the language does not have, or equal
+        neighbours, which no sentence has.
         """
         words = text.split() if isinstance(text, str) else list(text)
         if not words:
             raise BadInput(
                 "the sentence is empty", remedy="It begins with the word of the initial state."
             )
-        known = {word: number for number, word in enumerate(self.partition.words)}
-        for place, word in enumerate(words, 1):
-            if word not in known:
+        number = {word: n for n, word in enumerate(self.partition.words)}
+        for index, word in enumerate(words, 1):
+            if word not in number:
                 raise BadInput(
-                    f"word {place} of the sentence, {word!r}, is no word of this language",
+                    f"word {index} of the sentence, {word!r}, is no word of this language",
                     remedy=f"Its words are {', '.join(self.partition.words)}.",
                 )
-            if place > 1 and words[place - 2] == word:
+        for index, (before, word) in enumerate(pairwise(words), 1):
+            if before == word:
                 raise BadInput(
-                    f"the sentence says {word!r} twice in a row (words {place - 1} and {place})",
+                    f"the sentence says {word!r} twice in a row (words {index} and {index + 1})",
                     remedy="Write a word once, however long the plan stays in it.",
                 )
-        return tuple(known[word] for word in words)
+        return tuple(number[word] for word in words)
 
     def plans_with(self, words: Sequence[int]) -> PlanSpace:
         """The task's optimal plans with the sentence ``words``; see `plans_with_sentence`."""
@@ -81,6 +95,17 @@ class TaskLanguage:
     def text(self, words: Sequence[int]) -> str:
         """A sentence as it is written."""
         return " ".join(self.partition.words[word] for word in words)
+
+    def __repr__(self) -> str:
+        """The language and the task, not the plan space."""
+        task = describe(self.space, self.task)
+        return f"TaskLanguage({self.language!r}, task={task!r}, covered={self.covered})"
+
+    def _repr_svg_(self) -> str:
+        from coordlang.use.sentence.picture import to_svg
+        from coordlang.use.sentence.plan_dag import NODES_SHOWN, task_dag
+
+        return to_svg(task_dag(self, NODES_SHOWN))
 
 
 def language_in_task(

@@ -14,16 +14,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from coordlang.building import build_language
 from coordlang.use.sentence.drawing import COLOURS, cut_note, edge_lines, inks, node_lines, to_dot
 from coordlang.use.sentence.fitting_plans import NoPlanFits
 from coordlang.use.sentence.open_plans import OpenPlans, open_plans_data
 from coordlang.use.sentence.picture import _items, _place, to_svg
-from coordlang.use.sentence.plan_dag import PlanDag, plan_dag
-from coordlang.use.sentence.task_language import TaskLanguage
+from coordlang.use.sentence.plan_dag import PlanDag, plan_dag, task_dag
+from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 from planners.search.plan_file import texts
-from planners.search.plans import Plan
+from planners.search.plans import Plan, Plans
 from tests.support.command import Command
-from tests.support.domains import DOMAINS
+from tests.support.domains import DOMAINS, all_tasks
 from tests.support.naive_sentences import by_sentence
 from tests.support.task_languages import SHIPPED, random_task_language, shipped
 
@@ -43,6 +44,11 @@ def check(task_language: TaskLanguage, seed: int) -> None:
 
 def check_dag(task_language: TaskLanguage, graph: PlanDag, plans: set[Plan]) -> None:
     """Its paths are the plans, its nodes have the right words and counts."""
+    check_paths(task_language, graph, plans)
+    assert all(graph.sentence[node.words - 1] == node.word for node in graph.nodes)
+
+
+def check_paths(task_language: TaskLanguage, graph: PlanDag, plans: set[Plan]) -> None:
     assert graph.count == len(plans)
     assert not graph.cut
     through: Counter[int] = Counter()
@@ -62,7 +68,6 @@ def check_dag(task_language: TaskLanguage, graph: PlanDag, plans: set[Plan]) -> 
         assert node.word == task_language.language.states.get(
             node.key, task_language.language.default
         )
-        assert graph.sentence[node.words - 1] == node.word
         assert node.plans == through[number]
 
 
@@ -338,3 +343,59 @@ def test_json_of_a_plan_file_and_more() -> None:
     assert data["count"] == 16
     assert sum(node.get("merged", 0) for node in data["nodes"]) == plan_dag(understood, 10).cut > 0
     assert all(("state" in node) != ("merged" in node) for node in data["nodes"])
+
+
+# -- in a notebook
+
+
+def shown_texts(svg: str) -> list[str]:
+    return ["".join(e.itertext()) for e in ElementTree.fromstring(svg).iter() if e.text]
+
+
+def test_a_sentence_and_its_dag_show_themselves_as_a_picture() -> None:
+    task_language = shipped("t-map/problem")[1]
+    words = max(by_sentence(task_language), key=len)
+    found = OpenPlans.of(task_language, task_language.words_of(words))
+    assert found._repr_svg_() == plan_dag(found)._repr_svg_() == to_svg(plan_dag(found))
+    texts = shown_texts(found._repr_svg_())
+    assert set(words) <= set(texts)
+    assert any(text.startswith(f'"{" ".join(words)}" leaves') for text in texts)
+    assert repr(found) == f"OpenPlans(sentence={' '.join(words)!r}, count={found.count})"
+
+
+def test_a_language_in_a_task_shows_all_optimal_plans() -> None:
+    task_language = shipped("t-map/problem")[1]
+    groups = by_sentence(task_language)
+    graph = task_dag(task_language)
+    plans = set().union(*groups.values())
+    assert graph.count == len(plans)
+    check_paths(task_language, graph, plans)
+    assert set(graph.words) == {word for words in groups for word in words}
+    texts = shown_texts(task_language._repr_svg_())
+    assert set(graph.words) <= set(texts)
+    assert f"{len(plans)} plans, all optimal plans of the task" in texts
+    assert graph.task in texts
+    assert "task=" in repr(task_language)
+
+
+def test_only_one_of_several_tasks_is_shown() -> None:
+    candidates = all_tasks("grid", "gw1-2x2")
+    language = build_language(candidates, "greedy").language
+    *_, last = languages_in_tasks(language, candidates)
+    assert len(last.space.starts) > 1
+    plans = set(Plans.of(last.space, last.task))
+    assert task_dag(last).count == len(plans)
+    check_paths(last, task_dag(last), plans)
+
+
+def test_a_plan_space_shows_its_layers() -> None:
+    space = shipped("t-map/problem")[1].space
+    rows = ElementTree.fromstring(space._repr_html_()).findall("tr")
+    cells = [[cell.text for cell in row] for row in rows]
+    assert cells[0] == ["steps left", "nodes", "states", "edges"]
+    expected = [
+        [str(layer), str(span.stop - span.start), None, str(len(space.layer_edges(layer).edges))]
+        for layer, span in enumerate(space.layers)
+    ]
+    assert [[*row[:2], None, row[3]] for row in cells[1:]] == expected[::-1]
+    assert f"nodes={len(space)}" in repr(space)
