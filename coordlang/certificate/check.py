@@ -12,8 +12,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 
-import numpy as np
-
 from coordlang.certificate.encoding import Cnf, encode
 from coordlang.certificate.file import Certificate, PlanTexts, Reason
 from coordlang.language.warping import Clause, pair
@@ -120,21 +118,17 @@ def _states(space: PlanSpace, start: int, plan: PlanTexts, name: str) -> list[in
 
 def _follow(space: PlanSpace, start: int, plan: PlanTexts) -> list[int] | None:
     """The states that a plan passes through, or None if it is no optimal plan."""
-    node = start
-    states = [int(space.state[node])]
-    for step in plan:
-        labels = space.model.numbers(step) if len(step) == len(space.model.robots) else None
-        edges = np.arange(space.first[node], space.first[node + 1])
-        hit = (
-            edges[(space.labels[edges] == np.array(labels)).all(axis=1)]
-            if labels is not None
-            else edges[:0]
-        )
-        if not len(hit):
+    steps: list[tuple[int, ...]] = []
+    for texts in plan:
+        labels = space.model.numbers(texts) if len(texts) == len(space.model.robots) else None
+        if labels is None:
             return None
-        node = int(space.target[hit[0]])
-        states.append(int(space.state[node]))
-    return states if space.layer[node] == 0 else None
+        steps.append(labels)
+    path = space.path_with(start, steps)
+    if path is None or len(path) != space.layer[start]:
+        return None
+    states: list[int] = space.state[space.nodes_on(start, path)].tolist()
+    return states
 
 
 def _check_path(path: list[tuple[int, int]], rows: int, columns: int, name: str) -> None:

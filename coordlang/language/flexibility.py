@@ -94,7 +94,7 @@ def edge_shares(space: PlanSpace, counted: Sequence[int]) -> Floats:
 
     ``counted`` is `planners.search.plans.counts`.
     """
-    source, target = space.sources, space.target
+    source, target = space.sources, space.targets()
     if max(counted, default=0) < 2**53:
         number = np.array(counted, np.float64)
         return number[target] / number[source]
@@ -132,7 +132,6 @@ def _measure(space: PlanSpace, word: Ints) -> Flexibility:
     counted = counts(space)
     share_of_edge = edge_shares(space, counted)
     sentences = _Sentences()
-    source_of_edge = space.sources
     first_sentence = np.zeros(len(space), np.int64)
     # Of the layer below: sorted by node, bounds of each node's entries, sentence and share of each
     # entry.
@@ -146,16 +145,15 @@ def _measure(space: PlanSpace, word: Ints) -> Flexibility:
             share = np.ones(len(node))
             first_sentence[node] = said
         else:
-            edges = np.arange(space.first[span.start], space.first[span.stop])
-            target, source = space.target[edges], source_of_edge[edges]
+            above = space.layer_edges(number)
+            target, source = above.target, above.source
             low, high = np.searchsorted(node, target), np.searchsorted(node, target, "right")
             _check_memory(int((high - low).sum()))
-            entry, of = ranges(low, high - low), np.repeat(np.arange(len(edges)), high - low)
+            entry, of = ranges(low, high - low), np.repeat(np.arange(len(source)), high - low)
             new = _said(sentences, word, source[of], target[of], said[entry])
-            weight = share[entry] * share_of_edge[edges][of]
-            leading = space.first[span]
-            follows = space.target[leading]
+            weight = share[entry] * share_of_edge[above.edges][of]
             here = np.arange(span.start, span.stop)
+            follows = space.targets(space.first_edges(here))
             first_sentence[here] = _said(sentences, word, here, follows, first_sentence[follows])
             node, said, share = _summed(source[of], new, weight)
         mine = starts[(starts >= span.start) & (starts < span.stop)]

@@ -6,41 +6,46 @@ space.  Both ways are array operations on blocks of keys, for languages of milli
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import chain, islice, pairwise, repeat
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planners.joint.states import StateCodec
-from planners.tables import Ints, Rows
+from planners.tables import Bools, Ints, Rows
 
 _BLOCK = 50_000
 _BETWEEN = ") ("
 
 
 def read_keys(codec: StateCodec, keys: Iterable[str]) -> tuple[Rows, Ints]:
-    """The rows of keys, and the positions of those that are no key of a state.
+    """Read keys into rows.
 
-    The rows of these mean nothing.
+    Returns
+    -------
+    rows : (keys, blocks)
+        The states; those of what is no key mean nothing.
+    wrong : (wrong keys)
+        The positions of what is no key of a state of the model.
     """
-    atoms, place, value = _atoms(codec)
-    number = {atom[1:-1]: n for n, atom in enumerate(atoms)}
+    atoms = _KeyAtoms.of(codec)
+    number = {text[1:-1]: n for n, text in enumerate(atoms.texts)}
     blocks, wrong, start = [], [], 0
     iterator = iter(keys)
     while block := list(islice(iterator, _BLOCK)):
-        rows, bad = _read(codec, block, number, place, value)
+        rows, bad = _read(codec, block, number, atoms)
         blocks.append(rows)
         wrong.append(np.flatnonzero(bad) + start)
         start += len(block)
     if not blocks:
-        return np.zeros((0, codec.width), np.uint64), np.zeros(0, np.int64)
+        return codec.rows_of(()), np.zeros(0, np.int64)
     return np.concatenate(blocks), np.concatenate(wrong)
 
 
 def _read(
-    codec: StateCodec, keys: Sequence[str], number: dict[str, int], place: Ints, value: Rows
-) -> tuple[Rows, NDArray[np.bool_]]:
+    codec: StateCodec, keys: Sequence[str], number: Mapping[str, int], atoms: _KeyAtoms
+) -> tuple[Rows, Bools]:
     parts = [key[1:-1].split(_BETWEEN) if key else [] for key in keys]
     bad = np.array([key != "" and not (key[0] == "(" and key[-1] == ")") for key in keys])
     counts = np.fromiter(map(len, parts), np.int64, len(parts))
@@ -52,61 +57,68 @@ def _read(
     follows = source[1:] == source[:-1]
     bad[source[1:][follows & (found[1:] <= found[:-1])]] = True  # not sorted, or twice
     source, found = source[found >= 0], found[found >= 0]
-    rows = np.zeros((len(keys), codec.width), np.uint64)
-    np.bitwise_or.at(rows.reshape(-1), source * codec.width + place[found], value[found])
-    if codec.memory is not None:
-        seen = np.zeros((len(keys), codec.width), np.int64)
-        np.add.at(seen, (source, place[found]), 1)
-        bad |= (seen[:, codec.fact_blocks :] != 1).any(axis=1)
-    return rows, bad
+    rows = np.zeros((len(keys), codec.fact_blocks), np.uint64)
+    is_fact = atoms.robot[found] < 0
+    codec.set_each(rows, source[is_fact], atoms.value[found[is_fact]])
+    if codec.memory is None:
+        return rows, bad
+    state, last = source[~is_fact], found[~is_fact]
+    labels = np.full((len(keys), len(codec.robots)), -1)
+    labels[state, atoms.robot[last]] = atoms.value[last]
+    seen = np.zeros(labels.shape, np.int64)
+    np.add.at(seen, (state, atoms.robot[last]), 1)
+    return codec.remembering(rows, labels), bad | (seen != 1).any(axis=1)
 
 
 def keys_of(codec: StateCodec, rows: Rows) -> list[str]:
     """The keys of states: `StateCodec.key` of each row."""
-    atoms, place, value = _atoms(codec)
-    number = {atom: n for n, atom in enumerate(atoms)}
-    fact_number = np.array([number[fact] for fact in codec.facts.texts], np.int64)
+    atoms = _KeyAtoms.of(codec)
+    number_of_fact = np.flatnonzero(atoms.robot < 0)  # facts are in the order of their texts
     keys: list[str] = []
     for start in range(0, len(rows), _BLOCK):
         block = rows[start : start + _BLOCK]
-        words = np.ascontiguousarray(block[:, : codec.fact_blocks].astype("<u8"))
-        state, bit = np.nonzero(np.unpackbits(words.view(np.uint8), axis=1, bitorder="little"))
-        atom = fact_number[bit]
+        state, fact = np.nonzero(codec.truth(block))
+        found = number_of_fact[fact]
         if codec.memory is not None:
-            last = [
-                np.flatnonzero(place == codec.fact_blocks + robot)
-                for robot in range(len(codec.robots))
-            ]
-            said = [
-                mine[np.argsort(value[mine])][block[:, place[mine[0]]].astype(np.int64)]
-                for mine in last
-            ]
-            state = np.concatenate((state, np.tile(np.arange(len(block)), len(last))))
-            atom = np.concatenate((atom, *said))
-            order = np.lexsort((atom, state))
-            state, atom = state[order], atom[order]
+            last = atoms.last(codec.last_labels(block))
+            state = np.concatenate((state, np.repeat(np.arange(len(block)), last.shape[1])))
+            found = np.concatenate((found, last.reshape(-1)))
+            order = np.lexsort((found, state))
+            state, found = state[order], found[order]
         bounds = np.searchsorted(state, np.arange(len(block) + 1)).tolist()
-        texts = [atoms[n] for n in atom.tolist()]
+        texts = [atoms.texts[n] for n in found.tolist()]
         keys += [" ".join(texts[a:b]) for a, b in pairwise(bounds)]
     return keys
 
 
-def _atoms(codec: StateCodec) -> tuple[tuple[str, ...], Ints, Rows]:
-    """All atoms of the model, remembered actions too, sorted.
+@dataclass(frozen=True, slots=True)
+class _KeyAtoms:
+    """All atoms that a key may have, facts and remembered subactions, sorted by their ``texts``.
 
-    For each its word in a row, and its bit or value there.
+    For each ``robot``, -1 for a fact, and ``value``: the fact's number, or the label that the robot
+    had last (-1: none yet).
     """
-    listed = [(fact, n // 64, 1 << n % 64) for n, fact in enumerate(codec.facts.texts)]
-    for robot, (name, labels) in enumerate(
-        zip(codec.robots, codec.memory or (), strict=codec.memory is not None)
-    ):
-        listed += [
-            (f"(last {name} {label})", codec.fact_blocks + robot, n)
-            for n, label in enumerate(("none", *labels))
-        ]
-    listed.sort()
-    return (
-        tuple(atom for atom, _, _ in listed),
-        np.array([place for _, place, _ in listed], np.int64),
-        np.array([value for _, _, value in listed], np.uint64),
-    )
+
+    texts: tuple[str, ...]
+    robot: Ints
+    value: Ints
+
+    @classmethod
+    def of(cls, codec: StateCodec) -> _KeyAtoms:
+        listed = [(text, -1, number) for number, text in enumerate(codec.facts.texts)]
+        for robot, labels in enumerate(codec.memory or ()):
+            listed += [
+                (f"(last {codec.robots[robot]} {label})", robot, number)
+                for number, label in enumerate(("none", *labels), -1)
+            ]
+        texts, robots, values = zip(*sorted(listed), strict=True) if listed else ((), (), ())
+        return cls(tuple(texts), np.array(robots, np.int64), np.array(values, np.int64))
+
+    def last(self, labels: Ints) -> Ints:
+        """The numbers of the atoms that say what the robots did last (states, robots)."""
+        found = np.zeros(labels.shape, np.int64)
+        for robot in range(labels.shape[1]):
+            mine = np.flatnonzero(self.robot == robot)
+            by_label = mine[np.argsort(self.value[mine])]
+            found[:, robot] = by_label[labels[:, robot] + 1]
+        return found

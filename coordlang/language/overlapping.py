@@ -61,7 +61,7 @@ class Readings:
 
     def __init__(self, space: PlanSpace, words: Overlap) -> None:
         self._space = space
-        self._first, self._target = space.first.tolist(), space.target.tolist()
+        self._successors = [space.successors(node) for node in range(len(space))]
         self._sets: list[frozenset[Sentence]] = []
         self._number: dict[frozenset[Sentence], int] = {}
         self._before: dict[tuple[int, frozenset[int]], int] = {}
@@ -82,11 +82,11 @@ class Readings:
             self.classes[node] = self._read(node, words[self._state[node]])
 
     def _read(self, node: int, words: frozenset[int]) -> dict[int, int]:
-        edges = self._target[self._first[node] : self._first[node + 1]]
-        if not edges:
+        successors = self._successors[node]
+        if not successors:
             return {self._intern(frozenset((word,) for word in words)): 1}
         total: dict[int, int] = {}
-        for below in edges:
+        for below in successors:
             for number, plans in self.classes[below].items():
                 here = self._before.get((number, words))
                 if here is None:

@@ -21,7 +21,7 @@ from planners.errors import OutOfMemory, OutOfTime
 from planners.limits import memory_left, reaching, time_left
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.tables import Bools, Ints, ranges, spans, unique_tuples
+from planners.tables import Bools, Ints, spans, unique_tuples
 
 #: Walk edges handled at a time.
 _CHUNK = 1_000_000
@@ -130,7 +130,6 @@ def moves(
     With ``together`` only those in which all plans reach the same node.
     """
     robots = nodes.shape[1] - 1
-    degree = np.diff(space.first)
     sizes = edges_out_of(space, nodes)
     if not together:
         _check_size(sizes, robots)
@@ -139,19 +138,17 @@ def moves(
         prefix = nodes[span, robots]
         edges: list[Ints] = []
         for robot in range(robots):
-            at = nodes[source, robot]
-            counts = degree[at]
-            edge = ranges(space.first[at], counts)
-            source, prefix = np.repeat(source, counts), np.repeat(prefix, counts)
-            edges = [np.repeat(old, counts) for old in edges]
+            which, edge = space.edges_from(nodes[source, robot])
+            source, prefix = source[which], prefix[which]
+            edges = [old[which] for old in edges]
             if together and robot:
-                same = space.target[edge] == space.target[edges[0]]
+                same = space.targets(edge) == space.targets(edges[0])
                 source, prefix, edge = source[same], prefix[same], edge[same]
                 edges = [old[same] for old in edges]
             edges.append(edge)
-            prefix = index.follow(robot, prefix, space.labels[edge, robot])
+            prefix = index.follow(robot, prefix, space.robot_labels(robot, edge))
         mixed = (
-            np.where(prefix >= 0, space.target[np.maximum(prefix, 0)], FAILED)
+            np.where(prefix >= 0, space.targets(np.maximum(prefix, 0)), FAILED)
             if len(prefix)
             else prefix
         )
@@ -163,13 +160,13 @@ def edges_out_of(space: PlanSpace, nodes: Ints) -> NDArray[np.float64]:
 
     One for every choice of the plans' next steps.
     """
-    degree = np.diff(space.first)
-    product: NDArray[np.float64] = np.prod(degree[nodes[:, :-1]].astype(np.float64), axis=1)
+    degree = space.out_degrees.astype(np.float64)
+    product: NDArray[np.float64] = np.prod(degree[nodes[:, :-1]], axis=1)
     return product
 
 
 def _check_size(sizes: NDArray[np.float64], robots: int) -> None:
-    """What one node needs at once must fit, and what a layer needs be thinkable."""
+    """Stop before one node needs too much at once, or a layer too much work."""
     largest, total = sizes.max(initial=0), sizes.sum()
     # One row of a chunk holds its source, a prefix and an edge for each robot, and copies of them.
     if 100 * largest > memory_left():
@@ -191,7 +188,7 @@ def _forward(space: PlanSpace, index: EdgeIndex, layers: list[_Layer]) -> None:
 
     Every plan-space node starts at its own layer.
     """
-    columns = space.labels.shape[1] + 1
+    columns = space.robots + 1
     spans = space.layers
     arriving = np.zeros((0, columns), np.int64)
     held = 0
@@ -230,7 +227,7 @@ def _expand(
         broken = move.mixed == FAILED
         fails[move.source[broken]] = True
         follow = ~broken & (~fails[move.source] | diagonal[move.source])
-        target = space.target[move.edges]
+        target = space.targets(move.edges)
         fresh, number = unique_tuples(
             np.column_stack((target[follow], move.mixed[follow])) - below.start, bounds
         )
@@ -280,7 +277,7 @@ def _backward(space: PlanSpace, layers: Sequence[_Layer]) -> Walk:
             states = space.state[layer.parting[bad, :-1]]
             found.append(np.column_stack((states[:, 0], _sorted_different(states[:, 1:]))))
         below = fails
-    table = np.concatenate(found) if found else np.zeros((0, space.labels.shape[1] + 1), np.int64)
+    table = np.concatenate(found) if found else np.zeros((0, space.robots + 1), np.int64)
     return Walk(
         requires,
         unique_divergences(Divergences(table[:, 0], table[:, 1:])),

@@ -65,7 +65,7 @@ class SeparationWalk:
 
     def __init__(self, space: PlanSpace) -> None:
         self._space = space
-        self._robots = space.labels.shape[1]
+        self._robots = space.robots
         self._layers = _walk(space)
 
     @property
@@ -215,7 +215,7 @@ def _separated(word: Ints, shared: Ints, others: Ints) -> Bools:
 
 def _walk(space: PlanSpace) -> list[_Layer]:
     """All layers, goals first, without what cannot fail."""
-    robots = space.labels.shape[1]
+    robots = space.robots
     failed = len(space)
     index = EdgeIndex.of(space)
     tables: list[Ints] = []
@@ -260,7 +260,7 @@ def _links(space: PlanSpace, index: EdgeIndex, table: Ints) -> tuple[Ints, Ints,
     count = 0
     for move in moves(space, index, walking):
         mixed = np.where(move.mixed == FAILED, failed, move.mixed)
-        fresh, number = unique_tuples(np.column_stack((space.target[move.edges], mixed)), bounds)
+        fresh, number = unique_tuples(np.column_stack((space.targets(move.edges), mixed)), bounds)
         pairs, _ = unique_tuples(np.column_stack((move.source, number)), [len(table), len(fresh)])
         sources.append(pairs[:, 0])
         numbers.append(pairs[:, 1] + count)

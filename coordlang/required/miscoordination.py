@@ -88,7 +88,7 @@ def separable(space: PlanSpace) -> bool:
 
 
 def _inseparable(space: PlanSpace) -> Trail | None:
-    ends = np.column_stack((space.sources, space.target))
+    ends = np.column_stack((space.sources, space.targets()))
     if len(ends) == len(unique_tuples(ends, [len(space)] * 2)[0]):
         return None  # no two edges join the same two nodes
     return _trail(space, np.unique(space.starts), together=True)
@@ -123,7 +123,7 @@ def _walk_to_a_break(
     space: PlanSpace, starts: Ints, walked: list[int], *, together: bool
 ) -> Trail | None:
     """See `_trail`; ``walked`` counts layers and nodes."""
-    robots = space.labels.shape[1]
+    robots = space.robots
     index = EdgeIndex.of(space)
     table = np.zeros((0, robots + 1), np.int64)
     history: list[
@@ -143,7 +143,7 @@ def _walk_to_a_break(
             if len(broken):
                 first = broken[0]
                 return _retrace(history, int(move.source[first]), tuple(move.edges[first].tolist()))
-            target = space.target[move.edges]
+            target = space.targets(move.edges)
             found.append(np.column_stack((target, move.mixed, move.source, move.edges)))
         step = np.concatenate(found) if found else np.zeros((0, 2 * robots + 2), np.int64)
         table, number_of = unique_tuples(step[:, : robots + 1], [len(space)] * (robots + 1))
@@ -167,54 +167,43 @@ def _retrace(history: list[tuple[Ints, Ints, Ints]], row: int, last: tuple[int, 
 def describe_failure(
     space: PlanSpace, trail: Trail, sentence: tuple[str, ...] | None = None
 ) -> Miscoordination:
-    """A trail in words, with the plans completed to the goal.
+    """A trail as text, with the plans completed to the goal.
 
     The mixture goes up to its breaking step, with the reason why it breaks.
     """
     model = space.model
-    robots = len(model.robots)
-    paths = [_complete(space, [step[i] for step in trail.edges]) for i in range(robots)]
-    node = trail.start
-    mixed_nodes, mixture = [node], []
-    for edges in trail.edges:
-        labels = tuple(int(space.labels[edge, robot]) for robot, edge in enumerate(edges))
-        mixture.append(labels)
-        node = _follow(space, node, labels)
-        if node < 0:
-            break
-        mixed_nodes.append(node)
-    broken = mixed_nodes[len(mixture) - 1]
-    task = int(np.flatnonzero(space.starts == trail.start)[0])
+    paths = [_complete(space, plan) for plan in zip(*trail.edges, strict=True)]
+    mixed_nodes, mixture = _mixture(space, trail)
     return Miscoordination(
-        task=describe(space, task),
+        task=describe(space, int(np.flatnonzero(space.starts == trail.start)[0])),
         robots=model.robots,
-        plans=tuple(tuple(model.texts(space.labels[e].tolist()) for e in path) for path in paths),
-        states=tuple(_keys(space, trail.start, path) for path in paths),
+        plans=tuple(tuple(model.texts(space.labels_of(e)) for e in path) for path in paths),
+        states=tuple(
+            tuple(_key(space, node) for node in space.nodes_on(trail.start, path)) for path in paths
+        ),
         mixture=tuple(model.texts(labels) for labels in mixture),
-        mixed_states=tuple(_key(space, n) for n in mixed_nodes),
+        mixed_states=tuple(_key(space, node) for node in mixed_nodes),
         step=len(mixture) - 1,
-        reason=_reason(space, broken, mixture[-1]),
+        reason=_reason(space, mixed_nodes[len(mixture) - 1], mixture[-1]),
         sentence=sentence,
     )
 
 
-def _complete(space: PlanSpace, edges: list[int]) -> list[int]:
+def _complete(space: PlanSpace, edges: Sequence[int]) -> list[int]:
     """A path continued to the goal by first edges."""
-    path = list(edges)
-    while space.layer[space.target[path[-1]]] > 0:
-        path.append(int(space.first[space.target[path[-1]]]))
-    return path
+    return [*edges, *space.first_path(space.target_of(edges[-1]))]
 
 
-def _follow(space: PlanSpace, node: int, labels: tuple[int, ...]) -> int:
-    for edge in range(int(space.first[node]), int(space.first[node + 1])):
-        if tuple(space.labels[edge].tolist()) == labels:
-            return int(space.target[edge])
-    return FAILED
-
-
-def _keys(space: PlanSpace, start: int, path: list[int]) -> tuple[str, ...]:
-    return tuple(_key(space, n) for n in (start, *(int(space.target[e]) for e in path)))
+def _mixture(space: PlanSpace, trail: Trail) -> tuple[list[int], list[tuple[int, ...]]]:
+    """The mixture of a trail up to its breaking step: nodes before each step, and its labels."""
+    nodes, mixture = [trail.start], []
+    for edges in trail.edges:
+        mixture.append(tuple(space.labels_of(edge)[robot] for robot, edge in enumerate(edges)))
+        edge = space.edge_with(nodes[-1], mixture[-1])
+        if edge is None:
+            break
+        nodes.append(space.target_of(edge))
+    return nodes, mixture
 
 
 def _key(space: PlanSpace, node: int) -> str:

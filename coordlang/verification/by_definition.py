@@ -62,7 +62,7 @@ def verify(partition: Partition, spaces: Sequence[PlanSpace]) -> Verdict:
 def _explain(
     space: PlanSpace, partition: Partition, check: _Check, trail: Trail
 ) -> Miscoordination:
-    first_plan = [trail.start, *(int(space.target[step[0]]) for step in trail.edges)]
+    first_plan = space.nodes_on(trail.start, [step[0] for step in trail.edges])
     words = sentence(int(check.word[node]) for node in first_plan)
     return describe_failure(space, trail, tuple(partition.words[w] for w in words))
 
@@ -143,13 +143,10 @@ class _View:
         degrees: list[Ints] = []
         found: list[Ints] = []
         number = 0
-        sources = space.sources
-        for span in space.layers:
-            low, high = int(space.first[span.start]), int(space.first[span.stop])
-            move = (
-                space.labels[low:high, robot].astype(np.int64) * size + of[space.target[low:high]]
-            )
-            source = sources[low:high] - span.start
+        for layer, span in enumerate(space.layers):
+            below = space.layer_edges(layer)
+            move = space.robot_labels(robot, below.edges) * size + of[below.target]
+            source = below.source - span.start
             pairs, _ = unique_rows(np.column_stack((source, move)).astype(np.uint64))
             degree = np.bincount(pairs[:, 0].astype(np.int64), minlength=span.stop - span.start)
             ends = np.cumsum(degree)
@@ -182,20 +179,20 @@ class _Check:
     def __init__(self, space: PlanSpace, word: Ints) -> None:
         self.space = space
         self.word = word
-        self.robots = space.labels.shape[1]
+        self.robots = space.robots
         self._failed = len(space)  # in place of y
         self._views = [_View.of_robot(space, robot, word) for robot in range(self.robots)]
         self._leads = _Leads()
         # A mixture is looked up robot by robot: (number of the labels so far, label) has a number
         # of its own.
         self._radix = [
-            int(space.labels[:, robot].max(initial=0)) + 1 for robot in range(self.robots)
+            int(space.robot_labels(robot).max(initial=0)) + 1 for robot in range(self.robots)
         ]
         self._names: list[Ints] = []
-        name = np.zeros(len(space.labels), np.int64)
+        name = np.zeros(len(space.targets()), np.int64)
         for robot in range(self.robots):
             different, name = np.unique(
-                name * self._radix[robot] + space.labels[:, robot], return_inverse=True
+                name * self._radix[robot] + space.robot_labels(robot), return_inverse=True
             )
             self._names.append(different)
         self._edge_key = space.sources * (len(self._names[-1]) + 1) + name
@@ -278,15 +275,14 @@ class _Check:
         space, view = self.space, self._views[robot]
         edges = []
         for move in moves:
-            own = range(int(space.first[node]), int(space.first[node + 1]))
             wanted = int(view.label[move]), int(view.child[move])
             edge = next(
                 e
-                for e in own
-                if (int(space.labels[e, robot]), int(view.of[space.target[e]])) == wanted
+                for e in space.out_edges(node)
+                if (space.labels_of(e)[robot], int(view.of[space.target_of(e)])) == wanted
             )
             edges.append(edge)
-            node = int(space.target[edge])
+            node = space.target_of(edge)
         return edges
 
     def _with_starts(self, table: Ints, starts: Ints, layer: int) -> Ints:
@@ -354,4 +350,4 @@ class _Check:
         key = np.where((y == self._failed) | (name < 0), -1, y * (len(self._names[-1]) + 1) + name)
         found = np.minimum(np.searchsorted(self._edge_sorted, key), len(self._edge_sorted) - 1)
         hit = self._edge_sorted[found] == key
-        return np.where(hit, self.space.target[self._edge_order[found]], self._failed)
+        return np.where(hit, self.space.targets(self._edge_order[found]), self._failed)

@@ -75,12 +75,7 @@ def _from(space: PlanSpace, starts: Ints) -> PlanSpace:
 
 def _overlap_after(space: PlanSpace, several: Bools) -> Bools:
     """For each node whether a plan from it passes through a state with several words."""
-    found: Bools = several[space.state]
-    source = space.sources
-    for span in space.layers:
-        low, high = int(space.first[span.start]), int(space.first[span.stop])
-        found[source[low:high][found[space.target[low:high]]]] = True
-    return found
+    return space.ancestors(several[space.state])
 
 
 class _Check:
@@ -89,9 +84,8 @@ class _Check:
     def __init__(self, space: PlanSpace, words: Sequence[frozenset[int]]) -> None:
         self._space = space
         self._words = [words[s] for s in space.state.tolist()]
-        self._first, self._target = space.first.tolist(), space.target.tolist()
-        self._labels: list[tuple[int, ...]] = [tuple(row) for row in space.labels.tolist()]
-        self._robots = space.labels.shape[1]
+        self._target: list[int] = space.targets().tolist()
+        self._robots = space.robots
         #: Nodes walked.
         self.nodes = 0
 
@@ -114,9 +108,6 @@ class _Check:
                 return describe_failure(self._space, trail, tuple(names[w] for w in tried[0]))
         return None
 
-    def _edges(self, node: int) -> range:
-        return range(self._first[node], self._first[node + 1])
-
     def _sets(self, start: int) -> list[frozenset[Sentence]]:
         """The sets of sentences that the plans of a task have, each once."""
         layer: set[tuple[int, frozenset[Sentence]]]
@@ -124,7 +115,7 @@ class _Check:
         while self._space.layer[next(iter(layer))[0]] > 0:
             after: set[tuple[int, frozenset[Sentence]]] = set()
             for node, begun in layer:
-                for edge in self._edges(node):
+                for edge in self._space.out_edges(node):
                     target = self._target[edge]
                     longer = frozenset(
                         b if b[-1] == w else (*b, w) for b in begun for w in self._words[target]
@@ -165,7 +156,7 @@ class _Check:
         for node, own in zip(plans, places, strict=True):
             good = [
                 edge
-                for edge in self._edges(node)
+                for edge in self._space.out_edges(node)
                 if self._places(own, self._target[edge], sentence)
             ]
             combined = [(*edges, edge) for edges in combined for edge in good]
@@ -185,10 +176,9 @@ class _Check:
         """Where each robot's own part leads from ``y``; -1 where that is no optimal plan."""
         if y < 0:
             return -1
-        labels = tuple(self._labels[edge][robot] for robot, edge in enumerate(edges))
-        return next(
-            (self._target[edge] for edge in self._edges(y) if self._labels[edge] == labels), -1
-        )
+        labels = [self._space.labels_of(edge)[robot] for robot, edge in enumerate(edges)]
+        edge = self._space.edge_with(y, labels)
+        return -1 if edge is None else self._target[edge]
 
     def _count(self, nodes: int) -> None:
         self.nodes += nodes

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +41,7 @@ class EdgeIndex:
             prefix = np.cumsum(fresh) - 1
         return cls(tuple(radix), tuple(keys))
 
-    def follow(self, robot: int, prefix: Ints, label: NDArray[np.int32]) -> Ints:
+    def follow(self, robot: int, prefix: Ints, label: NDArray[np.integer[Any]]) -> Ints:
         """The prefixes one robot further; -1 where there is none (and where ``prefix`` is -1)."""
         keys, size = self.keys[robot], self.radix[robot]
         if len(keys) == 0:

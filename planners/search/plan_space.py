@@ -180,9 +180,9 @@ class PlanSpace:
         """The number of edges out of each node."""
         return np.diff(self.first)
 
-    def targets(self, edges: Ints) -> Ints:
-        """The nodes that these edges lead to."""
-        found: Ints = self.target[edges]
+    def targets(self, edges: Ints | None = None) -> Ints:
+        """The nodes that these edges (None: all) lead to."""
+        found: Ints = self.target if edges is None else self.target[edges]
         return found
 
     def robot_labels(self, robot: int, edges: Ints | slice | None = None) -> Ints:
