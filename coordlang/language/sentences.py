@@ -1,4 +1,4 @@
-"""The sentences of a task: the plans that each leaves open, and what it asks of each robot."""
+"""The sentences of a task: the plans that each leaves open, and what it demands of each robot."""
 
 from __future__ import annotations
 

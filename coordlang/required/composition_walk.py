@@ -5,7 +5,7 @@ of ``pi_i``, step by step - is not an optimal plan (the paper, section 3; for tw
 the two recombinations is not).  The walk goes through n plans in step and carries the state that
 the mixture has reached: nodes ``(x_1 .. x_n, y)``.  An edge of it *fails* when the mixed joint
 action is not an edge of the plan space in ``y``.  All starts and goals walk at once, layer by
-layer, in numpy.
+layer, in numpy.  Proposition 2 of docs/concepts.md says why this decides RC.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """First differences: where plans that introduce RC part, over all candidate tasks.
 
-The sets ``alpha*``, and what must be told apart.
+The sets ``alpha*`` of the paper's Theorem 3, and what must be separated: Propositions 3 and 4 of
+docs/concepts.md, Proposition 6 for more than two robots.
 """
 
 from __future__ import annotations

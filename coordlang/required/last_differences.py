@@ -6,7 +6,8 @@ Each tuple of plans that introduce RC has a *first difference* ``alpha = (p; s_1
 shared state and the next ones, and a *last difference* ``beta = (t_1 .. t_n; q)``, or ends in
 different goal states.  A partition is a coordination language if for every such tuple some two
 different ``s_i, s_j`` and ``p`` lie in three different words, or some two different ``t_i, t_j``
-and ``q`` do, or two of the different goal states lie in different words (docs/concepts.md).
+and ``q`` do, or two of the different goal states lie in different words (Propositions 5 and 6 of
+docs/concepts.md).
 
 The relation of all alphas with all betas is written down only where it is small
 (`SeparationWalk.every`).  Else the composition walk is kept, and asked for pairs that a partition

@@ -4,7 +4,7 @@ Shares the joint model and the plan spaces with the builders, nothing else.  Wal
 in step and carries ``(x_1 .. x_n, y or failed)`` and the *leads*: the words by which the sentence
 of plan 1 is ahead of that of plan i, or behind it (one must be a prefix of the other, else the
 sentences differ for good).  A violation is a walk that ends failed with all leads empty: n plans
-with one sentence whose mixture is no optimal plan.
+with one sentence whose mixture is no optimal plan (Proposition 9 of docs/concepts.md).
 """
 
 from __future__ import annotations

@@ -7,7 +7,8 @@ robot i and the others: the plans are then cells of a table, rows the parts of r
 parts of all others, and an RC-free set of cells lies in a *box*, some rows times some columns, all
 of whose cells are optimal plans.  So a sentence that plan x has leaves at most m(x) plans open, the
 number of cells of the largest box with x in it (for any choice of i), and E is at most the average
-of m(x) over the plans of the task, whatever the language and its number of words.
+of m(x) over the plans of the task, whatever the language and its number of words (Proposition 10
+of docs/concepts.md).
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""The paper's approximation: fill a word with every state that still fits, then the next word."""
+"""The paper's approximation: fill a word with every state that still fits, then the next word.
+
+Algorithm 1 of the paper; that it gives a language is the alpha part of Theorem 3 (Proposition 4 of
+docs/concepts.md).
+"""
 
 from __future__ import annotations
 

@@ -4,7 +4,8 @@ Loop for K words: find a partition that satisfies all clauses so far; look for p
 whose mixture fails; each such tuple gives a clause that every language must satisfy
 (`coordlang.language.warping`).  No partition left: K words do not suffice.  No counterexample left:
 a language.  Numbers of words are tried from below, and from above where that takes long, with the
-same clauses, until the two meet.
+same clauses, until the two meet.  The result is least among partitions (the paper's ``D_MinW+``);
+Proposition 8 of docs/concepts.md allows for symmetries.
 """
 
 from __future__ import annotations

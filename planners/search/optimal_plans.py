@@ -1,4 +1,7 @@
-"""All optimal plans of tasks: search forward, then back along optimal edges."""
+"""All optimal plans of tasks: search forward, then back along optimal edges.
+
+The set ``Pi(I, G)`` of the paper, as the paths of a graph (Proposition 1 of docs/concepts.md).
+"""
 
 from __future__ import annotations
 

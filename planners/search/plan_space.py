@@ -2,7 +2,7 @@
 
 Costs are lexicographic, makespan first: with ``d(s)`` the cost from ``s`` to the goal, the optimal
 plans from ``I`` are exactly the paths of edges ``s -> t`` with ``d(s) = c(edge) + d(t)``.  All of
-them have the same length.
+them have the same length (Proposition 1 of docs/concepts.md).
 """
 
 from __future__ import annotations

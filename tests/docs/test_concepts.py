@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pkgutil
+import re
 from itertools import product
 
 from coordlang.required.miscoordination import inseparable, miscoordination
@@ -12,7 +13,7 @@ from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
-from tests.support.pages import DOCS, code, rows, sections
+from tests.support.pages import DOCS, ROOT, code, prose, rows, sections
 
 
 def joint_space(
@@ -130,3 +131,22 @@ def test_names_of_the_table_exist() -> None:
     assert len(names) >= len(table)
     for name in names:
         assert pkgutil.resolve_name(name)
+
+
+def test_propositions_that_docstrings_cite_are_there() -> None:
+    page = prose(DOCS / "concepts.md")
+    real = {
+        int(number) for number in re.findall(r"^\*\*Proposition (\d+)\.?\*\*", page, re.MULTILINE)
+    }
+    cited = {
+        int(number)
+        for package in ("planners", "coordlang")
+        for path in (ROOT / package).rglob("*.py")
+        for found in re.findall(
+            r"Propositions? ([\d, and]+)\s+of\s+docs/concepts", path.read_text()
+        )
+        for number in re.findall(r"\d+", found)
+    }
+    assert real == set(range(1, len(real) + 1))
+    assert len(cited) > 5
+    assert cited <= real
