@@ -1,7 +1,8 @@
-"""The command line in this process: its exit code, output and messages."""
+"""The command line: in this process, and as a process of its own."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -16,3 +17,16 @@ class Outcome:
 
 
 Command = Callable[..., Outcome]
+
+#: Ctrl-C is heard even where this process ignores it, as jobs of a shell and under nohup do.
+_MAIN = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from coordlang.cli import main
+main()
+"""
+
+
+def own_process(*arguments: object) -> list[str]:
+    """The program and arguments that run ``coordlang ..`` as a process of its own."""
+    return [sys.executable, "-c", _MAIN, *map(str, arguments)]

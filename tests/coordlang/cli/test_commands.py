@@ -16,7 +16,7 @@ from planners.check.validate import validate
 from planners.loading import load
 from planners.pddl.robots import RobotSelection, find_team
 from planners.search.plan_file import read_plans
-from tests.support.command import Command
+from tests.support.command import Command, own_process
 from tests.support.domains import DOMAINS, ROOT
 
 GRID = DOMAINS / "grid"
@@ -191,7 +191,7 @@ def test_inseparable_plans(coordlang: Command, tmp_path: Path) -> None:
 
 def in_a_process(arguments: list[str], seed: str) -> bytes:
     done = subprocess.run(
-        [sys.executable, "-c", "from coordlang.cli import main; main()", *arguments],
+        own_process(*arguments),
         capture_output=True,
         env={**os.environ, "PYTHONHASHSEED": seed},
         check=True,

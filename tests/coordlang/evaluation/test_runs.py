@@ -8,7 +8,6 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from coordlang.evaluation.lab.recipe import Settings
 from coordlang.evaluation.lab.results import Results
 from coordlang.evaluation.lab.runner import Progress, UnitFailed, run
 from planners.errors import BadInput, UsageError
-from tests.support.command import Command
+from tests.support.command import Command, own_process
 from tests.support.domains import DOMAINS
 
 GAME, COMMUNICATION = RECIPES["game"], RECIPES["communication"]
@@ -99,21 +98,11 @@ def test_other_parameters_are_other_results(finished: Path, tmp_path: Path) -> N
 
 
 def start(folder: Path, *arguments: str) -> subprocess.Popen[bytes]:
-    call = [
-        "evaluate",
-        "game",
-        "--quick",
-        "--samples",
-        "2",
-        "--results",
-        str(folder),
-        "--domains",
-        str(DOMAINS),
-        *arguments,
-    ]
-    code = f"import sys; sys.argv[1:] = {call!r}; from coordlang.cli import main; main()"
+    options = ("--quick", "--samples", "2", "--results", folder, "--domains", DOMAINS)
     return subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        own_process("evaluate", "game", *options, *arguments),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
     )
 
 

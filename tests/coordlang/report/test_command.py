@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from coordlang.report import data
 from tests.coordlang.report.conftest import data_of
-from tests.support.command import Command
+from tests.support.command import Command, own_process
 from tests.support.domains import DOMAINS
 
 FILES = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
@@ -36,16 +35,7 @@ def test_the_same_input_gives_the_same_bytes_in_other_processes(
     for seed in ("1", "2"):
         page = tmp_path / f"{seed}.html"
         done = subprocess.run(
-            [
-                sys.executable,
-                "-c",
-                "from coordlang.cli import main; main()",
-                "report",
-                language,
-                *FILES,
-                "-o",
-                page,
-            ],
+            own_process("report", language, *FILES, "-o", page),
             env={**os.environ, "PYTHONHASHSEED": seed},
             check=False,
             capture_output=True,

@@ -39,7 +39,7 @@ from planners.joint.model import show
 from planners.pddl import read_domain, read_problem
 from planners.search.plans import Plan, Plans
 from planners.search.reachable import explore
-from tests.support.command import Command
+from tests.support.command import Command, own_process
 from tests.support.domains import DOMAINS
 from tests.support.naive_classical import optimal_plans
 from tests.support.random_chores import random_chores
@@ -380,7 +380,7 @@ def test_the_export_does_not_depend_on_hashes(
         folder = tmp_path / seed
         arguments = ["export", minimal, *t_map, SENTENCE, "--limit", "0", "-o", folder]
         subprocess.run(
-            [sys.executable, "-c", "from coordlang.cli import main; main()", *arguments],
+            own_process(*arguments),
             env={**os.environ, "PYTHONHASHSEED": seed},
             check=True,
         )
