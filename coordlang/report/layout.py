@@ -38,7 +38,7 @@ def graph_layout(number: int, links: Sequence[tuple[int, int]]) -> Floats:
     Returns
     -------
     array (number, 2)
-        Linked nodes are about 1 apart, the longer axis lies along x, no coordinate is negative.
+        Linked nodes are about 1 apart, the longer axis lies along x, the least coordinates are 0.
     """
     if number <= 1:
         return np.zeros((number, 2))

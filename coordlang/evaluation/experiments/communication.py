@@ -1,4 +1,4 @@
-"""How much shorter a sentence is than the plan that it stands for."""
+"""How much shorter a sentence is than the plan that it describes."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from coordlang.evaluation.lab.recipe import (
 )
 from coordlang.evaluation.lab.statistics import rounded_mean
 from coordlang.evaluation.material.languages import TITLES, language_for
-from coordlang.evaluation.material.method_comparison import Compared, compared_units
+from coordlang.evaluation.material.method_comparison import Comparison, comparison_units
 from coordlang.evaluation.material.paper import DIFFERING, SAVING_ALL, SAVING_DIFFERING
-from coordlang.evaluation.material.sentence_counts import (
+from coordlang.evaluation.material.sentence_statistics import (
     MOST_LISTED,
-    SentenceCounts,
-    sentence_counts_in,
+    SentenceStatistics,
+    candidate_statistics,
 )
-from coordlang.evaluation.material.state_orders import NATURAL, greedy_in_orders
+from coordlang.evaluation.material.state_orders import SYSTEMATIC, greedy_partitions
 from coordlang.evaluation.material.suite import ROW, WORLDS
 from coordlang.language.flexibility import flexibility
 
@@ -36,19 +36,18 @@ SHOWN = 100
 
 
 def units(settings: Settings) -> list[Unit]:
-    # The most flexible language takes long, and is kept: `flexibility`, which starts sooner, builds
-    # it.
-    """The pieces of work, with all their parameters."""
-    return compared_units("communication", settings, effort=1.5, flexible=1.5)
+    """List a unit for each method and world, and one for the greedy method in other orders."""
+    # The most flexible language takes long; `flexibility`, which starts sooner, builds it.
+    return comparison_units("communication", settings, effort=1.5, flexible=1.5)
 
 
 def run(unit: Unit, settings: Settings) -> Result:
-    """One piece of work, as JSON data."""
+    """Measure the savings of one language, or those of the greedy method in many orders."""
     world = WORLDS[unit.parameters["world"]]
     if "orders" in unit.parameters:
         candidates = world.candidates(settings.domains)
         found = {}
-        for name, words in greedy_in_orders(
+        for name, words in greedy_partitions(
             candidates, unit.parameters["orders"], unit.random(settings.seed)
         ):
             measured = flexibility(
@@ -60,12 +59,12 @@ def run(unit: Unit, settings: Settings) -> Result:
     candidates, language = language_for(world, unit.parameters["method"], settings)
     return {
         "words": len(language.words),
-        **measures(list(sentence_counts_in(candidates, language))),
+        **measures(list(candidate_statistics(candidates, language))),
     }
 
 
-def measures(tasks: Sequence[SentenceCounts]) -> Result:
-    """Savings of the first plan of each task, and what they would be for other plans.
+def measures(tasks: Sequence[SentenceStatistics]) -> Result:
+    """Return the mean savings of the tasks' first plans, and of other plans.
 
     ``differing``: tasks whose first plan's sentence is shorter than its state sequence.
     """
@@ -88,21 +87,20 @@ def measures(tasks: Sequence[SentenceCounts]) -> Result:
 
 
 def section(records: Sequence[Record]) -> Section:
-    """The results, as this section of the page."""
-    found = Compared.of(records)
+    """Render the savings by method, their distribution, and those of other domains."""
+    found = Comparison.of(records)
     row, mine = found.row, found.languages
     blocks: list[str | Figure] = [f"{_DEFINITION}{row}.", _table(mine)]
     if mine:
         blocks += [
             Figure(
                 "communication-tasks",
-                f"Plan and sentence lengths of the first {SHOWN} tasks of {row} whose sentence is "
-                "shorter",
+                f"Plan and sentence lengths of the first {SHOWN} tasks of {row} "
+                "whose sentence is shorter",
                 lambda: _first_tasks(mine),
             ),
             f"The first {SHOWN} tasks whose greedy sentence is shorter than the plan, as in the "
-            "paper's figure; below, the "
-            "savings of all tasks.",
+            "paper's figure; below, the savings of all tasks.",
             Figure(
                 "communication-savings",
                 f"Distribution of the communication saving over the tasks of {row}, by method, "
@@ -111,13 +109,13 @@ def section(records: Sequence[Record]) -> Section:
             ),
         ]
     if found.orders:
-        blocks.append(_told_orders(found.orders[0]))
+        blocks.append(_orders_text(found.orders[0]))
     if found.others:
-        blocks += ["Worlds that are no grids, all tasks:", _table(found.others, world=True)]
+        blocks += ["Domains that are not grids, all tasks:", _table(found.others, world=True)]
     return Section(tuple(blocks), _differences(row, mine, found.orders), _headlines(found))
 
 
-def _headlines(found: Compared) -> tuple[Headline, ...]:
+def _headlines(found: Comparison) -> tuple[Headline, ...]:
     results = found.greedy_and_minimal()
     if results is None:
         return ()
@@ -147,21 +145,23 @@ def _headlines(found: Compared) -> tuple[Headline, ...]:
 
 
 _DEFINITION = f"""\
-The *communication saving* of a plan is `1 - words / states`: the words of its sentence against the states that it
-passes through, one more than its joint actions. The paper's two figures, {percent(SAVING_DIFFERING)} over {DIFFERING} tasks
-and {percent(SAVING_ALL)} over all 956, agree with each other only if the tasks that do not differ save nothing, as they do
-when states are counted. *Sentence shorter* are the tasks that differ; *last plan* takes each task's last plan in place of
-the first, *any plan* the expectation over all of them, *shortest* the plan with the shortest sentence. Measured on """
+The *communication saving* of a plan is `1 - words / states`: the number of words of its sentence
+relative to the number of states that it passes through, which is one more than its joint actions.
+The paper's two values, {percent(SAVING_DIFFERING)} over {DIFFERING} tasks and \
+{percent(SAVING_ALL)} over all 956, agree with each other only if
+the tasks that do not differ save nothing, as they do when states are counted. *Sentence shorter*
+are the tasks that differ; *last plan* uses each task's last plan instead of the first, *any plan*
+the expectation over all plans, *shortest* the plan with the shortest sentence. Measured on """
 
 
 def _table(records: Sequence[Record], world: bool = False) -> str:
     rows: list[list[object]] = []
     for record in records:
         r = record.result
-        name = TITLES[record.unit.parameters["method"]]
+        name = TITLES[record.parameters["method"]]
         rows.append(
             [
-                f"{record.unit.parameters['world']}, {name}" if world else name,
+                f"{record.parameters['world']}, {name}" if world else name,
                 r["words"],
                 f"{r['differing']:,} of {r['tasks']:,}",
                 percent(r["saving_differing"]) if r["differing"] else None,
@@ -171,7 +171,7 @@ def _table(records: Sequence[Record], world: bool = False) -> str:
                 percent(r["saving_most"]),
             ]
         )
-    if not world and records and records[0].unit.parameters["world"] == ROW:
+    if not world and records and records[0].parameters["world"] == ROW:
         paper = [f"{DIFFERING} of 956", percent(SAVING_DIFFERING), percent(SAVING_ALL)]
         rows.insert(0, ["paper", 4, *paper, None, None, None])
     head = (
@@ -187,16 +187,14 @@ def _table(records: Sequence[Record], world: bool = False) -> str:
     return table(head, rows)
 
 
-def _told_orders(record: Record) -> str:
+def _orders_text(record: Record) -> str:
     found: dict[str, list[Any]] = record.result["differing_and_saving"]
-    savings = sorted(saving for name, (_, saving) in found.items() if name not in NATURAL)
-    named = ", ".join(f"{name} {percent(found[name][1])}" for name in NATURAL)
+    savings = sorted(saving for name, (_, saving) in found.items() if name not in SYSTEMATIC)
+    named = ", ".join(f"{name} {percent(found[name][1])}" for name in SYSTEMATIC)
     return (
-        f"With its states in {len(savings)} random orders, the greedy method "
-        f"saves {percent(savings[0])} to "
-        f"{percent(savings[-1])} over all tasks (median {percent(savings[len(savings) // 2])}); "
-        "in orders that an "
-        f"implementation may well have, {named}."
+        f"With the states in {len(savings)} random orders, the greedy method saves "
+        f"{percent(savings[0])} to {percent(savings[-1])} over all tasks (median "
+        f"{percent(savings[len(savings) // 2])}); in systematic orders, {named}."
     )
 
 
@@ -210,12 +208,12 @@ def _first_tasks(records: Sequence[Record]) -> Any:
     shown = differing[:SHOWN]
     series = [
         Series(
-            r.unit.parameters["method"],
-            TITLES[r.unit.parameters["method"]],
+            r.parameters["method"],
+            TITLES[r.parameters["method"]],
             [r.result["first_words"][n] for n in shown],
         )
         for r in records
-        if r.unit.parameters["method"] in ("greedy", "minimal")
+        if r.parameters["method"] in ("greedy", "minimal")
     ]
     return per_task([reference["states"][n] for n in shown], series, "length (states; words)")
 
@@ -223,9 +221,9 @@ def _first_tasks(records: Sequence[Record]) -> Any:
 def _savings(records: Sequence[Record]) -> Any:
     panels = []
     for record in records:
-        r, method = record.result, record.unit.parameters["method"]
+        r, method = record.result, record.parameters["method"]
         savings = [100 * (1 - w / s) for s, w in zip(r["states"], r["first_words"], strict=True)]
-        paper = 100 * SAVING_ALL if record.unit.parameters["world"] == ROW else None
+        paper = 100 * SAVING_ALL if record.parameters["world"] == ROW else None
         panels.append(
             Panel(
                 method, f"{TITLES[method]} ({r['words']} words)", savings, 100 * r["saving"], paper
@@ -237,31 +235,26 @@ def _savings(records: Sequence[Record]) -> Any:
 
 
 def _differences(row: str, records: Sequence[Record], orders: Sequence[Record]) -> tuple[str, ...]:
-    greedy = next((r.result for r in records if r.unit.parameters["method"] == "greedy"), None)
+    greedy = next((r.result for r in records if r.parameters["method"] == "greedy"), None)
     if row != ROW or greedy is None:
         return ()
     text = (
         f"**Communication.** The paper saves {percent(SAVING_ALL)} over all tasks of {ROW}, our "
-        "greedy language "
-        f"{percent(greedy['saving'])}. The figure depends on the order in which the greedy method "
-        "tries the states and on "
-        "which plan is called the first, and the paper's are not known."
+        f"greedy language {percent(greedy['saving'])}. The value depends on the order in which the "
+        "greedy method tries the states and on which plan is the first; the paper does not give "
+        "them."
     )
     if orders:
         savings = [saving for _, saving in orders[0].result["differing_and_saving"].values()]
-        reached = (
-            "the paper's is among them"
-            if min(savings) <= SAVING_ALL <= max(savings)
-            else "none gives the paper's"
-        )
+        inside = min(savings) <= SAVING_ALL <= max(savings)
+        reached = "the paper's value is in this range" if inside else "none gives the paper's value"
         text += (
-            f" {len(savings)} orders give {percent(min(savings))} to {percent(max(savings))} "
-            f"for first plans, {reached}."
+            f" {len(savings)} orders give {percent(min(savings))} to {percent(max(savings))} for "
+            f"first plans; {reached}."
         )
     return (
-        f"{text} The last plans in our order save {percent(greedy['saving_last'])}, the plans "
-        "with the shortest sentences "
-        f"{percent(greedy['saving_most'])}.",
+        f"{text} The last plans in our order save {percent(greedy['saving_last'])}, the plans with "
+        f"the shortest sentences {percent(greedy['saving_most'])}.",
     )
 
 

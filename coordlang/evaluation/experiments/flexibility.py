@@ -1,4 +1,4 @@
-"""How many plans a listener may still choose from."""
+"""How many plans a sentence leaves open."""
 
 from __future__ import annotations
 
@@ -19,30 +19,30 @@ from coordlang.evaluation.lab.recipe import (
 )
 from coordlang.evaluation.lab.statistics import rounded_mean
 from coordlang.evaluation.material.languages import TITLES, language_for
-from coordlang.evaluation.material.method_comparison import Compared, compared_units
+from coordlang.evaluation.material.method_comparison import Comparison, comparison_units
 from coordlang.evaluation.material.paper import OPEN_ALL, OPEN_SEVERAL, SEVERAL
-from coordlang.evaluation.material.sentence_counts import (
+from coordlang.evaluation.material.sentence_statistics import (
     MOST_LISTED,
-    SentenceCounts,
-    sentence_counts_in,
+    SentenceStatistics,
+    candidate_statistics,
 )
-from coordlang.evaluation.material.state_orders import NATURAL, greedy_in_orders
+from coordlang.evaluation.material.state_orders import SYSTEMATIC, greedy_partitions
 from coordlang.evaluation.material.suite import ROW, WORLDS
 from coordlang.language.flexibility import flexibility
 
 
 def units(settings: Settings) -> list[Unit]:
-    """The pieces of work, with all their parameters."""
-    return compared_units("flexibility", settings, effort=2.0, flexible=60.0)
+    """List a unit for each method and world, and one for the greedy method in other orders."""
+    return comparison_units("flexibility", settings, effort=2.0, flexible=60.0)
 
 
 def run(unit: Unit, settings: Settings) -> Result:
-    """One piece of work, as JSON data."""
+    """Measure the plans that one language leaves open, or the greedy method in many orders."""
     world = WORLDS[unit.parameters["world"]]
     if "orders" in unit.parameters:
         candidates = world.candidates(settings.domains)
         found = {}
-        for name, words in greedy_in_orders(
+        for name, words in greedy_partitions(
             candidates, unit.parameters["orders"], unit.random(settings.seed)
         ):
             measured = flexibility(
@@ -56,14 +56,12 @@ def run(unit: Unit, settings: Settings) -> Result:
     candidates, language = language_for(world, unit.parameters["method"], settings)
     return {
         "words": len(language.words),
-        **measures(list(sentence_counts_in(candidates, language))),
+        **measures(list(candidate_statistics(candidates, language))),
     }
 
 
-def measures(tasks: Sequence[SentenceCounts]) -> Result:
-    """Plans left open by the sentence of each task's first plan, and in expectation.
-
-    The expectation is over all its plans.
+def measures(tasks: Sequence[SentenceStatistics]) -> Result:
+    """Return the mean numbers of open plans: after first plans, last plans, and in expectation.
 
     ``several``: tasks in which the first plan's sentence leaves more than one plan open.
     """
@@ -82,27 +80,27 @@ def measures(tasks: Sequence[SentenceCounts]) -> Result:
 
 
 def section(records: Sequence[Record]) -> Section:
-    """The results, as this section of the page."""
-    found = Compared.of(records)
+    """Render the open plans by method, their distribution, and those of other domains."""
+    found = Comparison.of(records)
     row, mine = found.row, found.languages
     blocks: list[str | Figure] = [_DEFINITION.format(row=row), _table(mine)]
     if mine:
         blocks.append(
             Figure(
                 "flexibility",
-                f"Distribution over the tasks of {row} of the number of plans open after the "
-                "first plan's sentence",
+                f"Distribution over the tasks of {row} of the number of plans open after the first "
+                "plan's sentence",
                 lambda: _open(mine),
             )
         )
     if found.orders:
-        blocks.append(_told_orders(found.orders[0]))
+        blocks.append(_orders_text(found.orders[0]))
     if found.others:
-        blocks += ["Worlds that are no grids, all tasks:", _table(found.others, world=True)]
+        blocks += ["Domains that are not grids, all tasks:", _table(found.others, world=True)]
     return Section(tuple(blocks), _differences(row, mine, found.orders), _headlines(found))
 
 
-def _headlines(found: Compared) -> tuple[Headline, ...]:
+def _headlines(found: Comparison) -> tuple[Headline, ...]:
     results = found.greedy_and_minimal()
     if results is None:
         return ()
@@ -127,20 +125,21 @@ def _headlines(found: Compared) -> tuple[Headline, ...]:
 
 
 _DEFINITION = """\
-*Open* are the optimal plans that have the sentence of the first plan found, as in the paper; *several* counts the tasks
-where these are more than one. *Any plan* is the expectation when the speaker draws one of the N optimal plans uniformly,
-`sum of n_s^2 / N` over the sentences s with n_s plans each: it does not depend on the order in which plans are found.
-Measured on {row}; *optimal plans* is what no language can exceed."""
+*Open* are the optimal plans with the sentence of the first plan found, as in the paper; *several*
+counts the tasks with more than one. *Any plan* is the expectation when the speaker draws one of the
+N optimal plans uniformly, `sum of n_s^2 / N` over the sentences s with n_s plans each: it does not
+depend on the order in which plans are found. Measured on {row}; *optimal plans* is the upper bound
+for every language."""
 
 
 def _table(records: Sequence[Record], world: bool = False) -> str:
     rows: list[list[object]] = []
     for record in records:
         r = record.result
-        name = TITLES[record.unit.parameters["method"]]
+        name = TITLES[record.parameters["method"]]
         rows.append(
             [
-                f"{record.unit.parameters['world']}, {name}" if world else name,
+                f"{record.parameters['world']}, {name}" if world else name,
                 r["words"],
                 f"{r['open']:.1f}",
                 f"{r['several']:,} of {r['tasks']:,}",
@@ -150,7 +149,7 @@ def _table(records: Sequence[Record], world: bool = False) -> str:
                 f"{r['plans']:.1f}",
             ]
         )
-    if not world and records and records[0].unit.parameters["world"] == ROW:
+    if not world and records and records[0].parameters["world"] == ROW:
         rows.insert(0, ["paper", 4, OPEN_ALL, f"{SEVERAL} of 956", OPEN_SEVERAL, None, None, None])
     head = (
         "language",
@@ -165,26 +164,25 @@ def _table(records: Sequence[Record], world: bool = False) -> str:
     return table(head, rows)
 
 
-def _told_orders(record: Record) -> str:
+def _orders_text(record: Record) -> str:
     found: dict[str, list[float]] = record.result["open_and_expected"]
-    random = [pair for name, pair in found.items() if name not in NATURAL]
+    random = [pair for name, pair in found.items() if name not in SYSTEMATIC]
     first, expected = (sorted(column) for column in zip(*random, strict=True))
     middle = len(random) // 2
-    named = ", ".join(f"{name} {found[name][0]:.1f}" for name in NATURAL)
+    named = ", ".join(f"{name} {found[name][0]:.1f}" for name in SYSTEMATIC)
     return (
-        f"With its states in {len(random)} random orders, the greedy method leaves {first[0]:.1f} "
-        f"to {first[-1]:.1f} plans "
-        f"open (median {first[middle]:.1f}), in expectation {expected[0]:.1f} "
-        f"to {expected[-1]:.1f} (median "
-        f"{expected[middle]:.1f}); in orders that an implementation may well have, {named}."
+        f"With the states in {len(random)} random orders, the greedy method leaves {first[0]:.1f} "
+        f"to {first[-1]:.1f} plans open (median {first[middle]:.1f}), in expectation "
+        f"{expected[0]:.1f} to {expected[-1]:.1f} (median {expected[middle]:.1f}); in systematic "
+        f"orders, {named}."
     )
 
 
 def _open(records: Sequence[Record]) -> Any:
     panels = []
     for record in records:
-        r, method = record.result, record.unit.parameters["method"]
-        paper = OPEN_ALL if record.unit.parameters["world"] == ROW else None
+        r, method = record.result, record.parameters["method"]
+        paper = OPEN_ALL if record.parameters["world"] == ROW else None
         panels.append(
             Panel(method, f"{TITLES[method]} ({r['words']} words)", r["first"], r["open"], paper)
         )
@@ -195,22 +193,20 @@ def _open(records: Sequence[Record]) -> Any:
 
 
 def _differences(row: str, records: Sequence[Record], orders: Sequence[Record]) -> tuple[str, ...]:
-    greedy = next((r.result for r in records if r.unit.parameters["method"] == "greedy"), None)
+    greedy = next((r.result for r in records if r.parameters["method"] == "greedy"), None)
     if row != ROW or greedy is None:
         return ()
     spread = ""
     if orders:
         first = [pair[0] for pair in orders[0].result["open_and_expected"].values()]
         spread = (
-            f" The order of the states decides: {len(first)} orders give {min(first):.1f} "
-            f"to {max(first):.1f}."
+            f" It depends on the order of the states: {len(first)} orders give {min(first):.1f} to "
+            f"{max(first):.1f}."
         )
     return (
-        f"**Flexibility.** The paper leaves {OPEN_ALL} plans open on average over all tasks "
-        f"of {ROW} and {OPEN_SEVERAL} over "
-        f"{SEVERAL}, our greedy language {greedy['open']:.1f} and {greedy['open_several']:.1f} "
-        f"over {greedy['several']}."
-        f"{spread}",
+        f"**Flexibility.** The paper leaves {OPEN_ALL} plans open on average over all tasks of "
+        f"{ROW} and {OPEN_SEVERAL} over {SEVERAL}, our greedy language {greedy['open']:.1f} and "
+        f"{greedy['open_several']:.1f} over {greedy['several']}.{spread}",
     )
 
 

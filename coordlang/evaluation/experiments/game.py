@@ -1,9 +1,7 @@
-"""A coordination game: the speaker proposes until the listener accepts.
-
-It proposes plans in one game, sentences in the other.
+"""A coordination game: the speaker proposes plans, or sentences, until the listener accepts.
 
 The listener likes ``k`` of the task's optimal plans, drawn at random.  It accepts a plan that it
-likes, and a sentence that some plan which it likes has.  The speaker does not know them and
+likes, and a sentence that some plan which it likes has.  The speaker does not know these plans and
 proposes nothing twice.
 """
 
@@ -32,7 +30,7 @@ from coordlang.evaluation.lab.recipe import (
 )
 from coordlang.evaluation.lab.statistics import mean_interval
 from coordlang.evaluation.material.languages import TITLES, language_for
-from coordlang.evaluation.material.sentence_counts import sentence_counts_in
+from coordlang.evaluation.material.sentence_statistics import candidate_statistics
 from coordlang.evaluation.material.suite import OTHERS, WORLDS
 
 #: The row of Table 1 that the paper plays on.
@@ -43,7 +41,7 @@ LIKED = (1, 2, 3, 4, 5)
 
 
 def units(settings: Settings) -> list[Unit]:
-    """The pieces of work, with all their parameters."""
+    """List a unit for each method and world."""
     found = []
     for name in (ROW, *(world.name for world in OTHERS[: 1 if settings.quick else None])):
         for method in METHODS:
@@ -53,45 +51,58 @@ def units(settings: Settings) -> list[Unit]:
 
 
 def run(unit: Unit, settings: Settings) -> Result:
-    """One piece of work, as JSON data."""
+    """Play the games of one language and world, and compute their expectations."""
     world = WORLDS[unit.parameters["world"]]
     candidates, language = language_for(world, unit.parameters["method"], settings)
     # A task's game depends on its numbers of plans alone; a language makes few different ones.
     tasks = [
         tuple(sorted(task.plans.values(), reverse=True))
-        for task in sentence_counts_in(candidates, language)
+        for task in candidate_statistics(candidates, language)
     ]
-    result: Result = {"words": len(language.words), "tasks": len(tasks), "liked": list(LIKED)}
-    different = Counter(tasks)
-    exact: dict[str, list[float]] = {"plan": [], "sentence": [], "widest": []}
-    played: dict[str, list[list[int]]] = {"plan": [], "sentence": []}
-    for liked in LIKED:
-        sums = [Fraction(0)] * 3
-        for sizes, number in different.items():
-            k = min(liked, sum(sizes))
-            values = (
-                expected_for_plans(sum(sizes), k),
-                expected_for_sentences(sizes, k),
-                expected_widest_first(sizes, k),
-            )
-            sums = [total + number * value for total, value in zip(sums, values, strict=True)]
-        for name, total in zip(exact, sums, strict=True):
-            exact[name].append(round(float(total / len(tasks)), 6))
-        games = []
-        for number in range(settings.samples):
-            random = Random(
-                f"{settings.seed} {world.name} {liked} {number}"
-            )  # the same games for every language
-            games.append(play(random.choice(tasks), liked, random))
-        played["plan"].append([plan for plan, _ in games])
-        played["sentence"].append([sentence for _, sentence in games])
-    return result | {"exact": exact, "played": played}
+    # The same games for every language.
+    randoms = {
+        liked: [
+            Random(f"{settings.seed} {world.name} {liked} {n}") for n in range(settings.samples)
+        ]
+        for liked in LIKED
+    }
+    games = [
+        [play(random.choice(tasks), liked, random) for random in randoms[liked]] for liked in LIKED
+    ]
+    exact = [_expectations(Counter(tasks), liked) for liked in LIKED]
+    return {
+        "words": len(language.words),
+        "tasks": len(tasks),
+        "liked": list(LIKED),
+        "exact": {
+            name: [values[n] for values in exact]
+            for n, name in enumerate(("plan", "sentence", "widest"))
+        },
+        "played": {
+            name: [[game[n] for game in one] for one in games]
+            for n, name in enumerate(("plan", "sentence"))
+        },
+    }
+
+
+def _expectations(tasks: Counter[tuple[int, ...]], liked: int) -> list[float]:
+    """The mean expectations over tasks: plans, sentences, sentences with most plans first."""
+    sums = [Fraction(0)] * 3
+    for sizes, number in tasks.items():
+        k = min(liked, sum(sizes))
+        values = (
+            expected_for_plans(sum(sizes), k),
+            expected_for_sentences(sizes, k),
+            expected_widest_first(sizes, k),
+        )
+        sums = [total + number * value for total, value in zip(sums, values, strict=True)]
+    return [round(float(total / tasks.total()), 6) for total in sums]
 
 
 def play(sizes: Sequence[int], liked: int, random: Random) -> tuple[int, int]:
-    """Proposals of one game each, with plans and with sentences.
+    """Play one game with plans and one with sentences; the numbers of proposals.
 
-    ``sizes``: the numbers of plans of the sentences.
+    ``sizes`` are the numbers of plans of the sentences, ``liked`` the number of liked plans.
     """
     owner = [sentence for sentence, number in enumerate(sizes) for _ in range(number)]
     likes = set(random.sample(range(len(owner)), min(liked, len(owner))))
@@ -104,20 +115,19 @@ def play(sizes: Sequence[int], liked: int, random: Random) -> tuple[int, int]:
 
 
 def expected_for_plans(plans: int, liked: int) -> Fraction:
-    """Expected proposals until one of ``liked`` plans among ``plans`` is proposed, in random order.
+    """Return the expected proposals until one of k liked plans among N is proposed.
 
-    (N + 1) / (k + 1).
+    In random order it is (N + 1) / (k + 1).
     """
     return Fraction(plans + 1, liked + 1)
 
 
 def expected_for_sentences(sizes: Sequence[int], liked: int) -> Fraction:
-    """The same for sentences in random order.
+    """Return the expected proposals of sentences in random order.
 
-    With m of D sentences acceptable it is (D + 1) / (m + 1).
-
-    How many of the sets of ``liked`` plans meet exactly m sentences is the coefficient of ``x^liked
-    y^m`` in the product of ``1 + y ((1 + x)^n - 1)`` over the sentences with n plans each.
+    With m of D sentences acceptable it is (D + 1) / (m + 1).  How many of the sets of ``liked``
+    plans meet exactly m sentences is the coefficient of ``x^liked y^m`` in the product of ``1 + y
+    ((1 + x)^n - 1)`` over the sentences with n plans each.
     """
     ways = {(0, 0): 1}
     for n in sizes:
@@ -136,9 +146,9 @@ def expected_for_sentences(sizes: Sequence[int], liked: int) -> Fraction:
 
 
 def expected_widest_first(sizes: Sequence[int], liked: int) -> Fraction:
-    """The same for sentences that leave most plans open first.
+    """Return the expected proposals of sentences, those with most plans first.
 
-    The sum over j of the chance that the first j all fail.
+    It is the sum over j of the probability that the first j are all rejected.
     """
     left = sum(sizes)
     ways = comb(left, liked)
@@ -150,12 +160,12 @@ def expected_widest_first(sizes: Sequence[int], liked: int) -> Fraction:
 
 
 def section(records: Sequence[Record]) -> Section:
-    """The results, as this section of the page."""
+    """Render the numbers of proposals, world by world."""
     found = done(records)
     blocks: list[str | Figure] = [_DEFINITION]
-    for name in dict.fromkeys(r.unit.parameters["world"] for r in found):
-        here = [r for r in found if r.unit.parameters["world"] == name]
-        runs = here[0].unit.parameters["runs"]
+    for name in dict.fromkeys(r.parameters["world"] for r in found):
+        here = [r for r in found if r.parameters["world"] == name]
+        runs = here[0].parameters["runs"]
         blocks += [
             f"{name}, {here[0].result['tasks']:,} tasks, means of {runs} games and exact "
             "expectations:",
@@ -163,17 +173,17 @@ def section(records: Sequence[Record]) -> Section:
         ]
         if name == ROW:
             alt = f"Proposals until accepted on {ROW}, plans against sentences, by liked plans"
-            blocks.append(Figure("game", alt, partial(_drawn, here)))
-    return Section(
-        tuple(blocks), _differences([r for r in found if r.unit.parameters["world"] == ROW])
-    )
+            blocks.append(Figure("game", alt, partial(_figure, here)))
+    return Section(tuple(blocks), _differences([r for r in found if r.parameters["world"] == ROW]))
 
 
 _DEFINITION = """\
-The listener likes k of the task's optimal plans, drawn at random (all of them where there are fewer). The speaker, who does
-not know them, proposes plans in random order until one is accepted; or sentences in random order, accepted when some liked
-plan has the sentence; *widest first* proposes the sentences with most plans first. A task is drawn at random for each game.
-*Exact* is the expectation over tasks, liked plans and orders, in closed form: (N + 1) / (k + 1) for N plans."""
+The listener likes k of the task's optimal plans, drawn at random (all of them where there are
+fewer). The speaker, who does not know them, proposes plans in random order until one is
+accepted; or sentences in random order, accepted when some liked plan has the sentence; *widest
+first* proposes the sentences with most plans first. A task is drawn at random for each game.
+*Exact* is the expectation over tasks, liked plans and orders, in closed form: (N + 1) / (k + 1)
+for N plans."""
 
 
 def _table(records: Sequence[Record]) -> str:
@@ -181,7 +191,7 @@ def _table(records: Sequence[Record]) -> str:
     plan = records[0].result
     kinds: list[tuple[str, Result, str]] = [("plan", plan, "plan")]
     for record in records:
-        title = TITLES[record.unit.parameters["method"]]
+        title = TITLES[record.parameters["method"]]
         kinds += [
             (f"sentence, {title}", record.result, "sentence"),
             (f"{title}, widest first", record.result, "widest"),
@@ -195,7 +205,7 @@ def _table(records: Sequence[Record]) -> str:
     return table(("proposals of", *(f"k = {k}" for k in plan["liked"])), rows)
 
 
-def _drawn(records: Sequence[Record]) -> Any:
+def _figure(records: Sequence[Record]) -> Any:
     liked = records[0].result["liked"]
 
     def played(kind: str, label: str, result: Result, what: str) -> Series:
@@ -208,12 +218,12 @@ def _drawn(records: Sequence[Record]) -> Any:
             [e[1] for e in ends],
         )
 
-    runs = records[0].unit.parameters["runs"]
+    runs = records[0].parameters["runs"]
     first = records[0].result
     series = [played("plan", f"plan ({runs} games, 95 %)", first, "plan")]
     exact = [Series("plan", "plan, exact", first["exact"]["plan"])]
     for record in records:
-        method = record.unit.parameters["method"]
+        method = record.parameters["method"]
         series.append(played(method, f"sentence, {TITLES[method]}", record.result, "sentence"))
         exact.append(Series(method, f"{TITLES[method]}, exact", record.result["exact"]["sentence"]))
     return lines(
@@ -224,17 +234,16 @@ def _drawn(records: Sequence[Record]) -> Any:
 def _differences(records: Sequence[Record]) -> tuple[str, ...]:
     if not records:
         return ()
-    first = records[0].result
+    plans = records[0].result["exact"]["plan"][0]
+    sentences = ", ".join(
+        f"{record.result['exact']['sentence'][0]:.2f} sentences "
+        f"({TITLES[record.parameters['method']]})"
+        for record in records
+    )
     return (
-        "**Coordination game.** The order of the paper's proposals and the values of its figure "
-        "are not known to us; our "
-        f"expectations on {ROW} for k = 1 are {first['exact']['plan'][0]:.2f} plans against "
-        + ", ".join(
-            f"{r.result['exact']['sentence'][0]:.2f} sentences "
-            f"({TITLES[r.unit.parameters['method']]})"
-            for r in records
-        )
-        + ".",
+        "**Coordination game.** The paper does not give the order of its proposals, nor the values "
+        f"of its figure; our expectations on {ROW} for k = 1 are {plans:.2f} plans against "
+        f"{sentences}.",
     )
 
 

@@ -1,9 +1,9 @@
-"""Robust navigation: a human stands in the way, seen only once execution has started.
+"""Robust navigation: a human stands in the way, detected only once execution has started.
 
-Robots deliver in a warehouse (`coordlang.evaluation.material.warehouse`).  For all tasks of a
-delivery plans or sentences are agreed on before anybody moves.  Then a human is seen, in a random
-cell that is no corner, who stays there.  A plan fails if any robot would enter that cell.  Under a
-sentence each robot picks among its own choices.
+Robots deliver in a warehouse (`coordlang.evaluation.material.warehouse`).  For both tasks of a
+delivery they agree on plans or sentences beforehand.  Then a human is detected in a random cell
+that is no corner, and stays there.  A plan fails if any robot would enter that cell.  Under a
+sentence each robot selects among its own choices.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from coordlang.evaluation.material.suite import OTHERS, WORLDS
 from coordlang.evaluation.material.warehouse import LAYOUTS, WAREHOUSES, deliveries, listed_tasks
 
 METHODS = ("greedy", "separating", "minimal")
-#: Languages that are not found within minutes: an unfinished one would depend on the machine.
+#: Languages that take more than minutes to build: an unfinished one would depend on the machine.
 UNFINISHED = {
     *(
         (f"open {size}", layout, method)
@@ -47,48 +47,49 @@ UNFINISHED = {
 
 
 def units(settings: Settings) -> list[Unit]:
-    """The pieces of work, with all their parameters."""
-    found = []
-    for name, (world, _, _) in WAREHOUSES.items():
-        if settings.quick and name not in ("open 3x3", "ring 3x4"):
-            continue
-        for layout in LAYOUTS:
-            for method in METHODS:
-                if (name, layout, method) in UNFINISHED:
-                    continue
-                parameters = {
-                    "warehouse": name,
-                    "layout": layout,
-                    "method": method,
-                    "samples": settings.samples,
-                }
-                effort = 30.0 if name == "open 5x5" else 5.0
-                found.append(
-                    Unit("navigation", f"{name}/{layout}/{method}", parameters, world.files, effort)
-                )
+    """List a unit for each warehouse, layout and method, and for each other world and method."""
+    maps = ("open 3x3", "ring 3x4") if settings.quick else tuple(WAREHOUSES)
+    found = [
+        _warehouse_unit(name, layout, method, settings)
+        for name in maps
+        for layout in LAYOUTS
+        for method in METHODS
+        if (name, layout, method) not in UNFINISHED
+    ]
     for world in OTHERS[: 1 if settings.quick else None]:
         for method in METHODS:
             parameters = {"world": world.name, "method": method, "samples": settings.samples}
-            found.append(
-                Unit("navigation", f"{world.name}/{method}", parameters, world.files, 10.0)
-            )
+            key = f"{world.name}/{method}"
+            found.append(Unit("navigation", key, parameters, world.files, 10.0))
     return found
 
 
+def _warehouse_unit(name: str, layout: str, method: str, settings: Settings) -> Unit:
+    world, _, _ = WAREHOUSES[name]
+    parameters = {
+        "warehouse": name,
+        "layout": layout,
+        "method": method,
+        "samples": settings.samples,
+    }
+    effort = 30.0 if name == "open 5x5" else 5.0
+    return Unit("navigation", f"{name}/{layout}/{method}", parameters, world.files, effort)
+
+
 def run(unit: Unit, settings: Settings) -> Result:
-    """One piece of work, as JSON data."""
-    asked = unit.parameters
-    if "world" in asked:
-        candidates, language = language_for(WORLDS[asked["world"]], asked["method"], settings)
+    """Measure the success rates of plans and sentences, exactly and in random trials."""
+    parameters = unit.parameters
+    method = parameters["method"]
+    if "world" in parameters:
+        candidates, language = language_for(WORLDS[parameters["world"]], method, settings)
         trials = subaction_trials(candidates, language)
     else:
-        world, rows, columns = WAREHOUSES[asked["warehouse"]]
-        every = deliveries(rows, columns, asked["layout"])
-        candidates, language = language_for(world, asked["method"], settings, listed_tasks(every))
+        world, rows, columns = WAREHOUSES[parameters["warehouse"]]
+        every = deliveries(rows, columns, parameters["layout"])
+        candidates, language = language_for(world, method, settings, listed_tasks(every))
         trials = warehouse_trials(candidates, language, every)
-    random = Random(
-        f"{settings.seed} {unit.key.rsplit('/', 1)[0]}"
-    )  # the same draws for every language
+    # The same draws for every language.
+    random = Random(f"{settings.seed} {unit.key.rsplit('/', 1)[0]}")
     return {
         "words": len(language.words),
         "trials": len(trials.trials),
@@ -99,13 +100,13 @@ def run(unit: Unit, settings: Settings) -> Result:
 
 
 def section(records: Sequence[Record]) -> Section:
-    """The results, as this section of the page."""
+    """Render the success rates by map and method, and those on other domains."""
     found = done(records)
-    mine = [r for r in found if "warehouse" in r.unit.parameters]
-    others = [r for r in found if "world" in r.unit.parameters]
+    mine = [r for r in found if "warehouse" in r.parameters]
+    others = [r for r in found if "world" in r.parameters]
     blocks: list[str | Figure] = [_DEFINITION]
     for layout in LAYOUTS:
-        here = [r for r in mine if r.unit.parameters["layout"] == layout]
+        here = [r for r in mine if r.parameters["layout"] == layout]
         if not here:
             continue
         blocks += [
@@ -114,8 +115,9 @@ def section(records: Sequence[Record]) -> Section:
             Figure(
                 f"navigation-{layout}",
                 f"Success rates of deliveries {layout} the warehouse under an agreed plan and "
-                "under sentences, by map",
-                partial(_drawn, here),
+                "under"
+                "sentences, by map",
+                partial(_figure, here),
             ),
         ]
     if others:
@@ -124,25 +126,28 @@ def section(records: Sequence[Record]) -> Section:
 
 
 _DEFINITION = """\
-Two robots on a map whose corners are storage (S1, S2, left) and dispatch (D1, D2, right). They start in random corners;
-robot i fetches at Si and brings to Di, or back. That is two tasks one after the other, both agreed on before anybody moves.
-Then a human is seen in a random cell that is no corner, and stays. The agreed plan fails if a robot would enter that cell.
-Under the sentence of the same plan each robot picks among its own choices only (what `coordlang choices` leaves it), without
-looking at the other robot or speaking again; it fails if none of its choices avoids the cell. *Exact* is over all starts,
-directions, cells and plans, where the sentences are not too many; *possible* is what robots could reach that agree anew, on
-any optimal plan. In brackets 95 % intervals (Wilson). Plan and sentence get the same draws. The map, its size and the place
-of the corners are our choice: maps are full rectangles (*open*) or their border cells (*ring*); *across* puts D1 opposite S1,
-so that the deliveries cross, *along* on the same side."""
+Two robots on a map whose corners are storage (S1, S2, left) and dispatch (D1, D2, right). They
+start in random corners; robot i fetches at Si and brings to Di, or the other way round. These
+are two tasks one after the other, and the robots agree on both beforehand. Then a human is
+detected in a random cell that is no corner, and stays. The agreed plan fails if a robot would
+enter that cell. Under the sentence of the same plan each robot selects among its own choices
+only (those of `coordlang choices`), without observing the other robot and without further
+communication; it fails if none of its choices avoids the cell. *Exact* is over all starts,
+directions, cells and plans, where there are not too many sentences; *possible* is the rate of
+robots that agree again, on any optimal plan. In brackets 95 % intervals (Wilson). Plan and
+sentence get the same draws. The maps, their sizes and the positions of the corners are our
+choice: maps are full rectangles (*open*) or their border cells (*ring*); *across* puts D1
+opposite S1, so that the deliveries cross, *along* on the same side."""
 
 _OTHERS = """\
-Worlds that are no grids. There one subaction, drawn from those that optimal plans of the task use, turns out to be impossible
-when execution starts. All tasks, one each:"""
+Domains that are not grids. There one subaction, drawn from those that optimal plans of the task
+use, becomes impossible when execution starts. All tasks, one each:"""
 
 
 def _table(records: Sequence[Record]) -> str:
     rows = []
     for record in records:
-        r, asked = record.result, record.unit.parameters
+        r, asked = record.result, record.parameters
         few, many, exact = r["few"], r["many"], r["exact"]
         rows.append(
             [
@@ -178,21 +183,13 @@ def _share(successes: int, runs: int) -> str:
     return f"{percent(successes / runs)} ({100 * low:.1f} to {100 * high:.1f})"
 
 
-def _drawn(records: Sequence[Record]) -> Any:
-    maps = list(dict.fromkeys(r.unit.parameters["warehouse"] for r in records))
-    of = {(r.unit.parameters["warehouse"], r.unit.parameters["method"]): r.result for r in records}
+def _figure(records: Sequence[Record]) -> Any:
+    maps = list(dict.fromkeys(r.parameters["warehouse"] for r in records))
+    of = {(r.parameters["warehouse"], r.parameters["method"]): r.result for r in records}
 
     def series(kind: str, label: str, method: str, what: str) -> Series:
-        found = [of.get((name, method)) for name in maps]
-        ends = [wilson(r["few"][what], r["few"]["runs"]) if r else (None, None) for r in found]
-        return Series(
-            kind,
-            label,
-            [100 * r["few"][what] / r["few"]["runs"] if r else None for r in found],
-            [100 * low if low is not None else None for low, _ in ends],
-            [100 * high if high is not None else None for _, high in ends],
-            [100 * r["exact"][what] if r and r["exact"] else None for r in found],
-        )
+        points = [_point(of.get((name, method)), what) for name in maps]
+        return Series(kind, label, *zip(*points, strict=True))
 
     shown = [series("plan", "plan", "greedy", "plan")]
     shown += [series(m, f"sentence, {TITLES[m]}", m, "sentence") for m in METHODS]
@@ -200,8 +197,18 @@ def _drawn(records: Sequence[Record]) -> Any:
     return by_category(maps, shown, f"success rate (%), {few} runs; line: 95 %")
 
 
+def _point(result: Result | None, what: str) -> tuple[float | None, ...]:
+    """A success rate in per cent, the ends of its interval, and the exact rate."""
+    if result is None:
+        return None, None, None, None
+    few, exact = result["few"], result["exact"]
+    low, high = wilson(few[what], few["runs"])
+    known = 100 * exact[what] if exact else None
+    return 100 * few[what] / few["runs"], 100 * low, 100 * high, known
+
+
 def _rate(result: Result, what: str) -> float:
-    """A success rate in per cent: exact, or of many runs where it is not known."""
+    """A success rate in per cent: exact, or of many runs if it is not known."""
     many, exact = result["many"], result["exact"]
     return 100 * float(exact[what] if exact else many[what] / many["runs"])
 
@@ -211,14 +218,11 @@ def _differences(records: Sequence[Record]) -> tuple[str, ...]:
         return ()
     gains = [_rate(r.result, "sentence") - _rate(r.result, "plan") for r in records]
     lower = [gain for gain in gains if gain < 0]
-    text = (
-        "**Robust navigation.** The paper's map and rates are not known to us, so nothing can be "
-        "compared. On our maps a "
-        f"sentence adds {min(gains):.1f} to {max(gains):.1f} points to the plan's success rate"
-    )
+    worse = f"and on {len(lower)} of {len(records)} it loses" if lower else "and never loses"
     return (
-        text
-        + (f", and on {len(lower)} of {len(records)} it loses." if lower else ", and never loses."),
+        "**Robust navigation.** The paper does not give its map and rates, so nothing can be "
+        f"compared. On our maps a sentence adds {min(gains):.1f} to {max(gains):.1f} points to the "
+        f"plan's success rate, {worse}.",
     )
 
 

@@ -30,7 +30,7 @@ METHODS = ("greedy", "separating", "minimal")
 
 
 def units(settings: Settings) -> list[Unit]:
-    """The pieces of work, with all their parameters."""
+    """List a unit for each world, heuristic and method."""
     row = QUICK_ROW if settings.quick else ROW
     found = []
     for heuristic in ("manhattan", "relaxed", "blind"):
@@ -53,16 +53,16 @@ def _unit(world: str, heuristic: str, method: str, samples: int | None) -> Unit:
 
 
 def run(unit: Unit, settings: Settings) -> Result:
-    """One piece of work, as JSON data."""
+    """Count the nodes that A* expands with one heuristic, with and without the sentences."""
     world = WORLDS[unit.parameters["world"]]
     candidates, language = language_for(world, unit.parameters["method"], settings)
-    terrain = ExpandedStates(candidates.model, language.partition(candidates.model))
-    spoken = list(languages_in_tasks(language, candidates))
+    states = ExpandedStates(candidates.model, language.partition(candidates.model))
+    tasks = list(languages_in_tasks(language, candidates))
     samples = unit.parameters["samples"]
-    if samples is not None and samples < len(spoken):
+    if samples is not None and samples < len(tasks):
         # The same tasks for every language and heuristic.
-        spoken = Random(f"{settings.seed} {world.name}").sample(spoken, samples)
-    counted = [expansions(one, unit.parameters["heuristic"], terrain) for one in spoken]
+        tasks = Random(f"{settings.seed} {world.name}").sample(tasks, samples)
+    counted = [expansions(task, unit.parameters["heuristic"], states) for task in tasks]
     alone, pruned, bounded = (list(column) for column in zip(*counted, strict=True))
     return {
         "tasks": len(counted),
@@ -77,25 +77,28 @@ def run(unit: Unit, settings: Settings) -> Result:
 
 
 def expansions(
-    spoken: TaskLanguage, heuristic: str, terrain: ExpandedStates
+    language: TaskLanguage, heuristic: str, states: ExpandedStates
 ) -> tuple[int, int, int]:
-    """Nodes expanded by A* without a sentence.
+    """Count the nodes that A* expands in one task.
 
-    With that of the plan it finds, pruning only as in the paper; and with the words still to be
-    said as a bound, too.
+    Returns
+    -------
+    tuple of int
+        Without a sentence; with the sentence of the plan found, only pruning, as in the paper; and
+        with the number of remaining words as a bound, too.
     """
-    alone = plan_under_sentence(spoken, None, heuristic, terrain)
-    pruned = plan_under_sentence(spoken, alone.words, heuristic, terrain, count_words=False)
-    bounded = plan_under_sentence(spoken, alone.words, heuristic, terrain)
+    alone = plan_under_sentence(language, None, heuristic, states)
+    pruned = plan_under_sentence(language, alone.words, heuristic, states, count_words=False)
+    bounded = plan_under_sentence(language, alone.words, heuristic, states)
     return alone.expanded, pruned.expanded, bounded.expanded
 
 
 def section(records: Sequence[Record]) -> Section:
-    """The results, as this section of the page."""
+    """Render the expanded nodes by heuristic and method, and those on other domains."""
     found = done(records)
-    row = records[0].unit.parameters["world"]
-    mine = [r for r in found if r.unit.parameters["world"] == row]
-    others = [r for r in found if r.unit.parameters["world"] != row]
+    row = records[0].parameters["world"]
+    mine = [r for r in found if r.parameters["world"] == row]
+    others = [r for r in found if r.parameters["world"] != row]
     blocks: list[str | Figure] = [_DEFINITION.format(row=row, ratio=PLANNING_RATIO), _table(mine)]
     if mine:
         blocks.append(
@@ -103,13 +106,12 @@ def section(records: Sequence[Record]) -> Section:
                 "planning-cost",
                 f"How many times fewer nodes A* expands with a sentence on {row}, by heuristic "
                 "and language",
-                lambda: _drawn(mine),
+                lambda: _figure(mine),
             )
         )
     if others:
         blocks += [
-            "Worlds that are no grids, where the Manhattan distance says nothing; tasks drawn at "
-            "random:",
+            "Domains that are not grids, without a Manhattan distance; tasks drawn at random:",
             _table(others, world=True),
         ]
     return Section(tuple(blocks), _differences(row, mine), _headlines(row, mine))
@@ -117,9 +119,9 @@ def section(records: Sequence[Record]) -> Section:
 
 def _headlines(row: str, records: Sequence[Record]) -> tuple[Headline, ...]:
     of = {
-        r.unit.parameters["method"]: r.result
+        r.parameters["method"]: r.result
         for r in records
-        if r.unit.parameters["heuristic"] == "manhattan"
+        if r.parameters["heuristic"] == "manhattan"
     }
     if row != ROW or not {"greedy", "minimal"} <= of.keys():
         return ()
@@ -131,16 +133,18 @@ def _headlines(row: str, records: Sequence[Record]) -> tuple[Headline, ...]:
 
 
 _DEFINITION = """\
-A* looks for an optimal plan of each task, alone and then again under the sentence of the plan that it found. A node is
-expanded when its joint steps are looked at. *Pruned* is the paper's search: what does not fit the sentence is cut off.
-*Bounded* also counts the words that are still to be said, each of which takes a step at least. *Times fewer* compares all
-nodes over all tasks (paper: {ratio} times on {row}); *per task* is the mean of the tasks' own ratios."""
+A* searches an optimal plan of each task without a sentence, and then again under the sentence of
+the plan that it found. A node is expanded when its successors are generated. *Pruned* is the
+paper's search: what does not fit the sentence is pruned. *Bounded* also uses the number of words
+that remain as a lower bound, since each takes at least one step. *Times fewer* compares all
+nodes over all tasks (paper: {ratio} times on {row}); *per task* is the mean of the tasks' own
+ratios."""
 
 
 def _table(records: Sequence[Record], world: bool = False) -> str:
     rows = []
     for record in records:
-        r, asked = record.result, record.unit.parameters
+        r, asked = record.result, record.parameters
         name = f"{asked['heuristic']}, {TITLES[asked['method']]}"
         rows.append(
             [
@@ -169,10 +173,10 @@ def _table(records: Sequence[Record], world: bool = False) -> str:
     return table(head, rows)
 
 
-def _drawn(records: Sequence[Record]) -> Any:
-    heuristics = list(dict.fromkeys(r.unit.parameters["heuristic"] for r in records))
+def _figure(records: Sequence[Record]) -> Any:
+    heuristics = list(dict.fromkeys(r.parameters["heuristic"] for r in records))
     ratio = {
-        (r.unit.parameters["heuristic"], r.unit.parameters["method"]): r.result["alone"]
+        (r.parameters["heuristic"], r.parameters["method"]): r.result["alone"]
         / max(1, r.result["pruned"])
         for r in records
     }
@@ -184,26 +188,21 @@ def _drawn(records: Sequence[Record]) -> Any:
 
 
 def _differences(row: str, records: Sequence[Record]) -> tuple[str, ...]:
-    of = {(r.unit.parameters["heuristic"], r.unit.parameters["method"]): r.result for r in records}
+    of = {(r.parameters["heuristic"], r.parameters["method"]): r.result for r in records}
     if row != ROW or ("manhattan", "greedy") not in of:
         return ()
     greedy = of["manhattan", "greedy"]
     text = (
         f"**Planning cost.** The paper's A* expands {PLANNING_RATIO} times fewer nodes with a "
-        f"sentence on {ROW}, ours "
-        f"{greedy['alone'] / greedy['pruned']:.2f} times with the Manhattan distance and greedy "
-        "words. What can be saved "
-        "depends on how ties among equally good nodes are broken, and the paper's way is not "
-        "known: ours goes on from the "
-        f"node that was reached last, and alone expands {greedy['alone'] / greedy['tasks']:.1f} "
-        "nodes a task."
+        f"sentence on {ROW}, ours {greedy['alone'] / greedy['pruned']:.2f} times with the "
+        "Manhattan distance and greedy words. The possible saving depends on how ties between "
+        "equally good nodes are broken, which the paper does not say: ours expands the node that "
+        "was reached last first, and without a sentence "
+        f"{greedy['alone'] / greedy['tasks']:.1f} nodes a task."
     )
     least = of.get(("manhattan", "minimal"))
     if least and least["alone"] <= 1.05 * least["pruned"]:
-        text += (
-            " Minimal words cut off little: their sentences leave most plans open, which is "
-            "what they are for."
-        )
+        text += " Minimal words prune little, because their sentences leave most plans open."
     return (text,)
 
 

@@ -1,16 +1,14 @@
 """The motivating scenario: a place of interest appears, and one robot makes a detour.
 
-The other robot never knows.
-
-On the map `corridor` two robots trade rooms through a corridor with one passing place.  They have
-agreed on the sentence of the first optimal plan.  Then a place becomes interesting that robot 1
-would not pass.  If one of its choices under the sentence goes there, it goes; robot 2 does its own
-part as before, and both are still on an optimal plan.
+On the map `corridor` two robots exchange rooms through a corridor with one passing place.  They
+have agreed on the sentence of the first optimal plan.  Then a place becomes interesting that is not
+on the path of robot 1.  If one of its choices under the sentence leads there, it takes it; robot 2
+does its own part without being informed, and both are still on an optimal plan.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import product
 from random import Random
 from typing import Any
@@ -28,15 +26,19 @@ from coordlang.evaluation.lab.recipe import (
     percent,
     table,
 )
-from coordlang.evaluation.material.disruptions import Sayings, own_choices
-from coordlang.evaluation.material.grid_drawing import Path, draw_map, place_of
+from coordlang.evaluation.material.grid import entered_cells, placement, task_cells
+from coordlang.evaluation.material.grid_drawing import RobotPath, draw_map
 from coordlang.evaluation.material.languages import TITLES, language_for
 from coordlang.evaluation.material.suite import OTHERS, WORLDS, World
+from coordlang.evaluation.material.task_choices import TaskChoices
 from coordlang.tasks.listed import ListedTask
 from coordlang.use.choices.automaton import Automaton
 from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 from planners.joint.model import JointModel
 from planners.search.plans import Plan, Plans
+
+#: One robot's part of a plan, as label numbers.
+Part = tuple[int, ...]
 
 METHODS = ("greedy", "separating", "minimal")
 CORRIDOR = World("corridor", "corridor", "problem", "problem")
@@ -51,24 +53,20 @@ START, GOAL, PLACE = ("c0-0", "c0-8"), ("c2-8", "c2-0"), "c2-7"
 
 
 def trading_rooms() -> tuple[ListedTask, ...]:
-    """The candidate tasks.
+    """Return the candidate tasks of the corridor.
 
-    Robot 1 from any cell of the left room to any of the right one, robot 2 the other way.
+    Robot 1 moves from any cell of the left room to any of the right one, robot 2 the other way.
     """
     left, right = ROOMS
     return tuple(
-        ListedTask(_at(start), _at(goal))
+        ListedTask(placement(start), placement(goal))
         for start in product(left, right)
         for goal in product(right, left)
     )
 
 
-def _at(cells: Sequence[str]) -> tuple[str, ...]:
-    return tuple(f"(at r{n} {cell})" for n, cell in enumerate(cells, 1))
-
-
 def units(settings: Settings) -> list[Unit]:
-    """The pieces of work, with all their parameters."""
+    """List a unit for each method on the corridor, and for each other world and method."""
     methods = ("greedy",) if settings.quick else METHODS
     found = [
         Unit(
@@ -88,173 +86,178 @@ def units(settings: Settings) -> list[Unit]:
 
 
 def run(unit: Unit, settings: Settings) -> Result:
-    """One piece of work, as JSON data."""
-    asked = unit.parameters
-    if asked["world"] == "corridor":
-        candidates, language = language_for(CORRIDOR, asked["method"], settings, trading_rooms())
+    """Measure the freedom of the robots under a language; on the corridor, also the detour."""
+    world, method = unit.parameters["world"], unit.parameters["method"]
+    if world == "corridor":
+        candidates, language = language_for(CORRIDOR, method, settings, trading_rooms())
     else:
-        candidates, language = language_for(WORLDS[asked["world"]], asked["method"], settings)
-    spoken = list(languages_in_tasks(language, candidates))
+        candidates, language = language_for(WORLDS[world], method, settings)
+    tasks = list(languages_in_tasks(language, candidates))
     result: Result = {"words": len(language.words)}
-    if asked["world"] == "corridor":
-        result["drawn"] = detour(next(one for one in spoken if _ends(one) == (START, GOAL)))
-    elif asked["samples"] < len(spoken):
-        spoken = Random(f"{settings.seed} {asked['world']}").sample(spoken, asked["samples"])
-    return result | {"tasks": len(spoken), **freedom(spoken)}
+    if world == "corridor":
+        result["drawn"] = detour(drawn_task(tasks))
+    elif unit.parameters["samples"] < len(tasks):
+        tasks = Random(f"{settings.seed} {world}").sample(tasks, unit.parameters["samples"])
+    return result | {"tasks": len(tasks), **freedom(tasks)}
 
 
-def freedom(spoken: Sequence[TaskLanguage]) -> dict[str, int]:
-    """Things that robots may do beyond their part of the first plan, summed over tasks and robots.
+def drawn_task(tasks: Sequence[TaskLanguage]) -> TaskLanguage:
+    """Return the task from `START` to `GOAL`."""
+    return next(one for one in tasks if task_cells(one.space, one.task) == (START, GOAL))
 
-    A thing is a cell that a robot enters, or a subaction where there are no cells.  ``plan``:
-    things in its part of the agreed plan; ``sentence``: further ones in its choices under the
-    plan's sentence; ``optimal``: further ones in all optimal plans of the task, which would take
-    another agreement.
+
+def freedom(tasks: Sequence[TaskLanguage]) -> dict[str, int]:
+    """Count the options of robots beyond their parts of the first plans, over tasks and robots.
+
+    An option is a cell that a robot enters or, where there are no cells, a subaction.
+
+    Returns
+    -------
+    dict
+        ``plan``: options in the robots' parts of the agreed plans; ``sentence``: further ones in
+        their choices under the plans' sentences; ``optimal``: further ones in all optimal plans of
+        the tasks, which would take another agreement.
     """
     plan = sentence = optimal = 0
-    sayings: Sayings | None = None
-    for one in spoken:
-        if sayings is None or sayings.spoken.space is not one.space:
-            sayings = Sayings(one)
-        first, words = sayings.first(one.task)
-        for robot, choices in enumerate(sayings.choices(one.task, words)):
-            agreed = _things(one.model, robot, {step[robot] for step in first})
-            every = own_choices(one, robot)
+    known: TaskChoices | None = None
+    for one in tasks:
+        if known is None or known.space is not one.space:
+            known = TaskChoices(one)
+        first, words = known.first(one.task)
+        for robot, choices in enumerate(known.choices(one.task, words)):
+            agreed = _options(one.model, robot, {step[robot] for step in first})
+            every = known.optimal_choices(one.task, robot)
             plan += len(agreed)
-            sentence += len(_things(one.model, robot, set(choices.label.tolist())) - agreed)
-            optimal += len(_things(one.model, robot, set(every.label.tolist())) - agreed)
+            sentence += len(_options(one.model, robot, set(choices.label.tolist())) - agreed)
+            optimal += len(_options(one.model, robot, set(every.label.tolist())) - agreed)
     return {"plan": plan, "sentence": sentence, "optimal": optimal}
 
 
-def _things(model: JointModel, robot: int, labels: set[int]) -> set[str]:
-    nothing = {action.label for action in model.actions if action.does_nothing}
-    texts = {model.labels[robot][label] for label in labels if label}
-    return {place_of(text) or text for text in texts - nothing}
+def _options(model: JointModel, robot: int, labels: set[int]) -> set[str]:
+    """The cells that labels lead to, or the texts of those that lead to none."""
+    idle = {action.label for action in model.actions if action.does_nothing}
+    entered = entered_cells(model, robot)
+    found = set()
+    for label in labels:
+        text = model.label_text(robot, label)
+        if text is not None and text not in idle:
+            found.add(entered[label] or text)
+    return found
 
 
-def detour(spoken: TaskLanguage) -> Result:
-    """What happens when `PLACE` becomes interesting.
-
-    The agreed parts, and robot 1's when it goes there.
-    """
-    sayings = Sayings(spoken)
-    plan, words = sayings.first(spoken.task)
-    model = spoken.model
-    choices = sayings.choices(spoken.task, words)[0]
-    wanted = {n for n, text in enumerate(model.labels[0]) if place_of(text) == PLACE}
-    agreed = tuple(step[0] for step in plan)
-    ways = [way for way in subplans(choices) if wanted & set(way)]
-    found: Result = {
-        "sentence": [spoken.partition.words[w] for w in words],
-        "agreed": [_walk(model, plan, robot) for robot in range(2)],
-        "ways": len(ways),
-        "detour": None,
-    }
-    plans = Plans.of(spoken.space, spoken.task)
-    # All parts of robot 1 that go there on some optimal plan, and those that would do with robot
-    # 2's agreed part.
-    parts = {
-        tuple(step[0] for step in other) for other in plans if wanted & {step[0] for step in other}
-    }
+def detour(language: TaskLanguage) -> Result:
+    """Return what happens when `PLACE` becomes interesting: the agreed parts and r1's detour."""
+    known = TaskChoices(language)
+    plan, words = known.first(language.task)
+    model, plans = language.model, Plans.of(language.space, language.task)
+    choices = known.choices(language.task, words)[0]
+    own = _through_place(model, subplans(choices))
+    # All parts of robot 1 through the place on some optimal plan, and those that are optimal
+    # together with robot 2's agreed part.
+    parts = _through_place(model, {tuple(step[0] for step in other) for other in plans})
     fitting = [part for part in parts if plans.rank(_mixed(part, plan)) is not None]
-    found |= {"plans": plans.count, "parts": len(parts), "parts_that_fit": len(fitting)}
-    if ways:
-        way = max(
-            ways,
-            key=lambda w: (
-                sum(a == b for a, b in zip(w, agreed, strict=True)),
-                tuple(-x for x in w),
-            ),
-        )
-        executed = _mixed(way, plan)
-        found["detour"] = _walk(model, executed, 0)
+    found: Result = {
+        "sentence": [language.partition.words[word] for word in words],
+        "agreed": [_cells(model, plan, robot) for robot in range(2)],
+        "ways": len(own),
+        "detour": None,
+        "plans": plans.count,
+        "parts": len(parts),
+        "parts_that_fit": len(fitting),
+    }
+    if own:
+        agreed = [step[0] for step in plan]
+        executed = _mixed(_most_similar(own, agreed), plan)
+        found["detour"] = _cells(model, executed, 0)
         found["optimal"] = plans.rank(executed) is not None
     return found
 
 
-def subplans(automaton: Automaton) -> list[tuple[int, ...]]:
-    """All subplans that an automaton accepts, as label numbers."""
-    found: list[tuple[tuple[int, ...], int]] = [((), 0)]
-    for _ in automaton.layers[1:]:
+def _through_place(model: JointModel, parts: Iterable[Part]) -> list[Part]:
+    """The parts of robot 1 on which it enters `PLACE`."""
+    entered = entered_cells(model, 0)
+    return [part for part in parts if any(entered[label] == PLACE for label in part)]
+
+
+def subplans(automaton: Automaton) -> list[Part]:
+    """Return all subplans that an automaton accepts, as label numbers."""
+    found: list[tuple[Part, int]] = [((), 0)]
+    for _ in range(automaton.steps):
         found = [
-            ((*way, label), to) for way, state in found for label, to in automaton.moves(state)
+            ((*part, label), to) for part, state in found for label, to in automaton.moves(state)
         ]
-    return [way for way, _ in found]
+    return [part for part, _ in found]
 
 
-def _mixed(way: Sequence[int], plan: Plan) -> Plan:
-    """Robot 1 goes its way, the others do their part of the plan."""
-    return tuple((label, *step[1:]) for label, step in zip(way, plan, strict=True))
+def _most_similar(parts: Sequence[Part], agreed: Sequence[int]) -> Part:
+    """The part with most labels of the agreed one; the first of these in lexicographic order."""
+    return max(
+        sorted(parts), key=lambda part: sum(a == b for a, b in zip(part, agreed, strict=True))
+    )
 
 
-def _walk(model: JointModel, plan: Plan, robot: int) -> list[str]:
+def _mixed(part: Part, plan: Plan) -> Plan:
+    """The plan with another part of robot 1."""
+    return tuple((label, *step[1:]) for label, step in zip(part, plan, strict=True))
+
+
+def _cells(model: JointModel, plan: Plan, robot: int) -> list[str]:
     """The cells of a robot, step by step."""
+    entered = entered_cells(model, robot)
     cells = [START[robot]]
     for step in plan:
-        cells.append(
-            (place_of(model.labels[robot][step[robot]]) if step[robot] else None) or cells[-1]
-        )
+        cells.append(entered[step[robot]] or cells[-1])
     return cells
 
 
-def _ends(spoken: TaskLanguage) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Where the robots start and end; all optimal plans of these tasks end in one state."""
-    space, codec, node = spoken.space, spoken.model.codec, spoken.start
-    while space.layer[node] > 0:
-        node = int(space.target[space.first[node]])
-    keys = (codec.key(space.rows[space.state[n]]) for n in (spoken.start, node))
-    start, goal = (tuple(atom.strip("()").split()[2] for atom in key.split(") (")) for key in keys)
-    return start, goal
-
-
 def section(records: Sequence[Record]) -> Section:
-    """The results, as this section of the page."""
+    """Render the detour, and the freedom of the robots on all worlds."""
     found = done(records)
-    mine = [r for r in found if r.unit.parameters["world"] == "corridor"]
-    others = [r for r in found if r.unit.parameters["world"] != "corridor"]
+    mine = [r for r in found if r.parameters["world"] == "corridor"]
+    others = [r for r in found if r.parameters["world"] != "corridor"]
     blocks: list[str | Figure] = [_DEFINITION]
     shown = [r for r in mine if r.result["drawn"]["detour"]]
     if shown:
-        blocks += [Figure("scenario", _ALT, lambda: _drawn(shown[-1])), _told(shown[-1])]
+        blocks += [Figure("scenario", _ALT, lambda: _figure(shown[-1])), _detour_text(shown[-1])]
     if mine:
         blocks += [_FREEDOM, _table(mine + others)]
     return Section(tuple(blocks))
 
 
 _DEFINITION = f"""\
-Two robots trade rooms on the map `domains/corridor`: r1 from {START[0]} to {GOAL[0]}, r2 from {START[1]} to {GOAL[1]}.
-They have agreed on the sentence of the first plan found. On the way {PLACE} becomes a place of interest. r1 finds a way
-there among its own choices and takes it. r2 is not told, does what it would have done, and nothing is late. (Candidate tasks:
-robot 1 from any cell of the left room to any of the right one, robot 2 the other way.)"""
+Two robots exchange rooms on the map `domains/corridor`: r1 from {START[0]} to {GOAL[0]}, r2 from
+{START[1]} to {GOAL[1]}. They have agreed on the sentence of the first plan found. During
+execution {PLACE} becomes a place of interest. r1 finds a path through it among its own choices
+and takes it. r2 is not informed and does not change its part; no robot is late. (Candidate
+tasks: robot 1 from any cell of the left room to any of the right one, robot 2 the other way.)"""
 
 _ALT = (
-    "Above the agreed plan in the corridor; below r1 passes the place of interest and r2 does "
-    "the same as before"
+    "Above the agreed plan in the corridor; below r1 passes the place of interest and r2 does the "
+    "same as before"
 )
 
 _FREEDOM = """\
-Over all tasks of the corridor, and on worlds that are no grids, summed over the robots of a task: cells (there: subactions)
-in the agreed plan; those that robots may visit beyond them without a word to anybody, which under a plan are none; and those
-of all optimal plans, for the rest of which robots would have to agree anew."""
+Over all tasks of the corridor, and on domains that are not grids, summed over the robots of a task:
+cells (there: subactions) in the agreed plan; further ones that robots may use under the sentence
+without communication, of which a plan allows none; and further ones in all optimal plans, most of
+which would require another agreement."""
 
 
-def _told(record: Record) -> str:
+def _detour_text(record: Record) -> str:
     r = record.result["drawn"]
     return (
-        f"The language is {TITLES[record.unit.parameters['method']]} ({record.result['words']} "
-        "words), the sentence "
-        f"`{' '.join(r['sentence'])}`. The task has {r['plans']:,} optimal plans. On these r1 can "
-        f"pass {PLACE} in "
-        f"{r['parts']} ways, of which {r['parts_that_fit']} do with what r2 does; the others "
-        "collide or are late. The "
-        f"sentence leaves r1 {r['ways']} of them, whatever r2 chooses from its own."
+        f"The language is {TITLES[record.parameters['method']]} ({record.result['words']} words), "
+        f"the sentence `{' '.join(r['sentence'])}`. The task has {r['plans']:,} optimal plans. On "
+        f"these r1 can pass {PLACE} in {r['parts']} ways, of which {r['parts_that_fit']} are "
+        "optimal together with what r2 does; with the others the robots collide or are late. The "
+        f"sentence leaves r1 {r['ways']} of them, whatever r2 selects from its own choices."
     )
 
 
 def _table(records: Sequence[Record]) -> str:
     rows = []
     for record in records:
-        r, asked = record.result, record.unit.parameters
+        r, asked = record.result, record.parameters
         name = f"{asked['world']}, {TITLES[asked['method']]}"
         robots = r["tasks"]
         rows.append(
@@ -280,10 +283,10 @@ def _table(records: Sequence[Record]) -> str:
     return table(head, rows)
 
 
-def _drawn(record: Record) -> Any:
+def _figure(record: Record) -> Any:
     r = record.result["drawn"]
-    agreed = [Path("r1", r["agreed"][0]), Path("r2", r["agreed"][1])]
-    executed = [Path("r1", r["detour"]), Path("r2", r["agreed"][1])]
+    agreed = [RobotPath("r1", r["agreed"][0]), RobotPath("r2", r["agreed"][1])]
+    executed = [RobotPath("r1", r["detour"]), RobotPath("r2", r["agreed"][1])]
     cells = {cell for room in ROOMS for cell in room} | {
         cell for path in (*agreed, *executed) for cell in path.cells
     }
@@ -294,9 +297,11 @@ def _drawn(record: Record) -> Any:
             cells,
             executed,
             PLACE,
-            f"executed: {PLACE} has become interesting, r1 passes it, r2 is not told",
+            f"executed: {PLACE} has become interesting, r1 passes it, r2 is not informed",
         )
         return figure
 
 
-RECIPE = Recipe("scenario", "Motivating scenario: a detour nobody is told of", units, run, section)
+RECIPE = Recipe(
+    "scenario", "Motivating scenario: a detour without communication", units, run, section
+)

@@ -112,6 +112,7 @@ class _Worker:
         self._since = 0.0
 
     def begin(self, unit: Unit) -> None:
+        """Send a unit to the process."""
         self.unit, self._since = unit, perf_counter()
         self.connection.send(unit)
 
@@ -147,9 +148,11 @@ class _Worker:
 
     @property
     def alive(self) -> bool:
+        """Whether the process runs."""
         return self._process.is_alive()
 
     def kill(self) -> None:
+        """End the process at once."""
         self._process.kill()
         self._process.join()
         self.connection.close()

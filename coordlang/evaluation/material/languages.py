@@ -1,4 +1,4 @@
-"""The languages that experiments use, built once and kept."""
+"""The languages that experiments use, built once and stored."""
 
 from __future__ import annotations
 
@@ -30,27 +30,29 @@ TITLES = {
 def language_for(
     world: World, method: str, settings: Settings, listed: tuple[ListedTask, ...] = ()
 ) -> tuple[Candidates, Language]:
-    """The candidate tasks of a world and a language for them.
+    """Return the candidate tasks of a world and a language for them, built once and stored.
 
-    "flexible" is ``--method minimal --prefer flexible``.
+    The method "flexible" is ``--method minimal --prefer flexible``.
 
-    Raises `OutOfTime` or `OutOfMemory` where a limit ended the method early: what it then has
-    depends on the machine, and no experiment is made with it.
+    Raises
+    ------
+    OutOfTime, OutOfMemory
+        If a limit ended the method early: what it then has depends on the machine.
     """
     candidates = world.candidates(settings.domains, listed)
-    place = settings.cache / f"{_key(world, method, settings, listed)}.json.gz"
+    path = settings.cache / f"{_key(world, method, settings, listed)}.json.gz"
     settings.cache.mkdir(parents=True, exist_ok=True)
-    with open(f"{place}.lock", "w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # another process that builds this language is waited for
-        if place.exists():
-            return candidates, read_language(place)
+    with open(f"{path}.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # waits for a process that builds it
+        if path.exists():
+            return candidates, read_language(path)
         if method == "flexible":
             built = build_language(candidates, "minimal", seed=settings.seed, prefer="flexible")
         else:
             built = build_language(candidates, method, seed=settings.seed)
         if built.stopped is not None:
             raise built.stopped
-        write_language(built.language, place)
+        write_language(built.language, path)
         return candidates, built.language
 
 

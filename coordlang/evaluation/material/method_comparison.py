@@ -1,7 +1,4 @@
-"""What the experiments that compare languages on one row of Table 1 share.
-
-Their units, and their records by kind.
-"""
+"""What the experiments that compare methods on one row of Table 1 share: units and records."""
 
 from __future__ import annotations
 
@@ -10,18 +7,19 @@ from dataclasses import dataclass
 
 from coordlang.evaluation.lab.recipe import Record, Result, Settings, Unit, done
 from coordlang.evaluation.material.languages import COMPARED
-from coordlang.evaluation.material.state_orders import ORDERS
+from coordlang.evaluation.material.state_orders import RANDOM_ORDERS
 from coordlang.evaluation.material.suite import OTHERS, QUICK_ROW, ROW, WORLDS
 
 
-def compared_units(
+def comparison_units(
     experiment: str, settings: Settings, effort: float, flexible: float
 ) -> list[Unit]:
-    """A unit for each language of the row and of the other worlds, and one for the orders.
+    """Return a unit for each method and world, and one for the greedy method in other orders.
 
-    The other worlds are those that are no grids; the orders are those of the row.
-
-    ``effort`` of a language, ``flexible`` of the most flexible one.
+    Parameters
+    ----------
+    effort, flexible
+        Estimated seconds for a language, and for the most flexible one.
     """
     row = QUICK_ROW if settings.quick else ROW
     found = []
@@ -30,15 +28,24 @@ def compared_units(
             parameters = {"world": name, "method": method}
             cost = flexible if method == "flexible" else effort
             found.append(Unit(experiment, f"{name}/{method}", parameters, WORLDS[name].files, cost))
-    orders = {"world": row, "orders": 10 if settings.quick else ORDERS}
+    orders = {"world": row, "orders": 10 if settings.quick else RANDOM_ORDERS}
     return [*found, Unit(experiment, f"{row}/orders", orders, WORLDS[row].files, 3.0)]
 
 
 @dataclass(frozen=True, slots=True)
-class Compared:
-    """The records that came to their end.
+class Comparison:
+    """The records of the units that ended without meeting a limit.
 
-    Of the languages of ``row``, of its orders, of other worlds.
+    Attributes
+    ----------
+    row
+        The row of Table 1.
+    languages
+        One for each method, on the row.
+    orders
+        That of the greedy method in other orders, if it is there.
+    others
+        The languages of other worlds.
     """
 
     row: str
@@ -47,29 +54,24 @@ class Compared:
     others: list[Record]
 
     @classmethod
-    def of(cls, records: Sequence[Record]) -> Compared:
-        """By kind; the last record is one of the row."""
-        row = records[-1].unit.parameters["world"]
+    def of(cls, records: Sequence[Record]) -> Comparison:
+        """Sort the records of `comparison_units`, the last of which is one of the row."""
+        row = records[-1].parameters["world"]
         ended = done(records)
+        on_row = [record for record in ended if record.parameters["world"] == row]
         return cls(
             row,
-            [
-                r
-                for r in ended
-                if r.unit.parameters["world"] == row and "method" in r.unit.parameters
-            ],
-            [r for r in ended if "orders" in r.unit.parameters],
-            [r for r in ended if r.unit.parameters["world"] != row],
+            [record for record in on_row if "method" in record.parameters],
+            [record for record in on_row if "orders" in record.parameters],
+            [record for record in ended if record.parameters["world"] != row],
         )
 
     def greedy_and_minimal(self) -> tuple[Result, Result] | None:
-        """Results to be put beside the paper's.
+        """Return the results to be put beside the paper's.
 
         None if it is not the paper's row, or one of them is missing.
         """
-        of = {record.unit.parameters["method"]: record.result for record in self.languages}
-        return (
-            (of["greedy"], of["minimal"])
-            if self.row == ROW and {"greedy", "minimal"} <= of.keys()
-            else None
-        )
+        of = {record.parameters["method"]: record.result for record in self.languages}
+        if self.row != ROW or not {"greedy", "minimal"} <= of.keys():
+            return None
+        return of["greedy"], of["minimal"]

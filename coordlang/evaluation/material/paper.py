@@ -9,10 +9,14 @@ from dataclasses import dataclass
 class PaperRow:
     """A row of the paper's Table 1.
 
-    Candidate tasks, reachable states, words of the paper's greedy method, its seconds.
-
-    ``exact`` is the least number of words where the paper's exhaustive search ended,
-    ``exact_seconds`` what it took.
+    Attributes
+    ----------
+    tasks, states
+        Candidate tasks and reachable states.
+    words, seconds
+        Of the paper's greedy method.
+    exact, exact_seconds
+        The least number of words and the time, where the paper's exhaustive search ended.
     """
 
     tasks: int

@@ -1,7 +1,4 @@
-"""The greedy method with its states in other orders.
-
-What of its results is the method's and what the order's.
-"""
+"""The greedy method with its states in other orders: its results depend on the order."""
 
 from __future__ import annotations
 
@@ -16,78 +13,68 @@ from coordlang.vocabulary.greedy import greedy_partition
 from planners.tables import Ints, find_rows
 
 #: Random orders of the states that experiments try.
-ORDERS = 100
-#: What orders that are not random are called.
-NATURAL = ("by number", "by number, reversed", "by name", "breadth first", "depth first")
+RANDOM_ORDERS = 100
+#: The names of the orders that are not random.
+SYSTEMATIC = ("by number", "by number, reversed", "by name", "breadth first", "depth first")
 
 
-def greedy_in_orders(
-    candidates: Candidates, randoms: int, random: Random
+def greedy_partitions(
+    candidates: Candidates, orders: int, random: Random
 ) -> Iterator[tuple[str, Ints]]:
-    """Partitions that the greedy method fills in different orders of the states.
+    """Yield the partitions that the greedy method makes with the states in different orders.
 
-    It tries the states in `NATURAL` and in random orders.
+    All of them separate all first differences (alpha), so they are coordination languages
+    (Theorem 3).
 
-    Each is given with the name of its order, as the word number of every state of
-    ``candidates.rows``.  All of them satisfy alpha for all first differences, so they are
-    coordination languages (Theorem 3).
+    Parameters
+    ----------
+    orders
+        The number of random orders, beside the systematic ones.
+
+    Yields
+    ------
+    tuple
+        The name of the order, and the word number of every state of ``candidates.rows``.
     """
     constraints = separations(first_differences(candidates.spaces).divergences)
     states = states_on_plans(candidates.spaces).tolist()
-    orders = dict(natural_orders(candidates, states))
-    for number in range(1, randoms + 1):
-        orders[f"random {number}"] = random.sample(states, len(states))
-    for name, order in orders.items():
+    found = dict(systematic_orders(candidates, states))
+    for number in range(1, orders + 1):
+        found[f"random {number}"] = random.sample(states, len(states))
+    for name, order in found.items():
         filled = greedy_partition(order, constraints)
         words = np.zeros(len(candidates.rows), np.int64)
         words[list(filled)] = list(filled.values())
         yield name, words
 
 
-def natural_orders(candidates: Candidates, states: list[int]) -> Mapping[str, list[int]]:
-    """Orders that an implementation may well have.
+def systematic_orders(candidates: Candidates, states: list[int]) -> Mapping[str, list[int]]:
+    """Return orders that an implementation is likely to use.
 
-    As states are numbered or named, or as a search meets them from the problem's initial state.
+    The states as they are numbered or named, or as a search from the problem's initial state
+    reaches them; what it does not reach comes last.
     """
-    codec = candidates.model.codec
-    searched = _searched(candidates)
-    known = set(states)
+    import networkx as nx
+
+    codec, rows = candidates.model.codec, candidates.rows
+    steps = candidates.model.successors(rows)
+    target = find_rows(rows, steps.result)
+    inside = target >= 0
+    graph = nx.DiGraph()
+    ends = zip(steps.source[inside].tolist(), target[inside].tolist(), strict=True)
+    graph.add_edges_from(ends)
+    start = int(find_rows(rows, candidates.loaded.tasks[0].init[None, :])[0])
+    broad = [start, *(node for _, node in nx.bfs_edges(graph, start))]
+    deep = list(nx.dfs_preorder_nodes(graph, start))
+    every, known = range(len(rows)), set(states)
+
+    def complete(order: list[int]) -> list[int]:
+        return [state for state in dict.fromkeys((*order, *every)) if state in known]
+
     return {
         "by number": list(states),
         "by number, reversed": list(reversed(states)),
-        "by name": sorted(states, key=lambda state: codec.key(candidates.rows[state])),
-        **{name: [s for s in order if s in known] for name, order in searched.items()},
+        "by name": sorted(states, key=lambda state: codec.key(rows[state])),
+        "breadth first": complete(broad),
+        "depth first": complete(deep),
     }
-
-
-def _searched(candidates: Candidates) -> dict[str, list[int]]:
-    """All states, as breadth-first and as depth-first search meet them.
-
-    What neither reaches comes at the end.
-    """
-    model, rows = candidates.model, candidates.rows
-    start = int(find_rows(rows, candidates.loaded.tasks[0].init[None, :])[0])
-    following: dict[int, list[int]] = {}
-
-    def successors(state: int) -> list[int]:
-        if state not in following:
-            found = find_rows(rows, model.successors(rows[state][None, :]).result)
-            following[state] = list(dict.fromkeys(n for n in found.tolist() if n >= 0))
-        return following[state]
-
-    broad, deep = [start], []
-    seen = {start}
-    for state in broad:
-        for other in successors(state):
-            if other not in seen:
-                seen.add(other)
-                broad.append(other)
-    stack, seen = [start], set()
-    while stack:
-        state = stack.pop()
-        if state not in seen:
-            seen.add(state)
-            deep.append(state)
-            stack.extend(reversed(successors(state)))
-    rest = [state for state in range(len(rows)) if state not in seen]
-    return {"breadth first": broad + rest, "depth first": deep + rest}

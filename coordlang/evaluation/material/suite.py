@@ -15,11 +15,16 @@ from planners.pddl import read_domain, read_problem
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """A domain, one of its problems, and candidate tasks.
+    """A shipped domain, one of its problems, and candidate tasks.
 
-    ``"all"``, ``"problem"`` or the name of a task file.
-
-    ``name`` is what tables call it; files are below the folder ``domains``.
+    Attributes
+    ----------
+    name
+        What tables call it.
+    folder, problem
+        The folder below that of all domains, and the name of the problem file.
+    tasks
+        ``"all"`` (pairs of states), ``"problem"`` or the name of a task file.
     """
 
     name: str
@@ -36,7 +41,7 @@ class World:
         return tuple(f"{self.folder}/{name}" for name in names)
 
     def candidates(self, domains: Path, listed: Sequence[ListedTask] = ()) -> Candidates:
-        """The candidate tasks; ``listed`` ones instead of the world's own where there are any."""
+        """Return the candidate tasks, or those that are ``listed`` if there are any."""
         domain = read_domain(domains / self.files[0])
         problem = read_problem(domains / self.files[1], domain)
         if listed:
@@ -69,7 +74,7 @@ ROWS = (
     _row("GWB8", "4x4", filtered=True),
 )
 
-#: Worlds that are no grids, for the experiments that the paper makes on grids only.
+#: Domains that are not grids, for the experiments that the paper makes on grids only.
 OTHERS = (
     World("handover", "handover", "two-doors", "all"),
     World("push-box", "push-box", "next-door", "all"),
@@ -85,11 +90,12 @@ WORLDS = {world.name: world for world in (*ROWS, *OTHERS)}
 
 
 def find_domains(given: str | None) -> Path:
-    """The folder of the shipped domains.
+    """Return the folder of the shipped domains: ``given``, else that of here or of the checkout.
 
-    As given, else ``domains`` here or beside the package (a checkout).
-
-    Raises `UsageError` if there is none.
+    Raises
+    ------
+    UsageError
+        If there is none.
     """
     beside = Path(__file__).resolve().parents[3] / "domains"
     places = [Path(given)] if given else [Path("domains"), beside]

@@ -12,7 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import permutations, product
 
-from coordlang.evaluation.material.disruptions import Hazard
+from coordlang.evaluation.material.disruptions import Disruption
+from coordlang.evaluation.material.grid import destinations, placement
 from coordlang.evaluation.material.suite import World
 from coordlang.tasks.listed import ListedTask
 from planners.joint.model import JointModel
@@ -42,17 +43,13 @@ class Delivery:
 
     @property
     def legs(self) -> tuple[tuple[Corners, Corners], ...]:
-        """The tasks, one after the other.
-
-        Nothing is to be done for the first if the robots stand where they fetch.
-        """
-        return tuple(
-            leg for leg in ((self.start, self.fetch), (self.fetch, self.bring)) if leg[0] != leg[1]
-        )
+        """The tasks, one after the other; only the second if the robots start where they fetch."""
+        legs = (self.start, self.fetch), (self.fetch, self.bring)
+        return tuple(leg for leg in legs if leg[0] != leg[1])
 
 
 def deliveries(rows: int, columns: int, layout: str) -> tuple[Delivery, ...]:
-    """All deliveries: 12 ways to start in two different corners, times 4 directions."""
+    """Return all deliveries: 12 ways to start in two different corners, times 4 directions."""
     left, right = ["c0-0", f"c{rows - 1}-0"], [f"c0-{columns - 1}", f"c{rows - 1}-{columns - 1}"]
     if layout == "across":
         right.reverse()
@@ -65,23 +62,15 @@ def deliveries(rows: int, columns: int, layout: str) -> tuple[Delivery, ...]:
 
 
 def listed_tasks(every: Sequence[Delivery]) -> tuple[ListedTask, ...]:
-    """The candidate tasks: every leg of every delivery, once."""
+    """Return the candidate tasks: every leg of every delivery, once."""
     legs = sorted({leg for delivery in every for leg in delivery.legs})
-    return tuple(ListedTask(_at(start), _at(goal)) for start, goal in legs)
+    return tuple(ListedTask(placement(start), placement(goal)) for start, goal in legs)
 
 
-def _at(corners: Corners) -> tuple[str, ...]:
-    return tuple(f"(at r{n} {cell})" for n, cell in enumerate(corners, 1))
-
-
-def human_in(model: JointModel, cell: str) -> Hazard:
-    """Nobody can enter the cell any more."""
-    return Hazard(
-        cell,
-        tuple(
-            frozenset(
-                n for n, text in enumerate(labels) if n and text.strip("()").split()[-1] == cell
-            )
-            for labels in model.labels
-        ),
-    )
+def human_in(model: JointModel, cell: str) -> Disruption:
+    """Return the disruption that no robot can enter a cell, where a human stands."""
+    forbidden = [
+        frozenset(label for label, to in enumerate(destinations(model, robot)) if to == cell)
+        for robot in range(len(model.robots))
+    ]
+    return Disruption(cell, tuple(forbidden))

@@ -1,4 +1,4 @@
-"""What survives: against listed plans, whose parts are looked at robot by robot."""
+"""Success rates under disruptions: against listed plans, robot by robot."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from coordlang.evaluation.material.disruption_trials import (
     subaction_trials,
     warehouse_trials,
 )
-from coordlang.evaluation.material.disruptions import Hazard, Sayings, exact_odds, own_choices
+from coordlang.evaluation.material.disruptions import Disruption, success_rates
 from coordlang.evaluation.material.languages import language_for
+from coordlang.evaluation.material.task_choices import TaskChoices
 from coordlang.evaluation.material.warehouse import (
     LAYOUTS,
     WAREHOUSES,
@@ -42,17 +43,17 @@ def groups(one: TaskLanguage) -> dict[tuple[int, ...], list[Plan]]:
     return found
 
 
-def survive(plans: list[Plan], hazard: Hazard) -> bool:
+def succeed(plans: list[Plan], disruption: Disruption) -> bool:
     """Every robot by itself has a part without anything forbidden."""
     return all(
         any(not {step[robot] for step in plan} & forbidden for plan in plans)
-        for robot, forbidden in enumerate(hazard.forbidden)
+        for robot, forbidden in enumerate(disruption.forbidden)
     )
 
 
-def random_hazard(one: TaskLanguage, random: Random) -> Hazard:
+def random_disruption(one: TaskLanguage, random: Random) -> Disruption:
     labels = [range(1, len(own)) for own in one.model.labels]
-    return Hazard(
+    return Disruption(
         str(random.random()),
         tuple(frozenset(random.sample(own, random.randint(0, 2))) for own in labels),
     )
@@ -64,20 +65,20 @@ def random_hazard(one: TaskLanguage, random: Random) -> Hazard:
 def test_against_listed_plans(folder: str, stem: str) -> None:
     random = Random(5)
     tasks = task_languages(folder, stem)
-    sayings = Sayings(tasks[0])
-    hazards = [random_hazard(tasks[0], random) for _ in range(8)]
-    odds = exact_odds(tasks[0].space, tasks[0].word, hazards)
+    choices = TaskChoices(tasks[0])
+    disruptions = [random_disruption(tasks[0], random) for _ in range(8)]
+    rates = success_rates(tasks[0].space, tasks[0].word, disruptions)
     told = set()
     for one in random.sample(tasks, 25):
         said = groups(one)
         total = sum(map(len, said.values()))
-        for hazard, exact in zip(hazards, odds[one.task], strict=True):
-            lives = {words: survive(plans, hazard) for words, plans in said.items()}
-            assert lives == {words: sayings.survives(one.task, words, hazard) for words in said}
+        for disruption, exact in zip(disruptions, rates[one.task], strict=True):
+            lives = {words: succeed(plans, disruption) for words, plans in said.items()}
+            assert lives == {words: choices.succeeds(one.task, words, disruption) for words in said}
             assert exact.sentence == pytest.approx(
                 sum(len(said[w]) for w, yes in lives.items() if yes) / total
             )
-            alone = sum(not hazard.breaks(plan) for plans in said.values() for plan in plans)
+            alone = sum(not disruption.breaks(plan) for plans in said.values() for plan in plans)
             assert exact.plan == pytest.approx(alone / total)
             assert exact.possible == (alone > 0)
             assert exact.plan <= exact.sentence <= exact.possible
@@ -92,34 +93,34 @@ def test_three_cells_by_hand() -> None:
     one = three_cells()
     labels = one.model.labels[0]
     forbidden = frozenset([labels.index("(move r1 a b)")])
-    hazards = [human_in(one.model, "c"), Hazard("a b", (forbidden, frozenset()))]
-    [[in_c, in_ab]] = exact_odds(one.space, one.word, hazards)
+    disruptions = [human_in(one.model, "c"), Disruption("a b", (forbidden, frozenset()))]
+    [[in_c, in_ab]] = success_rates(one.space, one.word, disruptions)
     assert (in_c.plan, in_c.sentence, in_c.possible) == (0, 0, False)
     # Under b c a r1 goes straight in both plans, under b a it goes through c in both: nothing to
     # choose from.
     assert (in_ab.plan, in_ab.sentence, in_ab.possible) == (0.5, 0.5, True)
-    assert Sayings(one).survives(0, (1, 0), hazards[1])
-    assert not Sayings(one).survives(0, (1, 2, 0), hazards[1])
+    assert TaskChoices(one).succeeds(0, (1, 0), disruptions[1])
+    assert not TaskChoices(one).succeeds(0, (1, 2, 0), disruptions[1])
 
 
 def test_plans_are_drawn_with_their_sentences() -> None:
     one = task_languages("grid", "gw2-2x3")[100]
-    sayings, said = Sayings(one), groups(one)
+    choices, said = TaskChoices(one), groups(one)
     random = Random(2)
     for _ in range(50):
-        plan, words = sayings.draw(one.task, random)
+        plan, words = choices.draw(one.task, random)
         assert plan in said[words]
-    first, words = sayings.first(one.task)
+    first, words = choices.first(one.task)
     assert first == naive.listed(one.space, one.task, 10_000)[0]
     assert first in said[words]
 
 
-def test_own_choices_are_the_parts_of_all_plans() -> None:
+def test_optimal_choices_are_the_parts_of_all_plans() -> None:
     one = task_languages("grid", "gw2-2x3")[50]
     plans = naive.listed(one.space, one.task, 10_000)
     for robot in range(2):
         parts = {tuple(step[robot] for step in plan) for plan in plans}
-        assert sorted(subplans(own_choices(one, robot))) == sorted(parts)
+        assert sorted(subplans(TaskChoices(one).optimal_choices(one.task, robot))) == sorted(parts)
 
 
 def test_deliveries() -> None:
@@ -148,11 +149,11 @@ def test_a_warehouse_by_enumeration(tmp_path) -> None:
     )
     trials = warehouse_trials(candidates, language, every)
     assert len(trials.trials) == 48 * 5
-    base = trials.sayings.spoken
+    base = trials.choices.language
     plan, sentence = 0.0, 0.0
     said = {}
     for trial in trials.trials:
-        hazard, by_plan, by_sentence = trials.hazards[trial.hazard], 1.0, 1.0
+        disruption, by_plan, by_sentence = trials.disruptions[trial.disruption], 1.0, 1.0
         for task in trial.tasks:
             if task not in said:
                 said[task] = groups(
@@ -160,9 +161,11 @@ def test_a_warehouse_by_enumeration(tmp_path) -> None:
                 )
             found = said[task]
             total = sum(map(len, found.values()))
-            by_plan *= sum(not hazard.breaks(p) for plans in found.values() for p in plans) / total
+            by_plan *= (
+                sum(not disruption.breaks(p) for plans in found.values() for p in plans) / total
+            )
             by_sentence *= (
-                sum(len(plans) for plans in found.values() if survive(plans, hazard)) / total
+                sum(len(plans) for plans in found.values() if succeed(plans, disruption)) / total
             )
         plan, sentence = plan + by_plan, sentence + by_sentence
     exact = trials.exact()
@@ -181,8 +184,8 @@ def test_subactions_that_fail_are_needed_by_some_plan() -> None:
     trials = subaction_trials(candidates, language)
     by_task: dict[int, set[str]] = {}
     for trial in trials.trials:
-        by_task.setdefault(trial.tasks[0], set()).add(trials.hazards[trial.hazard].name)
-    model, space = candidates.model, trials.sayings.spoken.space
+        by_task.setdefault(trial.tasks[0], set()).add(trials.disruptions[trial.disruption].name)
+    model, space = candidates.model, trials.choices.space
     nothing = {action.label for action in model.actions if action.does_nothing}
     for task in Random(0).sample(range(len(space.starts)), 30):
         used = {
@@ -200,11 +203,11 @@ def test_subactions_that_fail_are_needed_by_some_plan() -> None:
         assert by_task.get(task, set()) == names
 
 
-def test_a_plan_survives_only_what_it_does_not_need() -> None:
+def test_a_plan_succeeds_without_what_it_does_not_need() -> None:
     one = three_cells()
-    nobody = Hazard("nothing", (frozenset(), frozenset()))
+    nobody = Disruption("nothing", (frozenset(), frozenset()))
     trials = Trials(
-        Sayings(one), (nobody, human_in(one.model, "c")), (Trial((0,), 0), Trial((0,), 1))
+        TaskChoices(one), (nobody, human_in(one.model, "c")), (Trial((0,), 0), Trial((0,), 1))
     )
     assert trials.exact() == {"plan": 0.5, "sentence": 0.5, "possible": 0.5}
     runs = trials.sample(200, Random(0))

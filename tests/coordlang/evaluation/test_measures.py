@@ -10,12 +10,17 @@ import numpy as np
 import pytest
 
 from coordlang.evaluation.experiments import communication, flexibility
-from coordlang.evaluation.experiments.table1 import brute_force, pairs_of_plans
 from coordlang.evaluation.lab.statistics import mean_interval, wilson
-from coordlang.evaluation.material.sentence_counts import SentenceCounts, said, sentence_counts
-from coordlang.evaluation.material.state_orders import NATURAL, greedy_in_orders, natural_orders
+from coordlang.evaluation.material.brute_force import find_by_brute_force, pairs_of_plans
+from coordlang.evaluation.material.sentence_statistics import SentenceStatistics, task_statistics
+from coordlang.evaluation.material.state_orders import (
+    SYSTEMATIC,
+    greedy_partitions,
+    systematic_orders,
+)
 from coordlang.language.flexibility import flexibility as measured
 from coordlang.language.partition import Partition
+from coordlang.language.sentences import sentence_counts
 from coordlang.required.divergences import states_on_plans
 from coordlang.verification.by_definition import verify
 from planners.errors import OutOfMemory
@@ -30,7 +35,7 @@ IN_A, IN_B, IN_C = 0, 1, 2
 
 def test_three_cells_by_hand() -> None:
     one = three_cells()
-    [task] = said(one.space, one.word)
+    [task] = task_statistics(one.space, one.word)
     assert task.plans == {(IN_B, IN_C, IN_A): 2, (IN_B, IN_A): 2}
     assert (task.steps, task.count, task.fewest_words) == (2, 4, 2)
     assert task.expected_open == 2  # whatever is said, two plans are left
@@ -61,8 +66,8 @@ def test_means_are_over_the_right_tasks() -> None:
     five.
     """
     tasks = [
-        SentenceCounts(2, {(0, 1, 2): 1}, (0, 1, 2), (0, 1, 2)),
-        SentenceCounts(2, {(0,): 5}, (0,), (0,)),
+        SentenceStatistics(2, {(0, 1, 2): 1}, (0, 1, 2), (0, 1, 2)),
+        SentenceStatistics(2, {(0,): 5}, (0,), (0,)),
     ]
     savings = communication.measures(tasks)
     assert (savings["differing"], savings["tasks"]) == (1, 2)
@@ -78,7 +83,9 @@ def test_means_are_over_the_right_tasks() -> None:
 def test_sentences_against_listed_plans(folder: str, stem: str) -> None:
     tasks = task_languages(folder, stem)
     lengths = set()
-    for one, counted in zip(tasks[:150], said(tasks[0].space, tasks[0].word), strict=False):
+    for one, counted in zip(
+        tasks[:150], task_statistics(tasks[0].space, tasks[0].word), strict=False
+    ):
         of_state = dict(zip(one.space.state.tolist(), one.word.tolist(), strict=True))
         plans = naive.listed(one.space, one.task, 10_000)
         sentences = [
@@ -98,7 +105,7 @@ def test_sentences_against_listed_plans(folder: str, stem: str) -> None:
 def test_the_same_as_the_library_measures() -> None:
     tasks = task_languages("grid", "gw2-2x3")
     space, word = tasks[0].space, tasks[0].word
-    ours, theirs = said(space, word), measured([space], [word])
+    ours, theirs = task_statistics(space, word), measured([space], [word])
     assert [t.count for t in ours] == list(theirs.plans)
     assert [float(t.expected_open) for t in ours] == pytest.approx(theirs.expected.tolist())
     assert [t.plans[t.first] for t in ours] == pytest.approx(theirs.first.tolist())
@@ -108,37 +115,39 @@ def test_the_same_as_the_library_measures() -> None:
 def test_too_many_sentences_are_not_counted() -> None:
     one = task_languages("grid", "gw2-2x3")[0]
     with pytest.raises(OutOfMemory):
-        sentence_counts(one.space, one.word, most=10)
+        sentence_counts(one.space, one.word, most_steps=10)
+    with pytest.raises(OutOfMemory):
+        sentence_counts(one.space, one.word, most_of_node=1)
 
 
 def test_all_orders_make_languages_of_different_sizes() -> None:
     candidates = all_tasks("grid", "gw2-2x3")
     states = states_on_plans(candidates.spaces).tolist()
-    for order in natural_orders(candidates, states).values():
+    for order in systematic_orders(candidates, states).values():
         assert sorted(order) == states
-    assert len({tuple(order) for order in natural_orders(candidates, states).values()}) == len(
-        NATURAL
+    assert len({tuple(order) for order in systematic_orders(candidates, states).values()}) == len(
+        SYSTEMATIC
     )
     sizes = {}
-    for name, words in greedy_in_orders(candidates, 15, Random(0)):
+    for name, words in greedy_partitions(candidates, 15, Random(0)):
         sizes[name] = int(words.max()) + 1
         names = tuple(f"w{n}" for n in range(int(words.max()) + 1))
         table = Partition(names, candidates.rows, words.astype(np.int64), 0)
         assert verify(table, candidates.spaces).holds
-    assert list(sizes)[:6] == [*NATURAL, "random 1"]
+    assert list(sizes)[:6] == [*SYSTEMATIC, "random 1"]
     assert len(set(sizes.values())) > 1
 
 
 def test_brute_force_says_why_it_has_nothing() -> None:
     candidates = all_tasks("three-cells")
-    assert brute_force(candidates, 60.0, 0)["words"] == 3
+    assert find_by_brute_force(candidates, 60.0, 0)["words"] == 3
     pairs = sum(
         len(naive.listed(space, task, 1000)) ** 2
         for space in candidates.spaces
         for task in range(len(space.starts))
     )
     assert pairs_of_plans(candidates) == pairs
-    assert brute_force(all_tasks("grid", "gw2-2x3"), 0.5, 0)["why"] == "out of time"
+    assert find_by_brute_force(all_tasks("grid", "gw2-2x3"), 0.5, 0)["why"] == "out of time"
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from coordlang.evaluation.experiments import planning_cost, scenario, table1
 from coordlang.evaluation.experiments.registry import RECIPES
 from coordlang.evaluation.lab.recipe import Record, Settings, Unit, table
 from coordlang.evaluation.lab.results import name_of
-from coordlang.evaluation.material.grid_drawing import place_of, position
+from coordlang.evaluation.material.grid import cell_position, entered_cells, is_cell, task_cells
 from coordlang.evaluation.material.languages import language_for
 from coordlang.evaluation.material.paper import (
     DIFFERING,
@@ -28,7 +28,7 @@ from coordlang.use.sentence.task_language import languages_in_tasks
 from coordlang.vocabulary.sat import PartitionProblem
 from planners.errors import OutOfTime, UsageError
 from planners.search.plans import Plans
-from tests.support.domains import DOMAINS
+from tests.support.domains import DOMAINS, all_tasks
 from tests.support.task_languages import task_languages, three_cells
 
 
@@ -99,7 +99,7 @@ def test_the_detour_is_optimal_and_nobody_else_moves_otherwise(tmp_path: Path) -
     one = next(
         s
         for s in languages_in_tasks(language, candidates)
-        if scenario._ends(s) == (scenario.START, scenario.GOAL)
+        if task_cells(s.space, s.task) == (scenario.START, scenario.GOAL)
     )
     found = scenario.detour(one)
     way, (agreed, other) = found["detour"], found["agreed"]
@@ -117,10 +117,10 @@ def test_the_detour_is_optimal_and_nobody_else_moves_otherwise(tmp_path: Path) -
             assert c != d
             assert (a, b) != (d, c)
             for before, after in ((a, c), (b, d)):
-                rows, columns = zip(position(before), position(after), strict=True)
+                rows, columns = zip(cell_position(before), cell_position(after), strict=True)
                 assert abs(rows[0] - rows[1]) + abs(columns[0] - columns[1]) <= 1
     # All parts of robot 1 through the place, by listing the plans.
-    wanted = {n for n, text in enumerate(one.model.labels[0]) if place_of(text) == scenario.PLACE}
+    wanted = {n for n, cell in enumerate(entered_cells(one.model, 0)) if cell == scenario.PLACE}
     parts = {tuple(step[0] for step in plan) for plan in Plans.of(one.space, one.task)}
     assert found["parts"] == sum(bool(wanted & set(part)) for part in parts)
     assert 0 < found["ways"] <= found["parts_that_fit"] <= found["parts"]
@@ -139,11 +139,18 @@ def test_freedom_on_three_cells() -> None:
     }  # r1 could go through c, and r2 straight
 
 
-def test_places() -> None:
-    assert place_of("(move r1 c0-0 c2-11)") == "c2-11"
-    assert place_of("(move r1 a b)") is None
+def test_cells() -> None:
+    assert is_cell("c2-11")
+    assert not is_cell("b")
+    assert cell_position("c2-11") == (2, 11)
     with pytest.raises(ValueError, match="no cell"):
-        position("kitchen")
+        cell_position("kitchen")
+    model = all_tasks("grid", "gw1-2x2").model
+    assert dict(zip(model.labels[0], entered_cells(model, 0), strict=True)) == {
+        text: text.strip("()").split()[-1] if text.startswith("(move") else None
+        for text in model.labels[0]
+    }
+    assert set(entered_cells(three_cells().model, 0)) == {None}  # called a, b and c
 
 
 def test_languages_are_kept_and_unfinished_ones_are_not(
