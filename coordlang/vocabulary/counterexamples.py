@@ -108,7 +108,7 @@ def _forward(space: PlanSpace, index: EdgeIndex, word: Ints, starts: Ints) -> li
 
     A node is (x_1 .. x_n, y or failed, leads), failed as ``len(space)``.
     """
-    robots = space.labels.shape[1]
+    robots = space.robots
     leads = _Leads()
     spans = space.layers
     layers: list[_Layer] = []
@@ -139,7 +139,7 @@ def _forward(space: PlanSpace, index: EdgeIndex, word: Ints, starts: Ints) -> li
 def _expand(
     space: PlanSpace, index: EdgeIndex, word: Ints, leads: _Leads, nodes: Ints
 ) -> tuple[_Layer, Ints]:
-    robots = space.labels.shape[1]
+    robots = space.robots
     failed = len(space)
     sources: list[Ints] = []
     edges: list[Ints] = []
@@ -179,7 +179,7 @@ def _backward(space: PlanSpace, layers: list[_Layer]) -> None:
 
     With the move that begins it.
     """
-    robots = space.labels.shape[1]
+    robots = space.robots
     goal = layers[0]
     bad = (goal.nodes[:, robots] == len(space)) & (goal.nodes[:, robots + 1 :] == 0).all(axis=1)
     goal.best = np.where(bad, 0, _FAR)
@@ -197,7 +197,7 @@ def _backward(space: PlanSpace, layers: list[_Layer]) -> None:
 
 
 def _retrace(space: PlanSpace, layers: list[_Layer], most: int) -> Iterator[Counterexample]:
-    robots = space.labels.shape[1]
+    robots = space.robots
     starts: list[tuple[int, int, int]] = []
     for number, layer in enumerate(layers):
         x = layer.nodes[:, : robots + 1]
@@ -223,7 +223,7 @@ def _follow(
 
     The best one, or at each node any move that still leads to one.
     """
-    robots = space.labels.shape[1]
+    robots = space.robots
     start = int(layers[number].nodes[row, 0])
     edges = []
     for below, layer in zip(layers[number - 1 :: -1], layers[number:0:-1], strict=True):

@@ -23,18 +23,26 @@ from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans, counts
 from planners.tables import Bools
 
-#: A task that requires coordination and has more plans than this keeps the sentences of the
-#: partition.
+#: Plans that a task requiring coordination may have for its sentences to be enlarged.
 MOST_PLANS = 1_000
+#: A word is worth adding if it raises the average E by more than rounding.
+_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
 class Enlarged:
     """Overlapping words, with their flexibility.
 
-    ``words`` of every state, ``expected`` E of each task, ``before`` that of the partition.
-
-    ``tried`` enlargements, ``stopped`` the error that ended the search early or None.
+    Attributes
+    ----------
+    words
+        The words of every state.
+    expected, before
+        (tasks) E with these words, and with those of the partition.
+    tried
+        How many enlargements were tried.
+    stopped
+        The error that ended the search early, or None.
     """
 
     words: Overlap
@@ -50,15 +58,29 @@ class Enlarged:
 
 
 def enlarge(
-    spaces: Sequence[PlanSpace], requires: Sequence[Bools], partition: Mapping[int, int]
+    spaces: Sequence[PlanSpace],
+    requires: Sequence[Bools],
+    partition: Mapping[int, int],
+    *,
+    most_plans: int = MOST_PLANS,
 ) -> Enlarged:
-    """Enlarge the words of ``partition``, which must be a language for the tasks of ``spaces``.
+    """Enlarge the words of a partition, which must be a language for the tasks of ``spaces``.
 
-    ``requires`` says of the nodes of each space whether coordination is required
-    (`coordlang.required.composition_walk.walk`). Anytime: out of time, or interrupted, it returns
-    what it has.
+    Anytime: out of time, or interrupted, it returns what it has.
+
+    Parameters
+    ----------
+    spaces
+        The plan spaces.
+    requires
+        For each space, of which nodes coordination is required
+        (`coordlang.required.composition_walk.walk`).
+    partition
+        State number -> word number.
+    most_plans
+        The states of a task that requires coordination and has more plans keep their words.
     """
-    search = _Search(spaces, requires, partition)
+    search = _Search(spaces, requires, partition, most_plans)
     before = search.expected
     stopped = run_until_stopped(search.run)
     return Enlarged(search.words, search.expected, before, search.tried, stopped)
@@ -77,6 +99,7 @@ class _Coordinated:
 
     @classmethod
     def of(cls, plans: Plans) -> _Coordinated:
+        """List the plans."""
         listed = list(plans)
         parts = tuple(tuple(zip(*plan, strict=True)) for plan in listed)
         return cls(tuple(tuple(plans.states(plan)) for plan in listed), parts, frozenset(parts))
@@ -104,88 +127,100 @@ class _Coordinated:
         )
 
 
+#: The classes of nodes (number of the plan space, node), as `Readings` has them.
+_Classes = dict[tuple[int, int], dict[int, int]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Task:
+    """A task: the number of its plan space, its node there, its plans where they are listed."""
+
+    space: int
+    node: int
+    coordinated: _Coordinated | None
+
+
 class _Search:
+    """Adds words one after another; ``words`` are a language at any time."""
+
     def __init__(
-        self, spaces: Sequence[PlanSpace], requires: Sequence[Bools], partition: Mapping[int, int]
+        self,
+        spaces: Sequence[PlanSpace],
+        requires: Sequence[Bools],
+        partition: Mapping[int, int],
+        most_plans: int,
     ) -> None:
         self.words: dict[int, frozenset[int]] = {s: frozenset((w,)) for s, w in partition.items()}
         self.tried = 0
-        self._all = sorted(set(partition.values()))
+        self._all_words = sorted(set(partition.values()))
         self._spaces = spaces
         self._readings = [Readings(space, self.words) for space in spaces]
-        # (plan space, node, its plans where coordination is required), and the states that must
-        # keep their words.
-        self._tasks: list[tuple[int, int, _Coordinated | None]] = []
+        self._tasks: list[_Task] = []
+        #: States that keep their words.
         self._fixed: set[int] = set()
-        for which, (space, required) in enumerate(zip(spaces, requires, strict=True)):
+        for number, (space, required) in enumerate(zip(spaces, requires, strict=True)):
             counted = counts(space)
             for node in space.starts.tolist():
                 plans = Plans(space, node, counted)
-                if required[node] and plans.count > MOST_PLANS:
-                    self._fixed |= _states_from(space, node)
-                few = required[node] and plans.count <= MOST_PLANS
-                self._tasks.append((which, node, _Coordinated.of(plans) if few else None))
-        self.expected = np.array([self._measure(number) for number in range(len(self._tasks))])
+                listed = required[node] and plans.count <= most_plans
+                self._tasks.append(_Task(number, node, _Coordinated.of(plans) if listed else None))
+                if required[node] and not listed:
+                    passed = space.descendants(np.array([node]))
+                    self._fixed.update(space.state[passed].tolist())
+        self.expected = np.array([self._measure(task) for task in self._tasks])
 
     def run(self) -> None:
+        """Try every word for every state, until none is worth adding."""
         better = True
         while better:
             better = False
             for state in sorted(set(self.words) - self._fixed):
-                for word in self._all:
+                for word in self._all_words:
                     if word not in self.words[state]:
                         better |= self._add(state, word)
 
-    def _measure(self, number: int) -> float:
-        which, node, coordinated = self._tasks[number]
-        return (
-            self._readings[which].expected(node)
-            if coordinated is None
-            else coordinated.expected(self.words)
-        )
+    def _measure(self, task: _Task) -> float:
+        """E of a task with the words as they are."""
+        if task.coordinated is not None:
+            return task.coordinated.expected(self.words)
+        return self._readings[task.space].expected(task.node)
 
-    def _add(self, state: int, word: int) -> bool:  # noqa: C901 - one step, undone where it does not pay
+    def _add(self, state: int, word: int) -> bool:
         """Give a state a further word if that is a language and leaves more plans open."""
         self.tried += 1
         old = self.words[state]
-        above = [nodes_above(space, state) for space in self._spaces]
-        affected = [n for n, (which, node, _) in enumerate(self._tasks) if above[which][node]]
-        kept: list[dict[int, dict[int, int]]] = []
-        after = self.expected.copy()
+        classes_before: _Classes = {}
         better = False
         self.words[state] = old | {word}
         try:
-            for number in affected:
-                if self._tasks[number][2] is not None:
-                    after[number] = self._measure(number)
-            if all(after[number] > 0 for number in affected):
-                for read, nodes in zip(self._readings, above, strict=True):
-                    numbers = np.flatnonzero(nodes).tolist()
-                    kept.append({n: read.classes[n] for n in numbers})
-                    read.update(numbers, self.words)
-                for number in affected:
-                    if self._tasks[number][2] is None:
-                        after[number] = self._measure(number)
-                better = bool(after.mean() > self.expected.mean() * (1 + 1e-12))
+            after = self._expected_after(state, classes_before)
+            if after.mean() > self.expected.mean() * (1 + _ROUNDING):
+                self.expected, better = after, True
         except TooManySentences:
             pass
-        finally:
-            if better:
-                self.expected = after
-            else:
+        finally:  # a limit, too, leaves the words as they were
+            if not better:
                 self.words[state] = old
-                for read, classes in zip(self._readings, kept, strict=False):
-                    for n, own in classes.items():
-                        read.classes[n] = own
+                for (number, node), classes in classes_before.items():
+                    self._readings[number].classes[node] = classes
         return better
 
+    def _expected_after(self, state: int, classes_before: _Classes) -> Floats:
+        """E of each task after a state got a further word; 0 throughout if some plan lost by it.
 
-def _states_from(space: PlanSpace, node: int) -> set[int]:
-    seen, todo = {node}, [node]
-    while todo:
-        here = todo.pop()
-        for target in space.target[space.first[here] : space.first[here + 1]].tolist():
-            if target not in seen:
-                seen.add(target)
-                todo.append(target)
-    return set(space.state[sorted(seen)].tolist())
+        The readings of nodes are brought up to date, and noted as they were before.
+        """
+        above = [nodes_above(space, state) for space in self._spaces]
+        after = self.expected.copy()
+        affected = [n for n, task in enumerate(self._tasks) if above[task.space][task.node]]
+        listed = [n for n in affected if self._tasks[n].coordinated is not None]
+        after[listed] = [self._measure(self._tasks[n]) for n in listed]
+        if (after[listed] == 0).any():
+            return np.zeros_like(after)
+        for number, (read, nodes) in enumerate(zip(self._readings, above, strict=True)):
+            changed = np.flatnonzero(nodes).tolist()
+            classes_before.update({(number, node): read.classes[node] for node in changed})
+            read.update(changed, self.words)
+        others = [n for n in affected if self._tasks[n].coordinated is None]
+        after[others] = [self._measure(self._tasks[n]) for n in others]
+        return after

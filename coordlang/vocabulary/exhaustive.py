@@ -10,7 +10,7 @@ from itertools import product
 
 from coordlang.language.sentences import sentence
 from coordlang.vocabulary.job import Job, Outcome
-from planners.search.plans import Plans, counts
+from planners.search.plans import Plan, Plans, counts
 
 #: A failing tuple of plans as state sequences.
 _Failing = tuple[tuple[int, ...], ...]
@@ -38,19 +38,20 @@ def exhaustive(job: Job) -> Outcome:
 def _failing(job: Job) -> Iterator[_Failing]:
     for space in job.candidates.spaces:
         counted = counts(space)
-        robots = space.labels.shape[1]
         for start in space.starts.tolist():
             plans = Plans(space, start, counted)
             listed = list(plans)
             optimal = set(listed)
             states = [tuple(plans.states(plan)) for plan in listed]
-            for chosen in product(range(len(listed)), repeat=robots):
-                steps = zip(*(listed[k] for k in chosen), strict=True)
-                if (
-                    tuple(tuple(own[i] for i, own in enumerate(step)) for step in steps)
-                    not in optimal
-                ):
+            for chosen in product(range(len(listed)), repeat=space.robots):
+                if _mixture([listed[k] for k in chosen]) not in optimal:
                     yield tuple(states[k] for k in chosen)
+
+
+def _mixture(plans: Sequence[Plan]) -> Plan:
+    """The plan in which each robot follows its part of its own one of the plans."""
+    steps = zip(*plans, strict=True)
+    return tuple(tuple(own[robot] for robot, own in enumerate(step)) for step in steps)
 
 
 def _partitions(states: int, size: int) -> Iterator[Sequence[int]]:

@@ -13,7 +13,8 @@ of docs/concepts.md).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,101 +24,131 @@ from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, counts
 from planners.tables import Bools
 
-#: Tasks with more plans than this are bounded by their number of plans.
+#: Plans of a task up to which its boxes are looked at.
 MOST_PLANS = 3_000
-#: Boxes looked at for one task; with more of them a plan is bounded by the rows and columns that it
-#: can share.
-_BOXES = 5_000
+#: Boxes that cannot grow, of one task and one division, that are looked at.
+MOST_BOXES = 5_000
 
 
-def flexibility_bounds(spaces: Sequence[PlanSpace], requires: Sequence[Bools]) -> Floats:
+def flexibility_bounds(
+    spaces: Sequence[PlanSpace],
+    requires: Sequence[Bools],
+    *,
+    most_plans: int = MOST_PLANS,
+    most_boxes: int = MOST_BOXES,
+) -> Floats:
     """For each task an upper bound on E = sum_s n_s^2 / N under any language.
 
-    N where the task does not require coordination, and where it has more than `MOST_PLANS` plans.
-    ``requires`` is what `coordlang.required.composition_walk.walk` says of the nodes of each space.
+    N where the task does not require coordination.
+
+    Parameters
+    ----------
+    spaces
+        The plan spaces of the tasks.
+    requires
+        For each space, of which nodes coordination is required
+        (`coordlang.required.composition_walk.walk`).
+    most_plans
+        A task with more plans is bounded by their number.
+    most_boxes
+        Where there are more boxes a plan is bounded by the rows and columns that it can share.
+
+    Returns
+    -------
+    Floats
+        (tasks), in the order of the spaces.
     """
     bounds: list[float] = []
     for space, required in zip(spaces, requires, strict=True):
         counted = counts(space)
         for start in space.starts.tolist():
             plans = Plans(space, start, counted)
-            if not required[start] or plans.count > MOST_PLANS:
+            if not required[start] or plans.count > most_plans:
                 bounds.append(float(min(plans.count, MANY)))
             else:
-                bounds.append(_average_box(list(plans)))
+                bounds.append(_average_box(list(plans), most_boxes))
     return np.array(bounds, np.float64)
 
 
-def _average_box(plans: Sequence[Plan]) -> float:
+def _average_box(plans: Sequence[Plan], most_boxes: int) -> float:
     """The size of the largest box with a plan in it, averaged over the plans.
 
-    Of all divisions the least for each plan.
+    Of all divisions of the robots the least size counts for each plan.
     """
     robots = len(plans[0][0])
-    divisions = (
-        range(robots) if robots > 2 else range(1)
-    )  # with two robots both divisions are one table
-    sizes = list(zip(*(_box_sizes(plans, robot) for robot in divisions), strict=True))
-    return float(sum(map(min, sizes)) / len(plans))
+    # With two robots both divisions are one table.
+    divisions = range(robots) if robots > 2 else range(1)
+    sizes = [_Table.of(plans, robot).box_sizes(most_boxes) for robot in divisions]
+    return float(sum(map(min, zip(*sizes, strict=True))) / len(plans))
 
 
-def _box_sizes(plans: Sequence[Plan], robot: int) -> list[int]:
-    """For each plan the size of the largest box with it.
+@dataclass(frozen=True, slots=True)
+class _Table:
+    """Plans as cells: rows are the parts of one robot, columns those of all others.
 
-    Rows are the robot's parts, columns those of all others.
+    ``cells[row, column]`` is the number of the plan, ``rows`` the columns of each row, as bits.
     """
-    row_of: dict[tuple[int, ...], int] = {}
-    column_of: dict[tuple[tuple[int, ...], ...], int] = {}
-    cells: dict[tuple[int, int], int] = {}
-    for number, plan in enumerate(plans):
-        own = tuple(step[robot] for step in plan)
-        rest = tuple(step[:robot] + step[robot + 1 :] for step in plan)
-        cells[row_of.setdefault(own, len(row_of)), column_of.setdefault(rest, len(column_of))] = (
-            number
-        )
-    rows = [0] * len(row_of)
-    for row, column in cells:
-        rows[row] |= 1 << column
-    closed = _closed(set(rows))
-    if closed is None:
-        return _shared(rows, cells)
-    boxes = [
-        (sum(row & columns == columns for row in rows) * columns.bit_count(), columns)
-        for columns in closed
-    ]
-    sizes = [0] * len(plans)
-    left = list(rows)
-    for size, columns in sorted(boxes, reverse=True):
-        for number, row in enumerate(rows):
-            if row & columns == columns:
-                for column in bits(left[number] & columns):
-                    sizes[cells[number, column]] = size
-                left[number] &= ~columns
-    return sizes
+
+    cells: dict[tuple[int, int], int]
+    rows: list[int]
+
+    @classmethod
+    def of(cls, plans: Sequence[Plan], robot: int) -> _Table:
+        """The table for a robot."""
+        row_of: dict[tuple[int, ...], int] = {}
+        column_of: dict[tuple[tuple[int, ...], ...], int] = {}
+        cells: dict[tuple[int, int], int] = {}
+        for number, plan in enumerate(plans):
+            own = tuple(step[robot] for step in plan)
+            rest = tuple(step[:robot] + step[robot + 1 :] for step in plan)
+            row = row_of.setdefault(own, len(row_of))
+            cells[row, column_of.setdefault(rest, len(column_of))] = number
+        rows = [0] * len(row_of)
+        for row, column in cells:
+            rows[row] |= 1 << column
+        return cls(cells, rows)
+
+    def box_sizes(self, most_boxes: int) -> list[int]:
+        """For each plan the size of the largest box with it; no less where there are many boxes."""
+        maximal = _intersections(self.rows, most_boxes)
+        if maximal is None:
+            return self._shared()
+        boxes = [
+            (sum(row & columns == columns for row in self.rows) * columns.bit_count(), columns)
+            for columns in maximal
+        ]
+        sizes = [0] * len(self.cells)
+        left = list(self.rows)
+        for size, columns in sorted(boxes, reverse=True):
+            for number, row in enumerate(self.rows):
+                if row & columns == columns:
+                    for column in bits(left[number] & columns):
+                        sizes[self.cells[number, column]] = size
+                    left[number] &= ~columns
+        return sizes
+
+    def _shared(self) -> list[int]:
+        """For each plan: of the rows that have its column, the columns shared with its row.
+
+        No box with it is larger.
+        """
+        sizes = [0] * len(self.cells)
+        for (row, column), number in self.cells.items():
+            sizes[number] = sum(
+                (self.rows[row] & other).bit_count() for other in self.rows if other >> column & 1
+            )
+        return sizes
 
 
-def _closed(rows: set[int]) -> set[int] | None:
-    """The column sets of the boxes that cannot grow.
+def _intersections(rows: Iterable[int], most: int) -> set[int] | None:
+    """All intersections of rows but the empty one: the column sets of boxes that cannot grow.
 
-    All intersections of rows; None if there are too many.
+    None if there are more than ``most``.
     """
-    closed: set[int] = set()
-    for row in sorted(rows):
-        closed |= {row & other for other in closed} | {row}
-        if len(closed) > _BOXES:
+    found: set[int] = set()
+    for row in sorted(set(rows)):
+        found |= {row & other for other in found} | {row}
+        if len(found) > most:
             return None
-    closed.discard(0)
-    return closed
-
-
-def _shared(rows: Sequence[int], cells: Mapping[tuple[int, int], int]) -> list[int]:
-    """For each plan: of the rows that have its column, the columns shared with its row.
-
-    No box with it is larger.
-    """
-    sizes = [0] * len(cells)
-    for (row, column), number in cells.items():
-        sizes[number] = sum(
-            (rows[row] & other).bit_count() for other in rows if other >> column & 1
-        )
-    return sizes
+    found.discard(0)
+    return found

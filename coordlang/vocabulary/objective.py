@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 from coordlang.language.flexibility import MANY, Floats, edge_shares
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
-from planners.tables import Ints, ranges
+from planners.tables import Bools, Ints, ranges
 
+#: An odd constant by which hashes of sentences are multiplied (2^64 divided by the golden ratio).
 _MIX = np.uint64(0x9E3779B97F4A7C15)
 #: Edges kept in parts of plan graphs, one part for each state; beyond, parts are cut out anew each
 #: time.
-_KEEP = 20_000_000
+_KEPT_EDGES = 20_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,27 +65,27 @@ class _Part:
 
     def expected(self, word: Ints, code: NDArray[np.uint64]) -> Floats:
         """E of each task; ``word`` of every state, ``code`` a random number for every word."""
-        together = np.zeros(self.nodes)
+        open_share = np.zeros(self.nodes)
         node = first = np.zeros(0, np.int64)
-        said = np.zeros(0, np.uint64)
+        sentence = np.zeros(0, np.uint64)
         share = np.zeros(0)
         for number, layer in enumerate(self.layers):
             if number == 0:
-                said, share = code[word[layer.state]], np.ones(len(layer.state))
-                node = np.arange(len(said))
+                sentence, share = code[word[layer.state]], np.ones(len(layer.state))
+                node = np.arange(len(sentence))
             else:
-                node, said, share = _sentences_above(layer, first, said, share, word, code)
+                node, sentence, share = _sentences_above(layer, first, sentence, share, word, code)
             first = np.searchsorted(node, np.arange(layer.high - layer.low + 1))
-            together[layer.low : layer.high] = np.bincount(
+            open_share[layer.low : layer.high] = np.bincount(
                 node, share * share, layer.high - layer.low
             )
-        return self.plans * together[self.start]
+        return self.plans * open_share[self.start]
 
 
 def _sentences_above(
     layer: _Layer,
     first: Ints,
-    said: NDArray[np.uint64],
+    sentence: NDArray[np.uint64],
     share: Floats,
     word: Ints,
     code: NDArray[np.uint64],
@@ -95,14 +96,14 @@ def _sentences_above(
     """
     leaving, entering = word[layer.leaving], word[layer.entering]
     source, weight = layer.source, layer.share
-    if len(first) - 1 == len(said):  # one sentence for every node below
+    if len(first) - 1 == len(sentence):  # one sentence for every node below
         entry = layer.target
     else:
         number = first[layer.target + 1] - first[layer.target]
         entry = ranges(first[layer.target], number)
         leaving, entering = np.repeat(leaving, number), np.repeat(entering, number)
         source, weight = np.repeat(source, number), np.repeat(weight, number)
-    rest = said[entry]
+    rest = sentence[entry]
     new = np.where(
         leaving != entering, (rest ^ (rest >> np.uint64(29))) * _MIX + code[leaving], rest
     )
@@ -178,21 +179,16 @@ class Objective:
                 for p in [space.part(space.passing(state))]
                 if len(p.tasks)
             ]
-            if self._kept > _KEEP:
+            if self._kept > _KEPT_EDGES:
                 return parts
             self._kept += sum(part.edges for part in parts)
             self._of_state[state] = parts
         return self._of_state[state]
 
 
-def nodes_above(space: PlanSpace, state: int) -> NDArray[np.bool_]:
+def nodes_above(space: PlanSpace, state: int) -> Bools:
     """The nodes from which a plan passes through a state, their own state included.  O(edges)."""
-    above: NDArray[np.bool_] = space.state == state
-    source = space.sources
-    for span in space.layers:
-        low, high = int(space.first[span.start]), int(space.first[span.stop])
-        above[source[low:high][above[space.target[low:high]]]] = True
-    return above
+    return space.ancestors(space.state == state)
 
 
 class _Measured:
@@ -203,45 +199,40 @@ class _Measured:
         self._before = before
         counted = counts(space)
         self._share = edge_shares(space, counted)
-        self._source = space.sources
-        self._spans = space.layers
+        self._edges_of_layers = [space.layer_edges(layer) for layer in range(len(space.layers))]
         self._plans = np.array(
             [float(min(counted[n], MANY)) for n in space.starts.tolist()], np.float64
         )
 
-    def passing(self, state: int) -> NDArray[np.bool_]:
+    def passing(self, state: int) -> Bools:
         """Which tasks have plans through a state."""
-        passing: NDArray[np.bool_] = nodes_above(self.space, state)[self.space.starts]
+        passing: Bools = nodes_above(self.space, state)[self.space.starts]
         return passing
 
-    def part(self, wanted: NDArray[np.bool_]) -> _Part:
+    def part(self, wanted: Bools) -> _Part:
         """The part of the graph on the plans of the wanted tasks."""
-        space, source = self.space, self._source
-        alive = np.zeros(len(space), np.bool_)
-        alive[space.starts[wanted]] = True
-        for span in reversed(self._spans):
-            low, high = int(space.first[span.start]), int(space.first[span.stop])
-            alive[space.target[low:high][alive[source[low:high]]]] = True
+        space = self.space
+        alive = space.descendants(space.starts[wanted])
         number = np.cumsum(alive) - 1
         layers: list[_Layer] = []
-        for span in self._spans:
-            nodes = np.arange(span.start, span.stop)[alive[span]]
+        low = high = 0
+        for span, below in zip(space.layers, self._edges_of_layers, strict=True):
+            nodes = np.flatnonzero(alive[span]) + span.start
             if not len(nodes):
                 continue
-            edges = np.arange(int(space.first[span.start]), int(space.first[span.stop]))
-            edges = edges[alive[source[edges]]]
-            low = layers[-1].high if layers else 0
-            below = layers[-1].low if layers else 0
+            kept = alive[below.source]
+            source, target = below.source[kept], below.target[kept]
+            first_below, low, high = low, high, high + len(nodes)
             layers.append(
                 _Layer(
                     low,
-                    low + len(nodes),
+                    high,
                     space.state[nodes],
-                    number[source[edges]] - low,
-                    number[space.target[edges]] - below,
-                    space.state[source[edges]],
-                    space.state[space.target[edges]],
-                    self._share[edges],
+                    number[source] - low,
+                    number[target] - first_below,
+                    space.state[source],
+                    space.state[target],
+                    self._share[below.edges[kept]],
                 )
             )
         tasks = np.flatnonzero(wanted)

@@ -53,7 +53,7 @@ def divided(space: PlanSpace, side: Sequence[int]) -> PlanSpace:
 
     Those in ``side`` as the first one, all others as the second one.
     """
-    others = [robot for robot in range(space.labels.shape[1]) if robot not in side]
+    others = [robot for robot in range(space.robots) if robot not in side]
     merged = []
     for robots in (list(side), others):
         _, number = np.unique(space.labels[:, robots], axis=0, return_inverse=True)
@@ -83,7 +83,7 @@ def pair_languages(spaces: Sequence[PlanSpace]) -> list[PairLanguage]:
     x_2, y)``, at most L^3 in a layer of L states, whatever n is; one language for all robots walks
     ``(x_1 .. x_n, y)``.
     """
-    robots = spaces[0].labels.shape[1]
+    robots = spaces[0].robots
     return [language_for(spaces, [pair]) for pair in combinations(range(robots), 2)]
 
 
@@ -92,7 +92,7 @@ def language_for(spaces: Sequence[PlanSpace], pairs: Sequence[tuple[int, int]]) 
 
     Raises `Inseparable` (with the two plans) when there is none.
     """
-    robots = spaces[0].labels.shape[1]
+    robots = spaces[0].robots
     divisions = sorted({_named(side, robots) for i, j in pairs for side in sides(robots, i, j)})
     views = [divided(space, side) for space in spaces for side in divisions]
     for view, space in zip(views, [space for space in spaces for _ in divisions], strict=True):
@@ -180,7 +180,7 @@ def unsafe_pair(spaces: Sequence[PlanSpace], words: Sequence[int]) -> tuple[int,
 
     None if there is none.
     """
-    robots = spaces[0].labels.shape[1]
+    robots = spaces[0].robots
     word = np.array(words, np.int64)
     for i, j in combinations(range(robots), 2):
         for side in sides(robots, i, j):

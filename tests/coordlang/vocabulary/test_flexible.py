@@ -16,6 +16,7 @@ from coordlang.language.flexibility import flexibility
 from coordlang.required.composition_walk import walk
 from coordlang.tasks.candidates import Candidates, from_listed, from_problems
 from coordlang.tasks.task_file import read_task_file
+from coordlang.vocabulary.annealing import AnnealingSettings
 from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Assignment, Outcome
@@ -265,16 +266,26 @@ def test_every_division_counts_in_the_bound() -> None:
     assert bound < min(alone)
 
 
-def test_bounds_without_listing_all_boxes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bounds_without_listing_all_boxes() -> None:
     """Where there are too many boxes the bound is looser, never too small."""
     candidates = all_tasks("grid", "gw1-2x2")
     requires = [walk(space).requires for space in candidates.spaces]
     exact = flexibility_bounds(candidates.spaces, requires)
-    monkeypatch.setattr("coordlang.vocabulary.flexibility_bound._BOXES", 0)
-    loose = flexibility_bounds(candidates.spaces, requires)
+    loose = flexibility_bounds(candidates.spaces, requires, most_boxes=0)
     assert (loose >= exact - 1e-9).all()
-    monkeypatch.setattr("coordlang.vocabulary.flexibility_bound.MOST_PLANS", 0)
-    assert (flexibility_bounds(candidates.spaces, requires) >= loose).all()
+    number = flexibility_bounds(candidates.spaces, requires, most_plans=0)
+    assert (number >= loose).all()
+
+
+def test_annealing_is_as_long_as_it_is_set() -> None:
+    built = build_language(all_tasks("grid", "gw1-2x2"), "greedy")
+    found = Outcome({state: n % 3 for n, state in enumerate(built.job.states)}, 1)
+    job = replace(built.job, check=lambda _: None)
+    untouched = flexible(job, found, AnnealingSettings(patience=0))
+    assert untouched.partition is found.partition
+    assert untouched.figures["moves"] == 0
+    short = AnnealingSettings(moves=0, least_moves=7, patience=2, better=1e9)
+    assert flexible(job, found, short).figures["moves"] == 14
 
 
 def test_flexible_reaches_its_bound_on_the_ring() -> None:
