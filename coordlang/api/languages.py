@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from os import PathLike, fspath
 from time import perf_counter
@@ -21,8 +21,6 @@ from coordlang.api.inputs import (
     read_planning,
 )
 from coordlang.api.options import (
-    BUILD_PREFERENCES,
-    METHODS,
     UNSOLVABLE,
     BuildPreference,
     GivenOptions,
@@ -33,7 +31,7 @@ from coordlang.api.options import (
 )
 from coordlang.api.presenting import Presented
 from coordlang.api.witness import witness_data
-from coordlang.building import Built, build_language, certificate_of
+from coordlang.building import BuildOptions, Built, build_language, certificate_of
 from coordlang.certificate import Certificate, Checked, read_certificate
 from coordlang.certificate import check as check_certificate
 from coordlang.language.file import read_language
@@ -45,13 +43,10 @@ from coordlang.tasks.candidates import Candidates
 from coordlang.verification.by_definition import Verdict
 from coordlang.verification.by_definition import verify as verify_partition
 from coordlang.verification.overlapping import verify_overlapping
-from planners.errors import ProvedImpossible, UsageError
+from planners.errors import ProvedImpossible
 
 #: Called with what is being done, now and then.
 Progress = Callable[[str], None]
-
-#: Methods that prove that no language has fewer words.
-EXACT_METHODS = ("minimal", "exhaustive")
 
 
 def load_language(path: File) -> Language:
@@ -74,6 +69,7 @@ class BuiltLanguage(Presented):
     """
 
     language: Language
+    options: BuildOptions
     candidates: Candidates
     built: Built
     seconds: Mapping[str, float]
@@ -183,32 +179,25 @@ def build(
         If a limit was hit before there was any verified language; later the language so far is
         returned, with ``stopped`` set.
     """
-    _check_build_options(method, alpha_only, prefer, unsolvable)
+    options = BuildOptions(method, seed, alpha_only, prefer, overlap)
+    require_one_of("--unsolvable", unsolvable, UNSOLVABLE)
     begin = perf_counter()
     files = read_planning(domain, problems, factored, GivenOptions.of(**model))
     candidates = _candidates(files, tasks, unsolvable)
     seconds = {"space": perf_counter() - begin}
-    built = build_language(
-        candidates,
-        method,
-        seed=seed,
-        alpha_only=alpha_only,
-        prefer=prefer,
-        overlap=overlap,
-        progress=progress or _silent,
-    )
+    built = build_language(candidates, **asdict(options), progress=progress or _silent)
     seconds |= built.seconds
     producer = {
         "program": "coordlang",
         "version": coordlang.__version__,
-        "arguments": _arguments(tasks, method, alpha_only, prefer, overlap),
+        "arguments": _arguments(tasks, options),
         "seed": seed,
         "solver": f"python-sat {version('python-sat')}",
         "seconds": {name: round(value, 3) for name, value in seconds.items()},
     }
     provenance = replace(built.language.provenance, producer=producer)
     language = replace(built.language, provenance=provenance)
-    return BuiltLanguage(language, candidates, built, seconds)
+    return BuiltLanguage(language, options, candidates, built, seconds)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -338,23 +327,6 @@ def _certificate(certificate: File | Certificate | None) -> Certificate | None:
     return certificate
 
 
-def _check_build_options(
-    method: str, alpha_only: bool, prefer: str | None, unsolvable: str
-) -> None:
-    require_one_of("--method", method, METHODS)
-    require_one_of("--prefer", prefer, BUILD_PREFERENCES)
-    require_one_of("--unsolvable", unsolvable, UNSOLVABLE)
-    if alpha_only and method != "separating":
-        raise UsageError(
-            "--alpha-only belongs to --method separating", remedy="Leave out one of the two."
-        )
-    if prefer and method not in EXACT_METHODS:
-        raise UsageError(
-            f"--prefer {prefer} belongs to --method minimal or exhaustive",
-            remedy="Add one of these methods.",
-        )
-
-
 def _candidates(
     files: PlanningInput, tasks: TasksSource | None, unsolvable: Unsolvable
 ) -> Candidates:
@@ -367,17 +339,12 @@ def _candidates(
         raise
 
 
-def _arguments(
-    tasks: TasksSource | None, method: str, alpha_only: bool, prefer: str | None, overlap: bool
-) -> list[str]:
+def _arguments(tasks: TasksSource | None, options: BuildOptions) -> list[str]:
     """Return the keywords of a call as a language file records them."""
-    given: dict[str, object] = {"method": method}
+    given = {name: value for name, value in asdict(options).items() if value}
     if isinstance(tasks, str | PathLike):
         given["tasks"] = fspath(tasks)
-    given |= {"alpha_only": alpha_only} if alpha_only else {}
-    given |= {"prefer": prefer} if prefer else {}
-    given |= {"overlap": overlap} if overlap else {}
-    return [f"{name}={value}" for name, value in given.items()]
+    return [f"{name}={value}" for name, value in sorted(given.items())]
 
 
 def _silent(_: str) -> None:

@@ -73,25 +73,29 @@ class GivenOptions:
         Raises
         ------
         UsageError
-            For a value that an option does not have, and for robots that are named in two ways.
+            For no robots, and for robots that are named in two ways.
         """
         from planners.errors import UsageError
 
-        require_one_of("--unowned", unowned, UNOWNED)
-        require_one_of("--cost", cost, COSTS)
         names = robots.split(",") if isinstance(robots, str) else list(robots or ())
         chosen = tuple(name.strip().lower() for name in names if name.strip())
         if robots is not None and not chosen:
             raise UsageError("--robots: expected names", remedy="As in --robots r1,r2.")
         if chosen and robot_type:
             raise UsageError(
-                "--robots and --robot-type both say who the robots are", remedy="Give one of them."
+                "--robots and --robot-type both say who the robots are: give one of them"
             )
         kind = robot_type.lower() if robot_type else None
         return cls(chosen, kind, unowned, cost, bool(remember_actions))
 
     def options(self) -> ModelOptions:
-        """Return the options of a model that no language file describes."""
+        """Return the options of a model that no language file describes.
+
+        Raises
+        ------
+        UsageError
+            For a value that an option does not have.
+        """
         from planners.loading import ModelOptions
         from planners.pddl.robots import RobotSelection
 

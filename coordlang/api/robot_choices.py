@@ -26,6 +26,7 @@ from coordlang.use.choices.file import monitor, to_bytes, to_data
 from coordlang.use.choices.monitor import Monitor
 from planners.errors import UsageError
 from planners.files import write_atomically
+from planners.search.plans import Plans
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -69,6 +70,11 @@ class RobotsChoices(Presented):
         """Robot -> the exact number of its subplans."""
         counts = (self.found.robots[number].automaton.count for number in self.chosen)
         return dict(zip(self.robots, counts, strict=True))
+
+    @property
+    def plans(self) -> int:
+        """The exact number of plans that the sentence leaves open."""
+        return Plans.of(self.found.fits).count
 
     @property
     def combinations(self) -> int:

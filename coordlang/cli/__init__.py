@@ -13,7 +13,8 @@ from typing import NoReturn
 
 import click
 
-from coordlang.cli.app import EXIT_BROKEN_PIPE, EXIT_INTERRUPTED, clear_progress, cli
+from coordlang.cli.exit_codes import BROKEN_PIPE, INTERRUPTED
+from coordlang.cli.group import cli
 from planners.errors import CoordlangError, OutOfMemory
 
 
@@ -22,27 +23,13 @@ def main() -> NoReturn:
     sys.exit(run(sys.argv[1:]))
 
 
-def run(arguments: list[str]) -> int:  # noqa: C901 - one clause for each way to end
+def run(arguments: list[str]) -> int:
     """Run one command; the exit code.  No traceback reaches a user without ``--debug``."""
     debug = "--debug" in arguments
     try:
-        result = cli.main(args=arguments, prog_name="coordlang", standalone_mode=False)
-        if sys.stdout is not None:
-            sys.stdout.flush()
-        return result if isinstance(result, int) else 0
-    except click.exceptions.Exit as done:
-        return int(done.exit_code)
+        return _run(arguments)
     except (KeyboardInterrupt, click.Abort):
-        return _fail("interrupted", EXIT_INTERRUPTED)
-    except click.ClickException as error:
-        error.show(file=sys.stderr)
-        return 2
-    except BrokenPipeError:
-        # The reader has gone (`| head`): no more output, and no complaint at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return EXIT_BROKEN_PIPE
-    except SystemExit:
-        return EXIT_BROKEN_PIPE  # so ends click a command whose reader has gone
+        return _fail("interrupted", INTERRUPTED)
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EIO, errno.EBADF):
             return _internal(error, debug)
@@ -61,8 +48,28 @@ def run(arguments: list[str]) -> int:  # noqa: C901 - one clause for each way to
         return _internal(error, debug)
 
 
+def _run(arguments: list[str]) -> int:
+    """Run one command through click; the exit code."""
+    try:
+        result = cli.main(args=arguments, prog_name="coordlang", standalone_mode=False)
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        return result if isinstance(result, int) else 0
+    except click.exceptions.Exit as done:
+        return int(done.exit_code)
+    except click.ClickException as error:
+        error.show(file=sys.stderr)
+        return 2
+    except BrokenPipeError:
+        # The reader has gone (`| head`): no more output, and no complaint at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return BROKEN_PIPE
+    except SystemExit:
+        return BROKEN_PIPE  # so ends click a command whose reader has gone
+
+
 def _internal(error: Exception, debug: bool) -> int:
-    """A bug of ours: said plainly, with its own exit code, and never hidden."""
+    """A bug: reported as one, with an exit code of its own, and never hidden."""
     if debug:
         traceback.print_exception(error)
     what = f"internal error: {type(error).__name__}: {error}"
@@ -70,6 +77,5 @@ def _internal(error: Exception, debug: bool) -> int:
 
 
 def _fail(message: str, code: int) -> int:
-    clear_progress()
     print(f"coordlang: {message}", file=sys.stderr)
     return code

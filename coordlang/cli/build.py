@@ -4,33 +4,28 @@ from __future__ import annotations
 
 import json
 import sys
-from dataclasses import asdict, replace
-from importlib.metadata import version
-from time import perf_counter
-from typing import TYPE_CHECKING, Any, Literal
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from coordlang.cli.app import (
-    EXIT_INTERRUPTED,
-    EXIT_UNPROVED,
-    GivenOptions,
-    PlanningFiles,
-    check_outputs,
-    clear_progress,
-    counted,
-    limits,
-    make_candidates,
-    model_options,
-    never_stdout,
-    note_single_robot,
-    planning_files,
-    progress,
+import coordlang
+from coordlang.api.options import (
+    BUILD_PREFERENCES,
+    METHODS,
+    UNSOLVABLE,
+    BuildPreference,
+    Method,
+    Unsolvable,
 )
+from coordlang.api.presenting import counted
+from coordlang.cli.exit_codes import INTERRUPTED, UNPROVED
+from coordlang.cli.files import PlanningFiles, check_outputs, never_stdout, planning_files
+from coordlang.cli.shared_options import ModelKeywords, limits, model_options
+from coordlang.cli.terminal import note_single_robot, working
 
 if TYPE_CHECKING:
-    from coordlang.building import Built
-    from coordlang.tasks.candidates import Candidates
+    from coordlang.api.languages import BuiltLanguage
 
 
 @click.command(name="build")
@@ -43,7 +38,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--method",
-    type=click.Choice(["greedy", "separating", "minimal", "exhaustive"]),
+    type=click.Choice(METHODS),
     default="greedy",
     show_default=True,
     help="greedy: fast.  separating: fewest words that part plans where they differ first or "
@@ -56,7 +51,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--prefer",
-    type=click.Choice(["flexible"]),
+    type=click.Choice(BUILD_PREFERENCES),
     help="flexible: of the languages with the fewest words, one "
     "whose sentences leave many plans open (with --method minimal or exhaustive).",
 )
@@ -68,15 +63,15 @@ if TYPE_CHECKING:
 @click.option(
     "--certificate",
     metavar="FILE",
-    help="Also write why fewer words do not suffice, for `verify --lower-bound`.",
+    help="Also write why fewer words do not suffice, for `verify --certificate`.",
 )
 @click.option(
     "--unsolvable",
-    type=click.Choice(["fail", "skip"]),
+    type=click.Choice(UNSOLVABLE),
     default="fail",
     show_default=True,
-    help="What to do about candidate tasks without plans: stop (exit 11), or name and leave "
-    "them out.",
+    help="What to do about candidate tasks without plans: stop (exit 11), "
+    "or name and leave them out.",
 )
 @click.option(
     "-o",
@@ -89,118 +84,103 @@ if TYPE_CHECKING:
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as one JSON object.")
 @model_options
 @limits
-def command(  # noqa: C901 - each option that excludes another has its check
+def command(
     pddl: PlanningFiles,
     tasks: str | None,
-    method: str,
+    method: Method,
     alpha_only: bool,
-    prefer: Literal["flexible"] | None,
+    prefer: BuildPreference | None,
     overlap: bool,
     certificate: str | None,
-    unsolvable: str,
+    unsolvable: Unsolvable,
     output: str,
     seed: int,
     as_json: bool,
-    given: GivenOptions,
+    model: ModelKeywords,
 ) -> int:
     """Build a coordination language and verify it before it is written.
 
     Exit 0: written, with the proof that the method promises.  3: written without it (a limit was
     hit).
     """
-    from coordlang.building import BuildOptions, build_language
-    from coordlang.cli.miscoordination import show
-    from coordlang.language.file import to_bytes, write_language
-    from coordlang.required.miscoordination import Inseparable
-    from planners.errors import ProvedImpossible
     from planners.limits import stop_clock, time_left
 
     never_stdout("--certificate", certificate)
     listed = tasks if tasks != "all" else None
     check_outputs([("-o", output), ("--certificate", certificate)], [*pddl.paths, listed])
-    options = BuildOptions(method, seed, alpha_only, prefer, overlap)
-    start = perf_counter()
-    lifted, read = pddl.read()
-    try:
-        candidates = make_candidates(
-            lifted, read, tasks, given.options(), skip_unsolvable=unsolvable == "skip"
-        )
-    except ProvedImpossible as error:
-        if unsolvable == "fail":
-            error.remedy = "\n  ".join(
-                filter(None, (error.remedy, "--unsolvable skip leaves out such tasks."))
-            )
-        raise
-    for name in candidates.skipped:
-        click.echo(f"coordlang: left out, it has no plan: {name}", err=True)
-    note_single_robot(candidates.model.robots)
-    seconds = {"space": perf_counter() - start}
-    try:
-        built = build_language(candidates, **asdict(options), progress=progress)
-    except Inseparable as error:
-        clear_progress()
-        click.echo(show(error.witness), err=True)
-        raise
+    built = _build(
+        pddl,
+        tasks=tasks,
+        method=method,
+        alpha_only=alpha_only,
+        prefer=prefer,
+        overlap=overlap,
+        unsolvable=unsolvable,
+        seed=seed,
+        **model,
+    )
     left = time_left()
     stop_clock()  # the work is done; from here on it is saved
-    clear_progress()
-    proved = built.language.guarantee.proved_minimal
-    seconds |= built.seconds
-    producer = {
-        "program": "coordlang",
-        "version": version("coordlang"),
-        "arguments": [a.encode("utf-8", "replace").decode() for a in sys.argv[1:]],
-        "seed": seed,
-        "solver": f"python-sat {version('python-sat')}",
-        "seconds": {name: round(value, 3) for name, value in seconds.items()},
-    }
-    provenance = replace(built.language.provenance, producer=producer)
-    language = replace(built.language, provenance=provenance)
-    if output == "-":
-        click.echo(to_bytes(language).decode(), nl=False)
-    else:
-        write_language(language, output)
-    no_certificate: BaseException | None = None
-    if certificate and (built.stopped is None or proved):
-        no_certificate = _certify(built, certificate, left)
-    elif certificate:
-        click.echo("coordlang: no certificate is written: the search was stopped", err=True)
-    stopped = no_certificate or built.stopped
-    figures = _figures(candidates, built, seconds)
+    _save(built, output)
+    uncertified = _certify(built, certificate, left) if certificate else None
+    figures = built.data()
     if as_json and output != "-":
         click.echo(json.dumps(figures))
     else:
         click.echo(_summary(figures, output), err=output == "-")
-    if isinstance(stopped, KeyboardInterrupt):
-        click.echo("coordlang: interrupted; the best language so far is written", err=True)
-        return EXIT_INTERRUPTED
-    if stopped is not None:
-        reason = str(stopped).splitlines()[0] if str(stopped) else "out of memory"
-        short_of = "" if proved and options.is_exact else ", without proof"
-        click.echo(f"coordlang: {reason}; the best language so far is written{short_of}", err=True)
-    unproved = stopped is not None
-    if options.is_exact:
-        unproved = not proved or no_certificate is not None
-    return EXIT_UNPROVED if unproved else 0
+    return _exit_code(built, uncertified)
 
 
-def _certify(built: Built, path: str, seconds: float) -> BaseException | None:
+def _build(pddl: PlanningFiles, **keywords: Any) -> BuiltLanguage:
+    """Build with progress shown, and write to stderr what belongs to the tasks."""
+    from coordlang.api.witness import witness_text
+
+    try:
+        with working("finding all optimal plans") as progress:
+            built = coordlang.build(
+                *pddl.files, factored=pddl.factored, progress=progress, **keywords
+            )
+    except coordlang.Inseparable as error:
+        click.echo(witness_text(error.witness), err=True)
+        raise
+    for name in built.skipped:
+        click.echo(f"coordlang: left out, it has no plan: {name}", err=True)
+    note_single_robot(built.candidates.model.robots)
+    return built
+
+
+def _save(built: BuiltLanguage, output: str) -> None:
+    """Write the language; its file records the arguments of the command line."""
+    from coordlang.language.file import to_bytes
+
+    arguments = [argument.encode("utf-8", "replace").decode() for argument in sys.argv[1:]]
+    provenance = built.language.provenance
+    producer = {**provenance.producer, "arguments": arguments}
+    language = replace(built.language, provenance=replace(provenance, producer=producer))
+    if output == "-":
+        click.echo(to_bytes(language).decode(), nl=False)
+    else:
+        language.save(output)
+
+
+def _certify(built: BuiltLanguage, path: str, seconds: float) -> BaseException | None:
     """Write the certificate, within ``seconds``; the error that ended it early, or None."""
-    from coordlang.building import certificate_of
     from coordlang.certificate import write_certificate
     from planners.limits import run_until_stopped, stop_clock, time_limit
 
+    if built.stopped is not None and not built.guarantee.proved_minimal:
+        click.echo("coordlang: no certificate is written: the search was stopped", err=True)
+        return None
+
     def write() -> None:
         with time_limit(seconds):
-            progress("writing down why fewer words do not suffice")
-            proof = certificate_of(built)
+            with working("writing why fewer words do not suffice"):
+                proof = built.certificate()
             stop_clock()
-            clear_progress()
             write_certificate(proof, path)
 
     stopped = run_until_stopped(write)
     if stopped is not None:
-        clear_progress()
         click.echo(
             "coordlang: no certificate is written: there was no time or memory left for it",
             err=True,
@@ -208,55 +188,54 @@ def _certify(built: Built, path: str, seconds: float) -> BaseException | None:
     return stopped
 
 
-def _figures(candidates: Candidates, built: Built, seconds: dict[str, float]) -> dict[str, Any]:
-    return {
-        "tasks": candidates.count,
-        "states": candidates.states,
-        "states_on_plans": built.states,
-        "tasks_requiring_coordination": built.first_differences.requiring,
-        "divergences": len(built.first_differences.divergences),
-        "words": built.language.guarantee.size,
-        "lower_bound": built.language.guarantee.lower_bound,
-        "method": built.language.guarantee.method,
-        "walk_nodes": built.first_differences.nodes,
-        "walk_edges": built.first_differences.edges,
-        "verify_nodes": built.verdict.nodes,
-        "verified": built.verdict.holds,
-        "proved_minimal": built.language.guarantee.proved_minimal,
-        **built.figures,
-        "seconds": {name: round(value, 3) for name, value in seconds.items()},
-    }
+def _exit_code(built: BuiltLanguage, uncertified: BaseException | None) -> int:
+    """Return the exit code, and write to stderr what ended the work early."""
+    proved, exact = built.guarantee.proved_minimal, built.options.is_exact
+    stopped = uncertified or built.stopped
+    if isinstance(stopped, KeyboardInterrupt):
+        click.echo("coordlang: interrupted; the best language so far is written", err=True)
+        return INTERRUPTED
+    if stopped is not None:
+        reason = str(stopped).splitlines()[0] if str(stopped) else "out of memory"
+        short_of = "" if proved and exact else ", without proof"
+        click.echo(f"coordlang: {reason}; the best language so far is written{short_of}", err=True)
+    if exact:
+        return 0 if proved and uncertified is None else UNPROVED
+    return 0 if stopped is None else UNPROVED
 
 
 def _summary(figures: dict[str, Any], output: str) -> str:
-    words, total = figures["words"], sum(figures["seconds"].values())
-    proof = (
-        "proved minimal, "
-        if figures["proved_minimal"]
-        else f"at least {figures['lower_bound']} needed, "
+    total = sum(figures["seconds"].values())
+    proof = f"at least {figures['lower_bound']} needed, "
+    if figures["proved_minimal"]:
+        proof = "proved minimal, "
+    words, tasks = counted(figures["words"], "word"), counted(figures["tasks"], "task")
+    return (
+        f"{words} ({figures['method']}, {proof}verified) for {tasks}, "
+        f"{figures['tasks_requiring_coordination']:,} of which require coordination\n"
+        f"{figures['states_on_plans']:,} states on optimal plans, "
+        f"{figures['divergences']:,} divergences, "
+        f"{figures['walk_nodes']:,} walk nodes, {total:.2f} s\n"
+        f"{_flexibility(figures)}"
+        f"written to {'stdout' if output == '-' else output}"
     )
-    flexible = (
-        f"a sentence leaves {figures['flexibility']:,.2f} plans open on average ("
-        f"{figures['flexibility_before']:,.2f} before, {figures['flexibility_bound']:,.2f} at "
-        "most), "
-        f"communication saving {100 * figures['communication_saving']:.1f} %\n"
-        if "flexibility" in figures
-        else ""
-    )
+
+
+def _flexibility(figures: dict[str, Any]) -> str:
+    """How many plans the sentences leave open, where that was optimised; whole lines."""
+    text = ""
+    if "flexibility" in figures:
+        text += (
+            f"a sentence leaves {figures['flexibility']:,.2f} plans open on average ("
+            f"{figures['flexibility_before']:,.2f} before, "
+            f"{figures['flexibility_bound']:,.2f} at most), "
+            f"communication saving {100 * figures['communication_saving']:.1f} %\n"
+        )
     if "overlapping_words" in figures:
-        flexible += (
-            f"{counted(figures['overlapping_words'], 'further word')} of states: a sentence well "
-            "chosen leaves "
+        text += (
+            f"{counted(figures['overlapping_words'], 'further word')} of states: "
+            "a sentence well chosen leaves "
             f"{figures['overlapping_flexibility']:,.2f} plans open on average (without them "
             f"{figures['partition_flexibility']:,.2f})\n"
         )
-    return (
-        f"{counted(words, 'word')} ({figures['method']}, {proof}verified) "
-        f"for {counted(figures['tasks'], 'task')}, "
-        f"{figures['tasks_requiring_coordination']:,} of which require coordination\n"
-        f"{figures['states_on_plans']:,} states on optimal plans, {figures['divergences']:,} "
-        "divergences, "
-        f"{figures['walk_nodes']:,} walk nodes, {total:.2f} s\n"
-        f"{flexible}"
-        f"written to {'stdout' if output == '-' else output}"
-    )
+    return text

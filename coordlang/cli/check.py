@@ -3,61 +3,39 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import click
 
-from coordlang.cli.app import limits, model_options, task_files
-
-if TYPE_CHECKING:
-    from planners.loading import PlanningInstance
+import coordlang
+from coordlang.cli.exit_codes import IMPOSSIBLE, REFUTED
+from coordlang.cli.files import PlanningFiles, planning_files
+from coordlang.cli.shared_options import ModelKeywords, limits, model_options
+from coordlang.cli.terminal import working
 
 
 @click.command(name="check")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
 @model_options
-@task_files
+@planning_files("DOMAIN PROBLEM", most=1)
 @limits
-def command(as_json: bool, load: Callable[[], PlanningInstance]) -> int:
+def command(as_json: bool, pddl: PlanningFiles, model: ModelKeywords) -> int:
     """Compare our optimal cost with Fast Downward's (through unified-planning).
 
     Exit 0: equal.  1: they differ.  11: both prove that there is no plan.
     """
-    from planners.classical.fast_downward import optimal_cost
-    from planners.errors import ProvedImpossible
-    from planners.search.optimal_plans import search
-
-    loaded = load()
-    model, task = loaded.model, loaded.tasks[0]
-    try:
-        ours: tuple[int, int] | None = search(model, task).cost_of(0)
-    except ProvedImpossible:
-        ours = None
-    answer = optimal_cost(model, task)
-    theirs = answer.cost
+    with working("solving the task twice"):
+        found = coordlang.check(*pddl.files, factored=pddl.factored, **model)
     if as_json:
-        click.echo(
-            json.dumps(
-                {
-                    "coordlang": ours,
-                    "fast_downward": theirs,
-                    "agree": ours == theirs,
-                    "form": answer.form,
-                    "actions": answer.actions,
-                }
-            )
-        )
+        click.echo(json.dumps(found.data()))
     else:
-        click.echo(f"coordlang      {_cost(ours, model.cost)}")
-        click.echo(
-            f"Fast Downward  {_cost(theirs, model.cost)}   ({answer.form} form, {answer.actions} "
-            "plain actions)"
-        )
-    if ours != theirs:
+        kind = model.get("cost") or "makespan"
+        plain = f"({found.form} form, {found.actions} plain actions)"
+        click.echo(f"coordlang      {_cost(found.cost, kind)}")
+        click.echo(f"Fast Downward  {_cost(found.fast_downward, kind)}   {plain}")
+    if not found.agree:
         click.echo("coordlang: the optimal costs differ", err=True)
-        return 1
-    return 11 if ours is None else 0
+        return REFUTED
+    return IMPOSSIBLE if found.cost is None else 0
 
 
 def _cost(cost: tuple[int, int] | None, kind: str) -> str:

@@ -7,26 +7,30 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from coordlang.cli.app import (
-    GivenOptions,
+import coordlang
+from coordlang.api.presenting import counted
+from coordlang.cli.exit_codes import REFUTED
+from coordlang.cli.files import (
     check_outputs,
-    counted,
     domain_argument,
-    form_of,
     language_argument,
-    limits,
-    model_options,
     problem_argument,
+    write,
 )
+from coordlang.cli.group import RenamedOptions
+from coordlang.cli.listing import form_of
+from coordlang.cli.shared_options import ModelKeywords, limits, model_options
+from coordlang.cli.terminal import covered_code, working
 
 if TYPE_CHECKING:
-    from coordlang.use.choices.choices import Choices, RobotChoices
+    from coordlang.api.robot_choices import RobotsChoices
+    from coordlang.use.choices.choices import RobotChoices
     from coordlang.use.choices.monitor import Answer, Monitor
 
 _STATES_SHOWN = 40
 
 
-@click.command(name="choices")
+@click.command(name="choices", cls=RenamedOptions, renamed={"--did": "--history"})
 @language_argument
 @domain_argument
 @problem_argument
@@ -44,7 +48,7 @@ _STATES_SHOWN = 40
     help="Walk every combination of all robots' choices: is each an optimal plan?",
 )
 @click.option(
-    "--did",
+    "--history",
     multiple=True,
     metavar="SUBACTION",
     help="What the robot did so far, one step each; or idle.",
@@ -80,7 +84,7 @@ def command(
     sentence: str,
     whose: tuple[str, ...],
     check: bool,
-    did: tuple[str, ...],
+    history: tuple[str, ...],
     visit: tuple[str, ...],
     avoid: tuple[str, ...],
     do: tuple[str, ...],
@@ -88,185 +92,152 @@ def command(
     form: str,
     as_json: bool,
     output: str | None,
-    given: GivenOptions,
+    model: ModelKeywords,
 ) -> int:
-    """Say which subplans each robot may follow under SENTENCE ("w1 w0").
+    """Show which subplans each robot may follow under SENTENCE ("w1 w0").
 
     Whatever the others choose from theirs, together they follow an optimal plan.
 
-    With --did and the detours: what one robot may do next, and whether the detours can still be
-    had, all at once.
+    With --history and the detours: what one robot may do next, and whether the detours are still
+    possible, all at once.
     """
-    from coordlang.cli.speaking import read_task_language, write
-    from coordlang.use.choices.choices import MOST, choices
-    from coordlang.use.choices.dot import to_dot
-    from coordlang.use.choices.file import to_bytes
-
     form = form_of(form, as_json)
     check_outputs([("-o", output)], [language, domain, problem])
-    spoken = read_task_language(language, domain, problem, given)
-    chosen = _numbers(spoken.model.robots, whose)
-    found = choices(spoken, spoken.words_of(sentence), most=None if check else MOST)
-    if did or visit or avoid or do or never:
-        if len(chosen) != 1 or form == "dot":
+    with working("finding the robots' choices"):
+        found = coordlang.choices(
+            language, domain, problem, sentence, robot=whose, check=check, **model
+        )
+    detours = {"visit": visit, "avoid": avoid, "do": do, "never": never}
+    code = 0
+    if history or any(detours.values()):
+        if len(found.robots) != 1 or form == "dot":
             raise click.UsageError(
-                "--did, --visit, --avoid, --do and --never ask about one --robot, as text or JSON"
+                "--history, --visit, --avoid, --do and --never ask about one --robot, "
+                "as text or JSON"
             )
-        wanted = {"visit": visit, "avoid": avoid, "do": do, "never": never}
-        text, code = _ask(found, spoken.model.robots[chosen[0]], did, wanted, form)
+        at, answer = _followed(found, history, detours)
+        text = _monitor_text(at, answer) if form == "text" else _monitor_json(at, answer)
+        code = REFUTED if answer is not None and not answer else 0
     elif form == "text":
-        text, code = _text(found, chosen, check), 0
+        text = _text(found, check)
     else:
-        text, code = (
-            (to_dot(found, chosen) if form == "dot" else to_bytes(found, chosen).decode()),
-            0,
-        )
+        text = found.dot() if form == "dot" else found.text()
     write(text, output)
-    return max(code, _judged(found, check))
+    return max(code, _guarantee_code(found, check))
 
 
-def _numbers(known: tuple[str, ...], whose: tuple[str, ...]) -> list[int]:
-    for robot in whose:
-        if robot.lower() not in known:
-            raise click.UsageError(
-                f"--robot {robot}: there is no such robot; there are {', '.join(known)}"
-            )
-    return list(dict.fromkeys(known.index(robot.lower()) for robot in whose)) or list(
-        range(len(known))
-    )
+def _guarantee_code(found: RobotsChoices, check: bool) -> int:
+    """Return the exit code of what is guaranteed, and write to stderr what is not."""
+    from coordlang.api.witness import witness_text
 
-
-def _judged(found: Choices, check: bool) -> int:
-    """What is guaranteed, said on stderr where it is not everything; the exit code."""
-    from coordlang.cli.miscoordination import show
-    from coordlang.cli.speaking import covered
-
-    walked = found.mixtures
-    if walked is not None and walked.violation is not None:
-        why = (
-            "the file holds no coordination language"
-            if found.task_language.covered
-            else "the language does not cover it"
-        )
+    if found.witness is not None:
+        why = "the language does not cover it"
+        if found.covered:
+            why = "the file holds no coordination language"
         click.echo(f"coordlang: refuted: choices of this task miscoordinate; {why}", err=True)
-        click.echo(show(walked.violation), err=True)
-        return 1
-    if check and not found.task_language.covered:
+        click.echo(witness_text(found.witness), err=True)
+        return REFUTED
+    if check and not found.covered:
         click.echo(
             "coordlang: note: the language does not cover this task; --check proved this sentence",
             err=True,
         )
         return 0
-    return covered(found.task_language)
+    return covered_code(found.covered)
 
 
-def _text(found: Choices, chosen: list[int], check: bool) -> str:
+def _text(found: RobotsChoices, check: bool) -> str:
     from coordlang.tasks.candidates import describe
-    from planners.search.plans import Plans
 
-    spoken = found.task_language
-    plans = counted(Plans.of(found.fits).count, "plan")
+    used, mixtures = found.found.task_language, found.found.mixtures
     lines = [
-        f"The task {describe(spoken.space, spoken.task)}",
-        f'"{spoken.text(found.words)}" leaves {plans} open.',
+        f"The task {describe(used.space, used.task)}",
+        f'"{found.sentence}" leaves {counted(found.plans, "plan")} open.',
     ]
-    if check and found.mixtures is not None and found.mixtures.holds:
-        number = 1
-        for own in found.robots:
-            number *= own.automaton.count
-        nodes = counted(found.mixtures.nodes, "node")
-        lines.append(
-            f"checked: {counted(number, 'combination')} of own subplans, all optimal plans "
-            f"({nodes} walked)"
-        )
-    for robot in chosen:
-        lines += ["", *_table(found, found.robots[robot])]
+    if check and mixtures is not None and mixtures.holds:
+        number = counted(found.combinations, "combination")
+        nodes = counted(mixtures.nodes, "node")
+        lines.append(f"checked: {number} of own subplans, all optimal plans ({nodes} walked)")
+    for robot in found.chosen:
+        lines += ["", *_table(found, found.found.robots[robot])]
     return "\n".join(lines) + "\n"
 
 
-def _table(found: Choices, own: RobotChoices) -> list[str]:
+def _table(found: RobotsChoices, own: RobotChoices) -> list[str]:
     """The automaton state by state: what may be done there, where it leads, what is known there."""
-    from coordlang.use.choices.dot import distinguishing
-
-    model, automaton = found.task_language.model, own.automaton
+    model, automaton = found.found.task_language.model, own.automaton
     subplans = counted(automaton.count, "subplan")
-    lines = [
-        f"{model.robots[own.robot]} may follow {subplans} ({counted(len(automaton), 'state')}):"
-    ]
-    rows = [("step", "state", "left", "may do", "knows")]
-    last = automaton.layers[-1]
-    for step, states in enumerate(automaton.layers[:-1], 1):
-        if states.start >= _STATES_SHOWN:
-            break
-        for state, atoms in zip(states, distinguishing(found, own, states), strict=True):
-            moves = [
-                f"{model.labels[own.robot][label] if label else 'idle'} -> {to}"
-                for label, to in automaton.moves(state)
-            ]
-            rows.append(
-                (
-                    str(step),
-                    str(state),
-                    f"{automaton.left[state]:,}",
-                    " | ".join(moves),
-                    " ".join(atoms),
-                )
-            )
-    del rows[_STATES_SHOWN + 1 :]
-    widths = [max(len(row[k]) for row in rows) for k in range(4)]
-    if len(rows) > 1:
-        for row in rows:
-            numbers = "  ".join(
-                cell.rjust(width) for cell, width in zip(row[:3], widths, strict=False)
-            )
-            lines.append(f"  {numbers}  {row[3].ljust(widths[3])}  {row[4]}".rstrip())
-    rest = last.start - (len(rows) - 1)
+    states = counted(len(automaton), "state")
+    lines = [f"{model.robots[own.robot]} may follow {subplans} ({states}):"]
+    rows = _rows(found, own)[:_STATES_SHOWN]
+    if rows:
+        rows.insert(0, ("step", "state", "left", "may do", "knows"))
+        widths = [max(len(row[k]) for row in rows) for k in range(4)]
+        for *numbers, may_do, knows in rows:
+            cells = [cell.rjust(width) for cell, width in zip(numbers, widths, strict=False)]
+            lines.append("  ".join(["", *cells, may_do.ljust(widths[3]), knows]).rstrip())
+    rest = automaton.layers[-1].start - max(0, len(rows) - 1)
     if rest > 0:
         lines.append(f"  .. and {counted(rest, 'state')} more; --format json has all of them")
     return lines
 
 
-def _ask(
-    found: Choices, robot: str, did: tuple[str, ...], wanted: dict[str, tuple[str, ...]], form: str
-) -> tuple[str, int]:
-    """What a monitor says after what the robot did, and of its detours."""
-    from coordlang.use.choices.file import monitor
-    from coordlang.use.choices.monitor import MonitorError, NotAllowed
-    from planners.errors import Refuted, UsageError
+def _rows(found: RobotsChoices, own: RobotChoices) -> list[tuple[str, str, str, str, str]]:
+    """A row for each state in which something may be done, of the first steps."""
+    from coordlang.use.choices.dot import distinguishing
 
+    model, automaton = found.found.task_language.model, own.automaton
+    rows = []
+    for step, states in enumerate(automaton.layers[:-1], 1):
+        if states.start >= _STATES_SHOWN:
+            break
+        for state, atoms in zip(states, distinguishing(found.found, own, states), strict=True):
+            moves = " | ".join(
+                f"{model.label_text(own.robot, label) or 'idle'} -> {to}"
+                for label, to in automaton.moves(state)
+            )
+            left = f"{automaton.left[state]:,}"
+            rows.append((str(step), str(state), left, moves, " ".join(atoms)))
+    return rows
+
+
+def _followed(
+    found: RobotsChoices, history: tuple[str, ...], detours: dict[str, tuple[str, ...]]
+) -> tuple[Monitor, Answer | None]:
+    """Return a monitor that followed what the robot did, and its answer to the detours, if any."""
     try:
-        at = monitor(found, robot)
-        for subaction in did:
+        at = found.monitor(found.robots[0])
+        for subaction in history:
             at.did(subaction)
-        answer = at.can(**wanted) if any(wanted.values()) else None
-    except NotAllowed as error:
-        raise Refuted(str(error), remedy="After that nothing is guaranteed any more.") from None
-    except MonitorError as error:
-        raise UsageError(str(error)) from None
-    code = int(answer is not None and not answer)
-    if form == "json":
-        return json.dumps(_asked_data(at, answer)) + "\n", code
+        return at, at.can(**detours) if any(detours.values()) else None
+    except coordlang.NotAllowed as error:
+        raise coordlang.Refuted(
+            str(error), remedy="After that nothing is guaranteed any more."
+        ) from None
+    except coordlang.MonitorError as error:
+        raise coordlang.UsageError(str(error)) from None
+
+
+def _monitor_text(at: Monitor, answer: Answer | None) -> str:
     if at.finished:
-        lines = [f"{robot} has done all its {counted(at.step, 'step')}"]
+        lines = [f"{at.robot} has done all its {counted(at.step, 'step')}"]
     else:
         may = " or ".join(text or "idle" for text in at.allowed())
-        lines = [
-            f"step {at.step + 1}: {robot} may do {may}; {counted(at.remaining, 'subplan')} left"
-        ]
+        left = counted(at.remaining, "subplan")
+        lines = [f"step {at.step + 1}: {at.robot} may do {may}; {left} left"]
     if answer is not None and not answer:
         lines.append("the detour is not possible any more, whatever it does")
     elif answer is not None:
-        lines.append(
-            f"the detour is possible in {counted(answer.subplans, 'subplan')}, the first of them:"
-        )
+        subplans = counted(answer.subplans, "subplan")
+        lines.append(f"the detour is possible in {subplans}, the first of them:")
         lines += [
             f"  {step:>4}  {text or 'idle'}"
             for step, text in enumerate(answer.subplan or (), at.step + 1)
         ]
-    return "\n".join(lines) + "\n", code
+    return "\n".join(lines) + "\n"
 
 
-def _asked_data(at: Monitor, answer: Answer | None) -> dict[str, Any]:
+def _monitor_json(at: Monitor, answer: Answer | None) -> str:
     from planners.search.plan_file import json_count
 
     data: dict[str, Any] = {
@@ -280,4 +251,4 @@ def _asked_data(at: Monitor, answer: Answer | None) -> dict[str, Any]:
         data["possible"] = bool(answer)
         data["subplans"] = json_count(answer.subplans)
         data["subplan"] = list(answer.subplan) if answer.subplan is not None else None
-    return data
+    return json.dumps(data) + "\n"

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
 import click
 
-from coordlang.cli.app import EXIT_UNPROVED, check_outputs, clear_progress, counted, limits
+from coordlang.api.presenting import counted
+from coordlang.cli.exit_codes import UNPROVED
+from coordlang.cli.files import check_outputs
+from coordlang.cli.group import RenamedOptions
+from coordlang.cli.shared_options import limits, was_given
+from coordlang.cli.terminal import bar
 
 if TYPE_CHECKING:
-    from coordlang.evaluation.lab.recipe import Record, Section
-    from coordlang.evaluation.lab.runner import Progress
+    from coordlang.evaluation.lab.recipe import Recipe, Record, Section, Settings
+    from coordlang.evaluation.lab.results import Results
 
 
-@click.command(name="evaluate")
+@click.command(name="evaluate", cls=RenamedOptions, renamed={"--unit-limit": "--unit-time-limit"})
 @click.argument("names", nargs=-1, required=True, metavar="NAME...")
 @click.option(
     "--results",
@@ -26,7 +30,7 @@ if TYPE_CHECKING:
     help="Where results are kept (default: evaluation; with --quick evaluation/quick).",
 )
 @click.option(
-    "--page", metavar="FILE", help="The page that tells them (default: evaluation.md in DIR)."
+    "--page", metavar="FILE", help="The page that shows them (default: evaluation.md in DIR)."
 )
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--jobs", type=click.IntRange(min=1), help="Processes (default: one for each core).")
@@ -39,7 +43,7 @@ if TYPE_CHECKING:
 )
 @click.option("--quick", is_flag=True, help="The smallest rows and sizes only, 10 samples.")
 @click.option(
-    "--unit-limit",
+    "--unit-time-limit",
     type=click.FloatRange(min=0, min_open=True),
     default=180.0,
     show_default=True,
@@ -61,7 +65,7 @@ def command(
     jobs: int | None,
     samples: int,
     quick: bool,
-    unit_limit: float,
+    unit_time_limit: float,
     domains: str | None,
     as_json: bool,
 ) -> int:
@@ -74,9 +78,7 @@ def command(
     from coordlang.evaluation.lab.page import sections, write_page
     from coordlang.evaluation.lab.recipe import Settings
     from coordlang.evaluation.lab.results import Results
-    from coordlang.evaluation.lab.runner import run
     from coordlang.evaluation.material.suite import find_domains
-    from planners.errors import OutOfTime
 
     for name in names:
         if name != "all" and name not in RECIPES:
@@ -85,53 +87,66 @@ def command(
             )
     check_outputs([("--page", page)], [])
     chosen = [recipe for name, recipe in RECIPES.items() if name in names or "all" in names]
-    given = click.get_current_context().get_parameter_source("samples")
-    if quick and given is click.core.ParameterSource.DEFAULT:
+    if quick and not was_given("samples"):
         samples = 10
     folder = Path(results or ("evaluation/quick" if quick else "evaluation"))
-    settings = Settings(find_domains(domains), folder / "cache", seed, samples, quick, unit_limit)
+    cache = folder / "cache"
+    settings = Settings(find_domains(domains), cache, seed, samples, quick, unit_time_limit)
     kept = Results(folder)
     begin = perf_counter()
-    try:
-        found = run(chosen, settings, kept, jobs or len(os.sched_getaffinity(0)), show_progress)
-    except (KeyboardInterrupt, OutOfTime):
-        clear_progress()
-        click.echo("coordlang: what is done is kept; the same command goes on from there", err=True)
-        raise
-    clear_progress()
+    found = _run(chosen, settings, kept, jobs)
     written = write_page(RECIPES, kept, Path(page) if page else folder / "evaluation.md")
     seconds = perf_counter() - begin
     if as_json:
-        click.echo(
-            json.dumps(
-                {
-                    "results": {
-                        name: [as_data(record) for record in records]
-                        for name, records in found.items()
-                    },
-                    "files": [str(path) for path in written],
-                    "seconds": round(seconds, 3),
-                }
-            )
-        )
+        click.echo(json.dumps(_data(found, written, seconds)))
     else:
         for name, section in sections(RECIPES, found).items():
             click.echo(f"# {RECIPES[name].title}\n")
             click.echo(as_text(section))
+    pieces = counted(sum(map(len, found.values())), "piece")
+    click.echo(
+        f"{pieces} of work in {seconds:.1f} s; results in {folder}, page {written[0]}", err=True
+    )
     unfinished = [
-        f"{name}/{r.unit.key}"
+        f"{name}/{record.unit.key}"
         for name, records in found.items()
-        for r in records
-        if r.status != "done"
+        for record in records
+        if record.status != "done"
     ]
-    done = sum(map(len, found.values()))
-    work = f"{counted(done, 'piece')} of work in {seconds:.1f} s"
-    told = f"{work}; results in {folder}, page {written[0]}"
-    click.echo(told, err=True)
     if unfinished:
         click.echo(f"coordlang: met their limit: {', '.join(unfinished)}", err=True)
-        return EXIT_UNPROVED
+        return UNPROVED
     return 0
+
+
+def _run(
+    recipes: list[Recipe], settings: Settings, kept: Results, jobs: int | None
+) -> dict[str, list[Record]]:
+    """Run experiments with progress shown; what is done is kept when they are stopped."""
+    from coordlang.evaluation.lab.runner import Progress, run
+    from planners.errors import OutOfTime
+
+    try:
+        with bar() as show:
+
+            def report(progress: Progress) -> None:
+                running = ", ".join(f"{unit.experiment}/{unit.key}" for unit in progress.running)
+                show(progress.done, progress.all, f"({progress.known} known) {running}")
+
+            return run(recipes, settings, kept, jobs or len(os.sched_getaffinity(0)), report)
+    except (KeyboardInterrupt, OutOfTime):
+        click.echo("coordlang: what is done is kept; the same command goes on from there", err=True)
+        raise
+
+
+def _data(
+    found: dict[str, list[Record]], written: tuple[Path, ...], seconds: float
+) -> dict[str, object]:
+    return {
+        "results": {name: list(map(as_data, records)) for name, records in found.items()},
+        "files": [str(path) for path in written],
+        "seconds": round(seconds, 3),
+    }
 
 
 def as_data(record: Record) -> dict[str, object]:
@@ -152,14 +167,3 @@ def as_text(section: Section) -> str:
         for block in section.blocks
     ]
     return "\n\n".join([*parts, *(f"- {difference}" for difference in section.differences)]) + "\n"
-
-
-def show_progress(progress: Progress) -> None:
-    """One line about what is being done, on a terminal only."""
-    if sys.stderr.isatty():
-        running = ", ".join(f"{unit.experiment}/{unit.key}" for unit in progress.running)
-        click.echo(
-            f"\r\033[K{progress.done} of {progress.all} ({progress.known} known) {running} ..",
-            nl=False,
-            err=True,
-        )

@@ -1,44 +1,39 @@
-"""``coordlang plan``: one optimal plan under a sentence, or under the best sentence by a wish."""
+"""``coordlang plan``: one optimal plan under a sentence, or under the best sentence."""
 
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from coordlang.cli.app import (
-    GivenOptions,
-    counted,
-    domain_argument,
-    language_argument,
-    limits,
-    model_options,
-    problem_argument,
-)
+import coordlang
+from coordlang.api.options import HEURISTICS, HeuristicName
+from coordlang.api.presenting import counted
+from coordlang.cli.files import domain_argument, language_argument, problem_argument
+from coordlang.cli.group import RenamedOptions
+from coordlang.cli.shared_options import ModelKeywords, limits, model_options
+from coordlang.cli.terminal import covered_code, working
 
 if TYPE_CHECKING:
-    from coordlang.use.sentence.best_sentence import BestSentence
-    from coordlang.use.sentence.guided_search import GuidedPlan
-    from coordlang.use.sentence.preferences import Preference
+    from coordlang.api.speaking import Fulfilled
 
 
-@click.command(name="plan")
+@click.command(name="plan", cls=RenamedOptions, renamed={"--wish": "--prefer"})
 @language_argument
 @domain_argument
 @problem_argument
 @click.argument("sentence", required=False)
 @click.option(
-    "--wish",
-    "wishes",
+    "--prefer",
     multiple=True,
-    metavar="WISH",
-    help='Instead of SENTENCE: shortest, most-plans, first:ROBOT or avoid:"(ATOM)"; a second one '
-    "decides among equals.",
+    metavar="PREFERENCE",
+    help='Instead of SENTENCE: shortest, most-plans, first:ROBOT or avoid:"(ATOM)"; '
+    "a second one decides among equals.",
 )
 @click.option(
     "--heuristic",
-    type=click.Choice(["relaxed", "manhattan", "blind"]),
+    type=click.Choice(HEURISTICS),
     default="relaxed",
     show_default=True,
     help="The lower bound of A*.",
@@ -51,95 +46,43 @@ def command(
     domain: str,
     problem: str,
     sentence: str | None,
-    wishes: tuple[str, ...],
-    heuristic: str,
+    prefer: tuple[str, ...],
+    heuristic: HeuristicName,
     as_json: bool,
-    given: GivenOptions,
+    model: ModelKeywords,
 ) -> int:
     """Find one optimal plan that has SENTENCE ("w1 w0"), by A* that prunes what does not fit.
 
-    With --wish the best sentence of the task is found first.  The nodes expanded with and without
+    With --prefer the best sentence of the task is found first.  The nodes expanded with and without
     the sentence go to stderr.
     """
-    from coordlang.cli.speaking import covered, read_task_language
-    from coordlang.use.sentence.best_sentence import best_sentence
-    from coordlang.use.sentence.guided_search import ExpandedStates, plan_under_sentence
-    from coordlang.use.sentence.open_plans import OpenPlans, open_plans_data
-    from coordlang.use.sentence.preferences import read_preference
-    from planners.search.plan_file import to_ipc
-
-    if (sentence is None) == (not wishes):
-        raise click.UsageError("expected a SENTENCE or --wish, one of the two")
-    spoken = read_task_language(language, domain, problem, given)
-    read = [read_preference(spoken, wish) for wish in wishes]
-    best = best_sentence(spoken, read) if read else None
-    words = best.words if best else spoken.words_of(sentence or "")
-    terrain = ExpandedStates(spoken.model, spoken.partition)
-    found = plan_under_sentence(spoken, words, heuristic, terrain)
-    without = plan_under_sentence(spoken, None, heuristic, terrain)
-    understood = OpenPlans.of(spoken, words)
+    with working("searching for a plan"):
+        found = coordlang.plan(
+            language, domain, problem, sentence, prefer=prefer, heuristic=heuristic, **model
+        )
     if as_json:
-        data = open_plans_data(understood, [found.plan], None)
-        data["search"] = {
-            "heuristic": heuristic,
-            **_work(found),
-            "without_sentence": _work(without),
-        }
-        if best:
-            data["wishes"] = _fulfilled(read, best)
-        click.echo(json.dumps(data))
-        return covered(spoken)
-    click.echo(to_ipc(understood.plans, found.plan) + f"; sentence = {spoken.text(words)}")
-    if best:
-        _comment(read, best)
-    click.echo(
-        f"A* ({heuristic}) expanded {counted(found.expanded, 'node')}; without the "
-        f"sentence {without.expanded:,}",
-        err=True,
-    )
-    return covered(spoken)
+        click.echo(json.dumps(found.data()))
+        return covered_code(found.covered)
+    click.echo(found.ipc(), nl=False)
+    for entry in found.fulfilled:
+        _comment(entry)
+    expanded = counted(found.expanded, "node")
+    without = f"without the sentence {found.without_sentence.expanded:,}"
+    click.echo(f"A* ({heuristic}) expanded {expanded}; {without}", err=True)
+    return covered_code(found.covered)
 
 
-def _work(search: GuidedPlan) -> dict[str, int]:
-    return {"expanded": search.expanded, "generated": search.generated, "states": search.states}
-
-
-def _fulfilled(wishes: list[Preference], best: BestSentence) -> list[dict[str, Any]]:
-    from planners.search.plan_file import json_count
-
-    result: list[dict[str, Any]] = []
-    for wish, value in zip(wishes, best.values, strict=True):
-        if isinstance(value, int):
-            assert isinstance(wish, str)
-            result.append({"wish": wish, "value": json_count(value)})
-        else:
-            assert not isinstance(wish, str)
-            worst, well = (wish.grades[grade] for grade in value)
-            result.append(
-                {
-                    "wish": wish.text,
-                    "granted": value[0] == 0,
-                    "worst_plan": worst,
-                    "best_plan": well,
-                }
-            )
-    return result
-
-
-def _comment(wishes: list[Preference], best: BestSentence) -> None:
-    """What became of each wish, on stderr."""
-    for wish, value in zip(wishes, best.values, strict=True):
-        if isinstance(value, int):
-            what = (
-                f"{counted(value, 'word')}"
-                if wish == "shortest"
-                else f"leaves {counted(value, 'plan')} open"
-            )
-            click.echo(f"{wish}: {what}", err=True)
-        else:
-            assert not isinstance(wish, str)
-            worst, well = value
-            every = "in every plan" if worst == well else "at worst"
-            click.echo(f"{wish.text}: {every} {wish.grades[worst]}", err=True)
-            if worst != well:
-                click.echo(f"{wish.text}: at best {wish.grades[well]}", err=True)
+def _comment(entry: Fulfilled) -> None:
+    """Write to stderr how the sentence meets a preference."""
+    lines = []
+    if entry.value is None:
+        every = "in every plan" if entry.worst_plan == entry.best_plan else "at worst"
+        lines.append(f"{every} {entry.worst_plan}")
+        if entry.worst_plan != entry.best_plan:
+            lines.append(f"at best {entry.best_plan}")
+    elif entry.preference == "shortest":
+        lines.append(counted(entry.value, "word"))
+    else:
+        lines.append(f"leaves {counted(entry.value, 'plan')} open")
+    for line in lines:
+        click.echo(f"{entry.preference}: {line}", err=True)

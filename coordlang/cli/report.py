@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from coordlang.cli.app import (
-    GivenOptions,
+from coordlang.api.presenting import counted
+from coordlang.cli.files import (
     check_outputs,
-    counted,
     domain_argument,
     language_argument,
-    limits,
-    model_options,
     problems_argument,
-    read_files,
 )
+from coordlang.cli.shared_options import ModelKeywords, limits, model_options
+from coordlang.cli.terminal import working
 
 if TYPE_CHECKING:
     from coordlang.report.places import Point
@@ -53,44 +51,42 @@ def command(
     tasks_shown: int,
     coordinates: str | None,
     seed: int,
-    given: GivenOptions,
+    model: ModelKeywords,
 ) -> None:
     """Write a self-contained HTML page that shows LANGUAGE.
 
     It has the words, and the sentences and plans in the tasks of PROBLEM.. and in some of the
     candidate tasks.
     """
-    from coordlang.language.file import read_language
+    from coordlang.api.inputs import read_language_source, read_planning
+    from coordlang.api.options import GivenOptions
     from coordlang.language.recorded import check_source
     from coordlang.report.page import make_report
-    from planners.errors import Position
     from planners.files import write_atomically
 
     places = coordinates if coordinates is not None else str(_beside(problems[0]))
     check_outputs([("-o", output)], [language, domain, *problems, places])
-    spoken = read_language(language)
-    lifted, read = read_files(domain, problems)
-    place = Position(language)
-    check_source(spoken, lifted, read, place)
-    report = make_report(
-        spoken,
-        lifted,
-        read,
-        tasks_shown=tasks_shown,
-        seed=seed,
-        options=given.for_language(spoken),
-        coordinates=_coordinates(coordinates, problems[0]),
-        position=place,
-    )
+    read, position = read_language_source(language)
+    files = read_planning(domain, problems, None, GivenOptions.of(**model))
+    check_source(read, files.domain, files.problems, position)
+    with working("drawing the page"):
+        report = make_report(
+            read,
+            files.domain,
+            files.problems,
+            tasks_shown=tasks_shown,
+            seed=seed,
+            options=files.options_of(read),
+            coordinates=_coordinates(coordinates, problems[0]),
+            position=position,
+        )
     if output == "-":
         click.echo(report.html.decode(), nl=False)
     else:
         write_atomically(output, report.html)
     shown = f"{counted(report.tasks, 'task')} of {report.candidates:,}"
-    click.echo(
-        f"{shown}, {len(report.html):,} bytes, written to {'stdout' if output == '-' else output}",
-        err=output == "-",
-    )
+    place = "stdout" if output == "-" else output
+    click.echo(f"{shown}, {len(report.html):,} bytes, written to {place}", err=output == "-")
 
 
 def _beside(problem: str) -> Path:

@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 
 import click
 
-from coordlang.cli.app import (
-    GivenOptions,
-    check_outputs,
-    counted,
-    domain_argument,
-    limits,
-    model_options,
-    problem_argument,
-    read_files,
-)
+import coordlang
+from coordlang.api.presenting import counted
+from coordlang.cli.files import check_outputs, domain_argument, problem_argument, write
+from coordlang.cli.shared_options import ModelKeywords, limits, model_options
+from coordlang.cli.terminal import working
 
 
 @click.command(name="tasks")
@@ -47,7 +41,7 @@ def command(
     goals: tuple[str, ...],
     output: str,
     as_json: bool,
-    given: GivenOptions,
+    model: ModelKeywords,
 ) -> None:
     """Write a task file: the tasks of PROBLEM with other starts and other goals.
 
@@ -55,30 +49,19 @@ def command(
     """
     from coordlang.tasks.patterns import varied_tasks
     from coordlang.tasks.task_file import tasks_text
-    from planners.files import write_atomically
-    from planners.loading import build
 
     check_outputs([("-o", output)], [domain, problem])
-    lifted, read = read_files(domain, (problem,))
-    options = replace(
-        given.options(), remember_actions=False
-    )  # tasks start with nothing to remember
-    tasks = varied_tasks(build(lifted, read, options), starts, goals)
-    text = tasks_text(tasks)
-    if output == "-":
-        click.echo(text, nl=False)
-    else:
-        write_atomically(output, text.encode())
+    model["remember_actions"] = False  # tasks start with no action to remember
+    with working("reading and grounding"):
+        tasks = varied_tasks(coordlang.load(domain, problem, **model), starts, goals)
+    write(tasks_text(tasks), output)
     figures = {
         "tasks": len(tasks),
-        "starts": len({t.init for t in tasks}),
-        "goals": len({t.goal for t in tasks}),
+        "starts": len({task.init for task in tasks}),
+        "goals": len({task.goal for task in tasks}),
     }
     if as_json and output != "-":
         click.echo(json.dumps(figures))
-    else:
-        click.echo(
-            f"{counted(figures['tasks'], 'task')}: {counted(figures['starts'], 'start')}, "
-            f"{counted(figures['goals'], 'goal')}",
-            err=output == "-",
-        )
+        return
+    line = ", ".join((counted(figures["starts"], "start"), counted(figures["goals"], "goal")))
+    click.echo(f"{counted(figures['tasks'], 'task')}: {line}", err=output == "-")

@@ -14,7 +14,8 @@ from pathlib import Path
 import click
 import pytest
 
-from coordlang.cli.app import COMMANDS, EXIT_BROKEN_PIPE, EXIT_INTERRUPTED, cli
+from coordlang.cli.exit_codes import BROKEN_PIPE, INTERRUPTED
+from coordlang.cli.group import COMMANDS, cli
 from planners.errors import CoordlangError
 from tests.support.domains import ROOT
 from tests.support.pages import DOCS, PAGES, anchor, blocks, code, links, prose, rows, sections
@@ -109,8 +110,8 @@ def test_exit_codes() -> None:
     assert listed == sorted(listed)
     assert set(listed) == {
         0,
-        EXIT_INTERRUPTED,
-        EXIT_BROKEN_PIPE,
+        INTERRUPTED,
+        BROKEN_PIPE,
         *(kind.exit_code for kind in error_tree(CoordlangError)),
     }
 

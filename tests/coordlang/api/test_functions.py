@@ -290,21 +290,20 @@ def test_robots_by_type_of_a_loaded_domain() -> None:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"cost": "steps"}, "--cost steps"),
-        ({"unowned": "nobody"}, "--unowned nobody"),
+        ({"cost": "steps"}, "'steps'.*option cost"),
+        ({"unowned": "nobody"}, "'nobody'.*option unowned"),
         ({"robots": ","}, "--robots"),
         ({"robots": "r1", "robot_type": "robot"}, "both say who the robots are"),
-        ({"method": "best"}, "--method best"),
-        ({"prefer": "simple", "method": "minimal"}, "--prefer simple"),
+        ({"method": "best"}, "no method 'best'"),
+        ({"prefer": "simple", "method": "minimal"}, "no preference 'simple'"),
         ({"prefer": "flexible"}, "--prefer flexible belongs to"),
         ({"alpha_only": True}, "--alpha-only belongs to"),
         ({"unsolvable": "ignore"}, "--unsolvable ignore"),
     ],
 )
 def test_wrong_options(wrong: dict[str, object], message: str) -> None:
-    with pytest.raises(coordlang.UsageError, match=message) as caught:
+    with pytest.raises(coordlang.UsageError, match=message):
         coordlang.build(*CELLS, **wrong)  # type: ignore[arg-type]
-    assert caught.value.remedy
 
 
 def test_wrong_uses(language: Path) -> None:

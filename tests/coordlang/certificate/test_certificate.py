@@ -227,18 +227,18 @@ def test_command_line(coordlang: Command, tmp_path: Path) -> None:
         proof,
     )
     assert made.code == 0
-    good = coordlang("verify", language, *files, "--lower-bound", proof, "--dimacs", dimacs)
+    good = coordlang("verify", language, *files, "--certificate", proof, "--dimacs", dimacs)
     assert (good.code, good.out.splitlines()[-1].split(":")[0]) == (0, "lower bound 3")
     assert "p cnf" in dimacs.read_text()
     data = msgspec.json.decode(proof.read_bytes())
     data["reasons"] = data["reasons"][1:2]
     proof.write_bytes(msgspec.json.encode(data))
-    bad = coordlang("verify", language, *files, "--lower-bound", proof)
+    bad = coordlang("verify", language, *files, "--certificate", proof)
     assert bad.code == 1
     assert "leave languages with 2 words" in bad.err
     data |= {"refuted": 1}
     proof.write_bytes(msgspec.json.encode(data))
-    weak = coordlang("verify", language, *files, "--lower-bound", proof)
+    weak = coordlang("verify", language, *files, "--certificate", proof)
     assert weak.code == 1
     assert "says that 3 words are needed; the certificate proves 2 only" in weak.err
 

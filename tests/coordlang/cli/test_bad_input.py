@@ -545,8 +545,8 @@ PLANS, UNDERSTAND = ("plans", "d", "p"), ("understand", "l", "d", "p", "w0")
         ((*UNDERSTAND, "--nodes", "3"), "--nodes cuts the DAG"),
         ((*UNDERSTAND, "--nodes", "3", "--json", "--count"), "--nodes cuts the DAG"),
         (
-            ("export", "l", "d", "p", "w0", "--to", "ltlf", "--limit", "2000"),
-            "--limit belongs to --to pddl",
+            ("export", "l", "d", "p", "w0", "--to", "ltlf", "--max-actions", "2000"),
+            "--max-actions belongs to --to pddl",
         ),
         ((*PLANS, "--robots", "r1", "--robot-type", "robot"), "give one of them"),
     ],

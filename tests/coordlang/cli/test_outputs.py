@@ -44,7 +44,7 @@ BUILD = ("build", "d.pddl", "p.pddl", "--tasks", "t.json")
 UNDERSTAND = ("understand", *ALL, SENTENCE)
 CHOICES = ("choices", *ALL, SENTENCE)
 EXPORT = ("export", *ALL, SENTENCE)
-VERIFY = ("verify", *ALL, "--tasks", "t.json", "--lower-bound", "proof.json", "--dimacs")
+VERIFY = ("verify", *ALL, "--tasks", "t.json", "--certificate", "proof.json", "--dimacs")
 REPORT = ("report", *ALL, "-o")
 OVERWRITING = [
     *((*BUILD, "-o", name) for name in ("d.pddl", "p.pddl", "t.json", "in/../d.pddl")),
@@ -53,7 +53,7 @@ OVERWRITING = [
     *((*CHOICES, "-o", name) for name in ALL),
     *((*EXPORT, "--to", "ltlf", "-o", name) for name in ALL),
     *((*EXPORT, "--json", "-o", name) for name in ALL),
-    (*EXPORT, "--back", "plan", "-o", "plan"),
+    (*EXPORT, "--translate-plan", "plan", "-o", "plan"),
     ("export", "l.json", "in/domain.pddl", "p.pddl", SENTENCE, "-o", "in"),
     ("export", "l.json", "d.pddl", "in/problem.pddl", SENTENCE, "-o", "in"),
     *(("tasks", "d.pddl", "p.pddl", "-o", name) for name in ("d.pddl", "p.pddl")),
@@ -123,7 +123,7 @@ def test_the_place_is_looked_at_before_the_work(
     monkeypatch.setattr(
         os, "access", lambda path, mode: Path(path).name != "shut" and access(path, mode)
     )
-    for module in ("planners.pddl.read_domain", "coordlang.evaluation.lab.runner.run"):
+    for module in ("coordlang.api.inputs.read_domain", "coordlang.evaluation.lab.runner.run"):
         monkeypatch.setattr(module, lambda *_: pytest.fail("no work before"))
     outcome = coordlang(*arguments, place)
     assert outcome.code == 2

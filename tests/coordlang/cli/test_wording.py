@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from coordlang.cli.miscoordination import show
+from coordlang.api.witness import witness_text
 from coordlang.required.miscoordination import Miscoordination
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
@@ -67,7 +67,7 @@ def test_the_trivial_lower_bound(
         ).code
         == 0
     )
-    out = coordlang("verify", language, *files, "--lower-bound", proof).out
+    out = coordlang("verify", language, *files, "--certificate", proof).out
     assert out.splitlines()[-1] == "lower bound 1: every language has a word"
 
 
@@ -108,7 +108,7 @@ def test_a_drawn_state_without_facts(
 def test_a_miscoordination_through_states_without_facts() -> None:
     plan = (("(a r1)", None), (None, "(a r2)"))
     states = ("", "(q)", "")
-    text = show(
+    text = witness_text(
         Miscoordination(
             "t", ("r1", "r2"), (plan, plan), (states, states), plan, ("", "(q)"), 1, "so it is"
         )

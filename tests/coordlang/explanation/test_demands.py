@@ -237,5 +237,5 @@ def test_json(coordlang: Command, language: object, t_map: tuple[object, object]
             *(c["to"] for c in said["changes"]),
         ]
         assert [len(robot["listed"][0]) for robot in said["robots"]] == [said["steps"]] * 2
-    each = coordlang("explain", language, *t_map, "--each").out
+    each = coordlang("explain", language, *t_map, "--formula-per-word").out
     assert "every other state" not in each

@@ -62,7 +62,7 @@ def test_dot(coordlang: Command, cells: Path) -> None:
 
 def test_detours(coordlang: Command, cells: Path) -> None:
     ask = "choices", cells, *CELLS, "w1 w0", "--robot", "r2"
-    yes = coordlang(*ask, "--did", "idle", "--visit", "(at r2 a)")
+    yes = coordlang(*ask, "--history", "idle", "--visit", "(at r2 a)")
     assert yes.code == 0
     assert yes.out.splitlines() == [
         "step 2: r2 may do (move r2 b a); 1 subplan left",
@@ -81,9 +81,9 @@ def test_detours(coordlang: Command, cells: Path) -> None:
         "subplans": 0,
         "subplan": None,
     }
-    done = coordlang(*ask, "--did", "(move r2 b a)", "--did", "idle")
+    done = coordlang(*ask, "--history", "(move r2 b a)", "--history", "idle")
     assert done.out == "r2 has done all its 2 steps\n"
-    wrong = coordlang(*ask, "--did", "idle", "--did", "idle")
+    wrong = coordlang(*ask, "--history", "idle", "--history", "idle")
     assert wrong.code == 1
     assert "step 2: r2 may not do idle; it may do (move r2 b a)" in wrong.err
 
@@ -91,15 +91,19 @@ def test_detours(coordlang: Command, cells: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
-        (["w1 w0", "--robot", "r3"], 2, "--robot r3: there is no such robot; there are r1, r2"),
-        (["w1 w0", "--did", "idle"], 2, "ask about one --robot"),
+        (
+            ["w1 w0", "--robot", "r3"],
+            2,
+            "--robot r3: there is no such robot\n  The robots are r1, r2.",
+        ),
+        (["w1 w0", "--history", "idle"], 2, "ask about one --robot"),
         (
             ["w1 w0", "--robot", "r1", "--visit", "(at r1 z)"],
             2,
             "(at r1 z) is no atom that can change",
         ),
-        (["w1 w0", "--robot", "r1", "--did", "jump"], 2, "'jump' is no PDDL text"),
-        (["w1 w0", "--robot", "r1", "--did", "idle", "--format", "dot"], 2, "as text or JSON"),
+        (["w1 w0", "--robot", "r1", "--history", "jump"], 2, "'jump' is no PDDL text"),
+        (["w1 w0", "--robot", "r1", "--history", "idle", "--format", "dot"], 2, "as text or JSON"),
         (["w0 w1"], 1, "no optimal plan has the sentence"),
         (["w1 w9"], 31, "'w9', is no word of this language"),
         ([""], 31, "the sentence is empty"),

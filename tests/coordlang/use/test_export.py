@@ -378,7 +378,7 @@ def test_the_export_does_not_depend_on_hashes(
     texts = []
     for seed in "02":
         folder = tmp_path / seed
-        arguments = ["export", minimal, *t_map, SENTENCE, "--limit", "0", "-o", folder]
+        arguments = ["export", minimal, *t_map, SENTENCE, "--max-actions", "0", "-o", folder]
         subprocess.run(
             own_process(*arguments),
             env={**os.environ, "PYTHONHASHSEED": seed},
@@ -410,7 +410,7 @@ def test_out_to_fast_downward_and_back(
 ) -> None:
     for limit in (2000, 0):
         folder = tmp_path / f"limit-{limit}"
-        done = coordlang("export", minimal, *t_map, SENTENCE, "-o", folder, "--limit", limit)
+        done = coordlang("export", minimal, *t_map, SENTENCE, "-o", folder, "--max-actions", limit)
         assert (done.code, done.err) == (0, "")
         assert ("explicit" if limit else "select-then-apply") in done.out
         names = solve(folder)
@@ -418,7 +418,14 @@ def test_out_to_fast_downward_and_back(
             "".join(f"({name} )\n" for name in names) + "; cost = 4 (general cost)\n"
         )
         back = coordlang(
-            "export", minimal, *t_map, SENTENCE, "--limit", limit, "--back", tmp_path / "sas_plan"
+            "export",
+            minimal,
+            *t_map,
+            SENTENCE,
+            "--max-actions",
+            limit,
+            "--translate-plan",
+            tmp_path / "sas_plan",
         )
         assert back.code == 0
         assert back.out.splitlines()[0] == "0: (move r2 c1-0 c1-1)"
@@ -457,16 +464,16 @@ def test_the_command_as_json(
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
-        ((SENTENCE, "--back", "missing"), 31, "cannot be read"),
-        ((SENTENCE, "--back", "other"), 31, "none of the exported problem"),
-        ((SENTENCE, "--back", "empty"), 1, "no optimal plan"),
-        ((SENTENCE, "--back", "two"), 31, "two:3:1: this file holds several plans"),
-        ((SENTENCE, "--to", "ltlf", "--back", "empty"), 2, "leave out --to ltlf"),
+        ((SENTENCE, "--translate-plan", "missing"), 31, "cannot be read"),
+        ((SENTENCE, "--translate-plan", "other"), 31, "none of the exported problem"),
+        ((SENTENCE, "--translate-plan", "empty"), 1, "no optimal plan"),
+        ((SENTENCE, "--translate-plan", "two"), 31, "two:3:1: this file holds several plans"),
+        ((SENTENCE, "--to", "ltlf", "--translate-plan", "empty"), 2, "leave out --to ltlf"),
         ((SENTENCE, "-o", "other"), 2, "the folder other cannot be made"),
         ((SENTENCE, "-o", "missing/x", "--to", "ltlf"), 2, "cannot be written"),
         (("w0 w1 w0",), 1, "no optimal plan has the sentence"),
         (("w7",), 31, "no word of this language"),
-        ((SENTENCE, "--limit", "-1"), 2, "--limit"),
+        ((SENTENCE, "--max-actions", "-1"), 2, "--max-actions"),
     ],
 )
 def test_wrong_arguments(

@@ -168,7 +168,7 @@ def test_json(coordlang: Command, files: tuple[Path, ...], tmp_path: Path) -> No
 
 def test_usage(coordlang: Command, files: tuple[Path, ...]) -> None:
     assert coordlang("plan", *files).code == 2
-    assert coordlang("plan", *files, "w0", "--wish", "shortest").code == 2
+    assert coordlang("plan", *files, "w0", "--prefer", "shortest").code == 2
     assert coordlang("plan", *files, "w0", "--heuristic", "best").code == 2
 
 
@@ -176,5 +176,7 @@ def test_manhattan_needs_coordinates(coordlang: Command, tmp_path: Path) -> None
     files = DOMAINS / "three-cells" / "domain.pddl", DOMAINS / "three-cells" / "problem.pddl"
     language = tmp_path / "language.json"
     assert coordlang("build", *files, "-o", language).code == 0
-    outcome = coordlang("plan", language, *files, "--wish", "shortest", "--heuristic", "manhattan")
+    outcome = coordlang(
+        "plan", language, *files, "--prefer", "shortest", "--heuristic", "manhattan"
+    )
     assert (outcome.code, "needs a goal with places such as c2-3" in outcome.err) == (2, True)

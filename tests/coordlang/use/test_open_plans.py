@@ -274,7 +274,7 @@ def test_samples_are_seeded(coordlang: Command, tmp_path: Path) -> None:
     language = tmp_path / "language.json"
     assert coordlang("build", *files, "-o", language).code == 0
     sentence = (
-        coordlang("plan", language, *files, "--wish", "most-plans")
+        coordlang("plan", language, *files, "--prefer", "most-plans")
         .out.splitlines()[-1]
         .partition("= ")[2]
     )

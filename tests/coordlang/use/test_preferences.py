@@ -312,7 +312,7 @@ def test_the_command_says_what_became_of_the_wishes(coordlang: Command, tmp_path
     language = f"{tmp_path}/language.json"
     assert coordlang("build", *files, "-o", language).code == 0
     outcome = coordlang(
-        "plan", language, *files, "--wish", "avoid:(at r1 c1-1)", "--wish", "most-plans"
+        "plan", language, *files, "--prefer", "avoid:(at r1 c1-1)", "--prefer", "most-plans"
     )
     assert outcome.code == 0
     assert "avoid:(at r1 c1-1): in every plan it keeps away from (at r1 c1-1)\n" in outcome.err
@@ -320,10 +320,17 @@ def test_the_command_says_what_became_of_the_wishes(coordlang: Command, tmp_path
     assert "c1-1" not in " ".join(line for line in outcome.out.splitlines() if "r1" in line)
     data = json.loads(
         coordlang(
-            "plan", language, *files, "--wish", "avoid:(at r1 c2-2)", "--wish", "shortest", "--json"
+            "plan",
+            language,
+            *files,
+            "--prefer",
+            "avoid:(at r1 c2-2)",
+            "--prefer",
+            "shortest",
+            "--json",
         ).out
     )
     avoided, shortest = data["wishes"]
     assert (avoided["granted"], avoided["worst_plan"]) == (False, "it passes through (at r1 c2-2)")
     assert shortest == {"wish": "shortest", "value": len(data["sentence"].split())}
-    assert coordlang("plan", language, *files, "--wish", "nothing").code == 2
+    assert coordlang("plan", language, *files, "--prefer", "nothing").code == 2

@@ -1,0 +1,14 @@
+"""Exit codes that are no errors of the one error tree (docs/cli.md, exit codes)."""
+
+from __future__ import annotations
+
+#: The answer is no: refuted, or nothing is guaranteed.
+REFUTED = 1
+#: An answer without the proof that was asked for.
+UNPROVED = 3
+#: It is proved that there is no plan.
+IMPOSSIBLE = 11
+#: Interrupted from the keyboard.
+INTERRUPTED = 130
+#: As a shell reports a process whose reader has gone: the answer did not arrive.
+BROKEN_PIPE = 141

@@ -1,0 +1,146 @@
+"""Arguments that name input files, and checks of output files before the work."""
+
+from __future__ import annotations
+
+import errno
+import functools
+import os
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+
+from coordlang.cli.shared_options import CommandFunction
+
+domain_argument = click.argument("domain", type=click.Path())
+problem_argument = click.argument("problem", type=click.Path())
+problems_argument = click.argument("problems", type=click.Path(), nargs=-1, required=True)
+language_argument = click.argument("language", type=click.Path())
+
+
+@dataclass(frozen=True, slots=True)
+class PlanningFiles:
+    """DOMAIN PROBLEM.., or ``--factored DIR`` in their place."""
+
+    files: tuple[str, ...]
+    factored: str | None
+
+    @property
+    def paths(self) -> list[str]:
+        """All files that are read."""
+        if self.factored:
+            return [str(path) for path in Path(self.factored).glob("*-*.pddl")]
+        return list(self.files)
+
+
+def planning_files(
+    metavar: str, most: int | None = None
+) -> Callable[[CommandFunction], CommandFunction]:
+    """DOMAIN and at most so many problems, or ``--factored DIR``.
+
+    The command gets them as ``pddl``, a `PlanningFiles`.
+    """
+
+    def decorate(function: CommandFunction) -> CommandFunction:
+        @click.argument("files", nargs=-1, metavar=metavar)
+        @click.option(
+            "--factored",
+            metavar="DIR",
+            help="Read domain-ROBOT.pddl and problem-ROBOT.pddl of every robot here.",
+        )
+        @functools.wraps(function)
+        def wrapped(
+            files: tuple[str, ...], factored: str | None, **arguments: object
+        ) -> int | None:
+            enough = not files if factored else 2 <= len(files) <= 1 + (most or len(files))
+            if not enough:
+                raise click.UsageError(f"expected {metavar}, or --factored DIR without them")
+            return function(pddl=PlanningFiles(files, factored), **arguments)
+
+        return wrapped
+
+    return decorate
+
+
+def check_outputs(
+    outputs: Sequence[tuple[str, str | None]],
+    inputs: Iterable[str | None],
+    *,
+    makes_folder: bool = False,
+) -> None:
+    """Refuse outputs that cannot be written, or overwrite an input file or one another.
+
+    Before the work, not after it.
+
+    Parameters
+    ----------
+    outputs
+        Pairs (option, path).  None is no file, ``-`` is stdout and not looked at.
+    inputs
+        The files that are read; None and ``-`` are left out.
+    makes_folder
+        Whether the command makes the folder itself where it is missing.
+
+    Raises
+    ------
+    UsageError
+        For an output that cannot be written, or that would overwrite something.
+    """
+    from planners.errors import UsageError
+
+    read = [path for path in inputs if path is not None and path != "-" and os.path.isfile(path)]
+    written: dict[str, str] = {}
+    for option, path in outputs:
+        if path is None or path == "-":
+            continue
+        if reason := _unwritable(path, makes_folder):
+            what = f"{option} {path} cannot be written: {reason}"
+            raise UsageError(what, remedy="Name a file in a folder that you may write to.")
+        if os.path.exists(path) and not os.path.isfile(path):
+            continue  # a device or a pipe: written to, and never replaced
+        if any(os.path.samefile(path, other) for other in read if os.path.exists(path)):
+            raise UsageError(
+                f"{option} {path} would overwrite an input file",
+                remedy="Give the output another name.",
+            )
+        other = written.setdefault(os.path.realpath(path), option)
+        if other != option:
+            raise UsageError(
+                f"{other} and {option} name the same file: {path}",
+                remedy="Give each a file of its own.",
+            )
+
+
+def never_stdout(option: str, path: str | None) -> None:
+    """Refuse ``-`` for a second output."""
+    from planners.errors import UsageError
+
+    if path == "-":
+        raise UsageError(f"{option} -: this cannot go to stdout", remedy="Name a file.")
+
+
+def write(text: str, output: str | None) -> None:
+    """Write to a file, or to stdout without one (or for ``-``)."""
+    from planners.files import write_atomically
+
+    if output is None or output == "-":
+        click.echo(text, nl=False)
+    else:
+        write_atomically(output, text.encode())
+
+
+def _unwritable(path: str, makes_folder: bool) -> str | None:
+    """Why no file can be written there, or None."""
+    if os.path.isdir(path):
+        return os.strerror(errno.EISDIR)
+    if os.path.exists(path) and not os.path.isfile(path):
+        return None if os.access(path, os.W_OK) else os.strerror(errno.EACCES)
+    folder = Path(os.path.realpath(path)).parent
+    while makes_folder and not folder.exists():
+        folder = folder.parent
+    if makes_folder and not folder.is_dir():
+        return f"the folder {Path(path).parent} cannot be made: {os.strerror(errno.ENOTDIR)}"
+    if not folder.is_dir():
+        return f"there is no folder {Path(path).parent}"
+    return None if os.access(folder, os.W_OK | os.X_OK) else os.strerror(errno.EACCES)

@@ -1,0 +1,91 @@
+"""The command group, and commands that still read former names of their options."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from typing import Any
+
+import click
+
+import coordlang
+
+#: Command -> one line about it, so that ``--help`` need not import them all.  A command is the
+#: module of this name in `coordlang.cli`, imported when it is called.
+COMMANDS = {
+    "inspect": "Show what was understood of a domain: robots, subactions, constraints.",
+    "plans": "Count, list or sample all optimal plans of a task.",
+    "check": "Compare our optimal cost with Fast Downward's.",
+    "coordination": "Decide which tasks require coordination, with a miscoordination shown.",
+    "tasks": "Write a task file: a problem with other starts and goals.",
+    "build": "Build a coordination language and verify it.",
+    "verify": "Check by definition that a file holds a coordination language.",
+    "say": "Print the sentence of an optimal plan.",
+    "understand": "Count, list, sample or draw the plans that a sentence leaves open.",
+    "plan": "Find one optimal plan under a sentence, or under the best sentence.",
+    "choices": "Show what each robot may do under a sentence, whatever the others choose.",
+    "export": "Write a task under a sentence as PDDL or LTLf, for other programs.",
+    "explain": "Show a language: words as formulas, sentences of a task.",
+    "report": "Write a page that shows a language: words, sentences, plans played.",
+    "evaluate": "Run the paper's experiments again, beside its own values.",
+    "schema": "Print the JSON Schema of a file format.",
+}
+
+
+class _LazyGroup(click.Group):
+    """Imports a command's module only when the command is called or its help is asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        module = importlib.import_module(f"coordlang.cli.{cmd_name}")
+        command: click.Command = module.command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+class RenamedOptions(click.Command):
+    """A command that reads former names of its options for one release, with a note on stderr.
+
+    Parameters
+    ----------
+    renamed
+        Former spelling -> present spelling.
+    """
+
+    def __init__(self, *args: Any, renamed: Mapping[str, str], **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.renamed = renamed
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the arguments, with former names of options replaced by the present ones."""
+        end = args.index("--") if "--" in args else len(args)
+        former = {arg.partition("=")[0] for arg in args[:end]} & self.renamed.keys()
+        for name in sorted(former):
+            click.echo(
+                f"coordlang: note: {name} is deprecated: it is called {self.renamed[name]} now",
+                err=True,
+            )
+        return super().parse_args(ctx, [*map(self._present, args[:end]), *args[end:]])
+
+    def _present(self, arg: str) -> str:
+        name, equals, value = arg.partition("=")
+        return f"{self.renamed.get(name, name)}{equals}{value}"
+
+
+@click.group(
+    cls=_LazyGroup,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)
+@click.version_option(coordlang.__version__)
+def cli() -> None:
+    """Coordination languages for robots that plan on their own and act together.
+
+    DOMAIN and PROBLEM are PDDL files, in that order.
+    """

@@ -1,0 +1,106 @@
+"""Options that several commands share: how PDDL is understood, and limits."""
+
+from __future__ import annotations
+
+import functools
+import math
+import re
+from collections.abc import Callable
+
+import click
+
+from coordlang.api.options import COSTS, UNOWNED, ModelKeywords
+
+#: A command's function; it returns the exit code, None for 0.
+CommandFunction = Callable[..., int | None]
+
+
+def limits(function: CommandFunction) -> CommandFunction:
+    """``--time-limit``, ``--memory-limit`` and ``--debug``; the command runs under them."""
+
+    @click.option(
+        "--time-limit",
+        type=click.FloatRange(min=0, min_open=True),
+        metavar="SECONDS",
+        help="Stop after this long (exit 23).",
+    )
+    @click.option(
+        "--memory-limit",
+        callback=_size,
+        metavar="SIZE",
+        help="Stop before using more, e.g. 4G (exit 22).",
+    )
+    @click.option("--debug", is_flag=True, help="Show tracebacks.")
+    @functools.wraps(function)
+    def wrapped(
+        time_limit: float | None, memory_limit: int | None, debug: bool, **arguments: object
+    ) -> int | None:
+        from planners.limits import limit_memory, require_memory
+        from planners.limits import time_limit as limit_time
+
+        if time_limit is not None and math.isnan(time_limit):
+            raise click.UsageError("--time-limit: expected a number of seconds")
+        if memory_limit is not None:
+            require_memory(memory_limit)
+            limit_memory(memory_limit)
+        with limit_time(time_limit):
+            return function(**arguments)
+
+    return wrapped
+
+
+def model_options(function: CommandFunction) -> CommandFunction:
+    """How the PDDL files are understood; the command gets them as ``model``, a dictionary."""
+
+    @click.option("--robots", metavar="R1,R2", help="The robots, where the domain does not say.")
+    @click.option(
+        "--robot-type", metavar="TYPE", help="The type (or unary predicate) of the robots."
+    )
+    @click.option(
+        "--unowned", type=click.Choice(UNOWNED), help="Who owns actions that name no robot."
+    )
+    @click.option(
+        "--cost", type=click.Choice(COSTS), help="What optimal means (default: makespan)."
+    )
+    @click.option(
+        "--remember-actions", is_flag=True, help="Add each robot's last subaction to the state."
+    )
+    @functools.wraps(function)
+    def wrapped(
+        robots: str | None,
+        robot_type: str | None,
+        unowned: str | None,
+        cost: str | None,
+        remember_actions: bool,
+        **arguments: object,
+    ) -> int | None:
+        model = {
+            "robots": robots,
+            "robot_type": robot_type,
+            "unowned": unowned,
+            "cost": cost,
+            "remember_actions": remember_actions,
+        }
+        return function(model=model, **arguments)
+
+    return wrapped
+
+
+def was_given(name: str) -> bool:
+    """Whether this parameter of the command stands on the command line."""
+    return (
+        click.get_current_context().get_parameter_source(name)
+        is click.core.ParameterSource.COMMANDLINE
+    )
+
+
+def _size(_context: click.Context, _parameter: click.Parameter, value: str | None) -> int | None:
+    if value is None:
+        return None
+    match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([kmgt]?)i?b?", value.strip().lower())
+    if not match:
+        raise click.BadParameter("expected a size such as 500M or 4G")
+    return int(float(match[1]) * 1024 ** " kmgt".index(match[2] or " "))
+
+
+__all__ = ["CommandFunction", "ModelKeywords", "limits", "model_options", "was_given"]

@@ -1,0 +1,95 @@
+"""Progress is shown on a terminal only, on stderr, and leaves nothing behind."""
+
+from __future__ import annotations
+
+import io
+import os
+import pty
+import subprocess
+import sys
+
+import pytest
+
+from coordlang.cli import terminal
+from tests.support.domains import ROOT
+
+CODE = """
+import sys, time
+from coordlang.cli import terminal
+terminal._DELAY = 0.0
+with terminal.working("first thing") as say:
+    time.sleep(0.5)
+    say("[second] thing")
+    time.sleep(0.5)
+print("answer")
+with terminal.bar() as show:
+    show(1, 3, "piece")
+    time.sleep(0.3)
+"""
+
+
+def on_a_terminal(code: str, **environment: str) -> tuple[str, str]:
+    """Run code with a terminal as stderr: (stdout, what the terminal got)."""
+    main, other = pty.openpty()
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm", **environment}
+    child = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=other, env=environment
+    )
+    os.close(other)
+    shown = b""
+    while True:
+        try:
+            part = os.read(main, 10_000)
+        except OSError:
+            break
+        if not part:
+            break
+        shown += part
+    out, _ = child.communicate()
+    os.close(main)
+    return out.decode(), shown.decode()
+
+
+def test_progress_on_a_terminal() -> None:
+    out, shown = on_a_terminal(CODE)
+    assert out == "answer\n"
+    assert "first thing .." in shown
+    assert "[second] thing .." in shown
+    assert "1/3" in shown
+    assert "piece" in shown
+
+
+def test_no_colour() -> None:
+    _, shown = on_a_terminal(CODE, NO_COLOR="1")
+    assert "first thing .." in shown
+    assert "\x1b[3" not in shown  # cursor movements are no colours
+
+
+def test_short_work_shows_nothing() -> None:
+    code = "from coordlang.cli import terminal\nwith terminal.working('x') as say: say('y')\n"
+    code += "import sys; print('rich' in sys.modules)"
+    assert on_a_terminal(code) == ("False\n", "")
+
+
+def test_no_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    for stderr in (io.StringIO(), None):
+        monkeypatch.setattr(sys, "stderr", stderr)
+        with terminal.working("x") as say:
+            say("y")
+        with terminal.bar() as show:
+            show(1, 2, "z")
+        if stderr is not None:
+            assert stderr.getvalue() == ""
+
+
+def test_an_error_ends_the_spinner() -> None:
+    code = CODE.split("with terminal.working")[0] + (
+        "try:\n"
+        "    with terminal.working('work'):\n"
+        "        time.sleep(0.5)\n"
+        "        raise ValueError('broken')\n"
+        "except ValueError as error:\n"
+        "    print(error, file=sys.stderr)\n"
+    )
+    _, shown = on_a_terminal(code)
+    assert shown.rstrip().endswith("broken")
