@@ -6,26 +6,26 @@ Tarski gets a relaxed core of the domain: one sort, types as static predicates, 
 of each conjunctive precondition, and add effects.  What is left out (negation, disjunction,
 quantifiers, inequality, other robots' actions) only makes the answer larger;
 `planners.grounding.instantiate` evaluates it exactly.  The program that Tarski makes of it is
-Datalog without negation, so clingo's grounder alone finds its least model.
+Datalog without negation, so clingo's grounder alone finds its least model; that nothing is missing
+in it is checked (`planners.grounding.closure`).
 """
 
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from threading import current_thread, main_thread
 from typing import TYPE_CHECKING, Any
 
 from planners.errors import CoordlangError
+from planners.grounding.closure import Arguments, RelaxedModel, require_closed
 from planners.pddl.formula_tree import required_atoms
 from planners.pddl.lifted import Atom, Domain, Formula, Schema, Variable
 from planners.pddl.robots import natural
 
 if TYPE_CHECKING:
     from clingo import Control
-
-Arguments = tuple[str, ...]
 
 
 def reachable_arguments(
@@ -52,36 +52,28 @@ def reachable_arguments(
     MemoryError
         If clingo meets the memory limit.
     CoordlangError
-        If clingo does not ground the program.
+        If clingo does not ground the program, or not all of it (`require_closed`).
     """
     from tarski.reachability import create_reachability_lp
 
+    init = list(init)
     core = _Core(domain, objects)
     for atom in init:
         core.add_initial(atom)
     for schema in domain.schemas:
         core.add_action(schema)
     program, _ = create_reachability_lp(core.problem)
-    arities = {
-        f"action_{symbol}": len(schema.parameters)
-        for schema, symbol in zip(domain.schemas, core.actions.values(), strict=True)
-    }
-    model = _least_model(program.rules, arities)
-    # Objects are numbered in natural order, so arguments sort as their numbers do.
-    number = {symbol: int(symbol[1:]) for symbol in core.objects}
+    model = core.translated(_least_model(program.rules))
+    require_closed(model, domain, objects, init)
+    number = {name: n for n, name in enumerate(core.objects.values())}
     return {
-        name: [
-            tuple(core.objects[o] for o in args)
-            for args in sorted(
-                model[f"action_{symbol}"], key=lambda args: [number[o] for o in args]
-            )
-        ]
-        for name, symbol in core.actions.items()
+        name: sorted(instances, key=lambda args: [number[a] for a in args])
+        for name, instances in model.instances.items()
     }
 
 
-def _least_model(rules: Sequence[str], arities: dict[str, int]) -> dict[str, list[Arguments]]:
-    """The argument tuples of ``arities``' predicates in the least model of a Datalog program."""
+def _least_model(rules: Sequence[str]) -> dict[str, list[Arguments]]:
+    """The argument tuples of each predicate in the least model of a Datalog program."""
     from clingo import Control
 
     messages: list[str] = []
@@ -105,10 +97,10 @@ def _least_model(rules: Sequence[str], arities: dict[str, int]) -> dict[str, lis
         raise CoordlangError("clingo's grounding of the reachability program is not complete")
     return {
         predicate: [
-            tuple(argument.name for argument in atom.symbol.arguments)
+            tuple([argument.name for argument in atom.symbol.arguments])
             for atom in atoms.by_signature(predicate, arity)
         ]
-        for predicate, arity in arities.items()
+        for predicate, arity, _ in atoms.signatures
     }
 
 
@@ -208,6 +200,17 @@ class _Core:
         self.actions[schema.name] = symbol
         parameters = [variables[p.name] for p in schema.parameters]
         self.problem.action(symbol, parameters, self._all(body), effects)
+
+    def translated(self, found: Mapping[str, Iterable[Arguments]]) -> RelaxedModel:
+        """The model of Tarski's program in the names of the domain."""
+
+        def named(predicate: str) -> set[Arguments]:
+            return {tuple([self.objects[o] for o in args]) for args in found.get(predicate, ())}
+
+        return RelaxedModel(
+            atoms={key: named(f"atom_{symbol.name}") for key, symbol in self._symbols.items()},
+            instances={name: named(f"action_{symbol}") for name, symbol in self.actions.items()},
+        )
 
     def _predicate(self, name: str, arity: int) -> Any:
         key = (name, arity)

@@ -95,7 +95,7 @@ def test_the_memory_limit_ends_clingo(left: int) -> None:
 
 def test_what_clingo_says_is_in_the_error(capfd: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(CoordlangError, match="syntax error"):
-        _least_model(["goal("], {})
+        _least_model(["goal("])
     with pytest.raises(CoordlangError, match="not complete"):
-        _least_model(["other()."], {})
+        _least_model(["other()."])
     assert capfd.readouterr() == ("", "")
