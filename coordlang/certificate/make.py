@@ -23,8 +23,9 @@ from planners.search.plan_space import PlanSpace
 def certify(candidates: Candidates, evidence: Mapping[Clause, Evidence], size: int) -> Certificate:
     """A certificate that no language for the candidates has ``size`` words or fewer.
 
-    ``evidence`` are necessary clauses that refute it (`coordlang.vocabulary.minimal.refuting_clauses`); a
-    small part of them is kept.  Raises `ValueError` if they do not refute it.
+    ``evidence`` are necessary clauses that refute it
+    (`coordlang.vocabulary.minimal.refuting_clauses`); a small part of them is kept.  Raises
+    `ValueError` if they do not refute it.
     """
     needed = core(evidence, size) if size else []
     reasons = [_reason(candidates, clause, evidence[clause]) for clause in needed]

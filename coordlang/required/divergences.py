@@ -1,17 +1,15 @@
 """First differences: where plans that introduce RC part, over all candidate tasks.
 
-The sets ``alpha*`` of the paper's Theorem 3, and what must be separated: Propositions 3 and 4 of
-docs/concepts.md, Proposition 6 for more than two robots.
+The sets ``alpha*`` of the paper's Theorem 3: Proposition 3 of docs/concepts.md.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from coordlang.language.warping import pair
 from coordlang.required.composition_walk import Divergences, Walk, unique_divergences, walk
 from planners.search.plan_space import PlanSpace
 from planners.tables import Ints
@@ -54,38 +52,3 @@ def first_differences(spaces: Sequence[PlanSpace]) -> FirstDifferences:
 def states_on_plans(spaces: Sequence[PlanSpace]) -> Ints:
     """The numbers of the states that lie on some optimal plan of some candidate task, sorted."""
     return np.unique(np.concatenate([space.state for space in spaces]))
-
-
-@dataclass(frozen=True, slots=True)
-class Separation:
-    """One way to satisfy a divergence: the pairs of states that must lie in different words."""
-
-    pairs: frozenset[tuple[int, int]]
-
-
-def separations(divergences: Divergences) -> list[tuple[Separation, ...]]:
-    """For each divergence its alternatives (Theorem 3, alpha part).
-
-    With two robots there is one: all three pairs of ``alpha*``.  With n robots any two of the
-    different next states will do, together with the last shared state.
-    """
-    rows = zip(divergences.last.tolist(), divergences.following.tolist(), strict=True)
-    return [alternatives(last, [s for s in row if s >= 0]) for last, row in rows]
-
-
-def alternatives(shared: int, others: Iterable[int]) -> tuple[Separation, ...]:
-    """The ways to separate plans at a difference.
-
-    Any two of the different states ``others``, with the shared state (-1: there is none, the plans
-    end in different states).
-    """
-    states = sorted(set(others))
-    return tuple(
-        Separation(
-            frozenset(
-                {pair(a, b)} if shared < 0 else {pair(shared, a), pair(shared, b), pair(a, b)}
-            )
-        )
-        for n, b in enumerate(states)
-        for a in states[:n]
-    )

@@ -9,21 +9,20 @@ different ``s_i, s_j`` and ``p`` lie in three different words, or some two diffe
 and ``q`` do, or two of the different goal states lie in different words (Propositions 5 and 6 of
 docs/concepts.md).
 
-The relation of all alphas with all betas is written down only where it is small
-(`SeparationWalk.every`).  Else the composition walk is kept, and asked for pairs that a partition
+The relation of all alphas with all betas is listed only where it is small
+(`DifferenceWalk.every`).  Else the composition walk is kept, and asked for pairs that a partition
 leaves unseparated.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise
 
 import numpy as np
 
 from coordlang.required.composition_walk import FAILED, moves
-from coordlang.required.divergences import Separation, alternatives
 from planners.errors import OutOfMemory
 from planners.joint.states import bits
 from planners.limits import memory_left
@@ -31,10 +30,11 @@ from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 from planners.tables import Bools, Ints, unique_tuples
 
-#: At least one of these must hold.
-Constraint = tuple[Separation, ...]
+#: The shared state (-1: there is none, the plans end in different states), then the different ones,
+#: sorted.
+Difference = tuple[int, ...]
 
-#: Links of a walk up to which all constraints may be written down.
+#: Links of a walk up to which all differences may be listed.
 _LINKS = 1_000_000
 
 
@@ -57,7 +57,7 @@ class _Layer:
     tail: Bools
 
 
-class SeparationWalk:
+class DifferenceWalk:
     """The composition walk of one plan space, kept whole, from every node of the plan space.
 
     Memory is that of the walk's links, of which only those are kept that lead to a failure.  Raises
@@ -79,8 +79,10 @@ class SeparationWalk:
         """How many edges the walk has."""
         return sum(len(layer.source) for layer in self._layers)
 
-    def unseparated(self, word: Ints, random: np.random.Generator) -> Iterator[Constraint]:
-        """Constraints that ``word`` (a word number for each state of the table) breaks.
+    def unseparated(
+        self, word: Ints, random: np.random.Generator
+    ) -> Iterator[tuple[Difference, Difference]]:
+        """First and last differences that ``word`` (the word number of each state) leaves together.
 
         For every unseparated first difference of plans that introduce RC, one of their unseparated
         last differences, drawn at random.
@@ -109,7 +111,7 @@ class SeparationWalk:
             if layer.parts.any():
                 rows = np.flatnonzero(layer.parts & (ending[layer.child] >= 0))
                 rows = rows[~_separated(word, first[rows, 0], after[rows])]
-                yield from self._constraints(
+                yield from self._with_endings(
                     first[rows, 0], after[rows], endings, ending[layer.child[rows]]
                 )
             last = np.flatnonzero(layer.meets & below.tail[layer.child])
@@ -123,35 +125,26 @@ class SeparationWalk:
             ending = np.full(len(layer.x), -1)
             ending[source[order]] = value[order]
 
-    def every(self, most: int) -> set[Constraint] | None:
-        """All constraints of these tasks.
+    def every(self, most: int) -> list[tuple[Difference, Difference]] | None:
+        """Each first difference with each last difference that can follow, of these tasks.
 
-        Each first difference with each last difference that can follow.
-
-        None if there may be more than ``most``.  O(links x last differences / word size).
+        None if there are more than ``most``.  O(links x last differences / block size).
         """
         if self.edges > _LINKS:
             return None
         firsts, lasts = self._differences()
         if sum(ends.bit_count() for ends in firsts.values()) > most:
             return None
-        known = [alternatives(shared, others) for shared, *others in lasts]
-        found = set()
-        for (shared, *others), ends in firsts.items():
-            alpha = alternatives(shared, others)
-            found |= {ordered({*alpha, *known[number]}) for number in bits(ends)}
-        return found
+        return [(first, lasts[number]) for first, ends in firsts.items() for number in bits(ends)]
 
-    def _differences(self) -> tuple[dict[tuple[int, ...], int], list[tuple[int, ...]]]:
-        """First differences with the last ones that can follow, as a set of bits.
+    def _differences(self) -> tuple[dict[Difference, int], list[Difference]]:
+        """First differences, and the list of last differences.
 
-        Their numbers in the second list.
-
-        A difference is the shared state (-1: none) and then the different ones, sorted.
+        With each first one a set of bits: the numbers of the last ones that can follow.
         """
         state = self._space.state
-        number: dict[tuple[int, ...], int] = {}
-        firsts: dict[tuple[int, ...], int] = {}
+        number: dict[Difference, int] = {}
+        firsts: dict[Difference, int] = {}
         x = state[self._layers[0].x]
         following = [
             1 << number.setdefault((-1, *sorted(row)), len(number)) if len(set(row)) > 1 else 0
@@ -180,9 +173,9 @@ class SeparationWalk:
             following = ends
         return firsts, list(number)
 
-    def _constraints(
+    def _with_endings(
         self, shared: Ints, following: Ints, endings: Sequence[Ints], ending: Ints
-    ) -> Iterator[Constraint]:
+    ) -> Iterator[tuple[Difference, Difference]]:
         if not len(shared):
             return
         ends = np.concatenate(endings)[ending]
@@ -191,14 +184,7 @@ class SeparationWalk:
         # One ending for each first difference will do in one round.
         _, fresh = np.unique(table[:, : self._robots + 1], axis=0, return_index=True)
         for row in table[fresh].tolist():
-            alpha = alternatives(row[0], row[1 : self._robots + 1])
-            beta = alternatives(row[self._robots + 1], row[self._robots + 2 :])
-            yield ordered({*alpha, *beta})
-
-
-def ordered(alternatives: Iterable[Separation]) -> Constraint:
-    """Alternatives in one order, so that equal constraints are equal."""
-    return tuple(sorted(alternatives, key=lambda s: sorted(s.pairs)))
+            yield tuple(row[: self._robots + 1]), tuple(row[self._robots + 1 :])
 
 
 def _separated(word: Ints, shared: Ints, others: Ints) -> Bools:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from coordlang.required.divergences import Separation, separations
 from coordlang.vocabulary.job import Job, Outcome
+from coordlang.vocabulary.separations import Separation, separations
 
 
 def greedy(job: Job) -> Outcome:

@@ -14,13 +14,19 @@ from typing import Protocol
 import numpy as np
 
 from coordlang.language.warping import Pair, pair
-from coordlang.required.divergences import Separation, separations
-from coordlang.required.last_differences import Constraint, SeparationWalk, ordered
+from coordlang.required.last_differences import DifferenceWalk
 from coordlang.vocabulary.clauses import most_constrained_first
 from coordlang.vocabulary.greedy import greedy_partition
 from coordlang.vocabulary.job import Assignment, Job, Outcome
 from coordlang.vocabulary.problems_by_size import ProblemsBySize, SolverBudget, close_bounds
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
+from coordlang.vocabulary.separations import (
+    Constraint,
+    Separation,
+    constraints,
+    ordered,
+    separations,
+)
 from coordlang.vocabulary.symmetry import symmetry_group
 from planners.errors import OutOfMemory
 from planners.limits import run_until_stopped
@@ -223,7 +229,7 @@ class _AlphaOrBeta:
         self.known: list[Constraint] = []
         self.apart: Sequence[int] = ()
         self._met: set[Constraint] = set()
-        self._walks: list[SeparationWalk] = []
+        self._walks: list[DifferenceWalk] = []
         self._permutations: list[list[int]] = []
         self._random = np.random.default_rng(job.seed)
 
@@ -232,9 +238,9 @@ class _AlphaOrBeta:
         job = self._job
         self._permutations = symmetry_group(job.candidates).permutations
         job.progress("walking to the last differences")
-        self._walks = [SeparationWalk(space) for space in job.candidates.spaces]
+        self._walks = [DifferenceWalk(space) for space in job.candidates.spaces]
         for walk in self._walks:
-            self._met.update(walk.every(_LISTED) or ())
+            self._met.update(constraints(walk.every(_LISTED) or ()))
         self.known = sorted(self._met, key=lambda c: [sorted(s.pairs) for s in c])
 
     def greedy_partition(self) -> Assignment | None:
@@ -256,7 +262,7 @@ class _AlphaOrBeta:
         return [
             constraint
             for walk in self._walks
-            for broken in walk.unseparated(word, self._random)
+            for broken in constraints(walk.unseparated(word, self._random))
             for constraint in self._new_images(broken)
         ]
 

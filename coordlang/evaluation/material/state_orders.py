@@ -7,9 +7,10 @@ from random import Random
 
 import numpy as np
 
-from coordlang.required.divergences import first_differences, separations, states_on_plans
+from coordlang.required.divergences import first_differences, states_on_plans
 from coordlang.tasks.candidates import Candidates
 from coordlang.vocabulary.greedy import greedy_partition
+from coordlang.vocabulary.separations import separations
 from planners.tables import Ints, find_rows
 
 #: Random orders of the states that experiments try.

@@ -12,11 +12,11 @@ import pytest
 
 from coordlang.building import build_language
 from coordlang.required.composition_walk import walk
-from coordlang.required.divergences import alternatives
-from coordlang.required.last_differences import SeparationWalk
+from coordlang.required.last_differences import DifferenceWalk
 from coordlang.required.miscoordination import inseparable
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.vocabulary.exhaustive import _partitions
+from coordlang.vocabulary.separations import alternatives, constraints
 from planners.errors import ProvedImpossible
 from tests.support import naive
 from tests.support.candidates import states_of
@@ -115,7 +115,7 @@ def test_against_the_theorem(
     With all constraints written down, and with constraints asked of the walk.
     """
     if not written:
-        monkeypatch.setattr(SeparationWalk, "every", lambda *_: None)
+        monkeypatch.setattr(DifferenceWalk, "every", lambda *_: None)
     seen: Counter[tuple[int, ...]] = Counter()
     for seed, candidates in small_models(robots, most, number):
         both, alpha = (demands(candidates, most, beta=b) for b in (True, False))
@@ -201,16 +201,16 @@ def test_different_ends_need_one_pair_only() -> None:
 def test_every_constraint_and_no_other(robots: int, most: int, number: int) -> None:
     """What is written down are the demands of the failing tuples, all listed."""
     for _, candidates in small_models(robots, most, number):
-        found = [SeparationWalk(space).every(10**6) for space in candidates.spaces]
+        found = [DifferenceWalk(space).every(10**6) for space in candidates.spaces]
         every = {
             tuple(
                 sorted(
                     (frozenset(frozenset(p) for p in s.pairs) for s in constraint), key=sorted_pairs
                 )
             )
-            for constraints in found
-            if constraints is not None
-            for constraint in constraints
+            for differences in found
+            if differences is not None
+            for constraint in constraints(differences)
         }
         assert None not in found
         assert every == demands(candidates, most, beta=True)
@@ -218,12 +218,13 @@ def test_every_constraint_and_no_other(robots: int, most: int, number: int) -> N
 
 def test_too_many_constraints_are_not_written_down() -> None:
     (space,) = all_tasks("three-cells").spaces
-    walk_of = SeparationWalk(space)
+    walk_of = DifferenceWalk(space)
     every = walk_of.every(10**6)
     assert every is not None
-    assert len(every) == 12
-    assert walk_of.every(24) == every, "each constraint is met in two ways: the domain is symmetric"
-    assert walk_of.every(11) is None
+    assert len(every) == 24
+    assert len(set(constraints(every))) == 12, "each is met in two ways: the domain is symmetric"
+    assert walk_of.every(24) == every
+    assert walk_of.every(23) is None
 
 
 def test_walk_keeps_only_what_fails() -> None:
@@ -231,7 +232,7 @@ def test_walk_keeps_only_what_fails() -> None:
     import numpy as np
 
     candidates = all_tasks("t-map")
-    kept = [SeparationWalk(space) for space in candidates.spaces]
+    kept = [DifferenceWalk(space) for space in candidates.spaces]
     assert sum(w.nodes for w in kept) > 0
     apart = np.arange(len(candidates.rows))
     random = np.random.default_rng(0)
