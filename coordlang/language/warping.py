@@ -1,9 +1,9 @@
 """When two state sequences have one sentence: warping paths, and the shortest of them.
 
 Key fact (Proposition 7 of docs/concepts.md): ``u`` and ``v`` have the same sentence under ``f`` iff
-there is a *warping path*: cells ``(i, j)`` from ``(0, 0)`` to the last indices, steps ``(1, 0)``, ``(0,
-1)``, ``(1, 1)``, with ``f(u_i) = f(v_j)`` on every cell.  So whoever wants the sentences to differ
-must separate ``u_i`` from ``v_j`` on some cell of *every* warping path.
+there is a *warping path*: cells ``(i, j)`` from ``(0, 0)`` to the last indices, steps ``(1, 0)``,
+``(0, 1)``, ``(1, 1)``, with ``f(u_i) = f(v_j)`` on every cell.  So whoever wants the sentences to
+differ must separate ``u_i`` from ``v_j`` on some cell of *every* warping path.
 """
 
 from __future__ import annotations

@@ -240,7 +240,7 @@ def test_command_line(coordlang: Command, tmp_path: Path) -> None:
     proof.write_bytes(msgspec.json.encode(data))
     weak = coordlang("verify", language, *files, "--certificate", proof)
     assert weak.code == 1
-    assert "says that 3 words are needed; the certificate proves 2 only" in weak.err
+    assert "claims that 3 words are needed; the certificate proves 2 only" in weak.err
 
 
 @pytest.mark.parametrize(
