@@ -1,4 +1,4 @@
-"""In which form the words are told: each by a formula of its own, or one after the other."""
+"""In which form words are described: each by a formula of its own, or one after the other."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ _TRIED = 4
 
 @dataclass(frozen=True, slots=True)
 class WordDescriptions:
-    """The words with their formulas, in the order in which they are told.
+    """The words with their formulas, in the order in which they are described.
 
-    A formula None says "every other state".  ``in_order``: each formula speaks only of the states
+    A formula None means "every other state".  ``in_order``: each formula is about the states only
     that no earlier one holds; otherwise each is exact by itself, in all mapped states.
     """
 
@@ -54,7 +54,7 @@ def describe_words(
 
 
 def _apart(formulas: dict[str, Cover]) -> WordDescriptions:
-    """The longest formula, if it says more than one value, is "every other state"."""
+    """The longest formula, if it mentions more than one value, is "every other state"."""
     longest = max(formulas, key=lambda word: (formulas[word].length, formulas[word].states))
     if formulas[longest].length < 2:
         return WordDescriptions(tuple(formulas.items()), False)

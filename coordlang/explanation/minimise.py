@@ -9,7 +9,7 @@ cover with one box less until it proves that there is none.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import comb
@@ -167,31 +167,42 @@ def _fewer(points: Points, number: int, needed: Sequence[int]) -> Bits | None:
     from pysat.solvers import Glucose4
 
     width = sum(points.sizes)
-    offset = points.offset
-    on, off = (points.on + offset + 1).tolist(), (points.off + offset + 1).tolist()
-    first = number * width
-    with Glucose4() as solver:
-        for t in range(number):
-            shift = t * width
-            for columns in off:
-                solver.add_clause([-(shift + column) for column in columns])
-            for i, columns in enumerate(on):
-                for column in columns:
-                    solver.add_clause([-(first + t * len(on) + i + 1), shift + column])
-        for i in range(len(on)):
-            solver.add_clause([first + t * len(on) + i + 1 for t in range(number)])
-        for t, i in enumerate(needed):
-            solver.add_clause([first + t * len(on) + i + 1])
+    with Glucose4(bootstrap_with=_box_clauses(points, number, needed)) as solver:
         try:
             answer = satisfiable(solver, conflicts=_CONFLICTS)
         except Undecided:
             return None
         if not answer:
             return np.zeros((0, width), np.bool_)
-        model = np.array(solver.get_model()[: first + number * len(on)]) > 0
-    holds = model[first:].reshape(number, len(on))
+        model = np.array(solver.get_model()[: number * (width + len(points.on))]) > 0
+    holds = model[number * width :].reshape(number, len(points.on))
     seeds = [points.supercube(np.flatnonzero(row)) for row in holds if row.any()]
     return _irredundant(points, np.array([expand(points, seed, points.on) for seed in seeds]))
+
+
+def _box_clauses(points: Points, number: int, needed: Sequence[int]) -> Iterator[list[int]]:
+    """Clauses: ``number`` boxes hold all ``on`` points and no ``off`` point.
+
+    No two of the ``needed`` points are in one box, so that each can have a box of its own.
+    """
+    width = sum(points.sizes)
+    on = (points.on + points.offset + 1).tolist()
+    off = (points.off + points.offset + 1).tolist()
+
+    def holds(box: int, point: int) -> int:
+        return number * width + box * len(on) + point + 1
+
+    for box in range(number):
+        shift = box * width
+        for columns in off:
+            yield [-(shift + column) for column in columns]
+        for point, columns in enumerate(on):
+            for column in columns:
+                yield [-holds(box, point), shift + column]
+    for point in range(len(on)):
+        yield [holds(box, point) for box in range(number)]
+    for box, point in enumerate(needed):
+        yield [holds(box, point)]
 
 
 def _shorten(points: Points, boxes: Bits) -> Bits:
@@ -255,19 +266,25 @@ def _freed(points: Points, seed: Bits) -> Bits:
 def _hitting(rows: NDArray[np.bool_], weights: Sequence[int]) -> set[int]:
     """Columns of which every row has one.
 
-    The fewest, and of these the least weight; greedily if there are too many.
+    The fewest, and of these the least weight; greedily if there are too many sets to try.
     """
     count = rows.shape[1]
     tried = 0
     for size in range(count + 1):
         tried += comb(count, size)
         if tried > _SUBSETS:
-            break
-        fitting = [
+            return _hitting_greedily(rows, weights)
+        hitting = [
             c for c in combinations(range(count), size) if rows[:, list(c)].any(axis=1).all()
         ]
-        if fitting:
-            return set(min(fitting, key=lambda c: (sum(weights[v] for v in c), c)))
+        if hitting:
+            return set(min(hitting, key=lambda c: (sum(weights[v] for v in c), c)))
+    return _hitting_greedily(rows, weights)
+
+
+def _hitting_greedily(rows: NDArray[np.bool_], weights: Sequence[int]) -> set[int]:
+    """Always next: the column in most rows that are not hit yet; then without superfluous ones."""
+    count = rows.shape[1]
     chosen: list[int] = []
     left = rows
     while len(left):

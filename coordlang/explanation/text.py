@@ -14,6 +14,8 @@ from planners.joint.model import show
 
 #: Terms of one formula, and alternatives of one choice, that are written out.
 _TERMS = 12
+#: The most columns to which terms are aligned.
+_WIDTH = 70
 _ALTERNATIVES = 4
 
 
@@ -26,10 +28,10 @@ def literal_text(literal: Literal) -> str:
     variable, negative = literal.variable, literal.is_negative
     if variable.is_fact:
         return variable.name if literal.values == {variable.values[0]} else f"not {variable.name}"
-    said = dict(zip(variable.values, variable.texts, strict=True))
+    texts_of = dict(zip(variable.values, variable.texts, strict=True))
     values: dict[str, list[str]] = {}
     for value in literal.others if negative else literal.listed:
-        subject, text = said[value]
+        subject, text = texts_of[value]
         values.setdefault(subject, []).append(text)
     parts = [_compared(subject, texts, negative) for subject, texts in values.items()]
     joined = (" and " if negative else " or ").join(parts)
@@ -90,64 +92,68 @@ def cover_data(cover: Cover) -> dict[str, Any]:
     }
 
 
-def descriptions_text(told: WordDescriptions, mapped: MappedStates) -> str:
+def descriptions_text(descriptions: WordDescriptions, mapped: MappedStates) -> str:
     """The words and their formulas, a term a line where there are several."""
     lines = []
     states = dict(zip(mapped.words, mapped.states, strict=True))
-    for word, formula in told.rules:
+    for word, formula in descriptions.rules:
         head = f"  {word} ({counted(states[word], 'state')}):"
-        terms = formula.terms if formula else ()
         if formula is None:
             lines.append(f"{head} every other state")
-        elif len(terms) < 2:
-            lines.append(f"{head} {shown(formula) if formula.states else 'no state'}")
+        elif not formula.states:
+            lines.append(f"{head} no state")
+        elif len(formula.terms) < 2:
+            lines.append(f"{head} {shown(formula)}")
         else:
-            lines.append(head)
-            width = max(len(term_text(term)) for term in terms[:_TERMS])
-            for number, (term, count) in enumerate(
-                zip(terms[:_TERMS], formula.counts, strict=False)
-            ):
-                lines.append(
-                    f"      {'or ' if number else '   '}{term_text(term):{min(width, 70)}}  "
-                    f"[{count}]"
-                )
-            if len(terms) > _TERMS:
-                lines.append(f"      .. and {len(terms) - _TERMS} more terms")
+            lines += [head, *_term_lines(formula)]
     return "\n".join(lines)
 
 
-def demands_text(asked: SentenceDemands) -> str:
+def _term_lines(formula: Cover) -> list[str]:
+    """The terms of a formula, each with its number of states."""
+    texts = [term_text(term) for term in formula.terms[:_TERMS]]
+    width = min(max(map(len, texts)), _WIDTH)
+    lines = []
+    for number, (text, count) in enumerate(zip(texts, formula.counts, strict=False)):
+        lines.append(f"      {'or ' if number else '   '}{text:{width}}  [{count}]")
+    rest = len(formula.terms) - _TERMS
+    return [*lines, f"      .. and {rest} more terms"] if rest > 0 else lines
+
+
+def demands_text(demands: SentenceDemands) -> str:
     """What a sentence asks, in plain sentences."""
-    lines = [f'"{" ".join(asked.sentence)}" leaves {counted(asked.plans, "plan")} open.']
-    lines += [line for part in asked.parts for line in _part_lines(part, asked.steps)]
+    lines = [f'"{" ".join(demands.sentence)}" leaves {counted(demands.plans, "plan")} open.']
+    lines += [line for part in demands.parts for line in _part_lines(part, demands.steps)]
     lines += [
         f"  {change.before} -> {change.after} {_when(change)}: {_cause(change)}."
-        for change in asked.changes
+        for change in demands.changes
     ]
     return "\n".join(lines)
 
 
 def _part_lines(part: RobotPart, steps: int) -> list[str]:
+    """What one robot may do."""
     if not steps:
         return [f"  {part.robot} has nothing to do."]
     if part.subplans == 1:
         only = part.listed[0] if part.listed else [own[0] for own in part.by_step]
         return [f"  {part.robot}: {_sequence(only)}."]
     if part.listed:
-        return [
-            f"  {part.robot} may choose:",
-            *(f"    {_sequence(subplan)}" for subplan in part.listed),
-        ]
+        listed = [f"    {_sequence(subplan)}" for subplan in part.listed]
+        return [f"  {part.robot} may choose:", *listed]
     number = f"{part.subplans:,}" if part.subplans is not None else "very many"
-    lines = [f"  {part.robot} has {number} ways:"]
-    step = 0
-    while step < len(part.by_step):
-        same = step
-        while same + 1 < len(part.by_step) and part.by_step[same + 1] == part.by_step[step]:
-            same += 1
-        name = f"step {step + 1}" if same == step else f"steps {step + 1} to {same + 1}"
-        lines.append(f"    {name}: {_alternatives([own or 'wait' for own in part.by_step[step]])}")
-        step = same + 1
+    return [f"  {part.robot} has {number} ways:", *_step_lines(part)]
+
+
+def _step_lines(part: RobotPart) -> list[str]:
+    """What a robot may do in each step, equal steps together."""
+    lines = []
+    first = 1
+    for subactions, run in groupby(part.by_step):
+        last = first + len(list(run)) - 1
+        name = f"step {first}" if first == last else f"steps {first} to {last}"
+        lines.append(f"    {name}: {_alternatives([own or 'wait' for own in subactions])}")
+        first = last + 1
     return lines
 
 
@@ -203,17 +209,17 @@ def counted(number: int, noun: str) -> str:
     return f"{number:,} {noun}{'s' * (number != 1)}"
 
 
-def demands_data(asked: SentenceDemands) -> dict[str, Any]:
+def demands_data(demands: SentenceDemands) -> dict[str, Any]:
     """What a sentence asks, for JSON; steps count from 1, null is idling."""
     return {
-        "steps": asked.steps,
+        "steps": demands.steps,
         "robots": [
             {
                 "robot": part.robot,
                 "subplans": part.subplans,
                 "listed": [list(subplan) for subplan in part.listed],
             }
-            for part in asked.parts
+            for part in demands.parts
         ],
         "changes": [
             {
@@ -226,6 +232,6 @@ def demands_data(asked: SentenceDemands) -> dict[str, Any]:
                     {"subactions": list(does), "steps": list(when)} for does, when in change.ways
                 ],
             }
-            for change in asked.changes
+            for change in demands.changes
         ],
     }

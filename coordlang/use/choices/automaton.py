@@ -24,7 +24,7 @@ from planners.tables import Ints, ranges, unique_tuples
 
 #: Bytes that one member of a subset takes, with its share of everything else.
 _MEMBER_BYTES = 160
-#: Bytes for which the system is not asked whether there is room.
+#: Up to so many bytes the free memory is not looked up.
 _SMALL = 1 << 24
 
 

@@ -22,8 +22,7 @@ from planners.errors import OutOfMemory
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 
-#: Combinations of the robots' moves beyond which exact knowledge is not tried, unless it was asked
-#: for.
+#: Combinations of the robots' moves beyond which exact knowledge is not tried by default.
 MOST = 2_000_000
 
 #: How what is known in an automaton's states was found: over every combination of all robots'

@@ -25,7 +25,7 @@ from planners.tables import Ints, spans, unique_tuples
 
 #: Joint moves handled at a time.
 _CHUNK = 1_000_000
-#: Bytes for which the system is not asked whether there is room.
+#: Up to so many bytes the free memory is not looked up.
 _SMALL = 1 << 24
 
 

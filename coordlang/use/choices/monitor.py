@@ -23,7 +23,7 @@ IDLE = "idle"
 
 #: Where a monitor is: a state of the automaton, and which parts of the detour are made already
 #: (bits).
-Position = tuple[int, int]
+Progress = tuple[int, int]
 
 #: One text or several; None is idling.
 Texts = str | Iterable[str | None] | None
@@ -149,8 +149,8 @@ class Monitor:
         self._unknown: list[frozenset[int]] = [frozenset(state["unknown"]) for state in states]
         self._history: tuple[str | None, ...] = ()
         self._promised = Detour()
-        self._position: Position = (0, 0)
-        self._left = self._counts(self._promised, self._position)
+        self._progress: Progress = (0, 0)
+        self._left = self._counts(self._promised, self._progress)
 
     @classmethod
     def read(cls, path: str, robot: str | None = None) -> Monitor:
@@ -180,12 +180,12 @@ class Monitor:
     @property
     def finished(self) -> bool:
         """Whether the robot has done all its steps."""
-        return not self._next[self._position[0]]
+        return not self._next[self._progress[0]]
 
     @property
     def remaining(self) -> int:
         """How many own subplans are left, of those that keep every promise."""
-        return self._left[self._position]
+        return self._left[self._progress]
 
     @property
     def promised(self) -> Detour:
@@ -197,7 +197,7 @@ class Monitor:
 
         Nothing when it has finished.
         """
-        return tuple(text for text, _ in self._moves(self._promised, self._left, self._position))
+        return tuple(text for text, _ in self._moves(self._promised, self._left, self._progress))
 
     def did(self, subaction: str | None) -> None:
         """Tell what the robot did in this step, as ``(move r1 a b)``; None or ``idle`` for idling.
@@ -205,9 +205,9 @@ class Monitor:
         Raises `NotAllowed`, and is then as it was before.
         """
         text = _subaction(subaction)
-        for own, after in self._moves(self._promised, self._left, self._position):
+        for own, after in self._moves(self._promised, self._left, self._progress):
             if own == text:
-                self._position = after
+                self._progress = after
                 self._history = (*self._history, text)
                 return
         raise NotAllowed(self.robot, text, self.step, self.allowed())
@@ -218,7 +218,7 @@ class Monitor:
         fact = self._facts.get(text)
         if fact is None and text not in self._others:
             raise MonitorError(f"{text} is no atom that can change: {self._similar(text)}")
-        state = self._position[0]
+        state = self._progress[0]
         if fact is None or fact in self._unknown[state]:
             return None
         return fact in self._true[state]
@@ -232,13 +232,13 @@ class Monitor:
         """
         whole = self._promised & (detour or Detour()) & Detour.of(**wanted)
         self._check_atoms(whole)
-        position = self._enter(whole, *self._position)
-        left = self._counts(whole, position) if position else {}
-        if position is None or not left[position]:
+        progress = self._enter(whole, *self._progress)
+        left = self._counts(whole, progress) if progress else {}
+        if progress is None or not left[progress]:
             return Answer(None, 0)
-        start, subplan = position, []
-        while self._next[position[0]]:
-            text, position = self._moves(whole, left, position)[0]
+        start, subplan = progress, []
+        while self._next[progress[0]]:
+            text, progress = self._moves(whole, left, progress)[0]
             subplan.append(text)
         return Answer(tuple(subplan), left[start])
 
@@ -253,13 +253,13 @@ class Monitor:
                 f"step {self.step + 1}: {self.robot} has no subplan left for this{kept}"
             )
         self._promised = self._promised & (detour or Detour()) & Detour.of(**wanted)
-        position = self._enter(self._promised, *self._position)
-        assert position is not None
-        self._position = position
-        self._left = self._counts(self._promised, position)
+        progress = self._enter(self._promised, *self._progress)
+        assert progress is not None
+        self._progress = progress
+        self._left = self._counts(self._promised, progress)
 
-    def _enter(self, detour: Detour, state: int, kept: int) -> Position | None:
-        """The position in a state; None if it is one to be avoided."""
+    def _enter(self, detour: Detour, state: int, kept: int) -> Progress | None:
+        """The progress in a state; None if the detour avoids the state."""
         true, unknown = self._true[state], self._unknown[state]
         for atom in detour.avoid:
             fact = self._facts.get(atom)
@@ -270,9 +270,9 @@ class Monitor:
                 kept |= 1 << 2 * bit
         return state, kept
 
-    def _after(self, detour: Detour, position: Position, text: str | None) -> Position | None:
-        """The position after one subaction; None if the detour forbids it."""
-        state, kept = position
+    def _after(self, detour: Detour, progress: Progress, text: str | None) -> Progress | None:
+        """The progress after one subaction; None if the detour forbids it."""
+        state, kept = progress
         if any(_matches(pattern, text) for pattern in detour.never):
             return None
         for bit, pattern in enumerate(detour.do):
@@ -280,36 +280,39 @@ class Monitor:
                 kept |= 2 << 2 * bit
         return self._enter(detour, self._next[state][text], kept)
 
-    def _counts(self, detour: Detour, start: Position) -> dict[Position, int]:
-        """How many subplans from each position make the detour.
-
-        For all positions from ``start`` on.
-        """
-        whole = sum(1 << 2 * bit for bit in range(len(detour.visit))) + sum(
-            2 << 2 * bit for bit in range(len(detour.do))
-        )
-        after: dict[Position, list[Position]] = {}
-        layer = [start]
-        while layer:
-            for position in layer:
-                moves = (self._after(detour, position, text) for text in self._next[position[0]])
-                after[position] = [to for to in moves if to is not None]
-            layer = list(dict.fromkeys(to for position in layer for to in after[position]))
-        left: dict[Position, int] = {}
-        for position in reversed(after):
-            final = not self._next[position[0]]
-            left[position] = (
-                int(position[1] == whole) if final else sum(left[to] for to in after[position])
-            )
+    def _counts(self, detour: Detour, start: Progress) -> dict[Progress, int]:
+        """How many subplans make the detour, from ``start`` on and from all progress after it."""
+        made = [1 << 2 * bit for bit in range(len(detour.visit))]
+        made += [2 << 2 * bit for bit in range(len(detour.do))]
+        whole = sum(made)
+        after = self._all_after(detour, start)
+        left: dict[Progress, int] = {}
+        for progress in reversed(after):
+            state, kept = progress
+            if self._next[state]:
+                left[progress] = sum(left[to] for to in after[progress])
+            else:
+                left[progress] = int(kept == whole)
         return left
 
+    def _all_after(self, detour: Detour, start: Progress) -> dict[Progress, list[Progress]]:
+        """Where subactions lead that the detour does not forbid, step by step from ``start`` on."""
+        after: dict[Progress, list[Progress]] = {}
+        layer = [start]
+        while layer:
+            for progress in layer:
+                moves = (self._after(detour, progress, text) for text in self._next[progress[0]])
+                after[progress] = [to for to in moves if to is not None]
+            layer = list(dict.fromkeys(to for progress in layer for to in after[progress]))
+        return after
+
     def _moves(
-        self, detour: Detour, left: Mapping[Position, int], position: Position
-    ) -> list[tuple[str | None, Position]]:
-        """The subactions that still lead to the end, with the position after each."""
+        self, detour: Detour, left: Mapping[Progress, int], progress: Progress
+    ) -> list[tuple[str | None, Progress]]:
+        """The subactions that still lead to the end, with the progress after each."""
         found = []
-        for text in self._next[position[0]]:
-            after = self._after(detour, position, text)
+        for text in self._next[progress[0]]:
+            after = self._after(detour, progress, text)
             if after is not None and left[after]:
                 found.append((text, after))
         return found
@@ -343,15 +346,16 @@ def _entry(data: Any, robot: str | None) -> Any:
         )
     try:
         entries = {entry["robot"]: entry for entry in data["choices"]}
-        if robot is None and len(entries) != 1:
-            raise MonitorError(f"whose choices? The file has those of {', '.join(entries)}")
-        if robot is not None and robot not in entries:
-            raise MonitorError(
-                f"the file has no choices of {robot}; it has those of {', '.join(entries)}"
-            )
+        names = ", ".join(map(str, entries))
     except (KeyError, TypeError, AttributeError) as error:
         raise MonitorError(f"this is no choices file: {type(error).__name__}: {error}") from None
-    return entries[robot] if robot is not None else next(iter(entries.values()))
+    if robot is not None:
+        if robot not in entries:
+            raise MonitorError(f"the file has no choices of {robot}; it has those of {names}")
+        return entries[robot]
+    if len(entries) != 1:
+        raise MonitorError(f"whose choices? The file has those of {names}")
+    return next(iter(entries.values()))
 
 
 def _check_moves(states: Sequence[Mapping[str, Any]]) -> None:

@@ -45,19 +45,7 @@ class OwnFacts:
         A fact is own if no action without this robot changes it, no conditional effect does, and
         two (joint) actions with the same own part change it in the same way.
         """
-        others = 0
-        variants: dict[int, list[Changes]] = {}
-        for action in model.actions:
-            certain, uncertain = _changes(model, action)
-            others |= uncertain
-            if robot in action.owners:
-                label = model.label_number(robot, action.part_of(robot))
-                assert label is not None, action.label
-                variants.setdefault(label, []).append(certain)
-            else:
-                others |= _bits(certain)
-        for changes in variants.values():
-            others |= _bits(_ambiguous(changes))
+        variants, others = _variants(model, robot)
         mask = ((1 << len(model.codec.facts)) - 1) & ~others
         labels = range(len(model.labels[robot]))
         first = [variants[label][0] if label in variants else {} for label in labels]
@@ -99,6 +87,24 @@ def with_own_facts(automaton: Automaton, own: OwnFacts, start: int) -> Automaton
         known.append([Knowledge(true, true | own.others) for _, true in layer])
         layer = list(following)
     return minimised(moves, known)
+
+
+def _variants(model: JointModel, robot: int) -> tuple[dict[int, list[Changes]], int]:
+    """What the actions of each label certainly do, and the facts that are not own."""
+    others = 0
+    variants: dict[int, list[Changes]] = {}
+    for action in model.actions:
+        certain, uncertain = _changes(model, action)
+        others |= uncertain
+        if robot in action.owners:
+            label = model.label_number(robot, action.part_of(robot))
+            assert label is not None, action.label
+            variants.setdefault(label, []).append(certain)
+        else:
+            others |= _bits(certain)
+    for changes in variants.values():
+        others |= _bits(_ambiguous(changes))
+    return variants, others
 
 
 def _changes(model: JointModel, action: GroundAction) -> tuple[Changes, int]:

@@ -25,7 +25,7 @@ it stays in states that the language maps.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from coordlang.use.export.membership import membership
@@ -92,14 +92,16 @@ class PddlExport:
                 steps.append({})
             steps[-1].update(labels)
         plan = [step for step in steps if step]
-        robots = range(len(self.model.robots))
-        for number, step in enumerate(plan, 1):
-            idle = next((self.model.robots[robot] for robot in robots if robot not in step), None)
-            if idle is not None:
+        return tuple(self._whole_step(number, step) for number, step in enumerate(plan, 1))
+
+    def _whole_step(self, number: int, labels: Mapping[int, int]) -> tuple[int, ...]:
+        """The labels of all robots in a step."""
+        for robot, name in enumerate(self.model.robots):
+            if robot not in labels:
                 raise BadInput(
-                    f"in step {number} of the plan {idle} chooses nothing: the plan is cut off"
+                    f"in step {number} of the plan {name} chooses nothing: the plan is cut off"
                 )
-        return tuple(tuple(step[robot] for robot in robots) for step in plan)
+        return tuple(labels[robot] for robot in range(len(self.model.robots)))
 
     def _labels_of(self, number: int, name: str) -> tuple[RobotLabel, ...]:
         labels = self.labels.get(name.lower())

@@ -202,11 +202,13 @@ class _Graph:
                 counts = inside if self.word[q] == word else further.setdefault(self.word[q], {})
                 counts[q] = counts.get(q, 0) + inside[point] * number
         found = [_Prefix((*prefix.words, w), counts, None) for w, counts in further.items()]
-        if ended:
-            columns = zip(*(self.grades[p] for p in ended), strict=True)
-            whole = _Whole(sum(ended.values()), tuple((max(c), min(c)) for c in columns))
-            found.append(_Prefix(prefix.words, {}, whole))
-        return found
+        return [*found, self._whole(prefix, ended)] if ended else found
+
+    def _whole(self, prefix: _Prefix, ended: dict[int, int]) -> _Prefix:
+        """A prefix as a whole sentence; ``ended`` has the plans that end at each point."""
+        columns = zip(*(self.grades[p] for p in ended), strict=True)
+        whole = _Whole(sum(ended.values()), tuple((max(c), min(c)) for c in columns))
+        return _Prefix(prefix.words, {}, whole)
 
     def values(self, prefix: _Prefix) -> tuple[int | tuple[int, int], ...]:
         """The value of a whole sentence in each preference."""

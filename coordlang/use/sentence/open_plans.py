@@ -103,7 +103,7 @@ def open_plans_data(
 
 
 def _node_data(node: DagNode) -> dict[str, Any]:
-    place = {"step": node.step, "plans": json_count(node.plans)}
+    numbers = {"step": node.step, "plans": json_count(node.plans)}
     if node.merged:
-        return {"merged": node.merged, **place}
-    return {"state": node.key, "word": node.word, "said": node.words, **place}
+        return {"merged": node.merged, **numbers}
+    return {"state": node.key, "word": node.word, "said": node.words, **numbers}

@@ -127,7 +127,7 @@ def language_in_task(
     loaded, recorded = model_of_listed(domain, [problem], listed, options, position)
     unknown = _atoms(language) - set(loaded.model.codec.facts.texts)
     if unknown:
-        # What can be true depends on where tasks start: the states that the language speaks of must
+        # What can be true depends on where tasks start: the states in the language file must
         # be possible here.
         all_true = ListedTask(tuple(sorted(unknown)), ())
         loaded, (*recorded, _) = model_of_listed(

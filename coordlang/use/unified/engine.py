@@ -240,7 +240,7 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         except ProvedImpossible as error:
             return self._none(_Status.UNSOLVABLE_PROVEN, str(error))
         except NoPlanFits as error:
-            # Other plans there may be: this is not what "proven" says.
+            # There may be other plans, so this is not a proof that there is none.
             return self._none(_Status.UNSOLVABLE_INCOMPLETELY, str(error))
         except Unsupported as error:
             return self._none(_Status.UNSUPPORTED_PROBLEM, str(error))

@@ -28,7 +28,7 @@ class Names:
 
     Each thing gets a PDDL name of its own.
 
-    What is a PDDL name already, in lower case, is kept if nobody has it.
+    What is a PDDL name already, in lower case, is kept unless it is taken.
     """
 
     def __init__(self) -> None:

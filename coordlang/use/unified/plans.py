@@ -10,7 +10,7 @@ different joint plans may become equal.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -35,20 +35,23 @@ def to_up(found: Translated, plans: Plans, plan: Plan, kind: Any, environment: A
     if kind == PlanKind.TIME_TRIGGERED_PLAN:
         timed = [(Fraction(n), action, None) for n, step in enumerate(steps) for action in step]
         return TimeTriggeredPlan(timed, environment)
-    after: dict[Any, list[Any]] = {}
-    last: list[Any] = []
-    for step in filter(None, steps):
-        after |= {action: list(step) for action in last}
-        last = step
-    return PartialOrderPlan({**after, **{action: [] for action in last}}, environment)
+    return PartialOrderPlan(_followers([step for step in steps if step]), environment)
+
+
+def _followers(steps: Sequence[list[Any]]) -> dict[Any, list[Any]]:
+    """For each action those of the next step."""
+    after = [*steps[1:], []]
+    return {
+        action: list(following)
+        for step, following in zip(steps, after, strict=False)
+        for action in step
+    }
 
 
 def of_up(
     found: Translated, model: JointModel, team: Team, plan: Any
 ) -> list[tuple[Texts, tuple[Any, ...]]]:
-    """The joint steps of a unified-planning plan.
-
-    What each robot does, and the actions that say it.
+    """The joint steps of a unified-planning plan: what each robot does, and the actions.
 
     A partial-order plan is read layer by layer, each action as early as its predecessors allow.
     Raises `NoSteps`.
@@ -150,5 +153,9 @@ def _parts(model: JointModel, team: Team, found: Translated, text: str) -> list[
     action = next((action for action in model.actions if action.label == text), None)
     if action is None:  # it can never be applied, so the plan is refused for that
         return [(robot, text) for robot in robots]
-    parts = ((robot, action.part_of(robot)) for robot in robots)
+    return _acting((robot, action.part_of(robot)) for robot in robots)
+
+
+def _acting(parts: Iterable[tuple[int, str | None]]) -> list[tuple[int, str]]:
+    """The robots that do not idle, with their parts."""
     return [(robot, part) for robot, part in parts if part is not None]
