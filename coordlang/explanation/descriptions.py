@@ -40,7 +40,7 @@ class WordDescriptions:
 def describe_words(
     mapped: MappedStates, formulas: dict[str, Cover], each: bool = False
 ) -> WordDescriptions:
-    """The shorter way to tell the words.
+    """The shorter way to describe the words.
 
     With ``each`` every one by a formula of its own, exact by itself.
     """

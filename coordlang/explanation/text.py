@@ -121,7 +121,7 @@ def _term_lines(formula: Cover) -> list[str]:
 
 
 def demands_text(demands: SentenceDemands) -> str:
-    """What a sentence asks, in plain sentences."""
+    """What a sentence demands, in plain sentences."""
     lines = [f'"{" ".join(demands.sentence)}" leaves {counted(demands.plans, "plan")} open.']
     lines += [line for part in demands.parts for line in _part_lines(part, demands.steps)]
     lines += [
@@ -210,7 +210,7 @@ def counted(number: int, noun: str) -> str:
 
 
 def demands_data(demands: SentenceDemands) -> dict[str, Any]:
-    """What a sentence asks, for JSON; steps count from 1, null is idling."""
+    """What a sentence demands, for JSON; steps count from 1, null is idling."""
     return {
         "steps": demands.steps,
         "robots": [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import compress
 
 import numpy as np
 
@@ -18,9 +19,18 @@ from planners.tables import Ints, Rows, find_rows, unique_rows
 
 @dataclass(frozen=True, slots=True)
 class MappedStates:
-    """The states that formulas must be exact on: their values and word numbers.
+    """The states that formulas must be exact on.
 
-    For all other states the formulas say nothing: several may be true there, or none.
+    In all other states the formulas are arbitrary: several may be true there, or none.
+
+    Parameters
+    ----------
+    words
+        The words by number.
+    valuation
+        The states as values of variables.
+    word
+        The word number of each state.
     """
 
     words: tuple[str, ...]
@@ -29,7 +39,7 @@ class MappedStates:
 
     @property
     def states(self) -> list[int]:
-        """How many states each word has."""
+        """The number of states of each word."""
         return [int(n) for n in np.bincount(self.word, minlength=len(self.words))]
 
 
@@ -51,11 +61,22 @@ def word_formulas(
     """Each word as a disjunction of few short terms over multi-valued variables.
 
     In every mapped state exactly one of the formulas is true, that of its word.  States that the
-    language does not map are on no optimal plan of a candidate task: what the formulas say there is
-    left open, unless the states are given as ``also`` (a table of rows), for tasks that are no
-    candidates.
+    language does not map are on no optimal plan of a candidate task; there the formulas are
+    arbitrary, unless the states are given as ``also``, for tasks that are no candidates.
 
-    Raises `BadInput` for a language of another model.
+    Parameters
+    ----------
+    language
+        The language.
+    model
+        The joint model that its states are of.
+    also
+        Further states, (states, blocks).
+
+    Raises
+    ------
+    BadInput
+        For a language of another model.
     """
     return all_covers(mapped_states(language, model, also))
 
@@ -68,9 +89,18 @@ def all_covers(mapped: MappedStates) -> dict[str, Cover]:
 def cover(
     mapped: MappedStates, word: int, against: Sequence[int] | None = None, quick: bool = False
 ) -> Cover:
-    """The formula of a word that is false in all states of the words ``against``.
+    """The formula of a word that is false in all states of some other words.
 
-    By default these are all others.
+    Parameters
+    ----------
+    mapped
+        The states.
+    word
+        The number of the word.
+    against
+        The numbers of the other words; None: all.
+    quick
+        Whether to look for few terms in one pass only, without proof.
     """
     value = mapped.valuation.value
     mine = mapped.word == word
@@ -93,17 +123,17 @@ def cover(
 def _term(
     mapped: MappedStates, points: Points, least: Sequence[bool], prime: Sequence[bool]
 ) -> Term:
-    """What is shortest to say between the least box and the prime one."""
+    """The shortest term between the least box and the prime one."""
     literals = []
     for variable, start in zip(mapped.valuation.variables, points.offset.tolist(), strict=True):
-        places = range(len(variable.values))
-        if all(prime[start + p] for p in places):
+        stop = start + len(variable.values)
+        if all(prime[start:stop]):
             continue
-        choices = [
-            Literal(variable, frozenset(variable.values[p] for p in places if box[start + p]))
+        limits = [
+            Literal(variable, frozenset(compress(variable.values, box[start:stop])))
             for box in (least, prime)
         ]
-        literals.append(min(choices, key=lambda c: (c.length, c.is_negative)))
+        literals.append(min(limits, key=lambda limit: (limit.length, limit.is_negative)))
     return tuple(literals)
 
 

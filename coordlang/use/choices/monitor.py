@@ -329,11 +329,10 @@ class Monitor:
             for text in (*self._facts, *sorted(self._others))
             if text.strip("()").split(" ")[0] == head
         ]
-        return (
-            f"there are {', '.join(alike[:8])}{' ..' if len(alike) > 8 else ''}"
-            if alike
-            else f"none is ({head} ..)"
-        )
+        if not alike:
+            return f"none is ({head} ..)"
+        more = " .." if len(alike) > 8 else ""
+        return f"there are {', '.join(alike[:8])}{more}"
 
 
 def _entry(data: Any, robot: str | None) -> Any:
