@@ -20,7 +20,7 @@ from coordlang.building import build_language
 from coordlang.language.partition import Partition
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.verification.by_definition import verify
-from coordlang.vocabulary.pairwise import pair_languages, together
+from coordlang.vocabulary.pairwise import joint_partition, pair_languages
 from planners.limits import time_limit
 from planners.loading import ModelOptions
 from planners.pddl import read_domain, read_problem
@@ -88,7 +88,7 @@ def main(wanted: list[str]) -> int:
             sum(language.nodes for language in languages),
             f"{middle - start:.1f}",
             f"{perf_counter() - middle:.1f}",
-            "yes" if is_language(candidates, together(languages)) else "no",
+            "yes" if is_language(candidates, joint_partition(languages)) else "no",
         )
         print(
             "  ".join(

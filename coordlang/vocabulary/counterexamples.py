@@ -15,20 +15,29 @@ from random import Random
 import numpy as np
 
 from coordlang.required.composition_walk import FAILED, moves
+from coordlang.vocabulary.leads import NO_LEAD, NO_WORD, PARTED, Leads
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 from planners.tables import Ints, unique_tuples
 
+#: Where no way leads to a violation; some steps may be added to it.
 _FAR = np.iinfo(np.int64).max // 4
 #: Random ways to a violation that are taken from one start at most.
-_AGAIN = 40
+_RANDOM_WAYS = 40
 
 
 @dataclass(frozen=True, slots=True)
 class Counterexample:
-    """A failing tuple of plans with one sentence.
+    """A failing tuple of plans with one sentence, from a node that they share.
 
-    Plan-space edges, step by step, and the states of each plan.
+    Attributes
+    ----------
+    start
+        The node of the plan space.
+    edges
+        Step by step, the edge of each plan.
+    states
+        The state numbers of each plan, that of ``start`` first.
     """
 
     start: int
@@ -36,49 +45,17 @@ class Counterexample:
     states: tuple[tuple[int, ...], ...]
 
 
-class _Leads:
-    """Words by which one plan's sentence is ahead of another's, as numbers; 0 is none."""
-
-    def __init__(self) -> None:
-        self._leads: list[tuple[int, tuple[int, ...]]] = [(0, ())]
-        self._number = {self._leads[0]: 0}
-        self._after: dict[tuple[int, int, int], int] = {}
-
-    def after(self, lead: Ints, first: Ints, other: Ints) -> Ints:
-        """The leads when plan 1 said ``first`` and the other one ``other`` (-1: nothing).
-
-        -1 where they part.
-        """
-        if not len(lead):
-            return lead
-        table = np.column_stack((lead, first + 1, other + 1))
-        bounds = [int(table[:, k].max()) + 1 for k in range(3)]
-        different, inverse = unique_tuples(table, bounds)
-        numbers = [self._one(a, b - 1, c - 1) for a, b, c in different.tolist()]
-        return np.array(numbers, np.int64)[inverse]
-
-    def _one(self, lead: int, first: int, other: int) -> int:
-        key = (lead, first, other)
-        if key not in self._after:
-            side, words = self._leads[lead]
-            mine = (words if side == 1 else ()) + ((first,) if first >= 0 else ())
-            theirs = (words if side == 2 else ()) + ((other,) if other >= 0 else ())
-            shared = min(len(mine), len(theirs))
-            if mine[:shared] != theirs[:shared]:
-                self._after[key] = -1
-            else:
-                rest = (1, mine[shared:]) if len(mine) > shared else (2, theirs[shared:])
-                if not rest[1]:
-                    rest = (0, ())
-                if rest not in self._number:
-                    self._number[rest] = len(self._leads)
-                    self._leads.append(rest)
-                self._after[key] = self._number[rest]
-        return self._after[key]
-
-
 @dataclass(slots=True)
 class _Layer:
+    """Nodes of the walk with equally many steps to go.
+
+    A node is ``(x_1 .. x_n, y or failed, leads)``, failed as the number of nodes of the plan space.
+    Each move has the row of its node in ``source``, the plans' ``edges``, and in ``child`` the row
+    of the node that it leads to, one layer below.  Each node has in ``best`` the fewest steps at
+    which the plans are in different states on a way to a violation, in ``choice`` the move that
+    begins it.
+    """
+
     nodes: Ints
     source: Ints
     edges: Ints
@@ -90,13 +67,21 @@ class _Layer:
 def counterexamples(
     space: PlanSpace, index: EdgeIndex, word: Ints, most: int, starts: Ints | None = None
 ) -> Iterator[Counterexample]:
-    """About ``most`` failing tuples of plans with one sentence under ``word``.
-
-    ``word`` has the word of each plan-space node.
+    """Failing tuples of plans with one sentence, those that differ least first.
 
     For each node that all plans and their mixture share, the rest of plans that begin alike: those
-    that differ at the fewest steps, and then others.  None at all: ``word`` is a language for these
-    tasks.
+    that differ at the fewest steps, and then others.
+
+    Parameters
+    ----------
+    space, index
+        The plan space, and what finds its edges.
+    word
+        (nodes) the word of each node of the plan space.
+    most
+        About how many are wanted.  If there is none at all, ``word`` is a language for the tasks.
+    starts
+        The nodes where the tasks start, sorted; None: all of them.
     """
     layers = _forward(space, index, word, np.unique(space.starts) if starts is None else starts)
     _backward(space, layers)
@@ -104,16 +89,12 @@ def counterexamples(
 
 
 def _forward(space: PlanSpace, index: EdgeIndex, word: Ints, starts: Ints) -> list[_Layer]:
-    """``layers[k]`` has k joint steps to go.
-
-    A node is (x_1 .. x_n, y or failed, leads), failed as ``len(space)``.
-    """
+    """The nodes of the walk: ``layers[k]`` has k joint steps to go."""
     robots = space.robots
-    leads = _Leads()
-    spans = space.layers
+    leads = Leads()
     layers: list[_Layer] = []
     arriving = np.zeros((0, 2 * robots), np.int64)
-    for number in range(len(spans) - 1, -1, -1):
+    for number in reversed(range(len(space.layers))):
         here = starts[space.layer[starts] == number]
         fresh = np.zeros((len(here), 2 * robots), np.int64)
         fresh[:, : robots + 1] = here[:, None]
@@ -137,8 +118,9 @@ def _forward(space: PlanSpace, index: EdgeIndex, word: Ints, starts: Ints) -> li
 
 
 def _expand(
-    space: PlanSpace, index: EdgeIndex, word: Ints, leads: _Leads, nodes: Ints
+    space: PlanSpace, index: EdgeIndex, word: Ints, leads: Leads, nodes: Ints
 ) -> tuple[_Layer, Ints]:
+    """A layer with the moves out of its nodes, and the nodes that they lead to."""
     robots = space.robots
     failed = len(space)
     sources: list[Ints] = []
@@ -148,15 +130,16 @@ def _expand(
     y = nodes[:, robots]
     walking = np.column_stack((nodes[:, :robots], np.where(y == failed, FAILED, y)))
     for move in moves(space, index, walking):
-        target = space.target[move.edges]
-        said = np.where(word[target] != word[nodes[move.source, :robots]], word[target], -1)
+        target = space.targets(move.edges)
+        same_word = word[target] == word[nodes[move.source, :robots]]
+        entered = np.where(same_word, NO_WORD, word[target])
         lead = nodes[move.source, robots + 1 :].copy()
         keep = np.ones(len(lead), np.bool_)
         for other in range(1, robots):
             lead[keep, other - 1] = leads.after(
-                lead[keep, other - 1], said[keep, 0], said[keep, other]
+                lead[keep, other - 1], entered[keep, 0], entered[keep, other]
             )
-            keep &= lead[:, other - 1] >= 0
+            keep &= lead[:, other - 1] != PARTED
         mixed = np.where(move.mixed == FAILED, failed, move.mixed)
         sources.append(move.source[keep])
         edges.append(move.edges[keep])
@@ -175,13 +158,12 @@ def _expand(
 
 
 def _backward(space: PlanSpace, layers: list[_Layer]) -> None:
-    """For each node the fewest differing steps on a way to a violation.
-
-    With the move that begins it.
-    """
+    """Set ``best`` and ``choice`` of each node, goals first."""
     robots = space.robots
     goal = layers[0]
-    bad = (goal.nodes[:, robots] == len(space)) & (goal.nodes[:, robots + 1 :] == 0).all(axis=1)
+    bad = (goal.nodes[:, robots] == len(space)) & (goal.nodes[:, robots + 1 :] == NO_LEAD).all(
+        axis=1
+    )
     goal.best = np.where(bad, 0, _FAR)
     for below, layer in pairwise(layers):
         x = layer.nodes[:, :robots]
@@ -197,11 +179,14 @@ def _backward(space: PlanSpace, layers: list[_Layer]) -> None:
 
 
 def _retrace(space: PlanSpace, layers: list[_Layer], most: int) -> Iterator[Counterexample]:
+    """Ways from the nodes at which the plans and their mixture are one, and no sentence leads."""
     robots = space.robots
     starts: list[tuple[int, int, int]] = []
     for number, layer in enumerate(layers):
         x = layer.nodes[:, : robots + 1]
-        diagonal = (x == x[:, :1]).all(axis=1) & (layer.nodes[:, robots + 1 :] == 0).all(axis=1)
+        diagonal = (x == x[:, :1]).all(axis=1) & (layer.nodes[:, robots + 1 :] == NO_LEAD).all(
+            axis=1
+        )
         hit = np.flatnonzero(diagonal & (layer.best < _FAR)) if number else np.zeros(0, np.int64)
         starts += [(int(layer.best[row]), number, int(row)) for row in hit]
     chosen = sorted(starts)[:most]
@@ -211,7 +196,7 @@ def _retrace(space: PlanSpace, layers: list[_Layer], most: int) -> Iterator[Coun
         return
     # Few starts: more ways to a violation from each, drawn at random (always the same ones).
     random = Random(0)
-    for _ in range(min(_AGAIN, most // len(chosen) - 1)):
+    for _ in range(min(_RANDOM_WAYS, most // len(chosen) - 1)):
         for _, number, row in chosen:
             yield _follow(space, layers, number, row, random)
 
@@ -219,10 +204,7 @@ def _retrace(space: PlanSpace, layers: list[_Layer], most: int) -> Iterator[Coun
 def _follow(
     space: PlanSpace, layers: list[_Layer], number: int, row: int, random: Random | None
 ) -> Counterexample:
-    """One way from a node to a violation.
-
-    The best one, or at each node any move that still leads to one.
-    """
+    """A way from a node to a violation: the best, or at each node any move that leads to one."""
     robots = space.robots
     start = int(layers[number].nodes[row, 0])
     edges = []
@@ -235,7 +217,7 @@ def _follow(
         edges.append(tuple(layer.edges[move].tolist()))
         row = int(layer.child[move])
     states = tuple(
-        (int(space.state[start]), *(int(space.state[space.target[step[i]]]) for step in edges))
-        for i in range(robots)
+        tuple(space.state[space.nodes_on(start, [step[robot] for step in edges])].tolist())
+        for robot in range(robots)
     )
     return Counterexample(start, tuple(edges), states)

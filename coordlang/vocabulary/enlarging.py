@@ -211,16 +211,19 @@ class _Search:
         The readings of nodes are brought up to date, and noted as they were before.
         """
         above = [nodes_above(space, state) for space in self._spaces]
-        after = self.expected.copy()
         affected = [n for n, task in enumerate(self._tasks) if above[task.space][task.node]]
+        after = self.expected.copy()
         listed = [n for n in affected if self._tasks[n].coordinated is not None]
-        after[listed] = [self._measure(self._tasks[n]) for n in listed]
+        self._measure_again(listed, after)
         if (after[listed] == 0).any():
             return np.zeros_like(after)
         for number, (read, nodes) in enumerate(zip(self._readings, above, strict=True)):
             changed = np.flatnonzero(nodes).tolist()
             classes_before.update({(number, node): read.classes[node] for node in changed})
             read.update(changed, self.words)
-        others = [n for n in affected if self._tasks[n].coordinated is None]
-        after[others] = [self._measure(self._tasks[n]) for n in others]
+        self._measure_again(sorted({*affected} - {*listed}), after)
         return after
+
+    def _measure_again(self, tasks: Sequence[int], expected: Floats) -> None:
+        for number in tasks:
+            expected[number] = self._measure(self._tasks[number])

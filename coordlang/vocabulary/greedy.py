@@ -32,14 +32,14 @@ def greedy_partition(
     O(words * (states + constraints)).
     """
     clashes: dict[int, set[int]] = {state: set() for state in states}
-    open_choices = _Choices()
+    alternatives_left = _Alternatives()
     for alternatives in constraints:
         if len(alternatives) == 1:
             for a, b in alternatives[0].pairs:
                 clashes[a].add(b)
                 clashes[b].add(a)
         else:
-            open_choices.add(alternatives)
+            alternatives_left.add(alternatives)
     words: dict[int, int] = {}
     waiting = list(states)
     number = 0
@@ -48,7 +48,7 @@ def greedy_partition(
         blocked: set[int] = set()
         left = []
         for state in waiting:
-            if state in blocked or not open_choices.merge(state, members):
+            if state in blocked or not alternatives_left.merge(state, members):
                 left.append(state)
                 continue
             words[state] = number
@@ -59,36 +59,38 @@ def greedy_partition(
     return words
 
 
-class _Choices:
-    """Constraints with several alternatives.
+class _Alternatives:
+    """Constraints with several alternatives; two states in one word rule out some of them.
 
-    Merging two states rules out those that keep them apart.
+    ``_left`` of each constraint the alternatives that are not ruled out, ``_ruled_out_by`` for each
+    pair of states the alternatives (with their constraints' numbers) that separate it.
     """
 
     def __init__(self) -> None:
-        self._alive: list[set[Separation]] = []
-        self._asking: dict[tuple[int, int], list[tuple[int, Separation]]] = {}
-        self._touched: set[int] = set()
+        self._left: list[set[Separation]] = []
+        self._ruled_out_by: dict[tuple[int, int], list[tuple[int, Separation]]] = {}
+        self._states: set[int] = set()
 
     def add(self, alternatives: tuple[Separation, ...]) -> None:
-        number = len(self._alive)
-        self._alive.append(set(alternatives))
+        """Add a constraint."""
+        number = len(self._left)
+        self._left.append(set(alternatives))
         for separation in alternatives:
             for pair in separation.pairs:
-                self._asking.setdefault(pair, []).append((number, separation))
-                self._touched.update(pair)
+                self._ruled_out_by.setdefault(pair, []).append((number, separation))
+                self._states.update(pair)
 
     def merge(self, state: int, members: Sequence[int]) -> bool:
         """Put ``state`` into a word with ``members`` if every constraint keeps an alternative."""
-        if state not in self._touched:
+        if state not in self._states:
             return True
-        gone: dict[int, set[Separation]] = {}
+        ruled_out: dict[int, set[Separation]] = {}
         for other in members:
             pair = (state, other) if state < other else (other, state)
-            for number, separation in self._asking.get(pair, ()):
-                gone.setdefault(number, set()).add(separation)
-        if any(self._alive[number] <= dead for number, dead in gone.items()):
+            for number, separation in self._ruled_out_by.get(pair, ()):
+                ruled_out.setdefault(number, set()).add(separation)
+        if any(self._left[number] <= out for number, out in ruled_out.items()):
             return False
-        for number, dead in gone.items():
-            self._alive[number] -= dead
+        for number, out in ruled_out.items():
+            self._left[number] -= out
         return True

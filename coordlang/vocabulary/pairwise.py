@@ -12,32 +12,38 @@ space with merged labels, and all that is known of two robots applies.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
-from coordlang.language.warping import Clause, separation_clause
+from coordlang.language.warping import Clause
 from coordlang.required.composition_walk import walk
 from coordlang.required.miscoordination import Inseparable, inseparable, separable
 from coordlang.vocabulary.clauses import most_constrained_first, without_implied
 from coordlang.vocabulary.counterexamples import counterexamples
+from coordlang.vocabulary.necessary_clauses import TaskPart
 from coordlang.vocabulary.sat import PartitionProblem
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-
-#: Counterexamples taken at a time.
-_MOST = 200
 
 
 @dataclass(frozen=True, slots=True)
 class PairLanguage:
     """A smallest language for pairs of robots.
 
-    ``words`` of the states, ``size`` how many; ``pairs`` by robots' numbers.
-
-    ``nodes`` and ``edges`` of the composition walks, ``clauses`` that were met.
+    Attributes
+    ----------
+    pairs
+        The pairs, by robots' numbers.
+    words, size
+        The word of each state, and how many there are.
+    nodes, edges
+        Of the composition walks.
+    clauses
+        How many clauses were met.
     """
 
     pairs: tuple[tuple[int, int], ...]
@@ -49,31 +55,32 @@ class PairLanguage:
 
 
 def divided(space: PlanSpace, side: Sequence[int]) -> PlanSpace:
-    """The plan space of two robots.
-
-    Those in ``side`` as the first one, all others as the second one.
-    """
+    """The plan space of two robots: those in ``side`` as one, all others as the other one."""
     others = [robot for robot in range(space.robots) if robot not in side]
-    merged = []
-    for robots in (list(side), others):
-        _, number = np.unique(space.labels[:, robots], axis=0, return_inverse=True)
-        merged.append(number.reshape(-1))
-    order = np.lexsort((merged[1], merged[0], space.sources))
-    labels = np.stack(merged, axis=1)[order].astype(np.int32)
-    return replace(space, target=space.target[order], labels=labels, cost=space.cost[order])
+    return space.with_robots_merged((side, others))
 
 
-def sides(robots: int, i: int, j: int) -> Iterator[tuple[int, ...]]:
-    """All sets of robots with i and without j."""
+def sides_between(robots: int, i: int, j: int) -> Iterator[tuple[int, ...]]:
+    """All sets of robots with robot i and without robot j."""
     rest = [robot for robot in range(robots) if robot not in (i, j)]
     for number in range(len(rest) + 1):
         for others in combinations(rest, number):
             yield tuple(sorted((i, *others)))
 
 
-def _named(side: tuple[int, ...], robots: int) -> tuple[int, ...]:
-    """A division by its side with robot 0."""
-    return side if 0 in side else tuple(robot for robot in range(robots) if robot not in side)
+def _divisions(robots: int, pairs: Iterable[tuple[int, int]]) -> list[tuple[int, ...]]:
+    """The divisions of the robots that have the robots of some pair on different sides.
+
+    Each is named by its side with robot 0.
+    """
+    everybody = range(robots)
+    return sorted(
+        {
+            side if 0 in side else tuple(robot for robot in everybody if robot not in side)
+            for i, j in pairs
+            for side in sides_between(robots, i, j)
+        }
+    )
 
 
 def pair_languages(spaces: Sequence[PlanSpace]) -> list[PairLanguage]:
@@ -90,79 +97,67 @@ def pair_languages(spaces: Sequence[PlanSpace]) -> list[PairLanguage]:
 def language_for(spaces: Sequence[PlanSpace], pairs: Sequence[tuple[int, int]]) -> PairLanguage:
     """A smallest partition that is a language for all these pairs of robots at once.
 
-    Raises `Inseparable` (with the two plans) when there is none.
+    Raises
+    ------
+    Inseparable
+        With two plans, when there is none.
     """
-    robots = spaces[0].robots
-    divisions = sorted({_named(side, robots) for i, j in pairs for side in sides(robots, i, j)})
-    views = [divided(space, side) for space in spaces for side in divisions]
-    for view, space in zip(views, [space for space in spaces for _ in divisions], strict=True):
+    views = [view for space in spaces for view in _separable_views(space, pairs)]
+    walks = [walk(view) for view in views]
+    parts = []
+    for view, found in zip(views, walks, strict=True):
+        starts = view.starts[found.requires[view.starts]]
+        if len(starts):
+            parts.append(TaskPart(view, EdgeIndex.of(view), np.unique(starts)))
+    states = np.unique(np.concatenate([space.state for space in spaces])).tolist()
+    clauses: list[Clause] = []
+    size = 2 if parts else 1
+    while (words := _words(states, parts, clauses, size)) is None:
+        size += 1
+    return PairLanguage(
+        pairs=tuple(pairs),
+        words=words,
+        size=len(set(words.values())),
+        nodes=sum(found.nodes for found in walks),
+        edges=sum(found.edges for found in walks),
+        clauses=len(clauses),
+    )
+
+
+def _separable_views(space: PlanSpace, pairs: Sequence[tuple[int, int]]) -> list[PlanSpace]:
+    """The plan spaces of all divisions; raises `Inseparable`."""
+    views = [divided(space, side) for side in _divisions(space.robots, pairs)]
+    for view in views:
         # Plans of two robots are plans of all: what is wrong with the former is wrong with the
         # latter.
         if not separable(view) and (witness := inseparable(space)) is not None:
             raise Inseparable(witness)
-    walks = [walk(view) for view in views]
-    nodes, edges = sum(w.nodes for w in walks), sum(w.edges for w in walks)
-    states = sorted({int(s) for space in spaces for s in space.state})
-    searched = [
-        (view, EdgeIndex.of(view), np.unique(starts))
-        for view, found in zip(views, walks, strict=True)
-        if len(starts := view.starts[found.requires[view.starts]])
-    ]
-    clauses: list[Clause] = []
-    size = 1 + bool(searched)
-    while True:
-        words = _words(states, searched, clauses, size)
-        if words is not None:
-            return PairLanguage(
-                tuple(pairs), words, len(set(words.values())), nodes, edges, len(clauses)
-            )
-        size += 1
+    return views
 
 
 def _words(
-    states: Sequence[int],
-    searched: Sequence[tuple[PlanSpace, EdgeIndex, np.ndarray]],
-    clauses: list[Clause],
-    size: int,
+    states: Sequence[int], parts: Sequence[TaskPart], clauses: list[Clause], size: int
 ) -> dict[int, int] | None:
     """A partition into ``size`` words without counterexample, or None if there is none.
 
     New clauses are added to the list.
     """
-    problem = PartitionProblem(most_constrained_first(states, clauses), size)
-    try:
+    word = np.zeros(max(states) + 1, np.int64)
+    with closing(PartitionProblem(most_constrained_first(states, clauses), size)) as problem:
         for clause in clauses:
             problem.separate_one(clause)
-        word = np.zeros(
-            max(len(view.rows) for view, _, _ in searched) if searched else max(states) + 1,
-            np.int64,
-        )
         while (partition := problem.solve()) is not None:
             word[list(partition)] = list(partition.values())
-            fresh = _violated(searched, word)
-            if not fresh:
+            violated = without_implied({clause for part in parts for clause in part.violated(word)})
+            if not violated:
                 return partition
-            for clause in fresh:
+            for clause in violated:
                 problem.separate_one(clause)
-            clauses += fresh
-        return None
-    finally:
-        problem.close()
+            clauses += violated
+    return None
 
 
-def _violated(
-    searched: Sequence[tuple[PlanSpace, EdgeIndex, np.ndarray]], word: np.ndarray
-) -> list[Clause]:
-    found = set()
-    for view, index, starts in searched:
-        for example in counterexamples(view, index, word[view.state], _MOST, starts):
-            clause = separation_clause(example.states, word.tolist())
-            assert clause, "the plans have one sentence, and none of them is the other"
-            found.add(clause)
-    return without_implied(found)
-
-
-def together(languages: Sequence[PairLanguage]) -> dict[int, int]:
+def joint_partition(languages: Sequence[PairLanguage]) -> dict[int, int]:
     """The partition by all pairs' words at once.
 
     Plans with one sentence under it have one sentence in each language.
@@ -176,19 +171,17 @@ def together(languages: Sequence[PairLanguage]) -> dict[int, int]:
 
 
 def unsafe_pair(spaces: Sequence[PlanSpace], words: Sequence[int]) -> tuple[int, int] | None:
-    """A pair of robots for which the partition ``words`` (by state number) is no language.
+    """A pair of robots for which a partition is no language, None if there is none.
 
-    None if there is none.
+    ``words`` (states) are the word of each state number.
     """
-    robots = spaces[0].robots
     word = np.array(words, np.int64)
+    robots = spaces[0].robots
     for i, j in combinations(range(robots), 2):
-        for side in sides(robots, i, j):
+        for side in sides_between(robots, i, j):
             for space in spaces:
                 view = divided(space, side)
-                if (
-                    next(counterexamples(view, EdgeIndex.of(view), word[view.state], 1), None)
-                    is not None
-                ):
+                found = counterexamples(view, EdgeIndex.of(view), word[view.state], 1)
+                if next(found, None) is not None:
                     return i, j
     return None

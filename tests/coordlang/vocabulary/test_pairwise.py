@@ -13,7 +13,7 @@ from coordlang.language.partition import Partition
 from coordlang.required.miscoordination import Inseparable, inseparable
 from coordlang.tasks.candidates import Candidates, from_problems
 from coordlang.verification.by_definition import verify
-from coordlang.vocabulary.pairwise import language_for, pair_languages, together, unsafe_pair
+from coordlang.vocabulary.pairwise import joint_partition, language_for, pair_languages, unsafe_pair
 from planners.joint.states import split_atoms
 from planners.pddl import read_domain, read_problem
 from planners.search.plans import Plan
@@ -118,7 +118,7 @@ def test_pair_languages_are_smallest() -> None:
             assert language.size == least
             compared += least > 1
         # With one sentence for each pair, two plans that fit all of them mix freely.
-        joined = together(languages)
+        joined = joint_partition(languages)
         assert (
             unsafe_pair(candidates.spaces, [joined.get(s, 0) for s in range(len(candidates.rows))])
             is None
