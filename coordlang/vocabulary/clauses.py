@@ -1,6 +1,8 @@
-"""Sets of clauses "one of these pairs of states must be separated": implied, frequent pairs.
+"""Sets of clauses: those that others imply, frequent pairs, the order of states that they give.
 
-A clause with fewer pairs asks for more: it implies every clause that holds its pairs.
+
+A clause says that one of its pairs of states must be separated; with fewer pairs it asks for
+more, and implies every clause that holds its pairs.
 """
 
 from __future__ import annotations

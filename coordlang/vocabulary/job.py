@@ -20,12 +20,26 @@ Assignment = Mapping[int, int]
 class Job:
     """A partition to find.
 
-    Of ``states`` (numbers in ``candidates.rows``; those on optimal plans), for ``candidates``.
-
-    ``incumbent`` is a partition that is known to be a language, what an anytime method returns in
-    the worst case. ``check`` verifies a partition by definition and raises if it is none; an
-    anytime method calls it for every better one that it finds, because when it is stopped there is
-    no time left.  ``alpha_only`` is for `separating`.
+    Attributes
+    ----------
+    candidates
+        The tasks that it is for.
+    states
+        Those on optimal plans, by their numbers in ``candidates.rows``.
+    first_differences
+        Where coordination is required, and how plans that introduce RC part.
+    incumbent
+        A partition that is known to be a language: what an anytime method returns in the worst
+        case.
+    seed
+        Of whatever is drawn at random.
+    alpha_only
+        For `separating`: separate plans where they part, never where they meet.
+    progress
+        Called with a line of text now and then.
+    check
+        Verifies a partition by definition, and raises if it is no language.  An anytime method
+        calls it for every better one that it finds: when it is stopped there is no time left.
     """
 
     candidates: Candidates
@@ -47,7 +61,14 @@ class Job:
 class Evidence:
     """Why a clause is necessary.
 
-    Plans of ``space`` whose mixture fails, or their image under a symmetry.
+    Attributes
+    ----------
+    space
+        The plan space of the plans.
+    example
+        Plans whose mixture fails.
+    symmetry
+        The clause is that of the plans' images under it; None: of the plans themselves.
     """
 
     space: PlanSpace
@@ -59,10 +80,19 @@ class Evidence:
 class Outcome:
     """A partition with what is proved of it.
 
-    ``lower_bound``: no partition with fewer words is a coordination language.  ``figures`` are the
-    work done.  ``stopped`` is the error that ended the search early, None if it came to its end.
-    ``evidence`` are the necessary clauses that were met, of which no partition into ``lower_bound -
-    1`` words satisfies all (nothing for methods that meet none).
+    Attributes
+    ----------
+    partition
+        State number -> word number.
+    lower_bound
+        No partition with fewer words is a coordination language.
+    figures
+        The work done, by name.
+    stopped
+        The error that ended the search early, None if it came to its end.
+    evidence
+        The necessary clauses that were met, of which no partition into ``lower_bound - 1`` words
+        satisfies all; empty for methods that meet none.
     """
 
     partition: Assignment
