@@ -8,13 +8,13 @@ which is what the solver is asked about.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 from coordlang.certificate.encoding import Cnf, encode
-from coordlang.certificate.file import Certificate, PlanTexts, Reason
-from coordlang.language.warping import Clause, pair
+from coordlang.certificate.file import Certificate, PlanTexts, Reason, WarpingPath
+from coordlang.language.warping import Clause, Pair, pair
 from coordlang.tasks.candidates import Candidates
 from coordlang.tasks.listed import goal_text
 from planners.errors import BadInput, Refuted
@@ -86,27 +86,34 @@ def _clause(reason: Reason, tasks: _Tasks) -> Clause:
         raise Refuted(f"expected a plan for each of {robots} robots")
     states = [_states(space, start, plan, f"plan {n}") for n, plan in enumerate(reason.plans)]
     mixture = [
-        [steps[robot][robot] for robot in range(robots)]
-        for steps in zip(*reason.plans, strict=True)
+        [own[robot] for robot, own in enumerate(step)] for step in zip(*reason.plans, strict=True)
     ]
     if _follow(space, start, mixture) is not None:
         raise Refuted("the mixture of its plans is an optimal plan: they need no separation")
-    clause = set()
-    joined = [{number} for number in range(robots)]
+    clause: set[Pair] = set()
     for path in reason.paths:
-        a, b = path.plans
-        if not (0 <= a < robots and 0 <= b < robots):
-            raise Refuted(f"there are no plans {a} and {b}")
-        _check_path(path.cells, len(states[a]), len(states[b]), f"the path of plans {a} and {b}")
-        clause |= {
-            pair(states[a][i], states[b][j]) for i, j in path.cells if states[a][i] != states[b][j]
-        }
-        union = joined[a] | joined[b]
-        for number in union:
-            joined[number] = union
-    if len(joined[0]) < robots:
+        clause |= _different_cells(path, states)
+    if not _joins_all([path.plans for path in reason.paths], robots):
         raise Refuted("its warping paths do not join all of its plans")
     return frozenset(clause)
+
+
+def _different_cells(path: WarpingPath, states: Sequence[Sequence[int]]) -> set[Pair]:
+    """The pairs of different states on the cells of a path; ``states`` by plan."""
+    a, b = path.plans
+    if not (0 <= a < len(states) and 0 <= b < len(states)):
+        raise Refuted(f"there are no plans {a} and {b}")
+    one, other = states[a], states[b]
+    _check_path(path.cells, len(one), len(other), f"the path of plans {a} and {b}")
+    return {pair(one[i], other[j]) for i, j in path.cells if one[i] != other[j]}
+
+
+def _joins_all(links: Sequence[tuple[int, int]], plans: int) -> bool:
+    """Whether links between plans lead from plan 0 to every other one."""
+    joined = {0}
+    for _ in range(plans):
+        joined |= {plan for link in links if joined & {*link} for plan in link}
+    return len(joined) == plans
 
 
 def _states(space: PlanSpace, start: int, plan: PlanTexts, name: str) -> list[int]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, islice
 
 import numpy as np
 
@@ -76,22 +76,25 @@ def encode(clauses: Sequence[Clause], size: int) -> Cnf:
     ``word``, has word w - 1. Any partition can be named like that, so the formula stays satisfiable
     if it was.
     """
-    states = most_constrained_first(
-        sorted({s for clause in clauses for p in clause for s in p}), clauses
-    )
     counter = iter(range(1, 2**62))
-    word = {s: tuple(next(counter) for _ in range(size)) for s in states}
-    pairs = sorted({p for clause in clauses for p in clause})
-    separated = {p: next(counter) for p in pairs}
-    cnf: list[tuple[int, ...]] = []
-    for own in word.values():
-        cnf.append(own)
-        cnf += [(-a, -b) for a, b in combinations(own, 2)]
+    word = {state: tuple(islice(counter, size)) for state in _states(clauses)}
+    separated = dict(zip(sorted(set().union(*clauses)), counter, strict=False))
+    cnf = [clause for own in word.values() for clause in _exactly_one(own)]
     for (a, b), variable in separated.items():
         cnf += [(-variable, -x, -y) for x, y in zip(word[a], word[b], strict=True)]
     cnf += _words_in_order(list(word.values()), size, counter)
     cnf += [tuple(separated[p] for p in sorted(clause)) for clause in clauses]
     return Cnf(size, next(counter) - 1, tuple(cnf), word, separated)
+
+
+def _states(clauses: Sequence[Clause]) -> list[int]:
+    """The states that clauses speak of, the most constrained first."""
+    states = {state for clause in clauses for two in clause for state in two}
+    return list(most_constrained_first(sorted(states), clauses))
+
+
+def _exactly_one(variables: Sequence[int]) -> list[tuple[int, ...]]:
+    return [tuple(variables), *((-a, -b) for a, b in combinations(variables, 2))]
 
 
 def _words_in_order(
@@ -134,9 +137,7 @@ def core(clauses: Iterable[Clause], size: int) -> list[Clause]:
 
 def _in_the_way(clauses: Sequence[Clause], size: int) -> list[Clause]:
     """Clauses that some partition, found under those before, broke; short ones first."""
-    states = most_constrained_first(
-        sorted({s for clause in clauses for p in clause for s in p}), clauses
-    )
+    states = _states(clauses)
     pairs = np.array([p for clause in clauses for p in sorted(clause)], np.int64).reshape(-1, 2)
     bounds = np.cumsum([0, *(len(clause) for clause in clauses)])[:-1]
     words = np.zeros(max(states, default=0) + 1, np.int64)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -103,19 +104,20 @@ def _check_words(record: LanguageRecord, position: Position) -> None:
                 remedy="Words are not empty and have no blanks in them.",
             )
     if not {*record.states.values(), record.default} <= words:
-        key, word = next(
-            (k, w)
-            for k, w in [*record.states.items(), ("default", record.default)]
-            if w not in words
-        )
+        given = [*record.states.items(), ("default", record.default)]
+        key, word = next((key, word) for key, word in given if word not in words)
         raise BadInput(f"{word!r} (of {key!r}) is not among the words", position=position)
     for key, further in record.also.items():
-        good = bool(further) and len(set(further)) == len(further)
-        if not good or key not in record.states or not set(further) <= words - {record.states[key]}:
+        others = words - {record.states.get(key)}
+        if key not in record.states or not further or not _all_different(further, others):
             raise BadInput(
                 f"'also' of {key!r} must hold further words of a state that 'states' has",
                 position=position,
             )
+
+
+def _all_different(words: Sequence[str], among: set[str]) -> bool:
+    return len(set(words)) == len(words) and among.issuperset(words)
 
 
 def _guarantee(record: LanguageRecord, position: Position) -> Guarantee | None:

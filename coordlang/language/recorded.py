@@ -42,17 +42,10 @@ def options_of(
     given = {"--cost": cost, "--unowned": unowned, "--remember-actions": remember_actions or None}
     for flag, value in given.items():
         if value is not None and value != recorded[flag]:
-            said = flag if value is True else f"{flag} {value}"
-            told = f"without {flag}" if recorded[flag] is False else f"with {flag} {recorded[flag]}"
-            raise UsageError(
-                f"{said} contradicts the language file, which was built {told}",
-                remedy=f"Leave out {flag}.",
-            )
-    own = tuple(
-        r
-        for r in language.provenance.robots or robots
-        if r != ENVIRONMENT or recorded["--unowned"] != "environment"
-    )
+            raise _contradiction(flag, value, recorded[flag])
+    own = tuple(language.provenance.robots or robots)
+    if recorded["--unowned"] == "environment":
+        own = tuple(robot for robot in own if robot != ENVIRONMENT)
     if robots and set(robots) != set(own):
         raise UsageError(
             f"--robots contradicts the language file: its robots are {', '.join(own)}",
@@ -64,6 +57,15 @@ def options_of(
         recorded["--cost"],
         recorded["--remember-actions"],
         tuple(idle) if idle is not None else None,
+    )
+
+
+def _contradiction(flag: str, given: str | bool, recorded: str | bool) -> UsageError:
+    option = flag if given is True else f"{flag} {given}"
+    built = f"without {flag}" if recorded is False else f"with {flag} {recorded}"
+    return UsageError(
+        f"{option} contradicts the language file, which was built {built}",
+        remedy=f"Leave out {flag}.",
     )
 
 
