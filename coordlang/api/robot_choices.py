@@ -81,6 +81,11 @@ class RobotsChoices(Presented):
         """The exact number of combinations of one subplan of every robot."""
         return prod(own.automaton.count for own in self.found.robots)
 
+    @property
+    def combinations_walked(self) -> int | None:
+        """The number of nodes walked to check every combination, None where that was left out."""
+        return self.found.mixtures.nodes if self.found.mixtures else None
+
     def monitor(self, robot: str) -> Monitor:
         """Return a run-time monitor of one robot.
 
