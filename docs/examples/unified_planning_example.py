@@ -18,10 +18,7 @@ from unified_planning.shortcuts import (
     get_environment,
 )
 
-from coordlang.building import build_language
-from coordlang.language.sentences import task_sentences
-from coordlang.tasks.candidates import from_problems
-from coordlang.use.sentence.task_language import languages_in_tasks
+import coordlang
 from coordlang.use.unified import register
 from coordlang.use.unified.translation import translate
 
@@ -74,27 +71,17 @@ with AnytimePlanner(name="coordlang") as planner:
 
 # %% A language, so that both robots know which plans the other one may follow.
 found = translate(problem)
-candidates = from_problems(found.domain, [found.problem])
-language = build_language(candidates, "minimal").language
-print(language.words, dict(language.sizes()))
+files = found.domain, found.problem
+language = coordlang.build(*files, method="minimal").language
+print(language.words, language.sizes())
 
-# %% What can be said, and the plan under a sentence.
-spoken = next(languages_in_tasks(language, candidates))
-for sentence in task_sentences(spoken.space, 0, spoken.partition):
+# %% The sentences of the task, and the plan under each.
+for sentence in coordlang.explain(language, *files).sentences:
     text = " ".join(sentence.words)
-    with OneshotPlanner(
-        name="coordlang", params={"language": language, "sentence": text}
-    ) as planner:
+    params = {"language": language, "sentence": text}
+    with OneshotPlanner(name="coordlang", params=params) as planner:
         result = planner.solve(problem)
-    with PlanValidator(
-        name="coordlang", params={"language": language, "sentence": text}
-    ) as validator:
+    with PlanValidator(name="coordlang", params=params) as validator:
         verdict = validator.validate(problem, result.plan)
-    print(
-        repr(text),
-        "leaves",
-        result.metrics["plans"],
-        "open;",
-        result.status.name,
-        verdict.status.name,
-    )
+    plans = result.metrics["plans"]
+    print(repr(text), "leaves", plans, "open;", result.status.name, verdict.status.name)
