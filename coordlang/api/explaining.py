@@ -194,7 +194,7 @@ class Explanation(Presented):
         """Return the task's sentences as text, without the words."""
         used = self.words.used
         total = Plans.of(used.space, used.task).count
-        steps = int(used.space.layer[used.start])
+        steps, _ = used.space.cost_of(used.task)
         lines = [
             f"The task {describe(used.space, used.task)}",
             f"has {counted(total, 'optimal plan')} of {counted(steps, 'step')} "

@@ -89,10 +89,7 @@ def read_planning(
     """
     found = [problem for problem in problems if problem is not None]
     if factored is not None:
-        if domain is not None or found:
-            raise UsageError("--factored names all files", remedy="Leave out domain and problem.")
-        lifted, problem = read_factored(fspath(factored))
-        return PlanningInput(lifted, [problem], given)
+        return _from_factored(factored, [domain, *found], given)
     if isinstance(domain, PlanningInstance):
         return _from_instance(domain, found, given, most)
     if domain is None or not found or (most is not None and len(found) > most):
@@ -148,6 +145,14 @@ def read_tasks(tasks: TasksSource) -> tuple[tuple[ListedTask, ...], Position]:
     ]
     data = {"format": TASKS.format, "version": TASKS.version, "tasks": entries}
     return tasks_from_data(data, position), position
+
+
+def _from_factored(factored: File, others: Sequence[object], given: GivenOptions) -> PlanningInput:
+    """Read a folder of factored files, which stands in the place of all ``others``."""
+    if any(other is not None for other in others):
+        raise UsageError("--factored names all files", remedy="Leave out domain and problem.")
+    domain, problem = read_factored(fspath(factored))
+    return PlanningInput(domain, [problem], given)
 
 
 def _from_instance(

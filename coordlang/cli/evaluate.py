@@ -80,13 +80,8 @@ def command(
     from coordlang.evaluation.lab.results import Results
     from coordlang.evaluation.material.suite import find_domains
 
-    for name in names:
-        if name != "all" and name not in RECIPES:
-            raise click.UsageError(
-                f"there is no experiment {name!r}; there are {', '.join(RECIPES)}, all"
-            )
+    chosen = _chosen(names)
     check_outputs([("--page", page)], [])
-    chosen = [recipe for name, recipe in RECIPES.items() if name in names or "all" in names]
     if quick and not was_given("samples"):
         samples = 10
     folder = Path(results or ("evaluation/quick" if quick else "evaluation"))
@@ -103,20 +98,37 @@ def command(
         for name, section in sections(RECIPES, found).items():
             click.echo(f"# {RECIPES[name].title}\n")
             click.echo(as_text(section))
-    pieces = counted(sum(map(len, found.values())), "piece")
+    units = counted(sum(map(len, found.values())), "piece")
     click.echo(
-        f"{pieces} of work in {seconds:.1f} s; results in {folder}, page {written[0]}", err=True
+        f"{units} of work in {seconds:.1f} s; results in {folder}, page {written[0]}", err=True
     )
+    return _exit_code(found)
+
+
+def _chosen(names: tuple[str, ...]) -> list[Recipe]:
+    """Return the experiments of these names."""
+    from coordlang.evaluation.experiments.registry import RECIPES
+
+    for name in names:
+        if name != "all" and name not in RECIPES:
+            raise click.UsageError(
+                f"there is no experiment {name!r}; there are {', '.join(RECIPES)}, all"
+            )
+    return [recipe for name, recipe in RECIPES.items() if name in names or "all" in names]
+
+
+def _exit_code(found: dict[str, list[Record]]) -> int:
+    """Return the exit code, and name on stderr the units that met their limit."""
     unfinished = [
         f"{name}/{record.unit.key}"
         for name, records in found.items()
         for record in records
         if record.status != "done"
     ]
-    if unfinished:
-        click.echo(f"coordlang: met their limit: {', '.join(unfinished)}", err=True)
-        return UNPROVED
-    return 0
+    if not unfinished:
+        return 0
+    click.echo(f"coordlang: met their limit: {', '.join(unfinished)}", err=True)
+    return UNPROVED
 
 
 def _run(

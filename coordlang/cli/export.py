@@ -84,12 +84,8 @@ def command(
 
     Exit 1: no plan fits, or the language does not cover the task and guarantees nothing for it.
     """
-    if translate_plan is not None and target != "pddl":
-        raise click.UsageError(
-            "--translate-plan translates plans of the exported PDDL: leave out --to ltlf"
-        )
-    if target == "ltlf" and was_given("max_actions"):
-        raise click.UsageError("--max-actions belongs to --to pddl")
+    if target == "ltlf":
+        _check_ltlf(translate_plan)
     inputs = [language, domain, problem, translate_plan]
     writes_folder = target == "pddl" and translate_plan is None and not as_json
     if output is not None and output != "-" and writes_folder:
@@ -110,6 +106,16 @@ def command(
     else:
         _write_pddl(exported, output, as_json)
     return covered_code(exported.covered)
+
+
+def _check_ltlf(translate_plan: str | None) -> None:
+    """Refuse what has no effect on a formula."""
+    if translate_plan is not None:
+        raise click.UsageError(
+            "--translate-plan translates plans of the exported PDDL: leave out --to ltlf"
+        )
+    if was_given("max_actions"):
+        raise click.UsageError("--max-actions belongs to --to pddl")
 
 
 def _write_pddl(exported: ExportedTask, output: str | None, as_json: bool) -> None:

@@ -90,16 +90,15 @@ def check_outputs(
     from planners.errors import UsageError
 
     read = [path for path in inputs if path is not None and path != "-" and os.path.isfile(path)]
+    named = [(option, path) for option, path in outputs if path is not None and path != "-"]
     written: dict[str, str] = {}
-    for option, path in outputs:
-        if path is None or path == "-":
-            continue
+    for option, path in named:
         if reason := _unwritable(path, makes_folder):
             what = f"{option} {path} cannot be written: {reason}"
             raise UsageError(what, remedy="Name a file in a folder that you may write to.")
-        if os.path.exists(path) and not os.path.isfile(path):
-            continue  # a device or a pipe: written to, and never replaced
-        if any(os.path.samefile(path, other) for other in read if os.path.exists(path)):
+        if _is_device(path):
+            continue  # a device or a pipe is written to, and never replaced
+        if os.path.exists(path) and any(os.path.samefile(path, other) for other in read):
             raise UsageError(
                 f"{option} {path} would overwrite an input file",
                 remedy="Give the output another name.",
@@ -130,17 +129,25 @@ def write(text: str, output: str | None) -> None:
         write_atomically(output, text.encode())
 
 
+def _is_device(path: str) -> bool:
+    return os.path.exists(path) and not os.path.isfile(path)
+
+
 def _unwritable(path: str, makes_folder: bool) -> str | None:
     """Why no file can be written there, or None."""
     if os.path.isdir(path):
         return os.strerror(errno.EISDIR)
-    if os.path.exists(path) and not os.path.isfile(path):
-        return None if os.access(path, os.W_OK) else os.strerror(errno.EACCES)
+    if _is_device(path):
+        return _denied(path, os.W_OK)
     folder = Path(os.path.realpath(path)).parent
     while makes_folder and not folder.exists():
         folder = folder.parent
-    if makes_folder and not folder.is_dir():
+    if folder.is_dir():
+        return _denied(folder, os.W_OK | os.X_OK)
+    if makes_folder:
         return f"the folder {Path(path).parent} cannot be made: {os.strerror(errno.ENOTDIR)}"
-    if not folder.is_dir():
-        return f"there is no folder {Path(path).parent}"
-    return None if os.access(folder, os.W_OK | os.X_OK) else os.strerror(errno.EACCES)
+    return f"there is no folder {Path(path).parent}"
+
+
+def _denied(path: str | Path, mode: int) -> str | None:
+    return None if os.access(path, mode) else os.strerror(errno.EACCES)
