@@ -1,6 +1,5 @@
 """Sets of clauses: those that others imply, frequent pairs, the order of states that they give.
 
-
 A clause says that one of its pairs of states must be separated; with fewer pairs it asks for
 more, and implies every clause that holds its pairs.
 """
