@@ -19,7 +19,12 @@ import numpy as np
 from coordlang.language.warping import Clause, pair
 from coordlang.tasks.candidates import Candidates
 from coordlang.vocabulary.symmetry_check import SymmetryCheck
-from coordlang.vocabulary.symmetry_graph import Renaming, automorphism_generators, joined_order
+from coordlang.vocabulary.symmetry_graph import (
+    LARGEST_GRAPH,
+    Renaming,
+    automorphism_generators,
+    joined_order,
+)
 from planners.pddl.robots import natural
 from planners.tables import Ints
 
@@ -92,13 +97,17 @@ class SymmetryGroup:
             yield frozenset(pair(to[a], to[b]) for a, b in clause), symmetry
 
 
-def symmetry_group(candidates: Candidates, largest: int = LARGEST_GROUP) -> SymmetryGroup:
+def symmetry_group(
+    candidates: Candidates, largest: int = LARGEST_GROUP, largest_graph: int = LARGEST_GRAPH
+) -> SymmetryGroup:
     """The symmetries of the candidates' model: all of them, or a subgroup.
 
     Parameters
     ----------
     largest
         Of a group with more elements, the identity among them, a subgroup is taken.
+    largest_graph
+        Vertices of the graph of the model (`automorphism_generators`).
 
     Returns
     -------
@@ -108,7 +117,7 @@ def symmetry_group(candidates: Candidates, largest: int = LARGEST_GROUP) -> Symm
     if candidates.model.remembers:
         return SymmetryGroup(())
     check = SymmetryCheck(candidates)
-    proposed = automorphism_generators(candidates)
+    proposed = automorphism_generators(candidates, largest_graph)
     generators = []
     for renaming in proposed:
         states = check.states_under(renaming)

@@ -19,7 +19,7 @@ import numpy as np
 from coordlang.tasks.candidates import Candidates
 from planners.joint.model import FullState, Goal, JointModel
 from planners.pddl.formula_tree import fold
-from planners.pddl.lifted import Atom, Domain, Formula, Not, Problem
+from planners.pddl.lifted import Atom, Domain, Formula, Not, Problem, StepAtom
 from planners.pddl.robots import fluent_predicates, natural
 from planners.search.plan_space import PlanSpace
 
@@ -127,7 +127,11 @@ class _ModelGraph:
     def add_actions(self) -> None:
         """Add a vertex for each ground action."""
         for action in self._model.actions:
-            self._instance(("action", action.schema, action.cost), action.args)
+            effects = sorted(
+                f"{e.adds} {_shape(e.atom)} {_shape(e.condition)}" for e in action.effects
+            )
+            shape = (_shape(action.precondition), *effects)
+            self._instance(("action", action.schema, action.cost, shape), action.args)
 
     def add_tasks(self, spaces: Sequence[PlanSpace]) -> None:
         """Add the initial states and the goals, joined to each other by the tasks."""
@@ -173,6 +177,20 @@ class _ModelGraph:
             if any(name != to for name, to in renaming.items()):
                 found.append(renaming)
         return found
+
+
+def _shape(formula: Formula) -> str:
+    """A ground formula without the arguments of its atoms, whatever the order of its parts."""
+    return fold(
+        formula, _name, lambda kind, parts: f"{type(kind).__name__}({', '.join(sorted(parts))})"
+    )
+
+
+def _name(leaf: Formula) -> str:
+    match leaf:
+        case Atom(name) | StepAtom(name):
+            return name
+    return str(leaf)
 
 
 def joined_order(candidates: Candidates) -> list[str]:
