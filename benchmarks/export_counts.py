@@ -1,8 +1,7 @@
-"""How many plans fit a sentence: by our graph, by listing all optimal plans, and by other planners
-on the exported PDDL.
+"""How many plans fit a sentence: by our graph, by listing all plans, and by other planners.
 
-    python benchmarks/export_counts.py [FOLDER ..] [--time-limit SECONDS] [--language
-    greedy|minimal]
+    python benchmarks/export_counts.py [FOLDER ..] [--time-limit SECONDS]
+        [--language greedy|minimal]
 
 For every problem in `domains/` a language is built, and of its sentences the one that leaves most
 plans open and the one that leaves fewest are exported, in both forms.  Columns: all optimal plans
@@ -24,6 +23,8 @@ import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+
+from printed_table import PrintedTable
 
 from coordlang.building import build_language
 from coordlang.language.sentences import sentence, task_sentences
@@ -61,6 +62,7 @@ class Row:
 
     @property
     def agrees(self) -> bool:
+        """Whether all answers are the same."""
         counts = {n for n in (self.graph, self.listing, self.kstar, self.symk) if n is not None}
         return len(counts) == 1 and self.fast_downward in (None, self.cost)
 
@@ -103,8 +105,9 @@ def problem_rows(
 
 
 def two_sentences(spoken: TaskLanguage) -> list[tuple[int, ...]]:
-    """The sentence of most and that of fewest plans; of the first and the last plan where there are
-    too many to compare.
+    """The sentence of most and that of fewest plans.
+
+    Those of the first and the last plan where there are too many sentences to compare.
     """
     try:
         listed = task_sentences(spoken.space, spoken.task, spoken.partition)
@@ -155,9 +158,7 @@ def row(
 
 
 def by_listing(spoken: TaskLanguage, plans: Plans, words: tuple[int, ...]) -> int | None:
-    """The definition: of all optimal plans those whose states' words, repeated ones collapsed, are
-    the sentence.
-    """
+    """The number of optimal plans with the sentence, by definition: all plans are listed."""
     if plans.count > 40 * MOST:
         return None
     word = spoken.partition.word_of(plans.space.rows).tolist()
@@ -240,6 +241,7 @@ def _distinct(plans: list[tuple[tuple[int, ...], ...]]) -> int:
 
 
 def main() -> int:
+    """Print the table; 1 if two numbers differ."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folders", nargs="*")
     parser.add_argument(
@@ -247,25 +249,23 @@ def main() -> int:
     )
     parser.add_argument("--language", choices=["greedy", "minimal"], default="greedy")
     arguments = parser.parse_args()
-    header = (
-        "problem",
-        "form",
-        "actions",
-        "words",
-        "plans",
-        "graph",
-        "listing",
-        "K*",
-        "SymK",
-        "cost",
-        "FD",
-        "",
+    table = PrintedTable(
+        ("problem", 24),
+        ("form", 8),
+        ("actions", 7),
+        ("words", 5),
+        ("plans", 15),
+        ("graph", 9),
+        ("listing", 9),
+        ("K*", 7),
+        ("SymK", 7),
+        ("cost", 4),
+        ("FD", 4),
+        ("", 1),
     )
-    widths = (24, 8, 7, 5, 15, 9, 9, 7, 7, 4, 4, 1)
-    print("  ".join(f"{h:>{w}}" for h, w in zip(header, widths, strict=True)))
     wrong = total = 0
     for found in rows(arguments.folders, arguments.time_limit, arguments.language):
-        cells = (
+        table.print(
             found.problem,
             found.form.split("-")[0],
             found.actions,
@@ -279,8 +279,6 @@ def main() -> int:
             found.fast_downward,
             "" if found.agrees else "!",
         )
-        texts = ("-" if c is None else f"{c:,}" if isinstance(c, int) else c for c in cells)
-        print("  ".join(f"{t:>{w}}" for t, w in zip(texts, widths, strict=True)), flush=True)
         total += 1
         wrong += not found.agrees
     print(f"{total} exports; {total - wrong} agree" + (f", {wrong} DO NOT" if wrong else ""))

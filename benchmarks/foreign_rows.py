@@ -1,13 +1,12 @@
-"""The PDDL that others wrote, in ``../shared/data``: what its README says of each, and the tasks
-varied for a language.
-"""
+"""The PDDL that others wrote, in ``../shared/data``: reference numbers, and tasks for languages."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from telling import Feature, all_of, exactly, in_which_order, who, who_does_what
+from plan_features import Feature, all_of, exactly, in_which_order, who, who_does_what
 
 SHARED = Path(__file__).resolve().parent.parent.parent / "shared" / "data"
 
@@ -127,10 +126,6 @@ ROWS = (
     ),
 )
 BY_NAME = {row.name: row for row in ROWS}
-
-
-# ---- a language for each
-# ---------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -301,3 +296,24 @@ LANGUAGES = (
     ),
 )
 LANGUAGE_BY_NAME = {language.name: language for language in LANGUAGES}
+
+
+def load(row: Row, cost: str, *, remember_actions: bool = False) -> Any:
+    """The joint model of a row."""
+    from planners.loading import ModelOptions, build
+    from planners.pddl import read_domain, read_problem
+    from planners.pddl.factored import read_factored
+    from planners.pddl.robots import RobotSelection
+
+    words = dict(zip(row.options[::2], row.options[1::2], strict=True))
+    choice = RobotSelection(
+        tuple(words["--robots"].split(",")) if "--robots" in words else (),
+        words.get("--robot-type"),
+        words.get("--unowned", "error"),  # type: ignore[arg-type]
+    )
+    if row.factored:
+        domain, problem = read_factored(str(SHARED / "foreign" / row.folder))
+    else:
+        domain = read_domain(row.arguments[0])
+        problem = read_problem(row.arguments[1], domain)
+    return build(domain, [problem], ModelOptions(choice, cost, remember_actions))  # type: ignore[arg-type]

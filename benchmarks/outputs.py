@@ -427,6 +427,7 @@ def run_world(program: str, listed: list[Command], folder: Path) -> None:
 
 
 def main() -> int:
+    """Run the commands that the arguments select."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path, help="where the outputs go; emptied before")
     parser.add_argument("--program", default="coordlang", help="the executable of the version")

@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 from time import perf_counter
 
-import numpy as np
+from printed_table import PrintedTable
 
 from coordlang.building import build_language
 from coordlang.language.partition import Partition
@@ -24,7 +24,6 @@ from coordlang.vocabulary.pairwise import joint_partition, pair_languages
 from planners.limits import time_limit
 from planners.loading import ModelOptions
 from planners.pddl import read_domain, read_problem
-from planners.tables import unique_rows
 
 DOMAINS = Path(__file__).parent.parent / "domains"
 PROBLEMS = (
@@ -47,58 +46,52 @@ def candidates_of(name: str) -> Candidates:
 
 
 def is_language(candidates: Candidates, words: dict[int, int]) -> bool:
-    """Checked by definition, for all robots."""
-    rows, place = unique_rows(candidates.rows)
-    ordered = np.zeros(len(rows), np.int64)
-    ordered[place[list(words)]] = list(words.values())
-    table = Partition(tuple(map(str, range(max(words.values()) + 1))), rows, ordered, 0)
-    return verify(table, candidates.spaces).holds
+    """Verify a partition of state numbers by definition, for all robots."""
+    return verify(Partition.of_states(candidates.rows, words), candidates.spaces).holds
 
 
-def main(wanted: list[str]) -> int:
-    header = (
-        "problem",
-        "tasks",
-        "words",
-        "pairs",
-        "walk nodes",
-        "of pairs",
-        "s",
-        "s pairs",
-        "pairs are safe",
+def print_problem(name: str, table: PrintedTable) -> None:
+    """Build the language for all robots and one for each pair."""
+    candidates = candidates_of(name)
+    start = perf_counter()
+    with time_limit(120):
+        joint = build_language(candidates, "minimal")
+    middle = perf_counter()
+    languages = pair_languages(candidates.spaces)
+    end = perf_counter()
+    guarantee = joint.language.guarantee
+    size: object = guarantee.size
+    if not guarantee.proved_minimal:
+        size = f"{guarantee.lower_bound}..{guarantee.size}"
+    table.print(
+        name,
+        candidates.count,
+        size,
+        " ".join(str(language.size) for language in languages),
+        joint.first_differences.nodes,
+        sum(language.nodes for language in languages),
+        f"{middle - start:.1f}",
+        f"{end - middle:.1f}",
+        "yes" if is_language(candidates, joint_partition(languages)) else "no",
     )
-    widths = (24, 6, 5, 10, 11, 10, 6, 7, 14)
-    print("  ".join(f"{h:>{w}}" for h, w in zip(header, widths, strict=True)))
+
+
+def main(wanted: list[str]) -> None:
+    """Print the table."""
+    table = PrintedTable(
+        ("problem", 24),
+        ("tasks", 6),
+        ("words", 5),
+        ("pairs", 10),
+        ("walk nodes", 11),
+        ("of pairs", 10),
+        ("s", 6),
+        ("s pairs", 7),
+        ("pairs are safe", 14),
+    )
     for name in wanted or PROBLEMS:
-        candidates = candidates_of(name)
-        start = perf_counter()
-        with time_limit(120):
-            joint = build_language(candidates, "minimal")
-        middle = perf_counter()
-        languages = pair_languages(candidates.spaces)
-        guarantee = joint.language.guarantee
-        cells = (
-            name,
-            candidates.count,
-            guarantee.size
-            if guarantee.proved_minimal
-            else f"{guarantee.lower_bound}..{guarantee.size}",
-            " ".join(str(language.size) for language in languages),
-            joint.first_differences.nodes,
-            sum(language.nodes for language in languages),
-            f"{middle - start:.1f}",
-            f"{perf_counter() - middle:.1f}",
-            "yes" if is_language(candidates, joint_partition(languages)) else "no",
-        )
-        print(
-            "  ".join(
-                f"{c:>{w},}" if isinstance(c, int) else f"{c:>{w}}"
-                for c, w in zip(cells, widths, strict=True)
-            )
-        )
-        sys.stdout.flush()
-    return 0
+        print_problem(name, table)
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    main(sys.argv[1:])

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from telling import Feature, Plan, exactly, said, who, who_does_what
+from plan_features import Feature, Plan, agreement, exactly, who, who_does_what
 
 from coordlang.building import build_language
 from coordlang.language.words import Language
@@ -220,7 +220,7 @@ def test_what_the_sentences_tell(
     folder: str, problem: str, tasks: str, told: Feature, leaves: bool
 ) -> None:
     given = candidates(folder, {"language for": problem, "--tasks": tasks, "options": ""})
-    figures = said(build_language(given, "minimal").language, given, told)
+    figures = agreement(build_language(given, "minimal").language, given, told)
     assert figures["different"] > 0
     assert figures["told"] == figures["different"]
     assert (figures["left"] > 0) == leaves

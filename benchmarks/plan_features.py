@@ -1,12 +1,10 @@
-"""What the sentences of a language tell of a plan, and what they leave open: plans with one
-sentence are compared.
-"""
+"""Features of plans, and whether the sentences of a language determine them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 
-from coordlang.language.sentences import sentence
+from coordlang.language.sentences import Sentence, sentence
 from coordlang.language.words import Language
 from coordlang.required.composition_walk import walk
 from coordlang.tasks.candidates import Candidates
@@ -63,36 +61,44 @@ def all_of(*features: Feature) -> Feature:
     return lambda plan: tuple(feature(plan) for feature in features)
 
 
-def said(
+def agreement(
     language: Language, candidates: Candidates, told: Feature, left: Feature = exactly
 ) -> dict[str, int]:
-    """Of the tasks that require coordination and have few plans, how many ..
+    """Count the tasks whose sentences determine a feature of plans, or leave another one open.
 
-    have plans with different ``told`` ("different"), and in which all plans of every sentence agree
-    on it ("told"); have plans with different ``left`` ("open"), and in which some sentence has
-    plans that disagree about it ("left").
+    Only tasks that require coordination and have few plans count.
+
+    Returns
+    -------
+    dict
+        "different": tasks whose plans differ in ``told``; "told": those of them in which all plans
+        of every sentence agree on it.  "open": tasks whose plans differ in ``left``; "left": those
+        of them in which plans of some sentence differ in it.
     """
-    table_of_words = language.partition(candidates.model)
+    partition = language.partition(candidates.model)
     figures = dict.fromkeys(("different", "told", "open", "left"), 0)
     for space in candidates.spaces:
-        word = table_of_words.word_of(space.rows).tolist()
+        word = partition.word_of(space.rows).tolist()
         requires = walk(space).requires[space.starts]
         for task in requires.nonzero()[0].tolist():
             plans = Plans.of(space, task)
-            if plans.count > MANY:
-                continue
-            by_sentence: dict[tuple[int, ...], tuple[set[object], set[object]]] = {}
-            for plan in plans:
-                texts = [space.model.texts(step) for step in plan]
-                sets = by_sentence.setdefault(
-                    sentence(word[s] for s in plans.states(plan)), (set(), set())
+            if plans.count <= MANY:
+                values = _values(plans, word, told)
+                figures["different"] += len(set().union(*values)) > 1
+                figures["told"] += len(set().union(*values)) > 1 and all(
+                    len(v) == 1 for v in values
                 )
-                sets[0].add(told(texts))
-                sets[1].add(left(texts))
-            groups = list(by_sentence.values())
-            different = len(set().union(*(g[0] for g in groups))) > 1
-            figures["different"] += different
-            figures["told"] += different and all(len(g[0]) == 1 for g in groups)
-            figures["open"] += len(set().union(*(g[1] for g in groups))) > 1
-            figures["left"] += any(len(g[1]) > 1 for g in groups)
+                values = _values(plans, word, left)
+                figures["open"] += len(set().union(*values)) > 1
+                figures["left"] += any(len(v) > 1 for v in values)
     return figures
+
+
+def _values(plans: Plans, word: Sequence[int], feature: Feature) -> list[set[Hashable]]:
+    """For each sentence, the values of a feature on its plans; ``word`` is that of each state."""
+    found: dict[Sentence, set[Hashable]] = {}
+    for plan in plans:
+        words = sentence(word[state] for state in plans.states(plan))
+        texts = [plans.space.model.texts(step) for step in plan]
+        found.setdefault(words, set()).add(feature(texts))
+    return list(found.values())
