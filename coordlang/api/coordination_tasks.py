@@ -8,10 +8,11 @@ from typing import Any, Unpack
 
 from coordlang.api.inputs import DomainSource, File, ProblemSource, read_planning
 from coordlang.api.options import GivenOptions, ModelKeywords
-from coordlang.api.presenting import Presented, counted, html_table
+from coordlang.api.presenting import Presented
 from coordlang.api.witness import witness_data, witness_text
 from coordlang.required.miscoordination import Miscoordination, miscoordination
 from coordlang.tasks.candidates import from_problems
+from planners.notebook import counted, html_table
 from planners.search.plan_file import json_count
 from planners.search.plans import counts
 

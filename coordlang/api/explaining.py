@@ -9,7 +9,7 @@ from typing import Any, Unpack
 
 from coordlang.api.inputs import DomainSource, LanguageSource, ProblemSource, read_task_language
 from coordlang.api.options import GivenOptions, ModelKeywords
-from coordlang.api.presenting import Presented, counted, html_table
+from coordlang.api.presenting import Presented
 from coordlang.api.speaking import SentenceSource
 from coordlang.explanation.cover import Cover
 from coordlang.explanation.demands import SentenceDemands, sentence_demands
@@ -27,6 +27,7 @@ from coordlang.language.sentences import TaskSentence, task_sentences
 from coordlang.tasks.candidates import describe
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import UsageError
+from planners.notebook import counted, html_table
 from planners.search.plan_file import json_count
 from planners.search.plans import Plans
 

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import Any
 
-from coordlang.api.presenting import Presented, html_table
+from coordlang.api.presenting import Presented
+from planners.notebook import html_table
 from planners.search.plan_file import Texts, texts, to_ipc, to_json
 from planners.search.plans import Plan, Plans
 

@@ -15,12 +15,13 @@ from coordlang.api.inputs import (
 )
 from coordlang.api.optimal_plans import OptimalPlans
 from coordlang.api.options import GivenOptions, ModelKeywords
-from coordlang.api.presenting import Presented, counted, html_table
+from coordlang.api.presenting import Presented
 from planners.classical.fast_downward import optimal_cost
 from planners.errors import ProvedImpossible
 from planners.inspection import Inspection
 from planners.inspection import inspect as inspect_instance
 from planners.loading import PlanningInstance
+from planners.notebook import counted, html_table
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from planners.search.reachable import count as count_reachable

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from html import escape
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
 
-#: Rows of a table in a notebook.
-ROWS_SHOWN = 20
+from planners.notebook import html_table
 
 
-class Presented:
+class Presented(ABC):
     """A result that shows itself: `facts` are what its ``repr`` and its table in a notebook say."""
 
     __slots__ = ()
 
+    @abstractmethod
     def facts(self) -> Mapping[str, object]:
         """Return name -> value, in the order in which they are shown."""
-        raise NotImplementedError
 
     def __repr__(self) -> str:
         shown = ", ".join(f"{name}={value!r}" for name, value in self.facts().items())
@@ -24,29 +23,6 @@ class Presented:
 
     def _repr_html_(self) -> str:
         return html_table((), [(name, _plain(value)) for name, value in self.facts().items()])
-
-
-def html_table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:
-    """Return an HTML table; with more than `ROWS_SHOWN` rows only their beginning."""
-    rows = list(rows)
-    lines = ["<table>"]
-    if caption:
-        lines.append(f"<caption>{escape(caption)}</caption>")
-    if head:
-        lines.append(_row("th", head))
-    lines += [_row("td", row) for row in rows[:ROWS_SHOWN]]
-    if len(rows) > ROWS_SHOWN:
-        lines.append(_row("td", [f".. and {len(rows) - ROWS_SHOWN:,} more"]))
-    return "\n".join([*lines, "</table>"])
-
-
-def counted(number: int, noun: str) -> str:
-    """``1 word``, ``3 words``, ``12,345 tasks``."""
-    return f"{number:,} {noun}{'s' * (number != 1)}"
-
-
-def _row(cell: str, texts: Sequence[str]) -> str:
-    return f"<tr>{''.join(f'<{cell}>{escape(text)}</{cell}>' for text in texts)}</tr>"
 
 
 def _plain(value: object) -> str:

@@ -16,7 +16,7 @@ from coordlang.api.inputs import (
     read_task_language,
 )
 from coordlang.api.options import GivenOptions, ModelKeywords
-from coordlang.api.presenting import Presented, html_table
+from coordlang.api.presenting import Presented
 from coordlang.api.speaking import SentenceSource
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.use.choices.choices import MOST, Choices
@@ -26,6 +26,7 @@ from coordlang.use.choices.file import monitor, to_bytes, to_data
 from coordlang.use.choices.monitor import Monitor
 from planners.errors import UsageError
 from planners.files import write_atomically
+from planners.notebook import html_table
 from planners.search.plans import Plans
 
 

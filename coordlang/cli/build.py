@@ -18,11 +18,11 @@ from coordlang.api.options import (
     Method,
     Unsolvable,
 )
-from coordlang.api.presenting import counted
 from coordlang.cli.exit_codes import INTERRUPTED, UNPROVED
 from coordlang.cli.files import PlanningFiles, check_outputs, never_stdout, planning_files
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import note_single_robot, working
+from planners.notebook import counted
 
 if TYPE_CHECKING:
     from coordlang.api.languages import BuiltLanguage

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import coordlang
-from coordlang.api.presenting import counted
 from coordlang.cli.exit_codes import REFUTED
 from coordlang.cli.files import (
     check_outputs,
@@ -21,6 +20,7 @@ from coordlang.cli.group import RenamedOptions
 from coordlang.cli.listing import form_of
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import covered_code, working
+from planners.notebook import counted
 
 if TYPE_CHECKING:
     from coordlang.api.robot_choices import RobotsChoices

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from coordlang.api.presenting import counted
 from coordlang.cli.exit_codes import UNPROVED
 from coordlang.cli.files import check_outputs
 from coordlang.cli.group import RenamedOptions
 from coordlang.cli.shared_options import limits, was_given
 from coordlang.cli.terminal import bar
+from planners.notebook import counted
 
 if TYPE_CHECKING:
     from coordlang.evaluation.lab.recipe import Recipe, Record, Section, Settings

@@ -12,7 +12,6 @@ import click
 
 import coordlang
 from coordlang.api.options import TARGETS, Target
-from coordlang.api.presenting import counted
 from coordlang.cli.files import (
     check_outputs,
     domain_argument,
@@ -23,6 +22,7 @@ from coordlang.cli.files import (
 from coordlang.cli.group import RenamedOptions
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options, was_given
 from coordlang.cli.terminal import covered_code, working
+from planners.notebook import counted
 
 if TYPE_CHECKING:
     from coordlang.api.exporting import ExportedFormula, ExportedTask

@@ -9,11 +9,11 @@ import click
 
 import coordlang
 from coordlang.api.options import HEURISTICS, HeuristicName
-from coordlang.api.presenting import counted
 from coordlang.cli.files import domain_argument, language_argument, problem_argument
 from coordlang.cli.group import RenamedOptions
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import covered_code, working
+from planners.notebook import counted
 
 if TYPE_CHECKING:
     from coordlang.api.speaking import Fulfilled

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from coordlang.api.presenting import counted
 from coordlang.cli.files import (
     check_outputs,
     domain_argument,
@@ -16,6 +15,7 @@ from coordlang.cli.files import (
 )
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import working
+from planners.notebook import counted
 
 if TYPE_CHECKING:
     from coordlang.report.places import Point

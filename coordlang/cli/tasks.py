@@ -7,10 +7,10 @@ import json
 import click
 
 import coordlang
-from coordlang.api.presenting import counted
 from coordlang.cli.files import check_outputs, domain_argument, problem_argument, write
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import working
+from planners.notebook import counted
 
 
 @click.command(name="tasks")

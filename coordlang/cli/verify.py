@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import click
 
 import coordlang
-from coordlang.api.presenting import counted
 from coordlang.cli.exit_codes import REFUTED
 from coordlang.cli.files import (
     PlanningFiles,
@@ -20,6 +19,7 @@ from coordlang.cli.files import (
 from coordlang.cli.group import RenamedOptions
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import working
+from planners.notebook import counted
 
 if TYPE_CHECKING:
     from coordlang.api.languages import Verification

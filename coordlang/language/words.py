@@ -16,6 +16,7 @@ from coordlang.language.partition import Partition
 from coordlang.language.provenance import Guarantee, Provenance
 from planners.errors import BadInput
 from planners.joint.model import JointModel
+from planners.notebook import counted, html_table
 from planners.tables import Rows, find_rows
 
 
@@ -91,6 +92,16 @@ class Language:
             f"Language(words={len(self.words)}, lower_bound={g.lower_bound}, method={g.method!r}, "
             f"states={len(self.states)}, robots={self.provenance.robots})"
         )
+
+    def _repr_html_(self) -> str:
+        """A table for notebooks: the words with their numbers of states."""
+        g, sizes = self.guarantee, self.sizes()
+        rows = [
+            (word, f"{sizes[word]:,}{' and every other state' * (word == self.default)}")
+            for word in self.words
+        ]
+        bound = "proved minimal" if g.proved_minimal else f"at least {g.lower_bound} are needed"
+        return html_table(("word", "states"), rows, f"{counted(len(rows), 'word')} ({g.method}, {bound})")
 
     def partition(self, model: JointModel) -> Partition:
         """Read the states' keys over a joint model.

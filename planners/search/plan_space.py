@@ -15,10 +15,8 @@ import numpy as np
 
 from planners.joint.conditions import Labels
 from planners.joint.model import Goal, JointModel
+from planners.notebook import counted, html_table
 from planners.tables import Bools, Ints, Rows, ranges
-
-#: Layers in the table that a notebook shows.
-_LAYERS_SHOWN = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,19 +84,14 @@ class PlanSpace:
 
     def _repr_html_(self) -> str:
         """A table for notebooks: nodes, states and edges of each layer, the first step on top."""
-        head = "<tr><th>steps left</th><th>nodes</th><th>states</th><th>edges</th></tr>"
         rows = []
         for layer, span in reversed(list(enumerate(self.layers))):
             states = len(np.unique(self.state[span]))
             edges = int(self.first[span.stop] - self.first[span.start])
-            cells = (layer, span.stop - span.start, states, edges)
-            rows.append(f"<tr>{''.join(f'<td>{cell:,}</td>' for cell in cells)}</tr>")
-        if len(rows) > _LAYERS_SHOWN:
-            more = f"<tr><td>.. and {len(rows) - _LAYERS_SHOWN:,} more</td></tr>"
-            rows = [*rows[:_LAYERS_SHOWN], more]
-        tasks = f"{len(self.starts):,} task{'s' * (len(self.starts) != 1)}"
-        caption = f"<caption>optimal plans of {tasks}</caption>"
-        return "\n".join(["<table>", caption, head, *rows, "</table>"])
+            numbers = (layer, span.stop - span.start, states, edges)
+            rows.append([f"{number:,}" for number in numbers])
+        caption = f"optimal plans of {counted(len(self.starts), 'task')}"
+        return html_table(("steps left", "nodes", "states", "edges"), rows, caption)
 
     @property
     def layers(self) -> list[slice]:

@@ -346,4 +346,7 @@ def test_results_show_themselves(language: Path) -> None:
         assert repr(result).startswith(f"{type(result).__name__}(")
         html = result._repr_html_()
         assert html.startswith(("<table>", "<svg"))
-    assert len(repr(coordlang.load_language(language))) < 200
+    loaded = coordlang.load_language(language)
+    assert len(repr(loaded)) < 200
+    for word, states in loaded.sizes().items():
+        assert f"<td>{word}</td><td>{states}" in loaded._repr_html_()
