@@ -101,7 +101,9 @@ class Language:
             for word in self.words
         ]
         bound = "proved minimal" if g.proved_minimal else f"at least {g.lower_bound} are needed"
-        return html_table(("word", "states"), rows, f"{counted(len(rows), 'word')} ({g.method}, {bound})")
+        return html_table(
+            ("word", "states"), rows, f"{counted(len(rows), 'word')} ({g.method}, {bound})"
+        )
 
     def partition(self, model: JointModel) -> Partition:
         """Read the states' keys over a joint model.
