@@ -20,7 +20,7 @@ from coordlang.tasks.listed import goal_text
 from planners.errors import BadInput, Refuted
 from planners.joint.model import JointModel
 from planners.joint.states import split_atoms
-from planners.pddl.sexpr import Expression, Source, Word, parse
+from planners.pddl.sexpr import Expression, Source, Token, parse
 from planners.search.plan_space import PlanSpace
 from planners.tables import find_rows
 
@@ -174,7 +174,7 @@ def _canonical(goal: Iterable[str]) -> object:
 
 
 def _tree(node: Expression) -> object:
-    if isinstance(node, Word):
+    if isinstance(node, Token):
         return node.text
     parts = [_tree(part) for part in node]
     return (node.head, frozenset(parts[1:])) if node.head in ("and", "or") else tuple(parts)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 
-from planners.errors import Unsupported
+from planners.errors import BadInput, Unsupported
 from planners.pddl.lifted import (
     TRUE,
     And,
@@ -19,8 +21,8 @@ from planners.pddl.lifted import (
     StepAtom,
     Variable,
 )
-from planners.pddl.names import Names, group, known, word
-from planners.pddl.sexpr import Expression, Group, Word
+from planners.pddl.names import Names, group, is_token, known, token
+from planners.pddl.sexpr import Expression, Group, Token
 
 #: How PDDL writes a number.
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)$")
@@ -33,120 +35,172 @@ _TEMPORAL = frozenset(
 )
 
 
-def read_formula(names: Names, item: Expression) -> Formula:  # noqa: C901 - one case for each connective
+def read_formula(names: Names, item: Expression) -> Formula:
     """A precondition, condition or goal.
 
     ``(name ..)`` is an atom when ``name`` is a declared predicate, else a literal about the same
     joint step when it is an action.  Raises `BadInput` or `Unsupported` with the place.
     """
-    document = names.document
-    item = group(document, item, "a formula in parentheses")
+    item = group(names.document, item, "a formula in parentheses")
     if len(item) == 0:
         return TRUE
-    head = word(document, item.items[0], "a predicate, 'and', 'or', 'not', ..").text
-    rest = item.items[1:]
+    head = token(names.document, item.items[0], "a predicate, 'and', 'or', 'not', ..").text
     if head in names.predicates:
         return _atom(names, item, head)
-    match head:
-        case "and":
-            return And(tuple(read_formula(names, part) for part in rest))
-        case "or":
-            return Or(tuple(read_formula(names, part) for part in rest))
-        case "not":
-            _expect(names, item, 1)
-            return Not(read_formula(names, rest[0]))
-        case "imply":
-            _expect(names, item, 2)
-            return Or((Not(read_formula(names, rest[0])), read_formula(names, rest[1])))
-        case "forall" | "exists":
-            _expect(names, item, 2)
-            variables = names.read_variables(group(document, rest[0], "a list of variables").items)
-            part = read_formula(names.with_variables(variables), rest[1])
-            return Forall(variables, part) if head == "forall" else Exists(variables, part)
-        case "=":
-            return _equal(names, item)
+    if head in _CONNECTIVES:
+        return _CONNECTIVES[head](names, item)
     if head in names.actions:
-        error = names.arity(item, head, [names.actions[head]], "action")
-        if error:
-            raise error
-        return StepAtom(head, tuple(names.term(term) for term in rest))
+        _require_arity(names, item, [names.actions[head]], "action")
+        return StepAtom(head, tuple(names.term(term) for term in item.items[1:]))
+    raise _no_formula(names, item, head)
+
+
+def _and(names: Names, item: Group) -> Formula:
+    return And(tuple(read_formula(names, part) for part in item.items[1:]))
+
+
+def _or(names: Names, item: Group) -> Formula:
+    return Or(tuple(read_formula(names, part) for part in item.items[1:]))
+
+
+def _not(names: Names, item: Group) -> Formula:
+    _expect(names, item, 1)
+    return Not(read_formula(names, item.items[1]))
+
+
+def _imply(names: Names, item: Group) -> Formula:
+    _expect(names, item, 2)
+    condition, conclusion = (read_formula(names, part) for part in item.items[1:])
+    return Or((Not(condition), conclusion))
+
+
+def _quantified(names: Names, item: Group) -> Formula:
+    _expect(names, item, 2)
+    listed, inner = item.items[1:]
+    variables = names.read_variables(group(names.document, listed, "a list of variables").items)
+    part = read_formula(names.with_variables(variables), inner)
+    return Forall(variables, part) if item.head == "forall" else Exists(variables, part)
+
+
+def _equal(names: Names, item: Group) -> Formula:
+    _expect(names, item, 2)
+    left, right = item.items[1:]
+    for side in (left, right):
+        if isinstance(side, Group) or (NUMBER.match(side.text) and side.text not in names.objects):
+            raise _unsupported(names, "numeric condition '(= ..)'", item)
+    return Equal(names.term(left), names.term(right))
+
+
+_CONNECTIVES: dict[str, Callable[[Names, Group], Formula]] = {
+    "and": _and,
+    "or": _or,
+    "not": _not,
+    "imply": _imply,
+    "forall": _quantified,
+    "exists": _quantified,
+    "=": _equal,
+}
+
+
+def _no_formula(names: Names, item: Group, head: str) -> BadInput | Unsupported:
+    """The error for something else than a formula: what PDDL has and coordlang not, or nothing."""
     if head in _NUMERIC_TESTS:
-        raise _unsupported(names, f"numeric condition '({head} ..)'", item)
+        return _unsupported(names, f"numeric condition '({head} ..)'", item)
     if head == "preference":
-        raise _unsupported(names, "a preference", item)
-    if head in _TEMPORAL or (head == "at" and rest and _is_word(rest[0], "end", "start")):
-        raise _unsupported(names, f"trajectory constraint '({head} ..)'", item)
-    raise document.fail(
-        f"unknown predicate {head!r}", item, known(names.predicates, head, "predicate")
-    )
+        return _unsupported(names, "a preference", item)
+    timed = head == "at" and len(item) > 1 and is_token(item.items[1], "end", "start")
+    if head in _TEMPORAL or timed:
+        return _unsupported(names, f"trajectory constraint '({head} ..)'", item)
+    return _unknown(names, f"unknown predicate {head!r}", item, head)
 
 
 def read_effects(names: Names, item: Expression) -> tuple[tuple[Effect, ...], int | Atom | None]:
     """The literal effects, flattened, and the term of ``(increase (total-cost) ..)``, if any."""
-    effects: list[Effect] = []
-    costs: list[int | Atom] = []
-    _collect(names, item, (), TRUE, effects, costs)
-    if len(costs) > 1:
+    reader = _EffectReader([], [])
+    reader.read(_Scope(names), item)
+    if len(reader.costs) > 1:
         raise names.document.fail("total-cost is increased twice in one action", item)
-    return tuple(effects), costs[0] if costs else None
+    return tuple(reader.effects), reader.costs[0] if reader.costs else None
 
 
-def _collect(  # noqa: C901 - one case for each kind of effect
-    names: Names,
-    item: Expression,
-    variables: tuple[Variable, ...],
-    condition: Formula,
-    effects: list[Effect],
-    costs: list[int | Atom],
-) -> None:
-    document = names.document
-    item = group(document, item, "an effect in parentheses")
-    if len(item) == 0:
-        return
-    head = word(document, item.items[0], "a predicate, 'and', 'not', 'when', ..").text
-    rest = item.items[1:]
-    if head in names.predicates:
-        effects.append(Effect(_atom(names, item, head), True, condition, variables))
-    elif head == "and":
-        for part in rest:
-            _collect(names, part, variables, condition, effects, costs)
-    elif head == "not":
-        _expect(names, item, 1)
-        part = group(document, rest[0], "an atom in parentheses")
-        if part.head not in names.predicates:
-            raise document.fail(
-                f"only atoms can be deleted, found '({part.head} ..)'",
-                part,
-                known(names.predicates, part.head, "predicate"),
-            )
-        effects.append(Effect(_atom(names, part, part.head), False, condition, variables))
-    elif head == "when":
-        _expect(names, item, 2)
-        inner = read_formula(names, rest[0])
-        both = inner if condition == TRUE else And((condition, inner))
-        _collect(names, rest[1], variables, both, effects, costs)
-    elif head == "forall":
-        _expect(names, item, 2)
-        more = names.read_variables(group(document, rest[0], "a list of variables").items)
-        # An inner variable may shadow an outer one: give it a name of its own.
-        taken = {v.name for v in variables} | names.variables
-        clash = next((v.name for v in more if v.name in taken), None)
-        if clash:
-            item = _rename(item, clash, _fresh(clash, taken))
-            _collect(names, item, variables, condition, effects, costs)
+@dataclass(frozen=True, slots=True)
+class _Scope:
+    """Where an effect stands: under which universal variables, and on which condition."""
+
+    names: Names
+    variables: tuple[Variable, ...] = ()
+    condition: Formula = TRUE
+
+
+@dataclass(frozen=True, slots=True)
+class _EffectReader:
+    """Collects the effects of one action."""
+
+    effects: list[Effect]
+    costs: list[int | Atom]
+
+    def read(self, scope: _Scope, item: Expression) -> None:
+        names = scope.names
+        item = group(names.document, item, "an effect in parentheses")
+        if len(item) == 0:
             return
-        inner_names = names.with_variables(more)
-        _collect(inner_names, rest[1], variables + more, condition, effects, costs)
-    elif head in _NUMERIC_EFFECTS:
-        costs.append(_cost(names, item, conditional=bool(variables) or condition != TRUE))
-    elif head in ("oneof", "probabilistic", "unknown"):
-        raise _unsupported(names, f"non-deterministic effect '({head} ..)'", item)
-    else:
-        raise document.fail(
-            f"unknown predicate {head!r} in an effect",
-            item,
-            known(names.predicates, head, "predicate"),
-        )
+        head = token(names.document, item.items[0], "a predicate, 'and', 'not', 'when', ..").text
+        if head in names.predicates:
+            self._add(scope, _atom(names, item, head), True)
+        elif head in _EFFECTS:
+            _EFFECTS[head](self, scope, item)
+        elif head in _NUMERIC_EFFECTS:
+            conditional = bool(scope.variables) or scope.condition != TRUE
+            self.costs.append(_cost(names, item, conditional=conditional))
+        elif head in ("oneof", "probabilistic", "unknown"):
+            raise _unsupported(names, f"non-deterministic effect '({head} ..)'", item)
+        else:
+            raise _unknown(names, f"unknown predicate {head!r} in an effect", item, head)
+
+    def _add(self, scope: _Scope, atom: Atom, adds: bool) -> None:
+        self.effects.append(Effect(atom, adds, scope.condition, scope.variables))
+
+    def _all(self, scope: _Scope, item: Group) -> None:
+        for part in item.items[1:]:
+            self.read(scope, part)
+
+    def _delete(self, scope: _Scope, item: Group) -> None:
+        names = scope.names
+        _expect(names, item, 1)
+        part = group(names.document, item.items[1], "an atom in parentheses")
+        if part.head not in names.predicates:
+            what = f"only atoms can be deleted, found '({part.head} ..)'"
+            raise _unknown(names, what, part, part.head)
+        self._add(scope, _atom(names, part, part.head), False)
+
+    def _when(self, scope: _Scope, item: Group) -> None:
+        _expect(scope.names, item, 2)
+        condition = read_formula(scope.names, item.items[1])
+        if scope.condition != TRUE:
+            condition = And((scope.condition, condition))
+        self.read(replace(scope, condition=condition), item.items[2])
+
+    def _forall(self, scope: _Scope, item: Group) -> None:
+        names = scope.names
+        _expect(names, item, 2)
+        listed = group(names.document, item.items[1], "a list of variables")
+        variables = names.read_variables(listed.items)
+        # An inner variable may shadow an outer one: give it a name of its own.
+        taken = {v.name for v in scope.variables} | names.variables
+        clash = next((v.name for v in variables if v.name in taken), None)
+        if clash:
+            self.read(scope, _rename(item, clash, _fresh(clash, taken)))
+            return
+        inner = names.with_variables(variables)
+        self.read(replace(scope, names=inner, variables=scope.variables + variables), item.items[2])
+
+
+_EFFECTS: dict[str, Callable[[_EffectReader, _Scope, Group], None]] = {
+    "and": _EffectReader._all,
+    "not": _EffectReader._delete,
+    "when": _EffectReader._when,
+    "forall": _EffectReader._forall,
+}
 
 
 def _cost(names: Names, item: Group, *, conditional: bool) -> int | Atom:
@@ -157,17 +211,8 @@ def _cost(names: Names, item: Group, *, conditional: bool) -> int | Atom:
     if conditional:
         raise _unsupported(names, "a cost that depends on a condition", item)
     amount = item.items[2]
-    if isinstance(amount, Word):
-        if not NUMBER.match(amount.text):
-            raise document.fail(f"expected a number, found {amount.text!r}", amount)
-        value = min(
-            float(amount.text), 2.0 * MAX_COST
-        )  # too large ones are refused where costs are used
-        if value < 0 or value % 1 != 0:
-            raise _unsupported(
-                names, f"action cost {amount.text} (whole numbers from 0 only)", item
-            )
-        return int(value)
+    if isinstance(amount, Token):
+        return _constant_cost(names, item, amount)
     if amount.head not in names.functions:
         if amount.head in ("+", "-", "*", "/"):
             raise _unsupported(names, "arithmetic in an action cost", amount)
@@ -176,26 +221,33 @@ def _cost(names: Names, item: Group, *, conditional: bool) -> int | Atom:
             amount,
             known(names.functions, amount.head, "function"),
         )
-    error = names.arity(amount, amount.head, names.functions[amount.head], "function")
-    if error:
-        raise error
+    _require_arity(names, amount, names.functions[amount.head], "function")
     return Atom(amount.head, tuple(names.term(term) for term in amount.items[1:]))
 
 
+def _constant_cost(names: Names, item: Group, amount: Token) -> int:
+    if not NUMBER.match(amount.text):
+        raise names.document.fail(f"expected a number, found {amount.text!r}", amount)
+    # Costs that are too large are refused where costs are used.
+    value = min(float(amount.text), 2.0 * MAX_COST)
+    if value < 0 or value % 1 != 0:
+        raise _unsupported(names, f"action cost {amount.text} (whole numbers from 0 only)", item)
+    return int(value)
+
+
 def _atom(names: Names, item: Group, head: str) -> Atom:
-    error = names.arity(item, head, names.predicates[head], "predicate")
-    if error:
-        raise error
+    _require_arity(names, item, names.predicates[head], "predicate")
     return Atom(head, tuple(names.term(term) for term in item.items[1:]))
 
 
-def _equal(names: Names, item: Group) -> Formula:
-    _expect(names, item, 2)
-    left, right = item.items[1:]
-    for side in (left, right):
-        if isinstance(side, Group) or (NUMBER.match(side.text) and side.text not in names.objects):
-            raise _unsupported(names, "numeric condition '(= ..)'", item)
-    return Equal(names.term(left), names.term(right))
+def _require_arity(names: Names, item: Group, arities: Iterable[int], what: str) -> None:
+    error = names.arity(item, item.head, arities, what)
+    if error:
+        raise error
+
+
+def _unknown(names: Names, what: str, item: Group, head: str) -> BadInput:
+    return names.document.fail(what, item, known(names.predicates, head, "predicate"))
 
 
 def _expect(names: Names, item: Group, count: int) -> None:
@@ -213,10 +265,6 @@ def _unsupported(names: Names, feature: str, item: Group) -> Unsupported:
     )
 
 
-def _is_word(item: Expression, *texts: str) -> bool:
-    return isinstance(item, Word) and item.text in texts
-
-
 def _fresh(name: str, taken: frozenset[str] | set[str]) -> str:
     number = 1
     while f"{name}.{number}" in taken:
@@ -226,8 +274,8 @@ def _fresh(name: str, taken: frozenset[str] | set[str]) -> str:
 
 def _rename(item: Group, old: str, new: str) -> Group:
     def renamed(part: Expression) -> Expression:
-        if isinstance(part, Word):
-            return Word(new, part.offset) if part.text == old else part
+        if isinstance(part, Token):
+            return Token(new, part.offset) if part.text == old else part
         return _rename(part, old, new)
 
     return Group(tuple(renamed(part) for part in item.items), item.offset, item.end)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 
 from planners.errors import BadInput, Unsupported
 from planners.pddl.lifted import Variable
-from planners.pddl.sexpr import Document, Expression, Group, Word
+from planners.pddl.sexpr import Document, Expression, Group, Token
 
 
 def known(names: Iterable[str], wrong: str, what: str) -> str:
@@ -23,11 +23,16 @@ def known(names: Iterable[str], wrong: str, what: str) -> str:
     return f"Declared {what}s: {listed}."
 
 
-def word(document: Document, item: Expression, what: str) -> Word:
-    """``item`` as a single word, or an error that says what was expected there."""
-    if isinstance(item, Word):
+def token(document: Document, item: Expression, what: str) -> Token:
+    """``item`` as a single token, or an error that says what was expected there."""
+    if isinstance(item, Token):
         return item
     raise document.fail(f"expected {what}, found a list", item)
+
+
+def is_token(item: Expression, *texts: str) -> bool:
+    """Whether ``item`` is a token with one of these texts."""
+    return isinstance(item, Token) and item.text in texts
 
 
 def group(document: Document, item: Expression, what: str) -> Group:
@@ -41,7 +46,7 @@ def group(document: Document, item: Expression, what: str) -> Group:
 class Typed:
     """One entry of a typed list."""
 
-    word: Word
+    token: Token
     types: tuple[str, ...]
 
 
@@ -51,10 +56,10 @@ def typed_list(document: Document, items: Sequence[Expression], what: str) -> li
     Raises `BadInput` where a dash has no names before or no type behind it.
     """
     entries: list[Typed] = []
-    waiting: list[Word] = []
+    waiting: list[Token] = []
     at = 0
     while at < len(items):
-        item = word(document, items[at], what)
+        item = token(document, items[at], what)
         if item.text != "-":
             waiting.append(item)
             at += 1
@@ -71,11 +76,11 @@ def typed_list(document: Document, items: Sequence[Expression], what: str) -> li
 
 
 def _types(document: Document, item: Expression) -> tuple[str, ...]:
-    if isinstance(item, Word):
+    if isinstance(item, Token):
         return (item.text,)
     if item.head != "either" or len(item) < 2:
         raise document.fail("expected a type or '(either type ..)'", item)
-    return tuple(word(document, part, "a type").text for part in item.items[1:])
+    return tuple(token(document, part, "a type").text for part in item.items[1:])
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,18 +114,18 @@ class Names:
         """A typed list of variables; their types must be declared."""
         variables: list[Variable] = []
         for entry in typed_list(self.document, items, "a variable"):
-            if not entry.word.text.startswith("?"):
+            if not entry.token.text.startswith("?"):
                 raise self.document.fail(
-                    f"expected a variable, found {entry.word.text!r}",
-                    entry.word,
-                    f"Variables start with '?': ?{entry.word.text}.",
+                    f"expected a variable, found {entry.token.text!r}",
+                    entry.token,
+                    f"Variables start with '?': ?{entry.token.text}.",
                 )
             self.check_types(entry)
-            if any(v.name == entry.word.text for v in variables):
+            if any(v.name == entry.token.text for v in variables):
                 raise self.document.fail(
-                    f"variable {entry.word.text} is declared twice", entry.word
+                    f"variable {entry.token.text} is declared twice", entry.token
                 )
-            variables.append(Variable(entry.word.text, entry.types))
+            variables.append(Variable(entry.token.text, entry.types))
         return tuple(variables)
 
     def check_types(self, entry: Typed) -> None:
@@ -128,8 +133,8 @@ class Names:
         for name in entry.types:
             if name not in self.types and name != "object":
                 raise self.document.fail(
-                    f"type {name!r} of {entry.word.text!r} is not declared",
-                    entry.word,
+                    f"type {name!r} of {entry.token.text!r} is not declared",
+                    entry.token,
                     known(self.types, name, "type"),
                 )
 
@@ -165,3 +170,36 @@ class Names:
             return None
         wanted = " or ".join(str(n) for n in sorted(arities))
         return self.document.fail(f"{what} {name!r} takes {wanted} arguments, found {found}", item)
+
+
+def read_objects(
+    names: Names, items: Sequence[Expression], into: dict[str, tuple[str, ...]]
+) -> None:
+    """Add a typed list of objects, with ``(:private ..)`` groups, to ``into`` (name -> types)."""
+    document = names.document
+    private = [item for item in items if isinstance(item, Group) and item.head == ":private"]
+    entries = typed_list(document, [i for i in items if i not in private], "an object")
+    declared = {entry.token.text for entry in entries}
+    for section in private:
+        entries += typed_list(document, _without_owner(section, declared), "an object")
+    for entry in entries:
+        names.check_types(entry)
+        name = entry.token.text
+        if name.startswith("?"):
+            raise document.fail("a variable cannot be an object", entry.token)
+        old = into.get(name, ())
+        into[name] = (*old, *(t for t in entry.types if t not in old))
+
+
+def _without_owner(section: Group, declared: Set[str]) -> Sequence[Expression]:
+    """The objects of a ``(:private ..)`` group, without an owner in front of them.
+
+    Unfactored MA-PDDL writes ``(:private depot0 hoist0 - hoist)``: the owner is declared elsewhere,
+    or again in the group.
+    """
+    inner = section.items[1:]
+    if not inner or not isinstance(inner[0], Token):
+        return inner
+    owner = inner[0].text
+    repeated = any(is_token(item, owner) for item in inner[1:])
+    return inner[1:] if repeated or owner in declared else inner

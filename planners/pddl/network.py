@@ -9,8 +9,8 @@ import re
 from collections.abc import Sequence
 
 from planners.pddl.lifted import Constraint, Schema
-from planners.pddl.names import Names, group, known, word
-from planners.pddl.sexpr import Expression, Group, Word
+from planners.pddl.names import Names, group, known, token
+from planners.pddl.sexpr import Expression, Group, Token
 
 #: More robots than there ever are: larger numbers mean the same.
 _MANY = 1_000_000_000
@@ -32,7 +32,7 @@ def read_network(
     dependences = []
     for section in sections.get(":positive-dependence", ()):
         pair = [
-            word(names.document, item, "the name of a constraint") for item in section.items[1:]
+            token(names.document, item, "the name of a constraint") for item in section.items[1:]
         ]
         if len(pair) != 2:
             raise names.document.fail("expected '(:positive-dependence V W)'", section)
@@ -56,11 +56,11 @@ def _constraint(names: Names, arities: dict[str, int], section: Group) -> Constr
     document = names.document
     if len(section) < 2:
         raise document.fail("expected the name of the constraint", section)
-    name = word(document, section.items[1], "the name of the constraint").text
+    name = token(document, section.items[1], "the name of the constraint").text
     fields: dict[str, Expression] = {}
     items = section.items[2:]
     for key, value in zip(items[::2], items[1::2], strict=False):
-        fields[word(document, key, "a keyword").text] = value
+        fields[token(document, key, "a keyword").text] = value
     missing = {":parameters", ":bounds", ":actions"} - set(fields)
     if missing or len(items) % 2:
         raise document.fail(
@@ -96,7 +96,7 @@ def _bounds(names: Names, item: Group) -> tuple[int, int | None]:
         raise names.document.fail("expected '(LOW HIGH)'", item)
     low = _number(names, item.items[0])
     high = item.items[1]
-    if isinstance(high, Word) and high.text in ("inf", "infinity"):
+    if isinstance(high, Token) and high.text in ("inf", "infinity"):
         return low, None
     most = _number(names, high)
     if most < low or most == 0:
@@ -109,7 +109,7 @@ def _bounds(names: Names, item: Group) -> tuple[int, int | None]:
 
 
 def _number(names: Names, item: Expression) -> int:
-    text = word(names.document, item, "a number").text
+    text = token(names.document, item, "a number").text
     if not re.fullmatch(r"[0-9]+", text):
         raise names.document.fail(f"expected a number from 0, found {text!r}", item)
     digits = text.lstrip("0") or "0"

@@ -6,11 +6,11 @@ from pathlib import Path
 
 from planners.errors import Unsupported
 from planners.limits import reaching
-from planners.pddl.domain import read_header, read_objects
 from planners.pddl.formulas import NUMBER, read_formula
 from planners.pddl.lifted import Atom, Domain, Formula, Problem
-from planners.pddl.names import Names, group, word
-from planners.pddl.sexpr import Document, Group, Source, Word, parse, read_source
+from planners.pddl.names import Names, group, read_objects, token
+from planners.pddl.sections import Sections, read_header
+from planners.pddl.sexpr import Document, Group, Source, Token, parse, read_source
 
 
 def read_problem(path: str | Path, domain: Domain) -> Problem:
@@ -29,7 +29,7 @@ def parse_problem(source: Source, domain: Domain) -> Problem:
     name, sections = read_header(document, "problem")
     for section in sections.get(":domain", ()):
         other = (
-            word(document, section.items[1], "the name of the domain").text
+            token(document, section.items[1], "the name of the domain").text
             if len(section) > 1
             else ""
         )
@@ -54,7 +54,7 @@ def parse_problem(source: Source, domain: Domain) -> Problem:
     )
 
 
-def _read_goal(names: Names, document: Document, sections: dict[str, list[Group]]) -> Formula:
+def _read_goal(names: Names, document: Document, sections: Sections) -> Formula:
     goals = sections.get(":goal", [])
     if len(goals) != 1 or len(goals[0]) != 2:
         found = "found none" if not goals else "this one has no formula, or several"
@@ -71,33 +71,35 @@ def _read_goal(names: Names, document: Document, sections: dict[str, list[Group]
 
 def _read_init(names: Names, item: Group, init: set[Atom], values: dict[Atom, float]) -> None:
     document = names.document
-    head = item.head
-    if head == "and":
+    if item.head == "and":
         for part in item.items[1:]:
             _read_init(names, group(document, part, "an atom in parentheses"), init, values)
-        return
-    if head == "not" and len(item) == 2:
+    elif item.head == "not" and len(item) == 2:
         read_formula(names, item.items[1])  # closed world: checked, and nothing to add
-        return
-    if head == "=" and len(item) == 3 and isinstance(item.items[1], Group):
+    elif item.head == "=" and len(item) == 3 and isinstance(item.items[1], Group):
         _read_value(names, item, values)
-        return
-    second = item.items[1] if len(item) > 1 else None
-    if head == "at" and len(item) == 3 and isinstance(item.items[2], Group):
+    else:
+        _refuse_other_states(document, item)
+        atom = read_formula(names, item)
+        if not isinstance(atom, Atom):
+            raise document.fail("expected an atom in the initial state", item)
+        init.add(atom)
+
+
+def _refuse_other_states(document: Document, item: Group) -> None:
+    """Raise `Unsupported` for what is said of a later state or of one of several states."""
+    if item.head == "at" and len(item) == 3 and isinstance(item.items[2], Group):
         raise Unsupported(
             "timed initial literals are not supported",
             position=document.source.position(item.offset),
             remedy="coordlang reads classical PDDL: list what is true at the start.",
         )
-    if head in ("oneof", "unknown", "or") and isinstance(second, Group):
+    second = item.items[1] if len(item) > 1 else None
+    if item.head in ("oneof", "unknown", "or") and isinstance(second, Group):
         raise Unsupported(
-            f"an uncertain initial state '({head} ..)' is not supported",
+            f"an uncertain initial state '({item.head} ..)' is not supported",
             position=document.source.position(item.offset),
         )
-    atom = read_formula(names, item)
-    if not isinstance(atom, Atom):
-        raise document.fail("expected an atom in the initial state", item)
-    init.add(atom)
 
 
 def _read_value(names: Names, item: Group, values: dict[Atom, float]) -> None:
@@ -106,7 +108,7 @@ def _read_value(names: Names, item: Group, values: dict[Atom, float]) -> None:
     number = item.items[2]
     if function.head not in names.functions and function.head != "total-cost":
         raise document.fail(f"unknown function {function.head!r}", function)
-    if not isinstance(number, Word) or not NUMBER.match(number.text):
+    if not isinstance(number, Token) or not NUMBER.match(number.text):
         raise Unsupported(
             "a function value that is no number is not supported",
             position=document.source.position(item.offset),

@@ -78,7 +78,7 @@ def objects_of(domain: Domain, problem: Problem, types: Sequence[str]) -> tuple[
     return tuple(sorted(found, key=natural))
 
 
-def find_team(domain: Domain, problem: Problem, choice: RobotSelection) -> Team:  # noqa: C901 - one case for each way to tell who acts
+def find_team(domain: Domain, problem: Problem, choice: RobotSelection) -> Team:
     """The robots: from subaction comments, ``:agent``, the user's choice, or by detection.
 
     Raises
@@ -88,36 +88,7 @@ def find_team(domain: Domain, problem: Problem, choice: RobotSelection) -> Team:
     UsageError
         The user's choice contradicts the files or names an unknown object or type.
     """
-    declared = _declared(domain, problem)
-    if declared is not None:
-        robots, by = declared
-        if choice.type and set(_of_kind(domain, problem, choice.type)) != set(robots):
-            raise UsageError(
-                f"--robot-type {choice.type} contradicts the domain",
-                remedy=f"The robots are {', '.join(robots)} (by {by}).",
-            )
-        if choice.names and set(choice.names) != set(robots):
-            raise UsageError(
-                f"--robots {','.join(choice.names)} contradicts the domain",
-                remedy=f"The robots are {', '.join(robots)} (by {by}).",
-            )
-    elif choice.names:
-        for name in choice.names:
-            if name not in problem.objects:
-                raise UsageError(
-                    f"--robots: there is no object {name!r}",
-                    remedy=f"Objects: {', '.join(sorted(problem.objects, key=natural))}.",
-                )
-        robots, by = tuple(sorted(set(choice.names), key=natural)), "--robots"
-    elif choice.type:
-        robots, by = _of_kind(domain, problem, choice.type), f"--robot-type {choice.type}"
-        if not robots:
-            raise UsageError(
-                f"--robot-type: nothing has type or predicate {choice.type!r}",
-                remedy=f"Candidates: {', '.join(_kinds(domain, problem)) or 'none'}.",
-            )
-    else:
-        robots, by = _detect(domain, problem)
+    robots, by = _found(domain, problem, choice)
     if not robots:
         raise BadInput(
             "there is no robot in this problem",
@@ -129,12 +100,53 @@ def find_team(domain: Domain, problem: Problem, choice: RobotSelection) -> Team:
     ):
         if ENVIRONMENT in problem.objects:
             raise UsageError(
-                f"--unowned environment: an object of this problem is called {ENVIRONMENT!r} "
-                "already",
+                "--unowned environment: an object of this problem is called "
+                f"{ENVIRONMENT!r} already",
                 remedy="Rename the object.",
             )
         robots = (*robots, ENVIRONMENT)
     return Team(robots, by, choice.unowned)
+
+
+def _found(domain: Domain, problem: Problem, choice: RobotSelection) -> tuple[tuple[str, ...], str]:
+    """The robots' names, and how they were found."""
+    declared = _declared(domain, problem)
+    if declared is not None:
+        _require_agreement(domain, problem, choice, *declared)
+        return declared
+    if choice.names:
+        for name in choice.names:
+            if name not in problem.objects:
+                raise UsageError(
+                    f"--robots: there is no object {name!r}",
+                    remedy=f"Objects: {', '.join(sorted(problem.objects, key=natural))}.",
+                )
+        return tuple(sorted(set(choice.names), key=natural)), "--robots"
+    if choice.type:
+        robots = _of_kind(domain, problem, choice.type)
+        if not robots:
+            raise UsageError(
+                f"--robot-type: nothing has type or predicate {choice.type!r}",
+                remedy=f"Candidates: {', '.join(_kinds(domain, problem)) or 'none'}.",
+            )
+        return robots, f"--robot-type {choice.type}"
+    return _detect(domain, problem)
+
+
+def _require_agreement(
+    domain: Domain, problem: Problem, choice: RobotSelection, robots: tuple[str, ...], by: str
+) -> None:
+    """Raise `UsageError` if the user names other robots than the domain."""
+    contradicting = None
+    if choice.type and set(_of_kind(domain, problem, choice.type)) != set(robots):
+        contradicting = f"--robot-type {choice.type}"
+    elif choice.names and set(choice.names) != set(robots):
+        contradicting = f"--robots {','.join(choice.names)}"
+    if contradicting:
+        raise UsageError(
+            f"{contradicting} contradicts the domain",
+            remedy=f"The robots are {', '.join(robots)} (by {by}).",
+        )
 
 
 def without_idle_environment(team: Team, owners: Iterable[int]) -> Team:

@@ -72,8 +72,8 @@ class JoinedSource(Source):
 
 
 @dataclass(frozen=True, slots=True)
-class Word:
-    """An atom of the text, in lower case (PDDL does not distinguish case)."""
+class Token:
+    """A name, number, keyword or variable, in lower case (PDDL does not distinguish case)."""
 
     text: str
     offset: int
@@ -83,24 +83,24 @@ class Word:
 class Group:
     """A parenthesised list; ``end`` is the offset of its closing parenthesis."""
 
-    items: tuple[Word | Group, ...]
+    items: tuple[Token | Group, ...]
     offset: int
     end: int
 
     @property
     def head(self) -> str:
-        """The first word, or the empty string."""
+        """The first token, or the empty string."""
         first = self.items[0] if self.items else None
-        return first.text if isinstance(first, Word) else ""
+        return first.text if isinstance(first, Token) else ""
 
-    def __iter__(self) -> Iterator[Word | Group]:
+    def __iter__(self) -> Iterator[Token | Group]:
         return iter(self.items)
 
     def __len__(self) -> int:
         return len(self.items)
 
 
-Expression = Word | Group
+Expression = Token | Group
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,58 +148,74 @@ def read_source(path: str | Path) -> Source:
         return Source(name, data.decode("latin-1"))
 
 
-def parse(source: Source) -> Document:  # noqa: C901 - one case for each kind of token
+def parse(source: Source) -> Document:
     """Read the one top-level expression of ``source``.
 
     Raises `BadInput` for unbalanced parentheses, text outside of them, or nesting beyond
     `MAX_DEPTH`.
     """
-    comments: list[Comment] = []
-    open_groups: list[tuple[int, list[Expression]]] = []
-    root: Group | None = None
+    reader = _Reader(source)
     for match in _TOKEN.finditer(source.text):
-        token, offset = match.group(), match.start()
-        if token[0] == ";":
-            comments.append(Comment(token.lstrip(";").strip().lower(), offset))
-        elif root is not None:
-            raise BadInput(
-                f"unexpected {token[:40]!r} after the end of the definition",
-                position=source.position(offset),
-                remedy="Expected the end of the file: a parenthesis too many before this position?",
+        reader.take(match.group(), match.start())
+    return reader.document()
+
+
+class _Reader:
+    """Expressions as their tokens come, one after the other."""
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self._comments: list[Comment] = []
+        self._open: list[tuple[int, list[Expression]]] = []
+        self._root: Group | None = None
+
+    def take(self, text: str, offset: int) -> None:
+        if text[0] == ";":
+            self._comments.append(Comment(text.lstrip(";").strip().lower(), offset))
+        elif self._root is not None:
+            raise self._error(
+                f"unexpected {text[:40]!r} after the end of the definition",
+                offset,
+                "Expected the end of the file: a parenthesis too many before this position?",
             )
-        elif token == "(":
-            if len(open_groups) >= MAX_DEPTH:
-                raise BadInput(
-                    f"nested more than {MAX_DEPTH} deep", position=source.position(offset)
-                )
-            open_groups.append((offset, []))
-        elif token == ")":
-            if not open_groups:
-                raise BadInput("')' without a '('", position=source.position(offset))
-            start, items = open_groups.pop()
-            group = Group(tuple(items), start, offset)
-            if open_groups:
-                open_groups[-1][1].append(group)
-            else:
-                root = group
-        elif not open_groups:
-            raise BadInput(
-                f"expected '(define ...', found {token[:40]!r}", position=source.position(offset)
-            )
+        elif text == "(":
+            if len(self._open) >= MAX_DEPTH:
+                raise self._error(f"nested more than {MAX_DEPTH} deep", offset)
+            self._open.append((offset, []))
+        elif text == ")":
+            self._close(offset)
+        elif not self._open:
+            raise self._error(f"expected '(define ...', found {text[:40]!r}", offset)
         else:
-            open_groups[-1][1].append(Word(token.lower(), offset))
-    if open_groups:
-        start, items = open_groups[-1]
-        first = items[0].text if items and isinstance(items[0], Word) else ""
-        raise BadInput(
-            f"the '({first}' that opens here is never closed",
-            position=source.position(start),
-            remedy=f"Expected {len(open_groups)} more ')' before the end of the file.",
-        )
-    if root is None:
-        raise BadInput(
-            "expected '(define ...', found an empty file",
-            position=Position(source.name),
-            remedy="Give a PDDL file: DOMAIN first, then PROBLEM.",
-        )
-    return Document(source, root, tuple(comments))
+            self._open[-1][1].append(Token(text.lower(), offset))
+
+    def _close(self, offset: int) -> None:
+        if not self._open:
+            raise self._error("')' without a '('", offset)
+        start, items = self._open.pop()
+        group = Group(tuple(items), start, offset)
+        if self._open:
+            self._open[-1][1].append(group)
+        else:
+            self._root = group
+
+    def document(self) -> Document:
+        """The whole, when there is no more text."""
+        if self._open:
+            start, items = self._open[-1]
+            first = items[0].text if items and isinstance(items[0], Token) else ""
+            raise self._error(
+                f"the '({first}' that opens here is never closed",
+                start,
+                f"Expected {len(self._open)} more ')' before the end of the file.",
+            )
+        if self._root is None:
+            raise BadInput(
+                "expected '(define ...', found an empty file",
+                position=Position(self._source.name),
+                remedy="Give a PDDL file: DOMAIN first, then PROBLEM.",
+            )
+        return Document(self._source, self._root, tuple(self._comments))
+
+    def _error(self, what: str, offset: int, remedy: str | None = None) -> BadInput:
+        return BadInput(what, position=self._source.position(offset), remedy=remedy)
