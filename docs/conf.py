@@ -141,8 +141,8 @@ def link_as_python_does(
     if node.get("refdomain") != "py":
         return None
     target = node["reftarget"]
-    scopes = [node.get("py:module"), node.get("py:class"), "builtins"]
-    names = [target, *(f"{scope}.{target}" for scope in scopes if scope)]
+    module, owner = node.get("py:module"), node.get("py:class")
+    names = [target, f"{module}.{target}", f"{module}.{owner}.{target}", f"builtins.{target}"]
     thing = next((found for name in names if (found := imported(name)) is not None), None)
     python = env.domains.python_domain
     home = f"{getattr(thing, '__module__', '')}.{getattr(thing, '__qualname__', '')}"
