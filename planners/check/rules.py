@@ -3,8 +3,7 @@
 One state and one step at a time, over states that are plain sets of atoms.
 
 The independent twin of grounding and composition (docs/pddl.md has the rules): nothing is shared
-with them, only the lifted nouns and the robots.  Formulas are never rewritten; they are read in
-negation normal form by carrying their polarity downwards.
+with them, only the lifted nouns and the robots.
 """
 
 from __future__ import annotations
@@ -13,50 +12,21 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
-from planners.errors import BadInput
-from planners.pddl.lifted import (
-    And,
-    Atom,
-    Constraint,
-    Domain,
-    Equal,
-    Exists,
-    Forall,
-    Formula,
-    Not,
-    Or,
-    Problem,
-    Schema,
-    StepAtom,
-    Term,
-    Truth,
-    Variable,
+from planners.check.meaning import (
+    Binding,
+    Literal,
+    Meaning,
+    Moment,
+    State,
+    ground_atom,
+    text_of,
 )
-from planners.pddl.robots import Team, fluent_predicates, objects_of
+from planners.errors import BadInput
+from planners.pddl.lifted import Atom, Constraint, Domain, Problem, Schema, StepAtom
+from planners.pddl.robots import Team
 
-#: The true fluents; what is static comes from the problem.
-State = frozenset[Atom]
 #: One entry per robot: the text of its subaction, or None for idling.
 Labels = Sequence[str | None]
-Binding = dict[str, str]
-#: A ground atom and whether it is required to be true.
-Literal = tuple[Atom | StepAtom, bool]
-
-
-@dataclass(frozen=True, slots=True)
-class Moment:
-    """What a formula is read against.
-
-    The state before the step, the subactions of the step, and who acts.
-
-    A negative action formula never speaks of the robots in ``acting`` (empty for conditions of
-    effects and goals). ``step`` None leaves the step open: every literal about it then counts as
-    true.
-    """
-
-    state: State
-    step: frozenset[StepAtom] | None = frozenset()
-    acting: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +44,7 @@ class Instance:
     @property
     def text(self) -> str:
         """The subaction as PDDL text."""
-        return _text_of(self.name)
+        return text_of(self.name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,10 +64,9 @@ class Rules:
     problem: Problem
     team: Team
     allow_idle: tuple[bool, ...]
-    fluents: frozenset[str]
+    meaning: Meaning
     schemas: dict[str, Schema]
     is_joint_action: bool
-    _members: dict[tuple[str, ...], tuple[str, ...]] = field(default_factory=dict)
     _instances: dict[str, Instance | str] = field(default_factory=dict)
     _touched: dict[StepAtom, Touched] = field(default_factory=dict)
 
@@ -109,7 +78,13 @@ class Rules:
         idle = tuple(allow_idle) if allow_idle is not None else (True,) * len(team.robots)
         schemas = {schema.name: schema for schema in domain.schemas}
         return cls(
-            domain, problem, team, idle, fluent_predicates(domain), schemas, domain.is_joint_action
+            domain,
+            problem,
+            team,
+            idle,
+            Meaning(domain, problem, team),
+            schemas,
+            domain.is_joint_action,
         )
 
     # -- joint steps
@@ -156,7 +131,7 @@ class Rules:
         """Whether some step could hold the subaction in a state, by its own precondition."""
         found = self._known(label)
         moment = Moment(state, None, found.owners)
-        return self.holds(found.schema.precondition, found.binding, True, moment)
+        return self.meaning.holds(found.schema.precondition, found.binding, True, moment)
 
     def _known(self, label: str) -> Instance:
         found = self.instance(label)
@@ -164,14 +139,14 @@ class Rules:
         return found
 
     def _read(self, label: str) -> Instance | str:
-        name, *args = label.lower().replace("(", " ").replace(")", " ").split() or [""]
+        name, *args = _tokens(label) or [""]
         schema = self.schemas.get(name)
         if schema is None:
             return f"{label} is no action of the domain"
         if len(args) != len(schema.parameters):
             return f"{label} has {len(args)} arguments, {name} takes {len(schema.parameters)}"
         for parameter, arg in zip(schema.parameters, args, strict=True):
-            if arg not in self.objects(parameter.types):
+            if arg not in self.meaning.objects(parameter.types):
                 return f"in {label}, {arg} is no object of type {' or '.join(parameter.types)}"
         return self.bind(schema, tuple(args))
 
@@ -209,8 +184,8 @@ class Rules:
             if action is None:
                 continue
             formula, moment = action.schema.precondition, Moment(state, step, action.owners)
-            if not self.holds(formula, action.binding, True, moment):
-                why = self.why_not(formula, action.binding, True, moment)
+            if not self.meaning.holds(formula, action.binding, True, moment):
+                why = self.meaning.why_not(formula, action.binding, True, moment)
                 return f"{self.team.robots[robot]} cannot do {action.text} here: {why}"
         return None
 
@@ -246,16 +221,8 @@ class Rules:
                 for binding in self._matches(constraint, action):
                     groups.setdefault(binding, []).append(action)
             for binding, group in groups.items():
-                if len(group) < constraint.low or (
-                    constraint.high is not None and len(group) > constraint.high
-                ):
-                    most = "any number" if constraint.high is None else constraint.high
-                    bounds = f"{constraint.low} to {most}"
-                    doing = ", ".join(action.text for action in group)
-                    return (
-                        f"constraint {constraint.name} {' '.join(binding)} takes {bounds} "
-                        f"together: {doing}"
-                    )
+                if reason := _outside(constraint, binding, group):
+                    return reason
         for needed, by in self.domain.dependences:
             for binding, group in used[by].items():
                 if binding not in used[needed]:
@@ -273,7 +240,7 @@ class Rules:
             if name == action.schema.name
             for binding in [tuple(action.name.args[p] for p in positions)]
             if all(
-                v in self.objects(p.types)
+                v in self.meaning.objects(p.types)
                 for v, p in zip(binding, constraint.parameters, strict=True)
             )
         }
@@ -298,15 +265,16 @@ class Rules:
         if action.name in self._touched:
             return self._touched[action.name]
         needs = set(
-            self._required(action.schema.precondition, action.binding, True, action.owners) or ()
+            self.meaning.required(action.schema.precondition, action.binding, True, action.owners)
+            or ()
         )
         changes: dict[bool, set[Atom]] = {True: set(), False: set()}
         for effect in action.schema.effects:
-            for binding in self._bindings(effect.variables, action.binding):
-                required = self._required(effect.condition, binding, True, ())
+            for binding in self.meaning.bindings(effect.variables, action.binding):
+                required = self.meaning.required(effect.condition, binding, True, ())
                 if required is not None:
                     needs |= required
-                    changes[effect.adds].add(_atom(effect.atom, binding))
+                    changes[effect.adds].add(ground_atom(effect.atom, binding))
         touched = Touched(
             frozenset(needs), frozenset(changes[True]), frozenset(changes[False] - changes[True])
         )
@@ -320,9 +288,9 @@ class Rules:
         changes: dict[bool, set[Atom]] = {True: set(), False: set()}
         for action in actions:
             for effect in action.schema.effects:
-                for binding in self._bindings(effect.variables, action.binding):
-                    if self.holds(effect.condition, binding, True, moment):
-                        changes[effect.adds].add(_atom(effect.atom, binding))
+                for binding in self.meaning.bindings(effect.variables, action.binding):
+                    if self.meaning.holds(effect.condition, binding, True, moment):
+                        changes[effect.adds].add(ground_atom(effect.atom, binding))
         return (state - changes[False]) | changes[True]
 
     # -- joint-action PDDL
@@ -334,10 +302,10 @@ class Rules:
         results: dict[State, str] = {}
         for action in self._whole_actions(labels):
             formula, moment = action.schema.precondition, Moment(state)
-            if self.holds(formula, action.binding, True, moment):
+            if self.meaning.holds(formula, action.binding, True, moment):
                 results.setdefault(self._after(state, (action,)), action.text)
             elif reason is None:
-                why = self.why_not(formula, action.binding, True, moment)
+                why = self.meaning.why_not(formula, action.binding, True, moment)
                 reason = f"{action.text} is not applicable: {why}"
         if len(results) > 1:
             first, second = sorted(results.values())[:2]
@@ -362,7 +330,7 @@ class Rules:
             if binding is None:
                 continue
             domains = [
-                tuple(o for o in self.objects(p.types) if binding.get(p.name, o) == o)
+                tuple(o for o in self.meaning.objects(p.types) if binding.get(p.name, o) == o)
                 for p in schema.parameters
             ]
             for args in product(*domains):
@@ -373,201 +341,43 @@ class Rules:
 
         None if the labels are not the schema's parts.
         """
-        templates: dict[str, tuple[Term, ...] | None] = {
-            part.robot: part.template for part in schema.parts
-        }
+        templates = {part.robot: part.template for part in schema.parts}
         binding: Binding = {}
         for robot, label in zip(self.team.robots, labels, strict=True):
             template = templates.get(robot)  # a missing line means idle
-            words = (
-                None if label is None else label.lower().replace("(", " ").replace(")", " ").split()
-            )
-            if template is None and words is None:
+            if template is None and label is None:
                 continue
-            if template is None or words is None or len(template) != len(words):
+            tokens = None if label is None else _tokens(label)
+            if template is None or tokens is None or len(template) != len(tokens):
                 return None
-            for term, word in zip(template, words, strict=True):
-                wanted = binding.setdefault(term, word) if term.startswith("?") else term
-                if wanted != word:
+            for term, name in zip(template, tokens, strict=True):
+                wanted = binding.setdefault(term, name) if term.startswith("?") else term
+                if wanted != name:
                     return None
         return binding
 
-    # -- formulas
-    # --------------------------------------------------------------------------------------------
 
-    def holds(self, formula: Formula, binding: Binding, positive: bool, moment: Moment) -> bool:
-        """Whether a formula (negated unless ``positive``) holds."""
-        formula, positive = _unsigned(formula, positive)
-        branches = self._branches(formula, binding)
-        if branches is not None:
-            values = (self.holds(part, inner, positive, moment) for part, inner in branches)
-            return all(values) if _is_conjunction(formula, positive) else any(values)
-        fixed = self._fixed(formula, binding, positive, moment.acting)
-        if fixed is not None:
-            return fixed
-        atom = _ground(formula, binding)
-        if isinstance(atom, Atom):
-            return (atom in moment.state) == positive
-        return moment.step is None or (atom in moment.step) == positive
+def _first(atoms: Iterable[Atom | StepAtom]) -> str:
+    return min(text_of(atom) for atom in atoms)
 
-    def why_not(self, formula: Formula, binding: Binding, positive: bool, moment: Moment) -> str:
-        """Why a formula that does not hold does not hold, in words."""
-        formula, positive = _unsigned(formula, positive)
-        branches = self._branches(formula, binding)
-        if branches is None:
-            return self._literal_fails(formula, binding, positive)
-        failing = [
-            self.why_not(part, inner, positive, moment)
-            for part, inner in branches
-            if not self.holds(part, inner, positive, moment)
-        ]
-        if _is_conjunction(formula, positive):
-            return failing[0]
-        if len(failing) > 3:
-            failing[3:] = [f"{len(failing) - 3} more alternatives fail"]
-        return " and ".join(failing) or "there is nothing that it could be true of"
 
-    def _required(
-        self, formula: Formula, binding: Binding, positive: bool, acting: tuple[int, ...]
-    ) -> frozenset[Literal] | None:
-        """The literals left after statics, equalities and types are simplified.
+def _tokens(label: str) -> list[str]:
+    """The names in the text of a subaction, without its parentheses."""
+    return label.lower().replace("(", " ").replace(")", " ").split()
 
-        None if that makes it false.
 
-        A formula that this makes true requires nothing, whatever stands inside.
-        """
-        found = self._simplified(formula, binding, positive, acting)
-        if isinstance(found, bool):
-            return frozenset() if found else None
-        return found
-
-    def _simplified(
-        self, formula: Formula, binding: Binding, positive: bool, acting: tuple[int, ...]
-    ) -> frozenset[Literal] | bool:
-        formula, positive = _unsigned(formula, positive)
-        branches = self._branches(formula, binding)
-        if branches is None:
-            fixed = self._fixed(formula, binding, positive, acting)
-            return frozenset({(_ground(formula, binding), positive)}) if fixed is None else fixed
-        neutral = _is_conjunction(formula, positive)
-        left = [self._simplified(part, inner, positive, acting) for part, inner in branches]
-        if (not neutral) in left:
-            return not neutral
-        literals = [part for part in left if not isinstance(part, bool)]
-        return frozenset().union(*literals) if literals else neutral
-
-    def _fixed(
-        self, formula: Formula, binding: Binding, positive: bool, acting: tuple[int, ...]
-    ) -> bool | None:
-        """The value of a literal that no state and no step can change; None for the others."""
-        match formula:
-            case Truth(value):
-                return value == positive
-            case Equal(left, right):
-                return (binding.get(left, left) == binding.get(right, right)) == positive
-            case Atom(predicate) if predicate not in self.fluents:
-                return (_ground(formula, binding) in self.problem.init) == positive
-            case StepAtom():
-                return self._fixed_step_atom(formula, binding, positive, acting)
+def _outside(
+    constraint: Constraint, binding: tuple[str, ...], group: Sequence[Instance]
+) -> str | None:
+    """Which bounds of a constraint a group of actions breaks."""
+    high = constraint.high
+    if constraint.low <= len(group) and (high is None or len(group) <= high):
         return None
-
-    def _fixed_step_atom(
-        self, formula: StepAtom, binding: Binding, positive: bool, acting: tuple[int, ...]
-    ) -> bool | None:
-        schema = self.schemas[formula.action]
-        if self.is_joint_action:
-            raise BadInput(
-                f"action {schema.name!r} is used as a formula in a joint-action domain",
-                position=self.domain.source.position(schema.offset),
-                remedy="A joint action already says what every robot does: use predicates only.",
-            )
-        args = _ground(formula, binding).args
-        if not all(
-            a in self.objects(p.types) for p, a in zip(schema.parameters, args, strict=True)
-        ):
-            return not positive  # no such subaction exists
-        if not positive and set(self.team.owners(schema, args)) & set(acting):
-            return True  # as if the domain had said "(or (= ?o ?r) (not ..))"
-        return None
-
-    def _branches(
-        self, formula: Formula, binding: Binding
-    ) -> Iterable[tuple[Formula, Binding]] | None:
-        """The parts of a connective or quantifier; None for a literal."""
-        match formula:
-            case And(parts) | Or(parts):
-                return ((part, binding) for part in parts)
-            case Forall(variables, part) | Exists(variables, part):
-                return ((part, inner) for inner in self._bindings(variables, binding))
-        return None
-
-    def _bindings(self, variables: Sequence[Variable], binding: Binding) -> Iterator[Binding]:
-        """The binding with all values of more variables, which hide older ones of the same name."""
-        names = [v.name for v in variables]
-        for values in product(*(self.objects(v.types) for v in variables)):
-            yield {**binding, **dict(zip(names, values, strict=True))}
-
-    def _literal_fails(self, formula: Formula, binding: Binding, positive: bool) -> str:
-        match formula:
-            case Atom():
-                return f"{_text_of(_ground(formula, binding))} is {'false' if positive else 'true'}"
-            case StepAtom() if positive:
-                return f"nobody does {_text_of(_ground(formula, binding))} in the same step"
-            case StepAtom():
-                return f"{_text_of(_ground(formula, binding))} is done in the same step"
-            case Equal(left, right):
-                what = "are different" if positive else "are the same"
-                return f"{binding.get(left, left)} and {binding.get(right, right)} {what}"
-        return "its condition is never true"
-
-    # -- objects
-    # ---------------------------------------------------------------------------------------------
-
-    def objects(self, types: tuple[str, ...]) -> tuple[str, ...]:
-        """The objects of one of these types."""
-        if types not in self._members:
-            self._members[types] = objects_of(self.domain, self.problem, types)
-        return self._members[types]
-
-    def fluents_of(self, atoms: Iterable[Atom]) -> State:
-        """The state that a list of true atoms describes."""
-        return frozenset(atom for atom in atoms if atom.predicate in self.fluents)
+    bounds = f"{constraint.low} to {'any number' if high is None else high}"
+    doing = ", ".join(action.text for action in group)
+    return f"constraint {constraint.name} {' '.join(binding)} takes {bounds} together: {doing}"
 
 
 def _together(chosen: Iterable[Instance | None]) -> list[Instance]:
     """The different subactions of a step: a shared one stands for all its owners."""
     return list({action.name: action for action in chosen if action}.values())
-
-
-def _unsigned(formula: Formula, positive: bool) -> tuple[Formula, bool]:
-    """The formula inside all negations in front, and its polarity."""
-    while isinstance(formula, Not):
-        formula, positive = formula.part, not positive
-    return formula, positive
-
-
-def _is_conjunction(formula: Formula, positive: bool) -> bool:
-    """Whether all branches count (else any) when the formula is read with this polarity."""
-    return isinstance(formula, And | Forall) == positive
-
-
-def _atom(atom: Atom, binding: Binding) -> Atom:
-    return Atom(atom.predicate, tuple(binding.get(arg, arg) for arg in atom.args))
-
-
-def _ground(formula: Formula, binding: Binding) -> Atom | StepAtom:
-    match formula:
-        case Atom():
-            return _atom(formula, binding)
-        case StepAtom(name, args):
-            return StepAtom(name, tuple(binding.get(arg, arg) for arg in args))
-    raise AssertionError(formula)
-
-
-def _first(atoms: Iterable[Atom | StepAtom]) -> str:
-    return min(_text_of(atom) for atom in atoms)
-
-
-def _text_of(atom: Atom | StepAtom) -> str:
-    name = atom.predicate if isinstance(atom, Atom) else atom.action
-    return "(" + " ".join((name, *atom.args)) + ")"

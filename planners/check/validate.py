@@ -1,6 +1,6 @@
 """Independent plan checker: whether a sequence of joint steps is a plan.
 
-Reads `planners.check.rules`, the rules of joint steps taken literally, and nothing of grounding,
+Reads `planners.check.rules`, the rules of joint steps read literally, and nothing of grounding,
 composition or search.
 """
 
@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from planners.check.rules import Instance, Labels, Moment, Rules, State
+from planners.check.meaning import Moment, State
+from planners.check.rules import Instance, Labels, Rules
 from planners.pddl.lifted import Atom, Domain, Formula, Problem
 from planners.pddl.robots import Team
 
@@ -59,17 +60,17 @@ def validate(
     results.
     """
     rules = Rules.of(domain, problem, team, allow_idle)
-    state = rules.fluents_of(problem.init if init is None else init)
+    state = rules.meaning.fluents_of(problem.init if init is None else init)
     for number, labels in enumerate(plan):
         reason = rules.broken_rule(state, labels)
         if reason is not None:
             return Verdict(False, len(plan), number, reason)
         state = rules.result(state, labels)
     wanted = problem.goal if goal is None else goal
-    if not rules.holds(wanted, {}, True, Moment(state)):
-        reason = (
-            f"the goal does not hold at the end: {rules.why_not(wanted, {}, True, Moment(state))}"
-        )
+    at_end = Moment(state)
+    if not rules.meaning.holds(wanted, {}, True, at_end):
+        why = rules.meaning.why_not(wanted, {}, True, at_end)
+        reason = f"the goal does not hold at the end: {why}"
         return Verdict(False, len(plan), len(plan), reason)
     return Verdict(
         True, len(plan), None, "every step is a joint step and the goal holds at the end"

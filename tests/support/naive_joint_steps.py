@@ -41,7 +41,7 @@ class Twin:
     ) -> None:
         self._budget = budget
         self.rules = Rules.of(domain, problem, team, idle_allowed)
-        self.init = self.rules.fluents_of(problem.init)
+        self.init = self.rules.meaning.fluents_of(problem.init)
         self.labels = [self._labels(robot) for robot in range(len(team.robots))]
         self._steps: dict[State, frozenset[Step]] = {}
 
@@ -53,7 +53,7 @@ class Twin:
             if schema.parts:
                 name = self.rules.team.robots[robot]
                 templates = [p.template for p in schema.parts if p.robot == name and p.template]
-            for args in product(*(self.rules.objects(v.types) for v in schema.parameters)):
+            for args in product(*(self.rules.meaning.objects(v.types) for v in schema.parameters)):
                 binding = dict(zip((v.name for v in schema.parameters), args, strict=True))
                 for name, *terms in templates:
                     texts.add("(" + " ".join((name, *(binding.get(t, t) for t in terms))) + ")")
@@ -128,7 +128,7 @@ class Twin:
         wanted = self.rules.problem.goal if goal is None else goal
 
         def is_goal(state: State) -> bool:
-            return self.rules.holds(wanted, {}, True, Moment(state))
+            return self.rules.meaning.holds(wanted, {}, True, Moment(state))
 
         layers = [{self.init}]
         seen = set(layers[0])

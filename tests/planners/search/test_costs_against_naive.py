@@ -80,7 +80,7 @@ def brute_force(twin: Twin, goal: Formula, price: Price) -> tuple[int, int, int]
         done = [
             costs
             for state, costs in paths.items()
-            if twin.rules.holds(goal, {}, True, Moment(state))
+            if twin.rules.meaning.holds(goal, {}, True, Moment(state))
         ]
         if done:
             total = sum(done, Counter())

@@ -1,0 +1,230 @@
+"""What formulas mean, read literally: where they hold, why not, and what they require.
+
+Formulas are never rewritten; they are read in negation normal form by carrying their polarity
+downwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+from planners.errors import BadInput
+from planners.pddl.lifted import (
+    And,
+    Atom,
+    Domain,
+    Equal,
+    Exists,
+    Forall,
+    Formula,
+    Not,
+    Or,
+    Problem,
+    StepAtom,
+    Truth,
+    Variable,
+)
+from planners.pddl.robots import Team, fluent_predicates, objects_of
+
+#: The true fluents; what is static comes from the problem.
+State = frozenset[Atom]
+Binding = dict[str, str]
+#: A ground atom and whether it is required to be true.
+Literal = tuple[Atom | StepAtom, bool]
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """What a formula is read against.
+
+    The state before the step, the subactions of the step, and who acts.
+
+    A negative action formula never speaks of the robots in ``acting`` (empty for conditions of
+    effects and goals). ``step`` None leaves the step open: every literal about it then counts as
+    true.
+    """
+
+    state: State
+    step: frozenset[StepAtom] | None = frozenset()
+    acting: tuple[int, ...] = ()
+
+
+class Meaning:
+    """The meaning of the formulas of a problem, for its objects, static atoms and team."""
+
+    def __init__(self, domain: Domain, problem: Problem, team: Team) -> None:
+        self._domain = domain
+        self._problem = problem
+        self._team = team
+        self._fluents = fluent_predicates(domain)
+        self._schemas = {schema.name: schema for schema in domain.schemas}
+        self._members: dict[tuple[str, ...], tuple[str, ...]] = {}
+
+    def holds(self, formula: Formula, binding: Binding, positive: bool, moment: Moment) -> bool:
+        """Whether a formula (negated unless ``positive``) holds."""
+        formula, positive = _unsigned(formula, positive)
+        branches = self._branches(formula, binding)
+        if branches is not None:
+            values = (self.holds(part, inner, positive, moment) for part, inner in branches)
+            return all(values) if _is_conjunction(formula, positive) else any(values)
+        fixed = self._fixed(formula, binding, positive, moment.acting)
+        if fixed is not None:
+            return fixed
+        atom = _ground(formula, binding)
+        if isinstance(atom, Atom):
+            return (atom in moment.state) == positive
+        return moment.step is None or (atom in moment.step) == positive
+
+    def why_not(self, formula: Formula, binding: Binding, positive: bool, moment: Moment) -> str:
+        """Why a formula that does not hold does not hold, in words."""
+        formula, positive = _unsigned(formula, positive)
+        branches = self._branches(formula, binding)
+        if branches is None:
+            return self._literal_fails(formula, binding, positive)
+        failing = [
+            self.why_not(part, inner, positive, moment)
+            for part, inner in branches
+            if not self.holds(part, inner, positive, moment)
+        ]
+        if _is_conjunction(formula, positive):
+            return failing[0]
+        if len(failing) > 3:
+            failing[3:] = [f"{len(failing) - 3} more alternatives fail"]
+        return " and ".join(failing) or "there is nothing that it could be true of"
+
+    def required(
+        self, formula: Formula, binding: Binding, positive: bool, acting: tuple[int, ...]
+    ) -> frozenset[Literal] | None:
+        """The literals left after statics, equalities and types are simplified.
+
+        None if that makes it false.
+
+        A formula that this makes true requires nothing, whatever stands inside.
+        """
+        found = self._simplified(formula, binding, positive, acting)
+        if isinstance(found, bool):
+            return frozenset() if found else None
+        return found
+
+    def _simplified(
+        self, formula: Formula, binding: Binding, positive: bool, acting: tuple[int, ...]
+    ) -> frozenset[Literal] | bool:
+        formula, positive = _unsigned(formula, positive)
+        branches = self._branches(formula, binding)
+        if branches is None:
+            fixed = self._fixed(formula, binding, positive, acting)
+            return frozenset({(_ground(formula, binding), positive)}) if fixed is None else fixed
+        neutral = _is_conjunction(formula, positive)
+        left = [self._simplified(part, inner, positive, acting) for part, inner in branches]
+        if (not neutral) in left:
+            return not neutral
+        literals = [part for part in left if not isinstance(part, bool)]
+        return frozenset().union(*literals) if literals else neutral
+
+    def _fixed(
+        self, formula: Formula, binding: Binding, positive: bool, acting: tuple[int, ...]
+    ) -> bool | None:
+        """The value of a literal that no state and no step can change; None for the others."""
+        match formula:
+            case Truth(value):
+                return value == positive
+            case Equal(left, right):
+                return (binding.get(left, left) == binding.get(right, right)) == positive
+            case Atom(predicate) if predicate not in self._fluents:
+                return (_ground(formula, binding) in self._problem.init) == positive
+            case StepAtom():
+                return self._fixed_step_atom(formula, binding, positive, acting)
+        return None
+
+    def _fixed_step_atom(
+        self, formula: StepAtom, binding: Binding, positive: bool, acting: tuple[int, ...]
+    ) -> bool | None:
+        schema = self._schemas[formula.action]
+        if self._domain.is_joint_action:
+            raise BadInput(
+                f"action {schema.name!r} is used as a formula in a joint-action domain",
+                position=self._domain.source.position(schema.offset),
+                remedy="A joint action already says what every robot does: use predicates only.",
+            )
+        args = _ground(formula, binding).args
+        if not all(
+            a in self.objects(p.types) for p, a in zip(schema.parameters, args, strict=True)
+        ):
+            return not positive  # no such subaction exists
+        if not positive and set(self._team.owners(schema, args)) & set(acting):
+            return True  # as if the domain had said "(or (= ?o ?r) (not ..))"
+        return None
+
+    def _branches(
+        self, formula: Formula, binding: Binding
+    ) -> Iterable[tuple[Formula, Binding]] | None:
+        """The parts of a connective or quantifier; None for a literal."""
+        match formula:
+            case And(parts) | Or(parts):
+                return ((part, binding) for part in parts)
+            case Forall(variables, part) | Exists(variables, part):
+                return ((part, inner) for inner in self.bindings(variables, binding))
+        return None
+
+    def bindings(self, variables: Sequence[Variable], binding: Binding) -> Iterator[Binding]:
+        """The binding with all values of more variables, which hide older ones of the same name."""
+        names = [v.name for v in variables]
+        for values in product(*(self.objects(v.types) for v in variables)):
+            yield {**binding, **dict(zip(names, values, strict=True))}
+
+    def _literal_fails(self, formula: Formula, binding: Binding, positive: bool) -> str:
+        match formula:
+            case Atom():
+                return f"{text_of(_ground(formula, binding))} is {'false' if positive else 'true'}"
+            case StepAtom() if positive:
+                return f"nobody does {text_of(_ground(formula, binding))} in the same step"
+            case StepAtom():
+                return f"{text_of(_ground(formula, binding))} is done in the same step"
+            case Equal(left, right):
+                what = "are different" if positive else "are the same"
+                return f"{binding.get(left, left)} and {binding.get(right, right)} {what}"
+        return "its condition is never true"
+
+    def objects(self, types: tuple[str, ...]) -> tuple[str, ...]:
+        """The objects of one of these types."""
+        if types not in self._members:
+            self._members[types] = objects_of(self._domain, self._problem, types)
+        return self._members[types]
+
+    def fluents_of(self, atoms: Iterable[Atom]) -> State:
+        """The state that a list of true atoms describes."""
+        return frozenset(atom for atom in atoms if atom.predicate in self._fluents)
+
+
+def _unsigned(formula: Formula, positive: bool) -> tuple[Formula, bool]:
+    """The formula inside all negations in front, and its polarity."""
+    while isinstance(formula, Not):
+        formula, positive = formula.part, not positive
+    return formula, positive
+
+
+def _is_conjunction(formula: Formula, positive: bool) -> bool:
+    """Whether all branches count (else any) when the formula is read with this polarity."""
+    return isinstance(formula, And | Forall) == positive
+
+
+def ground_atom(atom: Atom, binding: Binding) -> Atom:
+    """The atom with the values of its variables."""
+    return Atom(atom.predicate, tuple(binding.get(arg, arg) for arg in atom.args))
+
+
+def _ground(formula: Formula, binding: Binding) -> Atom | StepAtom:
+    match formula:
+        case Atom():
+            return ground_atom(formula, binding)
+        case StepAtom(name, args):
+            return StepAtom(name, tuple(binding.get(arg, arg) for arg in args))
+    raise AssertionError(formula)
+
+
+def text_of(atom: Atom | StepAtom) -> str:
+    """PDDL text of a ground atom or action."""
+    name = atom.predicate if isinstance(atom, Atom) else atom.action
+    return "(" + " ".join((name, *atom.args)) + ")"
