@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from coordlang.cli import run
 from tests.support.command import Command, Outcome
-from tests.support.domains import DOMAINS, World, world_of
+from tests.support.domains import DOMAINS, Worlds, world_of
 
 
 @pytest.fixture
@@ -36,6 +35,6 @@ def language(coordlang: Command, t_map: tuple[Path, Path], tmp_path: Path) -> Pa
 
 
 @pytest.fixture(scope="session")
-def world() -> Callable[[str, str], World]:
+def world() -> Worlds:
     """``world(folder, problem)``: the model, its reachable states and all optimal plans."""
     return world_of

@@ -13,7 +13,8 @@ from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
-from tests.support.pages import DOCS, ROOT, code, prose, rows, sections
+from tests.support.domains import ROOT
+from tests.support.pages import DOCS, code, prose, rows, sections
 
 
 def joint_space(

@@ -22,7 +22,7 @@ from planners.search.optimal_plans import plan_spaces
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans, counts
 from planners.search.reachable import Space, explore
-from tests.support.domains import DOMAINS
+from tests.support.domains import DOMAINS, Worlds
 
 #: Table 1 of the paper: problem, tasks, states.
 ALL_TASKS = [
@@ -53,7 +53,9 @@ def to_every_state(space: Space) -> PlanSpace:
 
 @pytest.mark.parametrize("style", STYLES)
 @pytest.mark.parametrize(("problem", "tasks", "states"), ALL_TASKS)
-def test_table_1_all_tasks(world, style, problem, tasks, states):
+def test_table_1_all_tasks(
+    world: Worlds, style: str, problem: str, tasks: int, states: int
+) -> None:
     space = world(style, problem).space
     assert len(space) == states
     assert len(to_every_state(space).starts) == tasks
@@ -61,7 +63,9 @@ def test_table_1_all_tasks(world, style, problem, tasks, states):
 
 @pytest.mark.parametrize("style", STYLES)
 @pytest.mark.parametrize(("problem", "tasks", "states", "at_least"), FILTERED)
-def test_table_1_filtered_tasks(world, style, problem, tasks, states, at_least):
+def test_table_1_filtered_tasks(
+    world: Worlds, style: str, problem: str, tasks: int, states: int, at_least: int
+) -> None:
     here = world(style, problem)
     assert len(here.space) == states
     data = json.loads((DOMAINS / "grid" / f"{problem}.tasks.json").read_text())
@@ -76,24 +80,26 @@ def test_table_1_filtered_tasks(world, style, problem, tasks, states, at_least):
 
 def farthest(init: tuple[str, ...], goal: tuple[str, ...]) -> int:
     """The greatest Manhattan distance of a robot, from the atoms' text."""
-    numbers = [
+    numbers: list[list[list[int]]] = [
         [[int(n) for n in re.findall(r"\d+", atom)] for atom in state] for state in (init, goal)
     ]
     return max(
-        abs(a[1] - b[1]) + abs(a[2] - b[2]) for a, b in zip(*numbers, strict=True) if a[0] == b[0]
+        abs(a[1] - b[1]) + abs(a[2] - b[2])
+        for a, b in zip(numbers[0], numbers[1], strict=True)
+        if a[0] == b[0]
     )
 
 
 @pytest.mark.parametrize("style", STYLES)
 @pytest.mark.parametrize(("size", "plans"), [(3, 18), (4, 236), (5, 3090)])
-def test_trading_opposite_corners(world, style, size, plans):
+def test_trading_opposite_corners(world: Worlds, style: str, size: int, plans: int) -> None:
     assert Plans.of(world(style, f"corners-{size}x{size}").plans).count == plans
 
 
 @pytest.mark.parametrize(
     "problem", [row[0] for row in ALL_TASKS] + ["gwb5-3x3", "gwb7-3x5", "gwb8-4x4", "corners-4x4"]
 )
-def test_both_styles_are_the_same_model(world, problem):
+def test_both_styles_are_the_same_model(world: Worlds, problem: str) -> None:
     one, other = (world(style, problem).space for style in STYLES)
     assert one.model.codec.facts == other.model.codec.facts
     assert (one.rows == other.rows).all()
@@ -105,7 +111,7 @@ def test_both_styles_are_the_same_model(world, problem):
 
 
 @pytest.mark.parametrize("problem", ["three-cells", "t-map", "gw2-2x3", "gwb1-2x4", "corners-4x4"])
-def test_joint_schemas_are_disjoint(world, problem):
+def test_joint_schemas_are_disjoint(world: Worlds, problem: str) -> None:
     """Planners that do not compare what actions do would count a plan twice."""
     actions = world("grid-joint", problem).loaded.model.actions
     meant = Counter((action.parts, frozenset(conjuncts(action.precondition))) for action in actions)
@@ -165,7 +171,7 @@ def naive_steps(grid: GridMap, state: tuple[str, ...]) -> set[tuple[str, ...]]:
     ],
     ids=["triangle-2", "triangle-3", "square-4", "grid-2", "grid-3", "ring-3"],
 )
-def test_the_grid_domain_against_its_rules(grid, starts):
+def test_the_grid_domain_against_its_rules(grid: GridMap, starts: tuple[str, ...]) -> None:
     robots = len(starts)
     domain = read_domain(DOMAINS / "grid" / "domain.pddl")
     text = problem_text(Scenario("naive", grid, starts, starts), "grid")
@@ -189,7 +195,7 @@ def test_the_grid_domain_against_its_rules(grid, starts):
         assert Counter(after) == Counter(naive_steps(grid, state))
 
 
-def test_a_full_ring_can_only_turn():
+def test_a_full_ring_can_only_turn() -> None:
     """Following in a cycle: with no free cell all robots move at once, or none does."""
     assert naive_steps(three_cells(), ("a", "b", "c")) == {
         ("a", "b", "c"),
@@ -198,17 +204,17 @@ def test_a_full_ring_can_only_turn():
     }
 
 
-def test_three_cells(world):
+def test_three_cells(world: Worlds) -> None:
     space = world("three-cells", "problem").space
     assert len(space) == 6
     assert to_every_state(space).layer.max() == 2
 
 
-def test_t_map(world):
+def test_t_map(world: Worlds) -> None:
     assert len(world("t-map", "problem").space) == 12
 
 
-def test_who_uses_the_passing_place_of_the_corridor(world):
+def test_who_uses_the_passing_place_of_the_corridor(world: Worlds) -> None:
     here = world("corridor", "problem")
     aside = Counter(
         tuple(
@@ -236,7 +242,7 @@ def readme_rows() -> list[tuple[str, str, dict[str, int]]]:
     return found
 
 
-def test_every_problem_is_in_a_readme():
+def test_every_problem_is_in_a_readme() -> None:
     told = {(folder, problem) for folder, problem, _ in readme_rows()}
     there = {(p.parent.name, p.stem) for p in DOMAINS.glob("*/*.pddl") if p.stem != "domain"}
     assert told == there
@@ -253,7 +259,9 @@ def test_every_problem_is_in_a_readme():
         for row in readme_rows()
     ],
 )
-def test_the_numbers_in_the_readme_files(world, folder, problem, told):
+def test_the_numbers_in_the_readme_files(
+    world: Worlds, folder: str, problem: str, told: dict[str, int]
+) -> None:
     here = world(folder, problem)
     seen = {
         "states": len(here.space),
@@ -266,11 +274,11 @@ def test_the_numbers_in_the_readme_files(world, folder, problem, told):
 @pytest.mark.parametrize(
     ("problem", "tasks"), [*((r[0], r[1]) for r in ALL_TASKS), *((r[0], r[1]) for r in FILTERED)]
 )
-def test_the_numbers_of_tasks_in_the_readme(problem, tasks):
+def test_the_numbers_of_tasks_in_the_readme(problem: str, tasks: int) -> None:
     text = (DOMAINS / "grid" / "README.md").read_text()
     assert re.search(rf"^\| {problem} \| \d+ \| {tasks} \|", text, re.MULTILINE)
 
 
-def test_problems_of_one_folder_name_their_domain():
+def test_problems_of_one_folder_name_their_domain() -> None:
     for path in sorted(DOMAINS.glob("*/domain.pddl")):
         assert read_domain(path).name == path.parent.name

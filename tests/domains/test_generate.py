@@ -46,7 +46,7 @@ def files(folder: Path) -> dict[str, bytes]:
     }
 
 
-def test_the_shipped_files_are_what_the_generator_writes(tmp_path):
+def test_the_shipped_files_are_what_the_generator_writes(tmp_path: Path) -> None:
     # In a process of its own with another hash seed: the order of sets must not show.
     command = [sys.executable, str(DOMAINS / "generate.py"), "all", "--into", str(tmp_path)]
     subprocess.run(command, check=True, env={**os.environ, "PYTHONHASHSEED": "77"})
@@ -57,7 +57,7 @@ def test_the_shipped_files_are_what_the_generator_writes(tmp_path):
     assert [name for name in written if written[name] != shipped[name]] == []
 
 
-def test_pictures_are_self_contained_and_say_what_they_show():
+def test_pictures_are_self_contained_and_say_what_they_show() -> None:
     pictures = sorted(DOMAINS.glob("*/*.svg"))
     assert {p.stem for p in pictures} >= {p.stem for p in DOMAINS.glob("grid/*.pddl")} - {"domain"}
     for picture in pictures:
@@ -68,7 +68,7 @@ def test_pictures_are_self_contained_and_say_what_they_show():
         assert not [key for element in root.iter() for key in element.attrib if "href" in key]
 
 
-def test_a_ring_of_two_rows_is_drawn_with_its_wall():
+def test_a_ring_of_two_rows_is_drawn_with_its_wall() -> None:
     lines = {
         name: len(
             ElementTree.parse(DOMAINS / "grid" / f"{name}.svg").findall(
@@ -81,7 +81,7 @@ def test_a_ring_of_two_rows_is_drawn_with_its_wall():
 
 
 @pytest.mark.parametrize(("style", "domain"), [("agents", "grid"), ("joint", "grid-joint")])
-def test_one_problem_with_everything(tmp_path, style, domain):
+def test_one_problem_with_everything(tmp_path: Path, style: str, domain: str) -> None:
     problem, picture, tasks = (tmp_path / name for name in ("p.pddl", "p.svg", "t.json"))
     outputs = ["-o", str(problem), "--picture", str(picture), "--tasks", str(tasks)]
     assert main(["ring", "2x3", "--style", style, "--at-least", "3", *outputs]) == 0
@@ -93,7 +93,7 @@ def test_one_problem_with_everything(tmp_path, style, domain):
     assert len(json.loads(tasks.read_text())["tasks"]) == 188
 
 
-def test_a_problem_from_a_map_on_stdout(capsys, tmp_path):
+def test_a_problem_from_a_map_on_stdout(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     path = DOMAINS / "t-map" / "t-map.map"
     assert (
         main(
@@ -128,7 +128,9 @@ def test_a_problem_from_a_map_on_stdout(capsys, tmp_path):
         (["open", "2x2", "-o", "no/such/folder/p.pddl"], 31, "cannot write no/such/folder/p.pddl"),
     ],
 )
-def test_errors_of_the_command(capsys, arguments, code, message):
+def test_errors_of_the_command(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], code: int, message: str
+) -> None:
     assert main(arguments) == code
     captured = capsys.readouterr()
     assert message in captured.err
@@ -138,13 +140,13 @@ def test_errors_of_the_command(capsys, arguments, code, message):
 @pytest.mark.parametrize(
     "arguments", [["ring", "1x4"], ["open", "0x3"], ["open", "3"], ["circle", "3x3"], []]
 )
-def test_usage(arguments):
+def test_usage(arguments: list[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         main(arguments)
     assert caught.value.code == 2
 
 
-def test_where_robots_go_when_nothing_is_said():
+def test_where_robots_go_when_nothing_is_said() -> None:
     assert scenario("s", open_grid(3, 3)).starts == ("c0-0", "c2-2")
     assert scenario("s", open_grid(3, 3)).goals == ("c2-2", "c0-0")
     three = scenario("s", open_grid(3, 3), robots=3)

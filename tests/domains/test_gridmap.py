@@ -17,7 +17,7 @@ def written(tmp_path: Path, text: str) -> Path:
     return path
 
 
-def test_open_grid():
+def test_open_grid() -> None:
     grid = open_grid(2, 3)
     assert list(grid.cells) == ["c0-0", "c0-1", "c0-2", "c1-0", "c1-1", "c1-2"]
     assert grid.neighbours("c0-1") == ["c0-0", "c0-2", "c1-1"]
@@ -28,7 +28,7 @@ def test_open_grid():
 @pytest.mark.parametrize(
     ("size", "cells"), [((2, 2), 4), ((2, 4), 8), ((4, 2), 8), ((3, 3), 8), ((3, 5), 12)]
 )
-def test_a_ring_is_one_cycle(size, cells):
+def test_a_ring_is_one_cycle(size: tuple[int, int], cells: int) -> None:
     grid = ring(*size)
     assert len(grid.cells) == len(grid.edges) == cells
     tour = [next(iter(grid.cells))]
@@ -41,7 +41,7 @@ def test_a_ring_is_one_cycle(size, cells):
     assert all(grid.distance(a, b) == 1 for a, b in grid.edges)
 
 
-def test_a_ring_needs_two_rows():
+def test_a_ring_needs_two_rows() -> None:
     with pytest.raises(ValueError, match="at least two"):
         ring(1, 5)
 
@@ -56,7 +56,7 @@ def test_a_ring_needs_two_rows():
     ],
     ids=["movingai", "no type, no last newline", "windows", "other order, blank lines"],
 )
-def test_read_map(tmp_path, text):
+def test_read_map(tmp_path: Path, text: str) -> None:
     grid = read_map(written(tmp_path, text))
     assert list(grid.cells) == ["c0-0", "c0-2", "c1-0", "c1-2"]
     assert grid.edges == (("c0-0", "c1-0"), ("c0-2", "c1-2"))
@@ -78,26 +78,28 @@ def test_read_map(tmp_path, text):
         ("height 1\nwidth 2\nmap\n@T\n", ":", "no passable cell"),
     ],
 )
-def test_what_is_wrong_with_a_map_and_where(tmp_path, text, line, message):
+def test_what_is_wrong_with_a_map_and_where(
+    tmp_path: Path, text: str, line: str, message: str
+) -> None:
     path = written(tmp_path, text)
     with pytest.raises(BadInput, match=message) as caught:
         read_map(path)
     assert str(caught.value).startswith(str(path) + line)
 
 
-def test_no_such_map(tmp_path):
+def test_no_such_map(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="cannot read this map"):
         read_map(tmp_path / "none.map")
 
 
-def test_a_map_that_is_no_text(tmp_path):
+def test_a_map_that_is_no_text(tmp_path: Path) -> None:
     (tmp_path / "some.map").write_bytes(b"height 1\nwidth 1\nmap\n\xff\n")
     with pytest.raises(BadInput, match="cannot read this map"):
         read_map(tmp_path / "some.map")
 
 
 @pytest.mark.foreign
-def test_maps_that_others_wrote():
+def test_maps_that_others_wrote() -> None:
     if not SHARED.is_dir():
         pytest.skip(f"{SHARED} is not here")
     sizes = {

@@ -23,7 +23,7 @@ from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from planners.search.reachable import Space
 from tests.support.console import run_command
-from tests.support.domains import DOMAINS
+from tests.support.domains import DOMAINS, Worlds
 from tests.support.pages import blocks, commands, links
 from tests.support.readme_tables import Row, candidates, files, tables
 
@@ -56,7 +56,7 @@ by_world = pytest.mark.parametrize("folder", WORLDS)
 
 
 @by_problem
-def test_the_table_of_problems(world, folder: str, row: Row) -> None:
+def test_the_table_of_problems(world: Worlds, folder: str, row: Row) -> None:
     here = world(folder, row["problem"])
     assert len(here.loaded.model.robots) == int(row["robots"])
     assert len(here.space) == int(row["states"])
@@ -299,7 +299,7 @@ RULES: dict[str, Callable[[State, dict[str, tuple[str, ...]], State], bool]] = {
 
 
 @by_problem
-def test_the_rules_hold_in_every_step(world, folder: str, row: Row) -> None:
+def test_the_rules_hold_in_every_step(world: Worlds, folder: str, row: Row) -> None:
     rule, here = RULES[folder], world(folder, row["problem"])
     broken = [step for step in steps(here.loaded, here.space) if not rule(*step)]
     assert broken[:1] == []

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import foreign
 import pytest
-from foreign_rows import BY_NAME, LANGUAGE_BY_NAME, LANGUAGES, ROWS, SHARED, Row
+from foreign_rows import BY_NAME, LANGUAGE_BY_NAME, LANGUAGES, ROWS, SHARED, Language, Row
 
 from coordlang.cli import run
 from coordlang.required.miscoordination import Inseparable
@@ -187,7 +187,7 @@ def test_a_language_for_varied_tasks(name: str) -> None:
 @pytest.mark.parametrize(
     "language", [x for x in LANGUAGES if x.name not in QUICK], ids=lambda language: language.name
 )
-def test_the_other_languages(language: foreign.Language) -> None:
+def test_the_other_languages(language: Language) -> None:
     figures = foreign.build(language, 200)
     assert figures["verified"]
     assert figures["told"] == figures["different"] > 0  # type: ignore[operator]

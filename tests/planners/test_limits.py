@@ -158,6 +158,15 @@ class Stopping:
     def why_not(self, row: Rows, labels: Sequence[int]) -> str:
         return self.stepper.why_not(row, labels)
 
+    def joint_action(self, row: Rows, labels: Sequence[int]) -> str | None:
+        return self.stepper.joint_action(row, labels)
+
+    def interfering_pairs(self) -> int:
+        return self.stepper.interfering_pairs()
+
+    def conflict_in(self, rows: Rows) -> str | None:
+        return self.stepper.conflict_in(rows)
+
 
 def corners(problem: str = "corners-3x3") -> PlanningInstance:
     return load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / f"{problem}.pddl"])

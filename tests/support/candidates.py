@@ -9,7 +9,7 @@ from random import Random
 
 from coordlang.required.composition_walk import walk
 from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
-from coordlang.tasks.task_file import ListedTask
+from coordlang.tasks.listed import ListedTask
 from planners.errors import ProvedImpossible
 from planners.joint.states import split_atoms
 from planners.loading import ModelOptions

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -27,6 +28,10 @@ class World:
     loaded: PlanningInstance
     space: Space
     plans: PlanSpace
+
+
+#: ``world(folder, problem)``
+Worlds = Callable[[str, str], World]
 
 
 @cache

@@ -22,6 +22,12 @@ def listed(space: PlanSpace, task: int, most: int) -> list[Plan]:
     return list(plans)
 
 
+def known(labels: tuple[int, ...] | None) -> tuple[int, ...]:
+    """The label numbers of a step that is written in texts; the model has all of them."""
+    assert labels is not None
+    return labels
+
+
 def mixture(plans: tuple[Plan, ...]) -> Plan:
     """Robot i does its part of plan i, step by step."""
     return tuple(

@@ -103,7 +103,7 @@ class Twin:
         """
         if self.rules.is_joint_action:
             return sum(label is not None for label in labels)
-        return sum(not self.does_nothing(label) for label in {*labels} - {None})
+        return sum(not self.does_nothing(label) for label in {*labels} if label is not None)
 
     def does_nothing(self, label: str) -> bool:
         """No effect, whatever the state and the step, and no formula of the domain names the
@@ -191,41 +191,6 @@ class Optimal:
                     yield (labels, *rest)
 
         return walk(self.init, 0)
-
-
-def successors(
-    domain: Domain,
-    problem: Problem,
-    team: Team,
-    state: State,
-    idle_allowed: Sequence[bool] | None = None,
-) -> frozenset[Step]:
-    """All joint steps from a state: (labels, state after)."""
-    return Twin(domain, problem, team, idle_allowed).successors(state)
-
-
-def reachable(
-    domain: Domain,
-    problem: Problem,
-    team: Team,
-    idle_allowed: Sequence[bool] | None = None,
-    limit: int = 10_000,
-) -> list[State]:
-    """All reachable states; raises `TooLarge` beyond ``limit``."""
-    return Twin(domain, problem, team, idle_allowed).reachable(limit)
-
-
-def optimal_plans(
-    domain: Domain,
-    problem: Problem,
-    team: Team,
-    idle_allowed: Sequence[bool] | None = None,
-    *,
-    actions: bool = False,
-) -> tuple[tuple[int, int], frozenset[Plan]] | None:
-    """The optimal cost and all optimal plans, listed; None if the goal cannot be reached."""
-    found = Twin(domain, problem, team, idle_allowed).optimal(actions=actions)
-    return found and ((found.makespan, found.second), frozenset(found.plans()))
 
 
 def _actions_named(formula: Formula) -> Iterator[str]:

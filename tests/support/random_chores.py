@@ -32,7 +32,10 @@ def random_chores(seed: int, robots: int) -> tuple[Domain, Problem, ModelOptions
     """One to three things a robot, one or two with three robots."""
     random = Random(seed)
     names = [f"r{n + 1}" for n in range(robots)]
-    facts, things, chores, tool = [], [], [], {}
+    facts: list[str] = []
+    things: list[str] = []
+    chores: list[str] = []
+    tool: dict[str, int] = {}
     tools = random.choice([2, 4, 6]) * robots
     for robot in names:
         for _ in range(random.randint(1, 3 if robots == 2 else 2)):

@@ -12,7 +12,7 @@ from coordlang.language.partition import Partition
 from coordlang.language.words import Language
 from coordlang.required.miscoordination import Inseparable
 from coordlang.tasks.candidates import Candidates, from_listed, from_problems
-from coordlang.tasks.task_file import ListedTask
+from coordlang.tasks.listed import ListedTask
 from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 from planners.errors import ProvedImpossible
 from planners.loading import ModelOptions, build

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from random import Random
 
 import pytest
@@ -140,7 +141,7 @@ def test_deliveries() -> None:
             assert len(listed_tasks(every)) == 44
 
 
-def test_a_warehouse_by_enumeration(tmp_path) -> None:
+def test_a_warehouse_by_enumeration(tmp_path: Path) -> None:
     """Success rates of the smallest warehouse: every delivery, cell and pair of plans looked at."""
     world, rows, columns = WAREHOUSES["open 3x3"]
     every = deliveries(rows, columns, "along")

@@ -35,7 +35,7 @@ def written() -> dict[str, Any]:
 
 
 def valid(data: object) -> bool:
-    return jsonschema.Draft202012Validator(json_schema()).is_valid(data)
+    return bool(jsonschema.Draft202012Validator(json_schema()).is_valid(data))
 
 
 def readable(data: object) -> bool:

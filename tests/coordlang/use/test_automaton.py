@@ -47,7 +47,7 @@ def random_graph(random: Random) -> tuple[PlanSpace, list[list[tuple[int, int]]]
     facts = [random.choice([0, 1, 3, 3, 3, 3]) for _ in edges]
     flat = [edge for own in edges for edge in own]
     space = PlanSpace(
-        model=None,
+        model=None,  # type: ignore[arg-type]
         rows=np.zeros((0, 1), np.uint64),
         state=np.arange(len(edges)),
         goal=np.zeros(len(edges), np.int64),

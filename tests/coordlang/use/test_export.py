@@ -18,6 +18,7 @@ from itertools import islice
 from pathlib import Path
 from random import Random
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -214,7 +215,7 @@ def parse(text: str) -> tuple[object, ...]:
     return formula
 
 
-def true_at(formula: tuple[object, ...], states: Sequence[frozenset[str]], place: int) -> bool:
+def true_at(formula: Any, states: Sequence[frozenset[str]], place: int) -> bool:
     match formula:
         case ("symbol", name):
             return name == "true" or name in states[place]
@@ -388,8 +389,8 @@ def test_the_export_does_not_depend_on_hashes(
     assert texts[0] == texts[1]
 
 
-def solve(folder: Path) -> tuple[str, list[str]]:
-    """Fast Downward through unified-planning: the status and the actions of an optimal plan."""
+def solve(folder: Path) -> list[str]:
+    """The actions of an optimal plan by Fast Downward, through unified-planning."""
     import unified_planning as up
     from unified_planning.engines import PlanGenerationResultStatus as Status
     from unified_planning.io import PDDLReader

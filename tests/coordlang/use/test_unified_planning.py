@@ -29,6 +29,7 @@ from coordlang.use.sentence.task_language import languages_in_tasks
 from coordlang.use.unified import engine as engine_module
 from coordlang.use.unified import register
 from coordlang.use.unified.names import Names
+from coordlang.use.unified.options import PLAN_KINDS
 from coordlang.use.unified.plans import label
 from coordlang.use.unified.translation import translate
 from planners.loading import ModelOptions, load
@@ -180,7 +181,7 @@ def test_an_optimal_plan() -> None:
     assert result.metrics == {"makespan": "6", "plans": "2"}
     assert isinstance(result.plan, PartialOrderPlan)
     assert verdict(problem, result.plan).status == Validity.VALID
-    kinds = {kind: solve(problem, plan_kind=kind).plan for kind in engine_module.PLAN_KINDS}
+    kinds = {kind: solve(problem, plan_kind=kind).plan for kind in PLAN_KINDS}
     assert {kind: plan.kind for kind, plan in kinds.items()} == {kind: kind for kind in kinds}
     assert all(verdict(problem, plan).status == Validity.VALID for plan in kinds.values())
 
@@ -515,7 +516,7 @@ def test_limits(monkeypatch: pytest.MonkeyPatch) -> None:
     with up.AnytimePlanner(name="coordlang") as planner:
         stream = planner.get_solutions(crossing(), timeout=60)
         assert next(stream).status == Status.INTERMEDIATE
-        monkeypatch.setattr(engine_module.time, "monotonic", lambda: 1e12)
+        monkeypatch.setattr("time.monotonic", lambda: 1e12)
         assert [r.status for r in stream] == [Status.TIMEOUT]
         monkeypatch.undo()
 

@@ -59,7 +59,8 @@ def test_a_language_by_definition_with_a_true_bound(method: str, robots: int, mo
         built = build_language(candidates, method, seed=3)
         language, guarantee = built.language, built.language.guarantee
         codec = candidates.model.codec
-        word = [language.states.get(codec.key(row), "") for row in candidates.rows]
+        names = ("", *language.words)
+        word = [names.index(language.states.get(codec.key(row), "")) for row in candidates.rows]
         for space in candidates.spaces:
             for task in range(len(space.starts)):
                 plans = naive.listed(space, task, most)

@@ -77,7 +77,9 @@ def fewest_cells(u: tuple[int, ...], v: tuple[int, ...], word: list[int]) -> int
 
 
 def test_separation_clause_of_three_plans() -> None:
-    assert separation_clause([[0, 1, 3], [0, 2, 3], [0, 4, 3]], [0] * 5) == {(1, 2), (1, 4)}
+    assert separation_clause([[0, 1, 3], [0, 2, 3], [0, 4, 3]], [0] * 5) == frozenset(
+        {(1, 2), (1, 4)}
+    )
     assert separation_clause([[0, 1, 3], [0, 2, 3], [0, 4, 3]], [0, 1, 0, 0, 1]) is None
 
 
@@ -101,7 +103,7 @@ def test_colouring_against_trying_all(size: int, drawn: list[set[tuple[int, int]
     assert found is None or holds(found)
 
 
-GROUPS = (
+GROUPS: tuple[list[list[int]], ...] = (
     [],
     [[0, 1, 2, 4, 3]],
     [[1, 2, 3, 4, 0], [2, 3, 4, 0, 1], [3, 4, 0, 1, 2], [4, 0, 1, 2, 3]],

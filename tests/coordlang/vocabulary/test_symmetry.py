@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
-from coordlang.tasks.task_file import ListedTask
+from coordlang.tasks.listed import ListedTask
 from coordlang.vocabulary.symmetry import Symmetry, SymmetryGroup, generated, symmetry_group
 from coordlang.vocabulary.symmetry_check import SymmetryCheck
 from coordlang.vocabulary.symmetry_graph import automorphism_generators

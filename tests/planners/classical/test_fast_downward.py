@@ -222,10 +222,11 @@ def test_an_interrupt_ends_everything(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
     def interrupted(*_: object) -> int:
+        monkeypatch.undo()
         time.sleep(0.2)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(subprocess.Popen, "wait", lambda *_: monkeypatch.undo() or interrupted())
+    monkeypatch.setattr(subprocess.Popen, "wait", interrupted)
     loaded = workshop(GOAL)
     with pytest.raises(KeyboardInterrupt):
         optimal_cost(loaded.model, loaded.tasks[0])

@@ -73,21 +73,21 @@ def test_the_least_model_and_what_lacks_in_it(kind: Kind, monkeypatch: pytest.Mo
     for seed in range(25):
         text = random_model(seed, kind)
         domain, problem = read(text.domain, text.problem)
-        model, *given = checked(domain, problem, monkeypatch)
+        model, domain, objects, init = checked(domain, problem, monkeypatch)
         true, instances = least_model(domain, problem)
         atoms = [(signature, args) for signature, found in model.atoms.items() for args in found]
         assert {Atom(predicate, args) for (predicate, _), args in atoms} == true
         assert model.instances == instances
-        require_closed(model, *given)
+        require_closed(model, domain, objects, init)
         for signature, args in Random(seed).sample(atoms, min(4, len(atoms))):
             less = {**model.atoms, signature: model.atoms[signature] - {args}}
             with pytest.raises(CoordlangError, match="missing"):
-                require_closed(replace(model, atoms=less), *given)
+                require_closed(replace(model, atoms=less), domain, objects, init)
         for name, found in model.instances.items():
             if found:
                 fewer = {**model.instances, name: found - {min(found)}}
                 with pytest.raises(CoordlangError, match="missing"):
-                    require_closed(replace(model, instances=fewer), *given)
+                    require_closed(replace(model, instances=fewer), domain, objects, init)
 
 
 def test_conditions_with_constants_repeated_variables_and_more_types() -> None:

@@ -89,7 +89,7 @@ def brute_force(twin: Twin, goal: Formula, price: Price) -> tuple[int, int, int]
         for state, costs in paths.items():
             for labels, after in twin.successors(state):
                 step = sum(price(label) for label in {label for label in labels if label})
-                into = following.setdefault(after, Counter())  # type: ignore[arg-type]
+                into = following.setdefault(after, Counter())
                 for cost, number in costs.items():
                     into[cost + step] += number
         paths = following
@@ -105,7 +105,7 @@ def test_the_same_cost_and_the_same_number_of_plans(kind: Kind) -> None:
         twin = Twin(loaded.domain, loaded.problems[0], loaded.team, model.keeps_idle, 3000)
         try:
             last = twin.reachable(128)[-1]
-            parts = (
+            parts: tuple[Formula, ...] = (
                 *sorted(last - twin.init, key=str),
                 *(Not(a) for a in sorted(twin.init - last, key=str)),
             )
