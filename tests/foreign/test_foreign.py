@@ -11,7 +11,7 @@ from pathlib import Path
 
 import foreign
 import pytest
-from foreign_rows import BY_NAME, LANGUAGE_BY_NAME, LANGUAGES, ROWS, SHARED, Language, Row
+from foreign_rows import BY_NAME, LANGUAGE_BY_NAME, LANGUAGES, ROWS, SHARED, Language, Row, load
 
 from coordlang.cli import run
 from coordlang.required.miscoordination import Inseparable
@@ -216,5 +216,5 @@ def test_plans_that_no_state_tells_apart(capfd: pytest.CaptureFixture[str]) -> N
     plans = caught.value.witness.plans
     assert caught.value.witness.states[0] == caught.value.witness.states[1]
     assert plans[0] != plans[1]
-    tasks = varied_tasks(foreign.load(row, "makespan"), (), ("(at s1 r2x2)", "(at m1 ?)"))
+    tasks = varied_tasks(load(row, "makespan"), (), ("(at s1 r2x2)", "(at m1 ?)"))
     assert len(tasks) == 6
