@@ -10,6 +10,7 @@ import tempfile
 import zlib
 from contextlib import suppress
 from dataclasses import dataclass
+from inspect import cleandoc
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -104,6 +105,9 @@ class FileFormat(Generic[T]):
     def json_schema(self) -> dict[str, Any]:
         """The JSON Schema (draft 2020-12) of such files."""
         schema: dict[str, Any] = msgspec.json.schema(self.record)
+        for entry in schema["$defs"].values():
+            if "description" in entry:  # a docstring: before Python 3.13 it keeps its indentation
+                entry["description"] = cleandoc(entry["description"])
         record = schema["$defs"][schema["$ref"].rpartition("/")[2]]
         if self.format is not None:
             for key, value in (("format", self.format), ("version", self.version)):
