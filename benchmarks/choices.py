@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Every robot's choices for every sentence of every task of a row: their size and their time.
 
     python benchmarks/choices.py [NAME]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """How many plans fit a sentence: by our graph, by listing all plans, and by other planners.
 
     python benchmarks/export_counts.py [FOLDER ..] [--time-limit SECONDS]

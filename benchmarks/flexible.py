@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Plans that a sentence leaves open, and words saved: rows of Table 1 by method.
 
     python benchmarks/flexible.py [ROW ..] [--time-limit SECONDS]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """PDDL that others wrote (../shared/data): reference numbers, and a language for each domain.
 
     python benchmarks/foreign.py [--time-limit S] [ROW ..]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The reference numbers of the PDDL that others wrote, computed again; see `foreign`."""
 
 from __future__ import annotations

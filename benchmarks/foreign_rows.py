@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The PDDL that others wrote, in ``../shared/data``: reference numbers, and tasks for languages."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Nodes that A* expands with and without a sentence, over all candidate tasks of rows of Table 1.
 
     python benchmarks/guided.py [ROW ..] [--method greedy|minimal] [--heuristic NAME]

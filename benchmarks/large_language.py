@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Time and memory of a language of a million states: made, written, read, and looked up in.
 
     python benchmarks/large_language.py [--states N] [--words N] [--directory DIR]

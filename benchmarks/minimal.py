@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The least numbers of words, with bounds: running example, T-shaped map and rows of Table 1.
 
     python benchmarks/minimal.py [ROW ..] [--time-limit SECONDS] [--methods METHOD,METHOD]

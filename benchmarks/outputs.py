@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What the program prints and writes on the shipped domains, for comparing two versions of it.
 
     python benchmarks/outputs.py FOLDER [--program PATH] [--only PATTERN] [--jobs N]

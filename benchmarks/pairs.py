@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Three robots: one language for all of them, beside one two-robot language for each pair.
 
     python benchmarks/pairs.py [FOLDER/PROBLEM ..]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Features of plans, and whether the sentences of a language determine them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A table that is printed line by line while a benchmark runs."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Commands run as processes of their own, with their seconds and peak memory."""
 
 from __future__ import annotations

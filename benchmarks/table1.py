@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Table 1 of the paper with the greedy method: one table, one process.
 
     python benchmarks/table1.py [ROW ..]

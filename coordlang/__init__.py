@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Coordination languages.
 
 The fewest words that let robots plan on their own and still act together.

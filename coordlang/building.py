@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Candidate tasks -> a verified language: the steps of the mission in their order."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Sphinx: these pages, and a reference made of the docstrings with one page for each room.
 
 ``sphinx-build -W -n -b html docs docs/_build/html`` writes the site, without warnings.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Write the list of rooms and files in docs/extending.md from the opening lines of the modules.
 
 ``python docs/generate_extending.py`` writes the part of the page between the two marks;

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Makes the problems, task files and pictures of the grid domains.
 
 python domains/generate.py all                                    every generated file in domains/,

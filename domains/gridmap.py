@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Maps: cells and which of them are adjacent, made by size or read from a movingai file."""
 
 from __future__ import annotations

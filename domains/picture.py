@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A map with robots as a self-contained SVG picture.
 
 Nothing is told by colour alone: robots and goals carry their names, goals are dashed rings.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Planning for several robots: PDDL -> joint model -> all optimal plans.
 
 Knows nothing of languages.

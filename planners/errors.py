@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The one error tree.  Every error carries the exit code that the command line ends with.
 
 The codes follow Fast Downward's grouping: 1x proved impossible, 2x out of resources, 3x bad input

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Files in and out: written whole or not at all, JSON read against the record of its format."""
 
 from __future__ import annotations

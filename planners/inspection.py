@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What was understood of a domain and problem.
 
 Robots, subactions, constraints, interference, fluents.

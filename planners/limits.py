@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Time and memory limits of a process.
 
 Over the limit, work in progress ends with an error that the caller can catch.

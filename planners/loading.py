@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Domain and problems -> joint model and tasks: the steps of the front end in their order."""
 
 from __future__ import annotations

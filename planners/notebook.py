@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Small HTML tables, by which results show themselves in a notebook."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Tables of numbers: runs of a CSR table, duplicate rows out, rows found.
 
 A table has one row for each item (a state, a node of a walk) and is sorted where it is looked up

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Fixtures of all tests: the command line in this process, and a first language."""
 
 from __future__ import annotations

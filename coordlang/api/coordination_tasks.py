@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Which tasks require coordination: ``coordination``."""
 
 from __future__ import annotations

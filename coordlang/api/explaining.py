@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A language as a person reads it: ``explain``."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A task under a sentence for the programs of others: ``export``."""
 
 from __future__ import annotations

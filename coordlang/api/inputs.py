@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What the functions read: paths, or objects that were parsed before."""
 
 from __future__ import annotations

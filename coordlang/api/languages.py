@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Languages made, checked and read: ``build``, ``verify``, ``load_language``."""
 
 from __future__ import annotations

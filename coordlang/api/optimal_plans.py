@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """All optimal plans of a task as a value: counted, listed lazily, drawn at random."""
 
 from __future__ import annotations

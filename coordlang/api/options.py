@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The options that functions and commands share: their values, and what contradicts what."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Plans of a task, without any words: ``load``, ``inspect``, ``plans``, ``check``."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """How results show themselves: one line at the prompt, a table in a notebook."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What each robot may do under a sentence: ``choices``."""
 
 from __future__ import annotations

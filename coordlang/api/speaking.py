@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A language used in one task: ``say``, ``understand``, ``plan``."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A miscoordination as text and as JSON."""
 
 from __future__ import annotations

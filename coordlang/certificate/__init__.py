@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Why fewer words do not suffice: a certificate that a third party can check."""
 
 from coordlang.certificate.check import Checked, check

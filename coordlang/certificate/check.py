@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The check of a certificate, in code of its own.
 
 Every reason is checked against the model, and the rest is left to a SAT solver.

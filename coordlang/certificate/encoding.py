@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Clauses "one of these pairs of states is separated" -> a plain CNF that any SAT solver reads."""
 
 from __future__ import annotations

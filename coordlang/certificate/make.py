@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Evidence of the search -> a certificate."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The command line: arguments and rendering only.
 
 Data goes to stdout, logs and progress to stderr.  Exit codes are an interface (docs/cli.md).

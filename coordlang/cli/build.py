@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """``coordlang build``: a verified language for candidate tasks."""
 
 from __future__ import annotations

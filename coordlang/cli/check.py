@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """``coordlang check``: our optimal cost against Fast Downward's."""
 
 from __future__ import annotations

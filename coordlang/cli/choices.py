@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """``coordlang choices``: what each robot may do under a sentence, whatever the others choose."""
 
 from __future__ import annotations

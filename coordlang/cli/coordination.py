@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """``coordlang coordination``: which tasks require coordination, and one miscoordination shown."""
 
 from __future__ import annotations

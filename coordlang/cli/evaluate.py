@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """``coordlang evaluate``: the paper's tables and figures, run again."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Exit codes that are no errors of the one error tree (docs/cli.md, exit codes)."""
 
 from __future__ import annotations

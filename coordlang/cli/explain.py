@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """``coordlang explain``: a language as a person reads it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """``coordlang export``: a task under a sentence for the programs of others."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Arguments that name input files, and checks of output files before the work."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The command group, and commands that still read former names of their options."""
 
 from __future__ import annotations

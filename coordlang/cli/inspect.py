@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """``coordlang inspect``: what was understood of a domain and problem."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Which plans a command lists, and in which form."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """``coordlang plan``: one optimal plan under a sentence, or under the best sentence."""
 
 from __future__ import annotations

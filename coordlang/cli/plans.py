@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """``coordlang plans``: all optimal plans of a task."""
 
 from __future__ import annotations

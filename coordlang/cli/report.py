@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """``coordlang report``: a language as a page that opens offline."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """``coordlang say``: plan -> sentence."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """``coordlang schema``: the JSON Schemas of the file formats."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Options that several commands share: how PDDL is understood, and limits."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """``coordlang tasks``: a task file with varied starts and goals, for ``build --tasks FILE``."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What goes to stderr besides errors: progress on a terminal, notes and warnings."""
 
 from __future__ import annotations

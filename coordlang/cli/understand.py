@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """``coordlang understand``: sentence -> the plans that it leaves open."""
 
 from __future__ import annotations

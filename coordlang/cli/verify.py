@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """``coordlang verify``: is it a coordination language?  By definition."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A language as a person reads it, and a planner.
 
 Its words as short formulas over multi-valued variables.

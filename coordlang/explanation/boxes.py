@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Boxes over multi-valued points: the prime implicants of a set of points against another.
 
 A *box* allows a set of values for each variable; as a row of bits it has one column for each value

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Formulas: disjunctions of terms over multi-valued variables."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What one sentence demands of each robot, and which robots decide its changes of word."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """In which form words are described: each by a formula of its own, or one after the other."""
 
 from __future__ import annotations

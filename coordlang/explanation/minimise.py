@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The fewest boxes that hold some points and avoid others.
 
 Two-level minimisation with multi-valued variables.

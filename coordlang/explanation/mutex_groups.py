@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Groups of atoms of which at most one is true in every state (mutex groups).
 
 Groups are looked for among atoms that agree in some arguments, the *key*: ``(at r2 a), (at r2 b),

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Formulas, and what sentences ask, as text; formulas as PDDL conditions; all of it as JSON."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """PDDL fluents -> multi-valued variables.
 
 ``at(r2) = c3`` in the place of one truth value for each atom.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The words of a language as formulas."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Keys that occur twice in one JSON object: most readers keep the last and say nothing."""
 
 from __future__ import annotations

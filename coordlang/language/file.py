@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Language files: JSON in and out (docs/formats.md)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """How much a language leaves open, and how much it need not say.
 
 *Flexibility* of a task: draw one of its N optimal plans uniformly and say its sentence.  With

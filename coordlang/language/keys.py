@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """State keys, many at a time: texts as in a language file <-> rows of bits.
 
 A key is what `planners.joint.states.StateCodec.key` gives: the true atoms, sorted, joined by one

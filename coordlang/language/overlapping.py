@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Overlapping words: a state may have several words, a plan several sentences.
 
 The speaker chooses among them.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Partitions of a joint model's states into words: what builders make and verifiers check."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Where a language comes from: the domain, model, tasks and method that its file records."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a language file holds: its keys and types, and their JSON Schema (docs/formats.md)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a language's provenance implies: model options, checks of the files, candidate tasks."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The sentences of a task: the plans that each leaves open, and what it demands of each robot."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """When two state sequences have one sentence: warping paths, and the shortest of them.
 
 Key fact (Proposition 7 of docs/concepts.md): ``u`` and ``v`` have the same sentence under ``f`` iff

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A coordination language as its file holds it: states and words as text, and where it is from."""
 
 from __future__ import annotations

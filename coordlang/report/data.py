@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a report page needs, as one JSON object.
 
 States, labels and facts are numbers into tables; numbers of plans are strings, since they may be

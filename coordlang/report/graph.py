@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The graph of a task's plans as it is drawn and played: all of it, or a sample if it is large."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Graph layout: points of a graph's nodes, and orders of the nodes of layers with few crossings.
 
 Everything here is deterministic: the same input gives the same coordinates.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Location predicates: which atoms of a domain say where things are, found from what actions do."""
 
 from __future__ import annotations

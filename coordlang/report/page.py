@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A language and tasks -> one HTML file that needs nothing else."""
 
 from __future__ import annotations

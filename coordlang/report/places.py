@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Coordinates of places: from a file, else from their names, else by graph layout."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A miscoordination played to its break and, where the robots can, beyond it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Which tasks a report shows: those of problems, then candidate tasks of the language.
 
 Candidate tasks are drawn at random if they are many.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a report page needs of one task: its plans, its sentences, what goes wrong without them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What of a domain can be drawn: places, the things in them, and what each atom says about them.
 
 It is found from the actions and the static atoms of the model alone, see `find_locations`.

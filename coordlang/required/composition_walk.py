@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Required coordination (RC) by composition walk: polynomial, never by listing plans.
 
 Plans ``pi_1 .. pi_n``, one for each robot, introduce RC iff their *mixture* - robot i does its part

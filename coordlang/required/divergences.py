@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """First differences: where plans that introduce RC part, over all candidate tasks.
 
 The sets ``alpha*`` of the paper's Theorem 3: Proposition 3 of docs/concepts.md.

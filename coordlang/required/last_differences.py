@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Theorem 3 in full: plans that introduce RC are separated where they part or meet again.
 
 They must be separated where they first part or where they last meet.

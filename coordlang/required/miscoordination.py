@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Miscoordination shown: plans whose mixture breaks, the step at which it does, and why."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Candidate tasks: the tasks that a language must serve, and their plan spaces."""
 
 from __future__ import annotations

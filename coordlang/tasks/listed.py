@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Tasks as a file lists them, and the same tasks in a joint model: texts to atoms and back."""
 
 from __future__ import annotations

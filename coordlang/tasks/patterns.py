@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Varied candidate tasks of one problem: other starts and other goals, said by patterns.
 
 A *pattern* is an atom in which ``?`` stands for any one name, as ``(at r1 ?)``.  The *starts* are

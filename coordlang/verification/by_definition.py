@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Verification of a partition by definition, in code of its own.
 
 Shares the joint model and the plan spaces with the builders, nothing else.  Walks n plans of a task

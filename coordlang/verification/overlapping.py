@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Verification of overlapping words by definition, in code of its own.
 
 For every candidate task every optimal plan must have a usable sentence: one whose plans are

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Constraints -> a partition of states into words.  One interface: a `Job` in, an `Outcome` out."""
 
 from collections.abc import Callable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Simulated annealing over partitions, with necessary clauses as constraints.
 
 The energy is the flexibility less the price of violated clauses.  A partition may violate clauses

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Sets of clauses: those that others imply, frequent pairs, the order of states that they give.
 
 A clause says that one of its pairs of states must be separated; with fewer pairs it asks for

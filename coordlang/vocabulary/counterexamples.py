@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Tuples of plans that refute a candidate partition: many at a time, those that differ least first.
 
 The same walk as verification makes, written for the builders: it keeps, for every node, the way to

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A partition that is a language -> overlapping words that leave more plans open.
 
 A state with a further word gives plans through it further sentences, and sentences further plans.

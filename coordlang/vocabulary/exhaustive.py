@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The paper's brute force: all partitions by increasing size, judged by the definition.
 
 For tiny inputs.

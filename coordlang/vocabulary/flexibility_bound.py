@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Boxes: the largest sets of plans that mix freely.
 
 What follows from them for the flexibility of any language.

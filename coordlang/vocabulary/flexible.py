@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Among languages with equally many words, one whose sentences leave many plans open.
 
 Maximises the average of E = sum_s n_s^2 / N over the candidate tasks

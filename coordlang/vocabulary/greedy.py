@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The paper's approximation: fill a word with every state that still fits, then the next word.
 
 Algorithm 1 of the paper; that it gives a language is the alpha part of Theorem 3 (Proposition 4 of

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The interface of the methods: a `Job` in, an `Outcome` out."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Leads: the words by which one plan's sentence is ahead of another's, numbered."""
 
 from __future__ import annotations

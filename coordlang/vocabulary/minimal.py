@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The least number of words, with proof: counterexamples in, SAT out.
 
 Loop for K words: find a partition that satisfies all clauses so far; look for plans of one sentence

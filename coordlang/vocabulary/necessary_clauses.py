@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Clauses that every language satisfies: those of counterexamples, with their images."""
 
 from __future__ import annotations

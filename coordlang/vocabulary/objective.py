@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The flexibility of partitions that differ in few states, measured again and again.
 
 The inner loop of `flexible`.

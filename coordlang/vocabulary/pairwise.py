@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """One two-robot language for each pair of robots: cheaper for n > 2 robots, and not enough.
 
 Two plans introduce RC *for robots i and j* if some mixture of the two, in which i follows one plan,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Numbers of words, decided by SAT one by one: from below, from above, with growing budgets."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Partitions into K words under clauses "one of these pairs must be separated", by SAT."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The least partition that satisfies Theorem 3, with proof, by SAT.
 
 Alpha or beta, or with ``alpha_only`` alpha.  Between `greedy`, which satisfies alpha, and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Separations: which states a partition must tell apart where plans part or meet.
 
 The paper's Theorem 3: Propositions 4 and 5 of docs/concepts.md, Proposition 6 for more than two

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Symmetries of a joint model: permutations of its states that map plans to plans.
 
 They map candidate tasks to candidate tasks, too, and are renamings of the PDDL objects.  Generators

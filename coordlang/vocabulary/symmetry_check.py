@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Whether a renaming of objects maps a joint model and its candidate tasks onto themselves.
 
 Whoever proposes it, a renaming is used only after this check: robots, ground actions with their

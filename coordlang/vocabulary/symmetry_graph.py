@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A joint model as a coloured graph, whose automorphisms are the symmetries that can be expected.
 
 Vertices are the objects, the static facts about them, the fluent facts, the initial states and the

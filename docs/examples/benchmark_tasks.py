@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A benchmark over tasks: words, bounds and seconds of several methods on several domains.
 
 Run it as a script in the root of the repository, or cell by cell (``# %%``).

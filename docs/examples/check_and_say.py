@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Checking a plan and saying it: a plan of another planner, its sentence, what that leaves open.
 
 Run it as a script in the root of the repository, or cell by cell (``# %%``).

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A first language: is coordination required, the smallest language, and what its words mean.
 
 Run it as a script in the root of the repository, or cell by cell (``# %%``).

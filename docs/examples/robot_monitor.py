@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A robot with a monitor: it follows its choices under a sentence and changes its mind on the way.
 
 Run it as a script in the root of the repository, or cell by cell (``# %%``).

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Two robots modelled in unified-planning: their plans, a language, planning under a sentence.
 
 Run it as a script, or cell by cell (``# %%``) in an editor or as a notebook.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What formulas mean, read literally: where they hold, why not, and what they require.
 
 Formulas are never rewritten; they are read in negation normal form by carrying their polarity

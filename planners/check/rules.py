@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The rules of joint steps, read literally.
 
 One state and one step at a time, over states that are plain sets of atoms.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Independent plan checker: whether a sequence of joint steps is a plan.
 
 Reads `planners.check.rules`, the rules of joint steps read literally, and nothing of grounding,

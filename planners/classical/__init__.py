@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A joint model and one task as a plain ground planning task, for the planners of others.
 
 Two forms.  *Explicit*: one plain action per joint action.  *Select-then-apply*, of linear size: the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The joint model as both plain forms read it: who chooses what, at what cost, and what clashes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The explicit form: one plain action per joint action."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The optimal cost of a task by Fast Downward: the independent cross-check.
 
 unified-planning runs in a child process of its own group and in a directory of its own, so that

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The child process in which Fast Downward solves one classical task.
 
 ``python -m planners.classical.fast_downward_worker TASK RESULT`` reads the task (JSON, see

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A plain task as PDDL text."""
 
 from __future__ import annotations

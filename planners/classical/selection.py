@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The select-then-apply form, of linear size: choose one after another, check, then apply."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The plain task: what every planner reads."""
 
 from __future__ import annotations

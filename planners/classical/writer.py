@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What both plain forms write: facts, actions, initial state and goal."""
 
 from __future__ import annotations

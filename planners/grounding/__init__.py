@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Lifted actions -> ground actions.
 
 Tarski finds the reachable arguments, we evaluate the rest exactly.

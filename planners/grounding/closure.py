@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Check that a relaxed model is closed: that no rule derives an atom which it lacks.
 
 The check shares no code with Tarski and clingo, which find the model.  A set of atoms that holds

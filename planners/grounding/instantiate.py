@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Ground actions: arguments put in, statics evaluated, the rest in negation normal form.
 
 Static atoms, equalities and types are evaluated.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Concurrency networks as formulas about the joint step.
 
 The formulas stand in the preconditions of the ground actions that they bind.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The arguments with which each action can ever be applied.
 
 They are found by Tarski's reachability program (clingo).

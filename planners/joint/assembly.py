@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Ground actions of a team -> the joint model: its facts, labels, rules of idling, and stepper."""
 
 from __future__ import annotations

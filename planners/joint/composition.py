@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Joint steps composed from the robots' own subactions."""
 
 from __future__ import annotations

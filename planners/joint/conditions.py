@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Ground formulas evaluated on many (state, joint step) pairs at once."""
 
 from __future__ import annotations

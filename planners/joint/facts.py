@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The fluent atoms of a joint model, numbered: the table that turns atoms into text and back."""
 
 from __future__ import annotations

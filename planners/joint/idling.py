@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Which robots may idle without an action of their own: those with no do-nothing schema as good."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Which subactions of different robots may share a joint step."""
 
 from __future__ import annotations

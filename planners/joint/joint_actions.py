@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Joint steps of joint-action PDDL: every ground action is already a whole joint action."""
 
 from __future__ import annotations

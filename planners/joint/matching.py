@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Which operators are applicable in which states.
 
 A discrimination tree over required facts, for whole layers of states at a time.

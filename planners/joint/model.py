@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Robots' subactions -> the joint model: states, joint actions, their results.
 
 A joint step gives every robot one label: 0 is idling, ``k`` the robot's k-th subaction.  The

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Ground actions as tables: which are applicable in which states, and what they add and delete."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Joint states as rows of bits: encoding, keys, and what is true in them."""
 
 from __future__ import annotations

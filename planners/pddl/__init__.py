@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """PDDL text -> lifted domain and problem, with positions in every error message."""
 
 from planners.pddl.domain import parse_domain, read_domain

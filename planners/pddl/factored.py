@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Factored MA-PDDL: one domain and one problem file per robot -> one domain and one problem.
 
 A robot's files hold what it knows: public objects, its own private ones, and the actions that it

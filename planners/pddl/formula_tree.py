@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Formulas taken apart and put together: one fold, their literals, their text.
 
 `planners.check` has its own, because it checks what is built on this.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """S-expressions -> formulas and effects."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The nouns of lifted PDDL: formulas, effects, action schemas, domains, problems.
 
 All names are in lower case.  Formulas keep the user's structure; nothing is normalised here.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Typed lists and the names that a text may use, with helpful errors for the ones it may not."""
 
 from __future__ import annotations

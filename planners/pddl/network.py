@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Concurrency networks (Crosby, Jonsson, Rovatsos 2014).
 
 Constraints on how many do an action together.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Who acts: the robots of a problem and the owners of an action."""
 
 from __future__ import annotations

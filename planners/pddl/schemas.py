@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """An ``(:action ..)`` section -> `Schema`: plain PDDL, MA-PDDL and joint-action PDDL."""
 
 from __future__ import annotations

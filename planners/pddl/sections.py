@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The sections of a PDDL file, by keyword."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Text -> s-expressions that know where they stand, and the comments between them.
 
 The reader is iterative, so deep nesting costs an error message and not the stack.

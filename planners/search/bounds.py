@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Admissible heuristics: lower bounds on the joint steps from a state to a goal, for A*.
 
 Every one is consistent, is 0 exactly in goal states and counts joint steps only (the second cost

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Tables of node tuples: duplicates out, members found; the inner loop of composition walks."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """All optimal plans of tasks: search forward, then back along optimal edges.
 
 The set ``Pi(I, G)`` of the paper, as the paths of a graph (Proposition 1 of docs/concepts.md).

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Plan files: IPC text and JSON, written and read (docs/formats.md)."""
 
 from __future__ import annotations

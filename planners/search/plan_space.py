@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The optimal plans of tasks as paths of one layered graph, and what can be asked of it.
 
 Costs are lexicographic, makespan first: with ``d(s)`` the cost from ``s`` to the goal, the optimal

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Optimal plans counted, iterated, ranked and sampled, without listing them."""
 
 from __future__ import annotations

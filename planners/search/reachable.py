@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The reachable joint states as numpy arrays."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Limits and interrupts: the best language so far is kept, with what is proved of it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Options that contradict each other are refused where they are put together, for whoever calls."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The examples of docs/concepts.md that it gives in words, as models, and its table of names."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The example scripts run, cell by cell, and use nothing below ``coordlang``."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """docs/pddl.md: its table of what is not supported, and that each rule is shown by an example that
 is run.
 """

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The reader of docs/formats.md, without coordlang, says the same sentences as the package."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """docs/cli.md against click's own lists, links against files, the list of files against the
 packages.
 """

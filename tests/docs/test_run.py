@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The pages are run: Python blocks in one namespace, console blocks with their output compared."""
 
 from __future__ import annotations

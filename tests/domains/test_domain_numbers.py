@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What the shipped domains contain: the paper's numbers, the numbers in the README files, and both
 styles equal.
 """

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The generator: what is shipped is what it writes, and the command."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Maps by size and from movingai files."""
 
 from __future__ import annotations

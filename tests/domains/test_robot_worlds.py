@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The worlds that are no maps: their rules hold in every step, and what their README files say is
 true.
 """

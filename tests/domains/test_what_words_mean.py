@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What the READMEs say in words of a smallest language is true.
 
 Some describe the words: then that partition is a language, and none has fewer words.  Some say what

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """PDDL that others wrote, read where it lies, against independent reference numbers (its README has
 the table).
 """

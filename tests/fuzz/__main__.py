@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Broken and odd PDDL against the command line; a table of exit codes and every failure.
 
     python -m tests.fuzz [--number N] [--seed S] [--start K] [--keep FOLDER]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Mutants are run and judged: no traceback, no hang, a documented exit code, a useful message."""
 
 from __future__ import annotations

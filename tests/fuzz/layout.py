@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Ways to break the file itself: cut off, damaged, in another encoding, without anything."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Mutant K of a seed: a broken pair of files, the same whatever else is run."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Ways to break names: odd ones, equal ones, other case, variables that hide each other."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Ways to break sections: too many, empty, twice, of another language; numbers and comments."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The pieces of a PDDL text, however broken: tokens, groups, literals, sections, names."""
 
 from __future__ import annotations

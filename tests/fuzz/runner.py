@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Commands are run in a worker process, now and then in one of their own, under limits."""
 
 from __future__ import annotations

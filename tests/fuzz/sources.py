@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The files to break: pairs of a domain and a problem that are read without an error."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Ways to break the structure: tokens, groups and literals that are missing, doubled or moved."""
 
 from __future__ import annotations

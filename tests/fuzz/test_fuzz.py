@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Broken PDDL never ends in a traceback, a hang or a message without a place."""
 
 from __future__ import annotations

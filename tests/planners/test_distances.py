@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Distances to goals against breadth-first search written down from the definition."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """`coordlang inspect`: whatever was misread has to show there."""
 
 from __future__ import annotations

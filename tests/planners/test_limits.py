@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A limit ends the work with an error that says how far it got, in numbers, and what else may help."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Candidate tasks that are small enough to list every plan of them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Small models by hand for the plain forms of a joint model."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Blocks of a page are run, and their output is compared with what the page shows."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The shipped domains: each problem is loaded, explored and solved once in a process."""
 
 from __future__ import annotations

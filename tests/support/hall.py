@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Two robots that trade the two rooms of a hall, in one file or factored."""
 
 from __future__ import annotations

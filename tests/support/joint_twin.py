@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The joint model and plan search of a text against brute force."""
 
 from __future__ import annotations

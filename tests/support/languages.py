@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Languages written down by hand or drawn at random: partitions, no coordination languages."""
 
 from __future__ import annotations

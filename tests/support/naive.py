@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The paper's definitions, read literally: plans are listed and every mixture is made.  Tiny inputs
 only.
 """

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Choices by definition: plans are listed, projected and mixed; what a robot knows is read off all
 mixtures.
 """

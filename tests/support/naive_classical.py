@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """All optimal plans of a plain task by brute force."""
 
 from __future__ import annotations

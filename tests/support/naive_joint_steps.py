@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Naive twin of the joint model: joint steps, reachable states and optimal plans by brute force.
 
 Every robot tries every type-correct argument tuple of every schema; what is a joint step is asked

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Sentences by definition: every plan is listed, and its words are looked up in the language's own
 list of states.
 """

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Markdown pages as data: code blocks, headings, tables, links."""
 
 from __future__ import annotations

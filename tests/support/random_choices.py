@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Random tasks under a language, and what a naive twin lists of each of their sentences."""
 
 from __future__ import annotations

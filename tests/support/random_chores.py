@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Random models in which several robots have something to choose: which chores, and in which order;
 tools are few.
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Small random models as PDDL text: unstructured enough to meet what grids never show.
 
 Joint-action PDDL over a few facts, every joint action with random literals: joint actions with the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Small random domains and problems as PDDL text, for comparing the fast model with its naive twin.
 
 Every seed gives one model with two or three robots and at most `_FLUENTS` ground fluents, hence at

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Tables in the README files of the domains."""
 
 from __future__ import annotations

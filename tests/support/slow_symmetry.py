@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Symmetries by search over renamings of objects: the slow twin of the automorphisms of a graph.
 
 Backtracking over the objects, each among those of its types, with the static facts as soon as they

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Languages in tasks: of shipped worlds, built or the paper's own, and of random models."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """How much shorter a sentence is than the plan that it describes."""
 
 from __future__ import annotations

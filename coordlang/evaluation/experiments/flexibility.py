@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """How many plans a sentence leaves open."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A coordination game: the speaker proposes plans, or sentences, until the listener accepts.
 
 The listener likes ``k`` of the task's optimal plans, drawn at random.  It accepts a plan that it

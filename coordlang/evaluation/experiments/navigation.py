@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Robust navigation: a human stands in the way, detected only once execution has started.
 
 Robots deliver in a warehouse (`coordlang.evaluation.material.warehouse`).  For both tasks of a

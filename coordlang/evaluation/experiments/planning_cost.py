@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a sentence saves the listener: nodes that A* expands with and without it."""
 
 from __future__ import annotations

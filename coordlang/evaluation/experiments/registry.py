@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """All experiments, by the name that ``coordlang evaluate`` takes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The motivating scenario: a place of interest appears, and one robot makes a detour.
 
 On the map `corridor` two robots exchange rooms through a corridor with one passing place.  They

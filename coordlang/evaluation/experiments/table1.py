@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Table 1 of the paper: how many words the candidate tasks of a map need, by every method."""
 
 from __future__ import annotations

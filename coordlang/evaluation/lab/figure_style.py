@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """One style for all figures: colour-blind safe, rendered without a display, reproducible bytes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Hashes of what a result depends on: code, input files, parameters, versions."""
 
 from __future__ import annotations

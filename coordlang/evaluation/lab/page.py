@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The page of an evaluation: every experiment's results, and what differs from the paper."""
 
 from __future__ import annotations

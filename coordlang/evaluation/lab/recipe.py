@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """An experiment as a recipe: its work units, what each does, and how the results are rendered."""
 
 from __future__ import annotations

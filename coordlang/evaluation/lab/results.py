@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Results on disk: one JSON line for each work unit, appended as soon as it is done."""
 
 from __future__ import annotations

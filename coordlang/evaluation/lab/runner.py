@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Runs work units in processes of their own, stores each result at once, and skips known ones."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Means, shares and their confidence intervals."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The paper's exhaustive method, as far as it goes: it mixes all pairs of optimal plans."""
 
 from __future__ import annotations

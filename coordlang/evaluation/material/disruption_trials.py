@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Trials: robots commit to tasks, a disruption occurs, and the plan or the sentence succeeds."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Disruptions: subactions become impossible after the robots have committed.
 
 A robot that has committed to a plan succeeds if its part needs none of the forbidden subactions.

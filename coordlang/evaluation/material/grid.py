@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The shipped grid maps: cells named by row and column, robots in cells."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Drawings of robots' paths on a grid map."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The languages that experiments use, built once and stored."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What the experiments that compare methods on one row of Table 1 share: units and records."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The values that the paper reports (Yu Zhang, arXiv 1905.00517v3)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The sentences of every candidate task: their lengths, and how many plans each leaves open."""
 
 from __future__ import annotations

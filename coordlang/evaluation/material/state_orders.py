@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The greedy method with its states in other orders: its results depend on the order."""
 
 from __future__ import annotations

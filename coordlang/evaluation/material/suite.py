@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What the experiments run on: the shipped domains, with the candidate tasks of each."""
 
 from __future__ import annotations

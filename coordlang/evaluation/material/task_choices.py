@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Plans, sentences and choices of the tasks of one plan space, computed once and kept."""
 
 from __future__ import annotations

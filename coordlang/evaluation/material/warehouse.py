@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Deliveries in a warehouse: which tasks they are, and where a human may stand.
 
 The warehouse is a map with storage in the corners S1, S2 at its left end and dispatch in D1, D2 at

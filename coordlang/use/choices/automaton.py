@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A robot's subplans as the smallest deterministic automaton over its own subactions.
 
 The robot's subplans are what the plans of a plan space are when only its own subactions are seen.

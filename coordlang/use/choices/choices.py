@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A robot's choices: exactly the subplans that it may follow under a sentence.
 
 Whatever the others choose from theirs.

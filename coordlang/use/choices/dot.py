@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Robots' choices drawn in Graphviz' language.
 
 One cluster for each automaton, one rank for each step.

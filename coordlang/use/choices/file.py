@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Choices files: robots' choices as JSON (docs/formats.md)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Every combination of the robots' choices, walked.
 
 Are they all optimal, and in which states can they be?

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A robot's choices at run time.
 
 What may it do next, and are the detours that it wants still possible?

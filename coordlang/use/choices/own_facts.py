@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The facts that a robot's own subactions alone change.
 
 The robot knows their values without regard to what the others do.

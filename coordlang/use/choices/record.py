@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a choices file holds: its keys and types (docs/formats.md).
 
 A monitor reads such files without this module, because a robot may have Python's standard library

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A sentence as a formula of linear temporal logic over finite traces.
 
 LTLf: De Giacomo and Vardi, *Linear temporal logic and linear dynamic logic on finite traces* (IJCAI

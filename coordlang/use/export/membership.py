@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Which word a state belongs to, as a few tests on facts."""
 
 from __future__ import annotations

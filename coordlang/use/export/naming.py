@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Facts and actions that let a plain task follow a sentence.
 
 The plain task of `planners.classical` gets one more fact per word of the sentence, and after each

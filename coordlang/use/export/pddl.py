@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A task under a sentence as plain PDDL, so that any planner can take part.
 
 The plain task of `planners.classical` gets facts and actions that follow the sentence

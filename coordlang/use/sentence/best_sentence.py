@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The best sentence for a task, by preferences in order of weight."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The plans that a sentence leaves open, drawn: what is written and coloured, and Graphviz text."""
 
 from __future__ import annotations

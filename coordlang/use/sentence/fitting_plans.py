@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The optimal plans that a sentence leaves open, as a plan space of their own."""
 
 from __future__ import annotations

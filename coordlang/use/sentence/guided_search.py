@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """One optimal plan under a sentence, by A* on the joint model (the paper's guided search)."""
 
 from __future__ import annotations

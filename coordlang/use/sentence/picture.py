@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The plans that a sentence leaves open as an SVG picture that needs nothing else to be read.
 
 Layers go from left to right: joint states in boxes with a band in the colour of their word, and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The plans that a sentence leaves open as a layered graph that can be drawn."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Plan -> sentence; and what is wrong with a plan that has none."""
 
 from __future__ import annotations

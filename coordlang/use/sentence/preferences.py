@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What the sentence for a task should be like: preferences by which the best one is chosen."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A language and one task in which it is used."""
 
 from __future__ import annotations

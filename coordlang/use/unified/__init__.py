@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """coordlang in unified-planning: an engine that plans for several robots, and under a sentence."""
 
 from __future__ import annotations

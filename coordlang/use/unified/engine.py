@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The engine: unified-planning's oneshot planner, anytime planner and plan validator.
 
 This module imports unified-planning; `coordlang.use.unified.register` makes the factory import it.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """PDDL names for the names of a unified-planning problem, which may be anything."""
 
 from __future__ import annotations

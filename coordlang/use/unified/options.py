@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The parameters of the engine, checked before anything is solved."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Joint plans as unified-planning's plans, and back.
 
 A joint plan is a sequence of steps in each of which several robots act.  A *partial-order plan*

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A unified-planning problem as PDDL, with the way back.
 
 The text is written here, not by unified-planning's own writers: those for several agents write one

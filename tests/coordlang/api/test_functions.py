@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The public functions answer as the commands do, from files and from parsed objects."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What ``import coordlang`` gives, what it costs, and what hides it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Certificates of lower bounds: what is written holds, and what was tampered with does not."""
 
 from __future__ import annotations

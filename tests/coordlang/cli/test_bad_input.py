@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Bad input is normal input: the documented exit code, the place, and what to do about it."""
 
 from __future__ import annotations

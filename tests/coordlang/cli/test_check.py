@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """``coordlang check``: agreement, disagreement and proof of unsolvability, each with its exit code."""
 
 from __future__ import annotations

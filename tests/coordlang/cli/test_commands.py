@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Each command does its work, on stdout, in the documented form."""
 
 from __future__ import annotations

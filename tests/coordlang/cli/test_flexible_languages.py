@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """``build --prefer flexible`` and ``--overlap``: what is printed, written, and verified again."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Output files: refused before the work where they cannot be written, overwrite an input file or
 each other.
 """

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Former names of options still work, the same, with one note on stderr."""
 
 from __future__ import annotations

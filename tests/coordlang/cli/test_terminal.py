@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Progress is shown on a terminal only, on stderr, and leaves nothing behind."""
 
 from __future__ import annotations

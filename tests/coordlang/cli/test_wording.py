@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What people read: singular and plural, sentences that would say nothing, states in which nothing
 is true.
 """

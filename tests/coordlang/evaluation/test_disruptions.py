@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Success rates under disruptions: against listed plans, robot by robot."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The coordination game: closed forms against all games played out."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Sentences, savings and open plans: by hand on three cells, and against listed plans."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """docs/evaluation.md is what the results beside it say."""
 
 from __future__ import annotations

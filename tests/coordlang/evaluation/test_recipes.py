@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The recipes that search and draw: small runs of each, looked at."""
 
 from __future__ import annotations

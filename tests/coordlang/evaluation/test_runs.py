@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Runs: killed ones go on, processes do not matter, limits are kept, results say what they were
 made with.
 """

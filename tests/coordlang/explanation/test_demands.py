@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a sentence asks, against a list of its plans."""
 
 from __future__ import annotations

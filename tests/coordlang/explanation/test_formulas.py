@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Formulas against their definition: state by state, and the fewest boxes by trying all of them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Keys in bulk against `StateCodec`, one key at a time."""
 
 from __future__ import annotations

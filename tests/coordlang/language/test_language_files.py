@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A language file is believed only as far as it can be checked."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The JSON Schema of language files: the packaged copy, what is written, what is not allowed, and
 what is written by hand.
 """

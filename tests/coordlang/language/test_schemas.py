@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The JSON Schemas of all file formats: shipped as printed, and what is written fits them."""
 
 from __future__ import annotations

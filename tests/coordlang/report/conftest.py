@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Pages of shipped domains, each built once, and a real Chromium to open them in."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The page in a real Chromium, opened from a file: what it shows is what the planner says."""
 
 from __future__ import annotations

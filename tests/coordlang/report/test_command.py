@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """``coordlang report`` at the terminal."""
 
 from __future__ import annotations

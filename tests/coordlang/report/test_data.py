@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The page's data against plans that are listed one by one."""
 
 from __future__ import annotations

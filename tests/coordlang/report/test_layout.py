@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Coordinates: from names, from files, by graph layout; nodes of layers in an order with few
 crossings.
 """

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What is found to draw in the shipped domains: places, links, things, and what each atom says."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Varied tasks: the pairs that the patterns describe, and no others."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The least automaton of any layered graph, however nondeterministic: far more so than robots'
 plans are.
 """

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A robot's choices against the definition: every combination is optimal, and no subplan is left
 out.
 """

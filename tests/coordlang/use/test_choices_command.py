@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """``coordlang choices`` at the terminal: tables, JSON, pictures, detours, and what it says when
 something is wrong.
 """

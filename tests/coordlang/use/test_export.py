@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What is exported against the definition: the plans that fit, listed; the formula, evaluated on
 plans.
 """

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A* under a sentence: optimal, with the sentence, and valid by the independent checker."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The run-time monitor: its answers against the definition, over all own subplans and all mixtures;
 its files.
 """

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The plans that a sentence leaves open, counted, listed and drawn, against the list of all plans."""
 
 from __future__ import annotations

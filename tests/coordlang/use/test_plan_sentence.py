@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Plan -> sentence against the definition, and what is wrong with plans that have none."""
 
 from __future__ import annotations

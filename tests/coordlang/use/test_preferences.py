@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The best sentence by wishes, against all sentences with all their plans."""
 
 from __future__ import annotations

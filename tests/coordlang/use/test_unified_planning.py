@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The engine inside unified-planning: its plans against ours and against unified-planning's own
 simulator and validator.
 """

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Fast algorithms against their naive twins on random models with two and three robots."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Overlapping words against their definition: all readings of all plans, all mixtures."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What every way to a language must do, whatever it is: a new one in `METHODS` is tested here
 without being named.
 """

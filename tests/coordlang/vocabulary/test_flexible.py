@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Flexibility by its definition, and languages of minimal size that have more of it."""
 
 from __future__ import annotations

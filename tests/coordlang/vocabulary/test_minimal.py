@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The exact method: known minima, agreement with brute force, and what it rests on."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """One language for each pair of robots: by definition, as small as it can be, and not enough."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Theorem 3 against its definition: plans listed, all failing tuples separated, all partitions
 tried.
 """

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Symmetries: the group that the slow twin finds, checked on the model, and bounded."""
 
 from __future__ import annotations

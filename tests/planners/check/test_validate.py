@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The rules of joint steps (docs/pddl.md), each by hand-worked plans that keep it and that break
 it.
 """

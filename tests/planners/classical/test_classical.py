@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Both plain forms of a joint model have the optimal cost of the joint model."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The optimal plans of both plain forms stand one to one for the optimal joint plans."""
 
 from __future__ import annotations

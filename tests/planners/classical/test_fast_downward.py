@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Fast Downward, through unified-planning, finds the same optimal costs, and leaves nothing behind."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What clingo finds is the least relaxed model, and the closure check sees every atom that lacks."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Quantifiers that look up static facts give the formulas that trying every object gives, in the
 same order.
 """

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Concurrency networks: each kind of constraint by hand, and random networks against the naive
 twin.
 """

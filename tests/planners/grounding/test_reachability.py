@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Grounding by clingo, within this process: limits, signals and what clingo says reach the user as from anywhere."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The fast joint model and plan search against brute force, on small random models of every kind."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """One fold over formulas, and what is made with it, against the definitions on random formulas."""
 
 from __future__ import annotations

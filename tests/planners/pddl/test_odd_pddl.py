@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Odd but legal PDDL is read as meant: the number of optimal plans was worked out by hand for each
 case.
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Heuristics against the true distances: admissible, consistent, zero exactly at the goals."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """``--cost makespan+cost`` against brute force: least makespan, then least PDDL action cost, on
 random models.
 """

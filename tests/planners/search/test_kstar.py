@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """All optimal plans counted by K*, an independent planner, from the plain PDDL of the joint model.
 
 In the explicit form one plain action is one joint action, so the counts must be equal.  K* comes

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The project's own data: what it depends on, its licence, the versions of Python it is tested on."""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from tests.support.pages import ROOT
+
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+#: Distributions whose package has another name.
+PACKAGES = {
+    "python-sat": "pysat",
+    "unified-planning": "unified_planning",
+    "up-fast-downward": None,  # an engine that unified-planning finds by itself
+}
+OWN = {"coordlang", "planners"}
+PYTHON_FILES = sorted(
+    path
+    for folder in ("planners", "coordlang", "tests", "benchmarks", "domains", "docs")
+    for path in (ROOT / folder).rglob("*.py")
+    if "_build" not in path.parts
+)
+
+
+def imported(path: Path) -> set[str]:
+    """The packages that a file imports, anywhere in it."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name.partition(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module is not None:
+            found.add(node.module.partition(".")[0])
+    return found
+
+
+def test_dependencies_are_those_that_are_imported() -> None:
+    used = {
+        name
+        for path in PYTHON_FILES
+        if path.relative_to(ROOT).parts[0] in OWN
+        for name in imported(path)
+    }
+    listed = [re.match(r"[\w-]+", line)[0] for line in PROJECT["dependencies"]]
+    assert listed == sorted(listed)
+    declared = {PACKAGES.get(name, name) for name in listed} - {None}
+    assert declared == used - OWN - set(sys.stdlib_module_names)
+
+
+def test_tested_versions_of_python_are_supported() -> None:
+    least = PROJECT["requires-python"].removeprefix(">=")
+    tested = re.findall(r"Python :: (3\.\d+)", "\n".join(PROJECT["classifiers"]))
+    assert tested[0] == least
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert all(version in readme for version in tested)
+    assert f"{sys.version_info.major}.{sys.version_info.minor}" in tested
+
+
+@pytest.mark.parametrize("path", PYTHON_FILES, ids=lambda p: p.relative_to(ROOT).as_posix())
+def test_every_file_names_its_licence(path: Path) -> None:
+    with path.open(encoding="utf-8") as file:
+        assert file.readline() == "# SPDX-License-Identifier: GPL-3.0-or-later\n"
