@@ -11,14 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.pages import ROOT
+from tests.support.domains import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-#: Distributions whose package has another name.
-PACKAGES = {
-    "python-sat": "pysat",
-    "unified-planning": "unified_planning",
-    "up-fast-downward": None,  # an engine that unified-planning finds by itself
+#: Distributions whose packages have other names.
+PACKAGES: dict[str, set[str]] = {
+    "python-sat": {"pysat", "pysolvers"},
+    "unified-planning": {"unified_planning"},
+    "up-fast-downward": set(),  # an engine that unified-planning finds by itself
 }
 OWN = {"coordlang", "planners"}
 PYTHON_FILES = sorted(
@@ -47,9 +47,9 @@ def test_dependencies_are_those_that_are_imported() -> None:
         if path.relative_to(ROOT).parts[0] in OWN
         for name in imported(path)
     }
-    listed = [re.match(r"[\w-]+", line)[0] for line in PROJECT["dependencies"]]
+    listed = [re.split(r"[^\w-]", line)[0] for line in PROJECT["dependencies"]]
     assert listed == sorted(listed)
-    declared = {PACKAGES.get(name, name) for name in listed} - {None}
+    declared = {package for name in listed for package in PACKAGES.get(name, {name})}
     assert declared == used - OWN - set(sys.stdlib_module_names)
 
 
