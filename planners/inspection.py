@@ -159,7 +159,7 @@ def _formulas(model: JointModel) -> tuple[str, ...]:
         for kind, others in (("speaks of", touched.partners), ("forbids", touched.excluded)):
             if others and (key := f"{action.schema} {kind}") not in found:
                 found[key] = (
-                    f"{action.label} {kind} {_some(others & there) or _nobody(others)} in the "
+                    f"{action.label} {kind} {_some(others & there) or _impossible(others)} in the "
                     "same step"
                 )
     return tuple(found.values())
@@ -170,8 +170,8 @@ def _some(atoms: frozenset[StepAtom]) -> str:
     return ", ".join(names[:2]) + (f" and {len(names) - 2:,} more" if len(names) > 2 else "")
 
 
-def _nobody(atoms: frozenset[StepAtom]) -> str:
-    """What a formula speaks of in vain: often a mistake in the domain."""
+def _impossible(atoms: frozenset[StepAtom]) -> str:
+    """Subactions that a formula names and that no robot has: often a mistake in the domain."""
     return f"{_some(atoms)}, which nobody can ever do,"
 
 

@@ -180,7 +180,7 @@ class Meaning:
             case Atom():
                 return f"{text_of(_ground(formula, binding))} is {'false' if positive else 'true'}"
             case StepAtom() if positive:
-                return f"nobody does {text_of(_ground(formula, binding))} in the same step"
+                return f"no robot does {text_of(_ground(formula, binding))} in the same step"
             case StepAtom():
                 return f"{text_of(_ground(formula, binding))} is done in the same step"
             case Equal(left, right):

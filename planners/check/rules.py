@@ -170,7 +170,7 @@ class Rules:
                     return f"{robots[robot]} has to choose an action of its own"
                 continue
             if robot not in action.owners:
-                whose = " and ".join(robots[i] for i in action.owners) or "nobody"
+                whose = " and ".join(robots[i] for i in action.owners) or "no robot"
                 return f"{robots[robot]} cannot do {action.text}: it belongs to {whose}"
             for other in action.owners:
                 partner = chosen[other]

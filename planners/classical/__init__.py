@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A joint model and one task as a plain ground planning task, for the planners of others.
+"""A joint model and one task as a classical ground planning task, for the planners of others.
 
-Two forms.  *Explicit*: one plain action per joint action.  *Select-then-apply*, of linear size: the
-robots choose one after another, what they chose is checked, and only then the effects happen, one
-robot after another; all choices and checks see the state before the step, and only the first choice
-of a step pays for it.
+Two forms.  *Explicit*: one classical action per joint action.  *Select-then-apply*, of linear
+size: the robots select their subactions one after another, the selection is checked, and only then
+the effects happen, one robot after another.  Selections and checks see the state before the step,
+and only the first selection of a step pays for it.
 
 In both forms the optimal plans stand one to one for the optimal joint plans (sequences of the
 robots' labels): cases and formulas are decided in one order, so that nothing can be done in two
@@ -19,10 +19,10 @@ from __future__ import annotations
 
 from contextlib import suppress
 
-from planners.classical.choosers import Choosers, choosers_of
 from planners.classical.explicit import TooManyError, explicit
 from planners.classical.pddl import action_names, to_pddl
 from planners.classical.selection import select_then_apply
+from planners.classical.selectors import Selectors, selectors_of
 from planners.classical.task import LONGEST, ClassicalAction, ClassicalTask, Condition, Form
 from planners.classical.writer import Writer, state_literals
 from planners.joint.model import Goal, JointModel, PlanningTask, show
@@ -42,19 +42,19 @@ __all__ = [
 def compile_classical(
     model: JointModel, task: PlanningTask, limit: int = 2000, longest: int = LONGEST
 ) -> ClassicalTask:
-    """The plain form of a task.
+    """The classical form of a task.
 
-    Explicit with at most ``limit`` plain actions, else select-then-apply.
+    Explicit with at most ``limit`` classical actions, else select-then-apply.
 
     Parameters
     ----------
     limit
-        0 asks for select-then-apply.  Joint-action PDDL, whose ground actions are plain actions
+        0 asks for select-then-apply.  Joint-action PDDL, whose ground actions are classical actions
         already, may exceed it.
     longest
         The makespan, in joint steps, up to which `ClassicalTask.cost` has to be sure.
     """
-    team = choosers_of(model)
+    team = selectors_of(model)
     step_cost = team.highest_cost * longest + 1
     out, form = _written(team, model, task.goal, step_cost, limit)
     true_at_first = set(model.codec.true_facts(task.init))
@@ -72,7 +72,7 @@ def compile_classical(
 
 
 def _written(
-    team: Choosers, model: JointModel, goal: Goal, step_cost: int, limit: int
+    team: Selectors, model: JointModel, goal: Goal, step_cost: int, limit: int
 ) -> tuple[Writer, Form]:
     if model.is_joint_action and limit:
         limit = max(limit, 4 * len(model.actions))

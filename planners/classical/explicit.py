@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The explicit form: one plain action per joint action."""
+"""The explicit form: one classical action per joint action."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
-from planners.classical.choosers import Choosers
+from planners.classical.selectors import Selectors
 from planners.classical.task import Known
 from planners.classical.writer import (
     Writer,
@@ -24,7 +24,7 @@ class TooManyError(Exception):
     """The explicit form is larger than its limit."""
 
 
-def explicit(team: Choosers, model: JointModel, goal: Goal, step_cost: int, limit: int) -> Writer:
+def explicit(team: Selectors, model: JointModel, goal: Goal, step_cost: int, limit: int) -> Writer:
     """One classical action per joint action.
 
     One per case where it has disjunctions or conditional effects.
@@ -49,7 +49,7 @@ def explicit(team: Choosers, model: JointModel, goal: Goal, step_cost: int, limi
     return out
 
 
-def _joint_steps(team: Choosers, limit: int) -> Iterator[tuple[int, ...]]:
+def _joint_steps(team: Selectors, limit: int) -> list[tuple[int, ...]]:
     """The sets of actions that may share a step as far as owners and interference say.
 
     `TooManyError` beyond a limit.
@@ -62,30 +62,34 @@ def _joint_steps(team: Choosers, limit: int) -> Iterator[tuple[int, ...]]:
             bound = any(robot in team.owners[n] for n in step)
             if bound or idle:
                 grown.append(step)
-            for n in () if bound else first:
-                taken = any(set(team.owners[n]) & set(team.owners[m]) for m in step)
-                if not taken and team.clashes[n].isdisjoint(step):
-                    grown.append((*step, n))
+            if not bound:
+                grown += [(*step, n) for n in first if _may_join(team, n, step)]
             if len(grown) > limit:
                 raise TooManyError
         partial = grown
-    yield from partial
+    return partial
 
 
-def _name(team: Choosers, step: Sequence[int]) -> str:
+def _may_join(team: Selectors, number: int, step: Sequence[int]) -> bool:
+    """Whether the owners of an action are free in a step, and nothing in it clashes."""
+    taken = {owner for n in step for owner in team.owners[n]}
+    return taken.isdisjoint(team.owners[number]) and team.clashes[number].isdisjoint(step)
+
+
+def _name(team: Selectors, step: Sequence[int]) -> str:
     """Ground actions by their label tuple.
 
     Ground actions of joint-action PDDL that do the same with the same labels are one.
     """
     chosen = {robot: team.actions[n].label for n in step for robot in team.owners[n]}
     parts = next((team.actions[n].parts for n in step), ()) or [
-        chosen.get(r) for r in range(len(team.choosers))
+        chosen.get(r) for r in range(len(team.names))
     ]
     return " ".join(part or "idle" for part in parts)
 
 
 def _cases_of(
-    team: Choosers, model: JointModel, step: Sequence[int]
+    team: Selectors, model: JointModel, step: Sequence[int]
 ) -> Iterator[tuple[Known, set[Atom], set[Atom]]]:
     """The disjoint cases in which a joint action is applicable, as (known, adds, deletes)."""
     chosen = {StepAtom(team.actions[n].schema, team.actions[n].args) for n in step}
@@ -94,22 +98,17 @@ def _cases_of(
     def value(leaf: GroundLeaf) -> Formula:
         return Truth(leaf in chosen) if isinstance(leaf, StepAtom) else on_state(leaf)
 
-    effects = [
-        effect for n in step for effect in team.actions[n].effects if on_state(effect.atom) != FALSE
-    ]
-    conditions = [substituted(effect.condition, value) for effect in effects]
+    covered_by = [other for n in step for other in team.covered_by[n]]
     wanted = [substituted(team.actions[n].precondition, value) for n in step]
-    wanted += [
-        negated(substituted(team.actions[other].precondition, value))
+    wanted += [negated(substituted(team.actions[n].precondition, value)) for n in covered_by]
+    effects = [
+        (substituted(effect.condition, value), effect)
         for n in step
-        for other in team.covered_by[n]
+        for effect in team.actions[n].effects
+        if on_state(effect.atom) != FALSE
     ]
-    for known in _split({}, wanted, conditions):
-        fired = [
-            e
-            for e, c in zip(effects, conditions, strict=True)
-            if substituted(c, _lookup(known)) == TRUE
-        ]
+    for known in _split({}, wanted, [condition for condition, _ in effects]):
+        fired = [e for condition, e in effects if substituted(condition, _lookup(known)) == TRUE]
         adds = {e.atom for e in fired if e.adds}
         yield known, adds, {e.atom for e in fired if not e.adds} - adds
 

@@ -53,8 +53,8 @@ class FastDownwardAnswer:
 
     Its optimal cost (makespan, second component), None if it is unsolvable.
 
-    ``actions`` is the number of plain actions that it got, in the form ``form``; ``seconds`` are
-    wall time.
+    ``actions`` is the number of classical actions that it got, in the form ``form``; ``seconds``
+    are wall time.
     """
 
     cost: tuple[int, int] | None
@@ -91,49 +91,49 @@ def optimal_cost(
     start = time.monotonic()
     longest = LONGEST
     while True:
-        plain = compile_classical(model, task, limit, longest)
+        classical = compile_classical(model, task, limit, longest)
         left = None if time_limit is None else time_limit - (time.monotonic() - start)
-        total = _solve(plain, left, time_limit, memory_limit)
-        cost = None if total is None else plain.cost(total)
+        total = _solve(classical, left, time_limit, memory_limit)
+        cost = None if total is None else classical.cost(total)
         if total is None or cost is not None:
             return FastDownwardAnswer(
-                cost, plain.form, len(plain.actions), time.monotonic() - start
+                cost, classical.form, len(classical.actions), time.monotonic() - start
             )
         # No optimal plan has more steps than this one seems to have, so the second round is the
         # last.
-        longest = total // plain.step_cost
+        longest = total // classical.step_cost
 
 
 def total_cost(
-    plain: ClassicalTask, *, time_limit: float | None = None, memory_limit: int | None = None
+    classical: ClassicalTask, *, time_limit: float | None = None, memory_limit: int | None = None
 ) -> int | None:
-    """The total cost of an optimal plan of a plain task by Fast Downward, None if there is none.
+    """The total cost of an optimal plan by Fast Downward, None if there is no plan.
 
     See `optimal_cost`.
     """
-    return _solve(plain, time_limit, time_limit, memory_limit)
+    return _solve(classical, time_limit, time_limit, memory_limit)
 
 
-def as_json(plain: ClassicalTask, memory_limit: int | None) -> str:
+def as_json(classical: ClassicalTask, memory_limit: int | None) -> str:
     """The task as `planners.classical.fast_downward_worker` reads it; names stay here."""
     return json.dumps(
         {
-            "facts": len(plain.facts),
-            "init": sorted(plain.init),
-            "actions": [(a.preconditions, a.adds, a.deletes, a.cost) for a in plain.actions],
-            "goal": plain.goal,
+            "facts": len(classical.facts),
+            "init": sorted(classical.init),
+            "actions": [(a.preconditions, a.adds, a.deletes, a.cost) for a in classical.actions],
+            "goal": classical.goal,
             "memory_limit": memory_limit,
         }
     )
 
 
 def _solve(
-    plain: ClassicalTask, left: float | None, time_limit: float | None, memory_limit: int | None
+    classical: ClassicalTask, left: float | None, time_limit: float | None, memory_limit: int | None
 ) -> int | None:
-    """The cost of an optimal plan of a plain task, None if there is no plan."""
+    """The cost of an optimal plan of a classical task, None if there is no plan."""
     with tempfile.TemporaryDirectory(prefix="coordlang-") as name:
         directory = Path(name)
-        (directory / "task.json").write_text(as_json(plain, memory_limit))
+        (directory / "task.json").write_text(as_json(classical, memory_limit))
         try:
             code = _run(directory, left)
         except subprocess.TimeoutExpired:
@@ -151,7 +151,7 @@ def _solve(
     match answer["status"]:
         case "solved":
             total = int(answer["total"])
-            if total + plain.step_cost > _GREATEST:
+            if total + classical.step_cost > _GREATEST:
                 raise FastDownwardFailed(
                     f"a cost of {total} is too large for Fast Downward's 32-bit integers",
                     remedy="Check with --cost makespan.",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A plain task as PDDL text."""
+"""A classical task as PDDL text."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from collections.abc import Iterable, Sequence
 from planners.classical.task import ClassicalTask, Condition
 
 
-def to_pddl(plain: ClassicalTask) -> tuple[str, str]:
-    """Domain and problem text of a plain task: STRIPS with negative preconditions and action costs.
+def to_pddl(classical: ClassicalTask) -> tuple[str, str]:
+    """Domain and problem text: STRIPS with negative preconditions and action costs.
 
     Facts become predicates without arguments; a comment keeps what each predicate and action stands
     for.
     """
-    facts = _safe_names(plain.facts)
-    actions = action_names(plain)
+    facts = _safe_names(classical.facts)
+    actions = action_names(classical)
     domain = [
-        f"; {plain.name}: {plain.form} form; one joint step costs {plain.step_cost}",
+        f"; {classical.name}: {classical.form} form; one joint step costs {classical.step_cost}",
         "(define (domain plain)",
         "  (:requirements :strips :negative-preconditions :action-costs)",
         "  (:predicates",
-        *(f"    ({safe}) ; {text}" for safe, text in zip(facts, plain.facts, strict=True)),
+        *(f"    ({safe}) ; {text}" for safe, text in zip(facts, classical.facts, strict=True)),
         "  )",
         "  (:functions (total-cost) - number)",
     ]
-    for safe, action in zip(actions, plain.actions, strict=True):
+    for safe, action in zip(actions, classical.actions, strict=True):
         changes = [f"({facts[n]})" for n in action.adds] + [
             f"(not ({facts[n]}))" for n in action.deletes
         ]
@@ -43,17 +43,17 @@ def to_pddl(plain: ClassicalTask) -> tuple[str, str]:
         "  (:domain plain)",
         "  (:init",
         "    (= (total-cost) 0)",
-        *(f"    ({facts[n]})" for n in sorted(plain.init)),
+        *(f"    ({facts[n]})" for n in sorted(classical.init)),
         "  )",
-        f"  (:goal {_all_of(facts, plain.goal)})",
+        f"  (:goal {_all_of(facts, classical.goal)})",
         "  (:metric minimize (total-cost)))",
     ]
     return "\n".join((*domain, ")", "")), "\n".join((*problem, ""))
 
 
-def action_names(plain: ClassicalTask) -> list[str]:
-    """The names of the actions in `to_pddl`, in the order of ``plain.actions``."""
-    return _safe_names(action.name for action in plain.actions)
+def action_names(classical: ClassicalTask) -> list[str]:
+    """The names of the actions in `to_pddl`, in the order of ``classical.actions``."""
+    return _safe_names(action.name for action in classical.actions)
 
 
 def _all_of(names: Sequence[str], conditions: Iterable[Condition]) -> str:

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The select-then-apply form, of linear size: choose one after another, check, then apply."""
+"""The select-then-apply form, of linear size: select one after another, check, then apply."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
-from planners.classical.choosers import Choosers
+from planners.classical.selectors import Selectors
+from planners.classical.staged import StagedAction, selected
 from planners.classical.writer import (
     Writer,
     fact_atoms,
@@ -15,243 +16,229 @@ from planners.classical.writer import (
     state_reader,
 )
 from planners.joint.model import Goal, JointModel
-from planners.pddl.formula_tree import GroundLeaf, conjuncts, joined, negated, substituted
-from planners.pddl.lifted import FALSE, TRUE, And, Atom, Formula, Not, Or, StepAtom
+from planners.pddl.formula_tree import GroundLeaf
+from planners.pddl.lifted import FALSE, TRUE, Atom, Formula, StepAtom
+
+_IDLE = "idle"
+#: What a stage leads from and to: facts that say which stage it is.
+_Phases = tuple[Atom, Atom]
 
 
-def select_then_apply(team: Choosers, model: JointModel, goal: Goal, step_cost: int) -> Writer:
-    """Stages of a step: all choose; all check; all undo (rarely); all apply.
+def select_then_apply(team: Selectors, model: JointModel, goal: Goal, step_cost: int) -> Writer:
+    """Stages of a step: all select; all check; all undo (rarely); all apply.
 
     Robots without work skip a stage.
     """
-    out = Writer(fact_atoms(model))
-    value = _of_choices(team, model)
-    choices = [_Choice(team, n, value) for n in range(len(team.actions))]
-    robots = range(len(team.choosers))
-    stages = [
-        *(("choose", i) for i in robots),
-        *(("check", i) for i in robots if any(c.robot == i and c.has_checks for c in choices)),
-        *(("undo", i) for i in robots if any(c.robot == i and c.early for c in choices)),
-        *(("apply", i) for i in robots),
-    ]
-    names = [own_fact(f"time to {stage}", team.choosers[i]) for stage, i in stages]
-    stage = {s: (names[k], names[(k + 1) % len(names)]) for k, s in enumerate(stages)}
-    kinds = [[kind for kind in ("check", "undo") if (kind, i) in stage] for i in robots]
-    for robot in robots:
-        if team.may_idle[robot]:
-            _choose(out, team, None, robot, stage["choose", robot], step_cost, kinds[robot])
-        for kind in kinds[robot]:
-            _pass(out, f"nothing to {kind}", *stage[kind, robot], _simple(team, robot, kind))
-        for choice in choices:
-            if robot in team.owners[choice.number]:
-                _choose(out, team, choice, robot, stage["choose", robot], step_cost, kinds[robot])
-                _carry_out(out, team, choice, robot, stage)
-        idle = _chosen(team, robot, "idle")
-        here, after = stage["apply", robot]
-        if team.may_idle[robot]:
-            _pass(out, f"apply {team.choosers[robot]} idle", here, after, idle)
-    _set_goal(out, goal_formula(model, goal), names[0])
-    return out
+    value = _of_selections(team, model)
+    actions = [StagedAction(team, number, value) for number in range(len(team.actions))]
+    stages = _Stages(team, actions)
+    form = _SelectThenApply(Writer(fact_atoms(model)), team, actions, stages, step_cost)
+    for robot in range(len(team.names)):
+        form.write_robot(robot)
+    form.write_goal(goal_formula(model, goal))
+    return form.out
 
 
-def _carry_out(
-    out: Writer,
-    team: Choosers,
-    choice: _Choice,
-    robot: int,
-    stage: Mapping[tuple[str, int], tuple[Atom, Atom]],
-) -> None:
-    """Check, undo and apply of a chosen subaction; of a shared one the first owner does all."""
-    here, after = stage["apply", robot]
-    if robot != choice.robot:
-        mark = _chosen(team, robot, choice.label)
-        _pass(out, f"apply {team.choosers[robot]} {choice.label}", here, after, mark)
-        return
-    if choice.has_checks:
-        _check(out, choice, *stage["check", robot])
-    if choice.early:
-        _perform(out, choice, *stage["undo", robot], early=True)
-    _perform(out, choice, here, after, early=False)
+def _of_selections(team: Selectors, model: JointModel) -> Callable[[GroundLeaf], Formula]:
+    """The meaning of leaves on the classical facts.
 
-
-class _Choice:
-    """A subaction of its first owner.
-
-    What is read when it is chosen, checked afterwards, and done at last.
-
-    ``literals`` is None if they contradict each other.  ``groups`` are its conditional effects by
-    condition.  ``early`` are the atoms that it may both delete and conditionally add: their deletes
-    come before all adds of the step.
-    """
-
-    def __init__(self, team: Choosers, number: int, value: Callable[[GroundLeaf], Formula]) -> None:
-        action = team.actions[number]
-        self.number, self.label, self.robot = number, action.label, team.owners[number][0]
-        self.chosen = _chosen(team, self.robot, self.label)
-        now: list[Formula] = []
-        later: list[Formula] = []
-        for part in conjuncts(action.precondition):
-            if isinstance(part, Not) and isinstance(part.part, StepAtom):
-                continue  # among the clashes
-            (later if isinstance(part, And | Or | StepAtom) else now).append(
-                substituted(part, value)
-            )
-        later += [
-            negated(substituted(team.actions[other].precondition, value))
-            for other in team.covered_by[number]
-        ]
-        found = known_literals(joined(And, now))
-        self.literals = None if found is None else found[0]
-        self.checks = joined(And, later)
-        by_condition: dict[Formula, tuple[set[Atom], set[Atom]]] = {TRUE: (set(), set())}
-        for effect in action.effects:
-            if value(effect.atom) != FALSE:
-                sets = by_condition.setdefault(substituted(effect.condition, value), (set(), set()))
-                sets[0 if effect.adds else 1].add(effect.atom)
-        by_condition.pop(FALSE, None)
-        self.adds, self.deletes = by_condition.pop(TRUE)
-        self.groups = list(by_condition.items())
-        maybe = {atom for _, (adds, _) in self.groups for atom in adds} - self.adds
-        self.early = maybe & self.deletes.union(*(deletes for _, (_, deletes) in self.groups))
-
-    @property
-    def has_checks(self) -> bool:
-        return self.checks != TRUE or bool(self.groups)
-
-    def fires(self, group: int) -> Atom:
-        return own_fact("condition holds", *self.chosen.args, str(group))
-
-
-def _of_choices(team: Choosers, model: JointModel) -> Callable[[GroundLeaf], Formula]:
-    """The meaning of leaves on the plain facts.
-
-    That a subaction is done means that its first owner has chosen it.
+    That a subaction is done means that its first owner has selected it.
     """
     on_state = state_reader(model)
     who = {
-        StepAtom(action.schema, action.args): _chosen(team, owners[0], action.label)
+        StepAtom(action.schema, action.args): selected(team, owners[0], action.label)
         for action, owners in zip(team.actions, team.owners, strict=True)
     }
     return lambda leaf: who.get(leaf, FALSE) if isinstance(leaf, StepAtom) else on_state(leaf)
 
 
-def _chosen(team: Choosers, robot: int, label: str) -> Atom:
-    return own_fact("has chosen", team.choosers[robot], label)
+class _Stages:
+    """The stages of a step in their order, and the facts that say which one it is."""
+
+    def __init__(self, team: Selectors, actions: Sequence[StagedAction]) -> None:
+        robots = range(len(team.names))
+        order = [("choose", robot) for robot in robots]
+        for stage in ("check", "undo"):
+            busy = {action.robot for action in actions if action.has(stage)}
+            order += [(stage, robot) for robot in robots if robot in busy]
+        order += [("apply", robot) for robot in robots]
+        facts = [own_fact(f"time to {stage}", team.names[robot]) for stage, robot in order]
+        self.first = facts[0]
+        self._phases = dict(
+            zip(order, zip(facts, (*facts[1:], facts[0]), strict=True), strict=True)
+        )
+
+    def of(self, stage: str, robot: int) -> _Phases:
+        """The fact that this stage comes now, and that the next one does."""
+        return self._phases[stage, robot]
+
+    def between(self, robot: int) -> list[str]:
+        """The stages between selecting and applying that the robot takes part in."""
+        return [stage for stage in ("check", "undo") if (stage, robot) in self._phases]
 
 
-def _simple(team: Choosers, robot: int, kind: str) -> Atom:
-    return own_fact(f"nothing to {kind}", team.choosers[robot])
+class _SelectThenApply:
+    """Writes the actions of the form, robot by robot."""
 
+    def __init__(
+        self,
+        out: Writer,
+        team: Selectors,
+        actions: Sequence[StagedAction],
+        stages: _Stages,
+        step_cost: int,
+    ) -> None:
+        self.out = out
+        self._team = team
+        self._actions = actions
+        self._stages = stages
+        self._step_cost = step_cost
 
-def _choose(
-    out: Writer,
-    team: Choosers,
-    choice: _Choice | None,
-    robot: int,
-    stage: tuple[Atom, Atom],
-    step_cost: int,
-    kinds: Sequence[str],
-) -> None:
-    """One robot's choosing of a subaction, or of idling.
+    def write_robot(self, robot: int) -> None:
+        """Everything that one robot does in a step."""
+        name = self._team.names[robot]
+        if self._team.may_idle[robot]:
+            self._select_idling(robot)
+        for stage in self._stages.between(robot):
+            nothing = self._nothing_to(stage, robot)
+            self._pass(f"nothing to {stage}", self._stages.of(stage, robot), nothing)
+        for action in self._actions:
+            if robot == action.robot:
+                self._select(action)
+                self._carry_out(action)
+            elif robot in self._team.owners[action.number]:
+                self._join(robot, action)
+                mark = selected(self._team, robot, action.label)
+                self._pass(f"apply {name} {action.label}", self._stages.of("apply", robot), mark)
+        if self._team.may_idle[robot]:
+            mark = selected(self._team, robot, _IDLE)
+            self._pass(f"apply {name} {_IDLE}", self._stages.of("apply", robot), mark)
 
-    An earlier robot's choice may forbid it.
-    """
-    here, after = stage
-    label = choice.label if choice else "idle"
-    known = {here: True}
-    adds, deletes = {after, _chosen(team, robot, label)}, {here}
-    first = choice.robot if choice else robot
-    cost = step_cost if robot == 0 else 0
-    if choice and robot == first:
-        if choice.literals is None:
+    def write_goal(self, formula: Formula) -> None:
+        """The goal counts between two steps."""
+        here = self._stages.first
+        self.out.init = {self.out.fact(here)}
+        found = known_literals(formula)
+        if found and not found[1]:
+            self.out.goal = self.out.conditions({here: True, **found[0]})
             return
-        known |= choice.literals
-        cost += team.seconds[choice.number]
-        for other in team.clashes[choice.number]:
-            if (earlier := team.owners[other][0]) < robot:
-                known[_chosen(team, earlier, team.actions[other].label)] = False
-        adds |= {_calls(team, robot, k) for k in team.owners[choice.number] if k != robot}
-    for caller in _callers(team, robot):
-        known[_calls(team, caller, robot)] = caller == first
-    if choice and robot != first:
-        known[choice.chosen] = True
-        deletes.add(_calls(team, first, robot))
-    for kind in kinds:
-        if (
-            not choice
-            or robot != first
-            or not (choice.has_checks if kind == "check" else choice.early)
-        ):
-            adds.add(_simple(team, robot, kind))
-    out.action(f"choose {team.choosers[robot]} {label}", known, adds, deletes, cost)
+        done = own_fact("goal reached")
+        self.out.goal = self.out.conditions({done: True})
+        self.out.route("reach the goal", formula, here, done, {})
 
+    # -- select
 
-def _calls(team: Choosers, caller: int, robot: int) -> Atom:
-    """The caller has chosen a subaction that this robot has to choose too."""
-    return own_fact("waits for", team.choosers[caller], team.choosers[robot])
+    def _select(self, action: StagedAction) -> None:
+        """The first owner selects an action; what earlier robots have selected may forbid it."""
+        if action.literals is None:
+            return
+        team, robot = self._team, action.robot
+        known = dict(action.literals)
+        for other in team.clashes[action.number]:
+            earlier = team.owners[other][0]
+            if earlier < robot:
+                known[selected(team, earlier, team.actions[other].label)] = False
+        adds = {self._waits(robot, k) for k in team.owners[action.number] if k != robot}
+        idle = [stage for stage in self._stages.between(robot) if not action.has(stage)]
+        cost = team.seconds[action.number]
+        self._write_selection(robot, action.label, robot, known, adds, set(), idle, cost)
 
+    def _join(self, robot: int, action: StagedAction) -> None:
+        """Another owner selects an action that its first owner has selected."""
+        known, deletes = {action.selected: True}, {self._waits(action.robot, robot)}
+        idle = self._stages.between(robot)
+        self._write_selection(robot, action.label, action.robot, known, set(), deletes, idle, 0)
 
-def _callers(team: Choosers, robot: int) -> list[int]:
-    return sorted({owners[0] for owners in team.owners if robot in owners and owners[0] != robot})
+    def _select_idling(self, robot: int) -> None:
+        idle = self._stages.between(robot)
+        self._write_selection(robot, _IDLE, robot, {}, set(), set(), idle, 0)
 
+    def _write_selection(
+        self,
+        robot: int,
+        label: str,
+        first: int,
+        known: dict[Atom, bool],
+        adds: set[Atom],
+        deletes: set[Atom],
+        idle: Sequence[str],
+        cost: int,
+    ) -> None:
+        """One robot's selection; only the one of robot 0 pays for the step.
 
-def _check(out: Writer, choice: _Choice, here: Atom, after: Atom) -> None:
-    """Meet the formulas of a chosen subaction and note which of its conditional effects fire."""
-    name, known = f"check {choice.label}", {choice.chosen: True}
-    if choice.checks != TRUE:
-        end = out.place() if choice.groups else after
-        out.route(name, choice.checks, here, end, known)
-        here = end
-    for k, (condition, _) in enumerate(choice.groups):
-        end = after if k + 1 == len(choice.groups) else out.place()
-        out.route(
-            f"{name} fires {k} or not",
-            condition,
-            here,
-            end,
-            known,
-            (choice.fires(k),),
-            otherwise=end,
-        )
-        here = end
+        ``first`` is the first owner of what is selected: robots that wait for another selection of
+        this one forbid it.  ``idle`` are the stages in which the robot then has nothing to do.
+        """
+        here, after = self._stages.of("choose", robot)
+        for caller in self._callers(robot):
+            known[self._waits(caller, robot)] = caller == first
+        known[here] = True
+        adds = adds | {after, selected(self._team, robot, label)}
+        adds |= {self._nothing_to(stage, robot) for stage in idle}
+        if robot == 0:
+            cost += self._step_cost
+        name = f"choose {self._team.names[robot]} {label}"
+        self.out.action(name, known, adds, deletes | {here}, cost)
 
+    def _waits(self, caller: int, robot: int) -> Atom:
+        """The caller has selected an action that this robot has to select too."""
+        return own_fact("waits for", self._team.names[caller], self._team.names[robot])
 
-def _perform(out: Writer, choice: _Choice, here: Atom, after: Atom, *, early: bool) -> None:
-    """The effects of a chosen subaction: only the early deletes, or all the rest."""
+    def _callers(self, robot: int) -> list[int]:
+        owners = [own for own in self._team.owners if robot in own]
+        return sorted({own[0] for own in owners if own[0] != robot})
 
-    def part(adds: set[Atom], deletes: set[Atom]) -> tuple[set[Atom], set[Atom]]:
-        if early:
-            return set(), deletes & choice.early
-        return set(adds), deletes - choice.early - choice.adds
+    def _nothing_to(self, stage: str, robot: int) -> Atom:
+        return own_fact(f"nothing to {stage}", self._team.names[robot])
 
-    name = f"{'undo' if early else 'apply'} {choice.label}"
-    adds, deletes = part(choice.adds, choice.deletes)
-    end = out.place() if choice.groups else after
-    done = set() if early else {choice.chosen}
-    out.action(name, {here: True, choice.chosen: True}, adds | {end}, deletes | done | {here})
-    for k, (_, effects) in enumerate(choice.groups):
-        here, end = end, after if k + 1 == len(choice.groups) else out.place()
-        adds, deletes = part(*effects)
-        fires = choice.fires(k)
-        done = set() if early else {fires}
-        out.action(
-            f"{name} fired {k}", {here: True, fires: True}, adds | {end}, deletes | done | {here}
-        )
-        out.action(f"{name} not fired {k}", {here: True, fires: False}, {end}, {here})
+    def _pass(self, name: str, phases: _Phases, mark: Atom) -> None:
+        """Leave a stage in which a robot has nothing to do."""
+        here, after = phases
+        self.out.action(name, {here: True, mark: True}, {after}, {here, mark})
 
+    # -- check, undo, apply
 
-def _pass(out: Writer, name: str, here: Atom, after: Atom, mark: Atom) -> None:
-    """Leave a stage in which a robot has nothing to do."""
-    out.action(name, {here: True, mark: True}, {after}, {here, mark})
+    def _carry_out(self, action: StagedAction) -> None:
+        """Check, undo and apply a selected action; of a shared one the first owner does all."""
+        if action.has_checks:
+            self._check(action, *self._stages.of("check", action.robot))
+        if action.early:
+            self._perform(action, *self._stages.of("undo", action.robot), early=True)
+        self._perform(action, *self._stages.of("apply", action.robot), early=False)
 
+    def _check(self, action: StagedAction, here: Atom, after: Atom) -> None:
+        """Meet the formulas of an action and note which of its conditional effects fire."""
+        name, known = f"check {action.label}", {action.selected: True}
+        if action.checks != TRUE:
+            end = self.out.phase() if action.groups else after
+            self.out.route(name, action.checks, here, end, known)
+            here = end
+        for k, (condition, _) in enumerate(action.groups):
+            end = after if k + 1 == len(action.groups) else self.out.phase()
+            gain = (action.fires(k),)
+            group = f"{name} fires {k} or not"
+            self.out.route(group, condition, here, end, known, gain, otherwise=end)
+            here = end
 
-def _set_goal(out: Writer, formula: Formula, here: Atom) -> None:
-    """The goal counts between two steps (``here``)."""
-    out.init = {out.fact(here)}
-    found = known_literals(formula)
-    if found and not found[1]:
-        out.goal = out.conditions({here: True, **found[0]})
-        return
-    done = own_fact("goal reached")
-    out.goal = out.conditions({done: True})
-    out.route("reach the goal", formula, here, done, {})
+    def _perform(self, action: StagedAction, here: Atom, after: Atom, *, early: bool) -> None:
+        """The effects of a selected action: only the early deletes, or all the rest."""
+
+        def part(adds: set[Atom], deletes: set[Atom]) -> tuple[set[Atom], set[Atom]]:
+            if early:
+                return set(), deletes & action.early
+            return set(adds), deletes - action.early - action.adds
+
+        name = f"{'undo' if early else 'apply'} {action.label}"
+        adds, deletes = part(action.adds, action.deletes)
+        end = self.out.phase() if action.groups else after
+        done = set() if early else {action.selected}
+        known = {here: True, action.selected: True}
+        self.out.action(name, known, adds | {end}, deletes | done | {here})
+        for k, (_, effects) in enumerate(action.groups):
+            here, end = end, after if k + 1 == len(action.groups) else self.out.phase()
+            adds, deletes = part(*effects)
+            fires = action.fires(k)
+            done = set() if early else {fires}
+            known = {here: True, fires: True}
+            self.out.action(f"{name} fired {k}", known, adds | {end}, deletes | done | {here})
+            self.out.action(f"{name} not fired {k}", {here: True, fires: False}, {end}, {here})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The plain task: what every planner reads."""
+"""The classical task: what every planner reads."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Literal
 from planners.pddl.lifted import Atom
 
 Form = Literal["explicit", "select-then-apply"]
-#: A condition on a plain state: the number of a fact, and whether it is to be true.
+#: A condition on a classical state: the number of a fact, and whether it is to be true.
 Condition = tuple[int, bool]
 Known = Mapping[Atom, bool]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What both plain forms write: facts, actions, initial state and goal."""
+"""What both classical forms write: facts, actions, initial state and goal."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Writer:
         self.init: set[int] = set()
         self.goal: tuple[Condition, ...] = ()
         self._seen: set[ClassicalAction] = set()
-        self._places = 0
+        self._phases = 0
 
     def fact(self, atom: Atom) -> int:
         """The number of a fact; a new fact gets the next one."""
@@ -43,10 +43,10 @@ class Writer:
             self._seen.add(new)
             self.actions.append(new)
 
-    def place(self) -> Atom:
+    def phase(self) -> Atom:
         """A new fact that says where between two joint states the computation is."""
-        self._places += 1
-        return own_fact("at place", str(self._places))
+        self._phases += 1
+        return own_fact("at place", str(self._phases))
 
     def route(
         self,
@@ -74,7 +74,7 @@ class Writer:
             for left, part in zip(
                 range(len(formula.parts) - 1, -1, -1), formula.parts, strict=True
             ):
-                after = self.place() if left else None
+                after = self.phase() if left else None
                 if isinstance(formula, And):
                     self.route(
                         name, part, here, after or end, known, () if left else gain, otherwise
@@ -99,12 +99,12 @@ class Writer:
         literals, forks = found
         here = start
         if literals or not forks:
-            here = self.place() if forks else end
+            here = self.phase() if forks else end
             self.action(
                 name, {**known, **literals, start: True}, (here, *(() if forks else gain)), (start,)
             )
         for left, fork in zip(range(len(forks) - 1, -1, -1), forks, strict=True):
-            after = self.place() if left else end
+            after = self.phase() if left else end
             self.route(name, fork, here, after, known, () if left else gain)
             here = after
 

@@ -149,8 +149,8 @@ class _Grounder:
     def action(self, schema: Schema, args: tuple[str, ...], costs: bool) -> GroundAction | None:
         """The instance, or None if its precondition is false in every state."""
         binding = {p.name: a for p, a in zip(schema.parameters, args, strict=True)}
-        everybody = tuple(range(len(self._team.robots)))
-        owners = everybody if schema.parts else self._team.owners(schema, args)
+        everyone = tuple(range(len(self._team.robots)))
+        owners = everyone if schema.parts else self._team.owners(schema, args)
         precondition = self.formula(schema.precondition, binding, True, acting=owners)
         if precondition == FALSE:
             return None
@@ -159,7 +159,7 @@ class _Grounder:
                 f"action {label(schema.name, args)} names no robot "
                 f"(robots: {', '.join(self._team.robots)})",
                 position=self._domain.source.position(schema.offset),
-                remedy="Say --unowned environment (one extra chooser owns such actions) "
+                remedy="Say --unowned environment (one extra robot owns such actions) "
                 "or --unowned shared (all robots choose them together).",
             )
         effects = tuple(e for effect in schema.effects for e in self._effect(effect, binding))

@@ -102,7 +102,7 @@ def _bounds(names: Names, item: Group) -> tuple[int, int | None]:
     most = _number(names, high)
     if most < low or most == 0:
         raise names.document.fail(
-            f"nobody can meet the bounds ({low} {most})",
+            f"no robots can meet the bounds ({low} {most})",
             item,
             "HIGH is at least 1 and at least LOW; inf is no upper bound.",
         )

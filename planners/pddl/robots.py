@@ -13,7 +13,7 @@ from planners.pddl.lifted import And, Atom, Domain, Problem, Schema
 
 Unowned = Literal["error", "environment", "shared"]
 
-#: The name of the extra chooser that owns the actions of nobody under ``--unowned environment``.
+#: The name of the extra robot that owns actions without a robot, under ``--unowned environment``.
 ENVIRONMENT = "environment"
 
 
@@ -41,7 +41,7 @@ class RobotSelection:
 
 @dataclass(frozen=True, slots=True)
 class Team:
-    """The choosers of a joint step, in natural order of their names.
+    """Who acts in a joint step, in natural order of the names.
 
     ``by`` says how they were found, for `coordlang inspect`.  With ``--unowned environment`` the
     last one is the environment.
@@ -55,7 +55,7 @@ class Team:
         """The indices of the robots that must choose this subaction together (usually one).
 
         The ``:agent`` if the schema has one, else the robots among its arguments, else whoever
-        ``unowned`` names; empty if nobody.
+        ``unowned`` names; empty if there is none.
         """
         if schema.agent is not None:
             agent = args[schema.agent]

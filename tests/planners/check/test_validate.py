@@ -215,8 +215,8 @@ def test_a_positive_formula_demands_a_partner() -> None:
         LIFT.format(predicates=""), "(:objects r1 r2 - robot t u - table) (:init) (:goal (up t))"
     )
     assert one_step(setting, "(lift r1 t)", "(lift r2 t)") is None
-    assert "nobody does (lift r2 t)" in str(one_step(setting, "(lift r1 t)", None))
-    assert "nobody does (lift r2 t)" in str(one_step(setting, "(lift r1 t)", "(lift r2 u)"))
+    assert "no robot does (lift r2 t)" in str(one_step(setting, "(lift r1 t)", None))
+    assert "no robot does (lift r2 t)" in str(one_step(setting, "(lift r1 t)", "(lift r2 u)"))
 
 
 def test_a_positive_formula_may_be_met_by_the_acting_robot_itself() -> None:
@@ -240,7 +240,7 @@ def test_polarity_is_read_through_double_negation_and_implication() -> None:
         "(:objects r1 r2 - robot) (:init) (:goal (done r1))",
     )
     assert one_step(setting, "(nod r1)", None) is None
-    assert "nobody does (nod r1)" in str(one_step(setting, "(bow r1)", "(nod r2)"))
+    assert "no robot does (nod r1)" in str(one_step(setting, "(bow r1)", "(nod r2)"))
 
 
 def test_a_predicate_wins_over_an_action_of_the_same_name() -> None:
@@ -295,7 +295,7 @@ RING = "(:action ring :parameters () :effect (rung))"
 
 def test_actions_of_nobody() -> None:
     mine = world(CARRY.format(more=RING), CARRIERS)
-    assert "belongs to nobody" in str(one_step(mine, "(ring)", None, None))
+    assert "belongs to no robot" in str(one_step(mine, "(ring)", None, None))
     environment = world(CARRY.format(more=RING), CARRIERS, "environment")
     assert environment[2].robots == ("r1", "r2", "r3", "environment")
     assert one_step(environment, None, None, None, "(ring)") is None

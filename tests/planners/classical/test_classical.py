@@ -155,7 +155,7 @@ def test_without_its_conflicts_a_model_is_cheaper(
 ) -> None:
     loaded = read(TOOL, TOOL_TASK)
     monkeypatch.setattr(
-        plain_module.choosers, "clashes", lambda actions: (frozenset(),) * len(actions)
+        plain_module.selectors, "clashes", lambda actions: (frozenset(),) * len(actions)
     )
     assert solved(compile_classical(loaded.model, loaded.tasks[0], FORMS[form])) == (1, 0)
 

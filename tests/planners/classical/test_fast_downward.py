@@ -161,7 +161,7 @@ def test_a_wrong_model_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     expected = search(loaded.model, loaded.tasks[0]).cost_of(0)
     assert expected == (3, 0)
     monkeypatch.setattr(
-        plain_module.choosers, "clashes", lambda actions: (frozenset(),) * len(actions)
+        plain_module.selectors, "clashes", lambda actions: (frozenset(),) * len(actions)
     )
     assert optimal_cost(loaded.model, loaded.tasks[0], limit=0).cost == (1, 0)
 

@@ -123,7 +123,7 @@ def test_dependence_is_needed_by_the_second_only() -> None:
     ("network", "message"),
     [
         (constraint("v", "(1 1)", "swim"), "unknown action 'swim'"),
-        (constraint("v", "(2 1)", "row"), "nobody can meet the bounds (2 1)"),
+        (constraint("v", "(2 1)", "row"), "no robots can meet the bounds (2 1)"),
         (constraint("v", "(1)", "row"), "expected '(LOW HIGH)'"),
         (constraint("v", "(x 1)", "row"), "expected a number from 0, found 'x'"),
         (constraint("v", "(1 ²)", "row"), "expected a number from 0, found '²'"),

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The joint model as both classical forms read it: who selects what, its cost, what clashes."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+from planners.grounding import GroundAction
+from planners.joint.model import JointModel
+from planners.pddl.formula_tree import forbidden_steps, literals
+from planners.pddl.lifted import Atom, Equal, StepAtom
+
+
+@dataclass(frozen=True, slots=True)
+class Selectors:
+    """Who selects what: each robot its subactions; in joint-action PDDL the team, joint actions.
+
+    Attributes
+    ----------
+    names
+        The names of the robots, or of the team.
+    may_idle
+        Which of them may idle.
+    actions
+        The ground actions.
+    owners
+        For each action the numbers of those who select it together.
+    seconds
+        The second cost of each action.
+    clashes
+        For each action those of others that cannot share a step with it.
+    covered_by
+        In joint-action PDDL, the cheaper (or earlier) actions with the same parts.  Where one of
+        them is applicable too, both are one joint action, and it stands for both.
+    """
+
+    names: tuple[str, ...]
+    may_idle: tuple[bool, ...]
+    actions: tuple[GroundAction, ...]
+    owners: tuple[tuple[int, ...], ...]
+    seconds: tuple[int, ...]
+    clashes: tuple[frozenset[int], ...]
+    covered_by: tuple[tuple[int, ...], ...]
+
+    @property
+    def highest_cost(self) -> int:
+        """The most that one joint step can add to the second cost."""
+        most = [0] * len(self.names)
+        for owners, second in zip(self.owners, self.seconds, strict=True):
+            most[owners[0]] = max(most[owners[0]], second)
+        return sum(most)
+
+
+def selectors_of(model: JointModel) -> Selectors:
+    """Who selects what in a joint model, at what second cost."""
+    actions = model.actions
+    seconds = tuple(second_cost(model, action) for action in actions)
+    if model.is_joint_action:
+        nothing = (frozenset[int](),) * len(actions)
+        return Selectors(
+            ("team",),
+            (False,),
+            actions,
+            ((0,),) * len(actions),
+            seconds,
+            nothing,
+            _covered_by(actions, seconds),
+        )
+    owners = tuple(action.owners for action in actions)
+    return Selectors(
+        model.robots,
+        model.keeps_idle,
+        actions,
+        owners,
+        seconds,
+        clashes(actions),
+        ((),) * len(actions),
+    )
+
+
+def _covered_by(
+    actions: Sequence[GroundAction], seconds: Sequence[int]
+) -> tuple[tuple[int, ...], ...]:
+    groups: dict[tuple[str | None, ...], list[int]] = defaultdict(list)
+    for number in sorted(range(len(actions)), key=lambda n: (seconds[n], n)):
+        groups[actions[number].parts].append(number)
+    return tuple(
+        tuple(groups[action.parts][: groups[action.parts].index(n)])
+        for n, action in enumerate(actions)
+    )
+
+
+def second_cost(model: JointModel, action: GroundAction) -> int:
+    """The second component of an action's cost (0 under ``makespan``)."""
+    if model.cost == "makespan+cost":
+        return action.cost
+    if model.cost == "makespan":
+        return 0
+    return (
+        sum(part is not None for part in action.parts)
+        if model.is_joint_action
+        else int(not action.does_nothing)
+    )
+
+
+#: A fact and the value that is written or read.
+_Literal = tuple[Atom, bool]
+_Pairs = set[frozenset[int]]
+
+
+def clashes(actions: Sequence[GroundAction]) -> tuple[frozenset[int], ...]:
+    """For each action the others that cannot share a joint step with it (docs/pddl.md).
+
+    In terms of literals ``(atom, value)``: two actions interfere when one writes the contrary of
+    what the other writes or reads; the latter is forgiven when a positive formula links them.
+    Besides, a formula may forbid the other.
+    """
+    number = {StepAtom(a.schema, a.args): n for n, a in enumerate(actions)}
+    writers, readers = _writers(actions), _readers(actions)
+    linked, forbidden = _linked(actions, number), _forbidden(actions, number)
+    pairs = set(forbidden)
+    for (atom, value), changing in writers.items():
+        pairs |= _pairs(changing, writers.get((atom, not value), set()))
+        pairs |= _pairs(changing, readers.get((atom, not value), set())) - linked
+    found: list[set[int]] = [set() for _ in actions]
+    for pair in pairs:
+        if len(pair) == 2:
+            first, second = pair
+            found[first].add(second)
+            found[second].add(first)
+    return tuple(frozenset(others) for others in found)
+
+
+def _pairs(some: Iterable[int], others: Iterable[int]) -> _Pairs:
+    return {frozenset(pair) for pair in product(some, others)}
+
+
+def _writers(actions: Sequence[GroundAction]) -> dict[_Literal, set[int]]:
+    """Which actions make an atom true or false; one that does both makes it true."""
+    found: dict[_Literal, set[int]] = defaultdict(set)
+    for number, action in enumerate(actions):
+        adds = {effect.atom for effect in action.effects if effect.adds}
+        for effect in action.effects:
+            if effect.adds or effect.atom not in adds:
+                found[effect.atom, effect.adds].add(number)
+    return found
+
+
+def _conditions(action: GroundAction) -> Iterator[tuple[Atom | StepAtom, bool]]:
+    """The literals of its precondition and of the conditions of its effects."""
+    for condition in (action.precondition, *(effect.condition for effect in action.effects)):
+        for leaf, positive in literals(condition):
+            assert not isinstance(leaf, Equal), "an equality in a ground formula"
+            yield leaf, positive
+
+
+def _readers(actions: Sequence[GroundAction]) -> dict[_Literal, set[int]]:
+    """Which actions read that an atom is true or false."""
+    found: dict[_Literal, set[int]] = defaultdict(set)
+    for number, action in enumerate(actions):
+        for leaf, positive in _conditions(action):
+            if isinstance(leaf, Atom):
+                found[leaf, positive].add(number)
+    return found
+
+
+def _linked(actions: Sequence[GroundAction], number: Mapping[StepAtom, int]) -> _Pairs:
+    """Pairs of which one names the other in a positive formula or in the network."""
+    found: _Pairs = set()
+    for n, action in enumerate(actions):
+        named = {leaf for leaf, positive in _conditions(action) if positive}
+        for step in number.keys() & (named | action.links):
+            found.add(frozenset((n, number[step])))
+    return found
+
+
+def _forbidden(actions: Sequence[GroundAction], number: Mapping[StepAtom, int]) -> _Pairs:
+    """Pairs of which one's precondition forbids the other."""
+    return {
+        frozenset((n, number[step]))
+        for n, action in enumerate(actions)
+        for step in forbidden_steps(action.precondition)
+        if step in number
+    }

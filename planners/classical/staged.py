@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A ground action in stages: what is read when it is selected, checked later and done at last."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from planners.classical.selectors import Selectors
+from planners.classical.writer import known_literals, own_fact
+from planners.pddl.formula_tree import GroundLeaf, conjuncts, joined, negated, signed, substituted
+from planners.pddl.lifted import FALSE, TRUE, And, Atom, Formula, Or, StepAtom
+
+
+class StagedAction:
+    """A ground action of the robot that owns it first, as the select-then-apply form needs it.
+
+    Attributes
+    ----------
+    number, label, robot
+        Which action it is, its text, and its first owner.
+    selected
+        The fact that its first owner has selected it.
+    literals
+        What selecting it requires of the state; None if that contradicts itself.
+    checks
+        What is checked when all robots have selected: the other conjuncts of its precondition.
+    adds, deletes
+        Its unconditional effects.
+    groups
+        Its conditional effects, by condition: (condition, (adds, deletes)).
+    early
+        The atoms that it may both delete and conditionally add: their deletes come before all adds
+        of the step.
+    """
+
+    def __init__(
+        self, team: Selectors, number: int, value: Callable[[GroundLeaf], Formula]
+    ) -> None:
+        action = team.actions[number]
+        self.number, self.label, self.robot = number, action.label, team.owners[number][0]
+        self.selected = selected(team, self.robot, self.label)
+        self._split_precondition(team, value)
+        by_condition: dict[Formula, tuple[set[Atom], set[Atom]]] = {TRUE: (set(), set())}
+        for effect in action.effects:
+            if value(effect.atom) != FALSE:
+                condition = substituted(effect.condition, value)
+                adds, deletes = by_condition.setdefault(condition, (set(), set()))
+                (adds if effect.adds else deletes).add(effect.atom)
+        by_condition.pop(FALSE, None)
+        self.adds, self.deletes = by_condition.pop(TRUE)
+        self.groups = list(by_condition.items())
+        maybe = {atom for _, (adds, _) in self.groups for atom in adds} - self.adds
+        self.early = maybe & self.deletes.union(*(deletes for _, (_, deletes) in self.groups))
+
+    def _split_precondition(self, team: Selectors, value: Callable[[GroundLeaf], Formula]) -> None:
+        now: list[Formula] = []
+        later: list[Formula] = []
+        for part in conjuncts(team.actions[self.number].precondition):
+            literal, positive = signed(part)
+            if isinstance(literal, StepAtom) and not positive:
+                continue  # among the clashes
+            when = later if isinstance(part, And | Or | StepAtom) else now
+            when.append(substituted(part, value))
+        later += [
+            negated(substituted(team.actions[other].precondition, value))
+            for other in team.covered_by[self.number]
+        ]
+        found = known_literals(joined(And, now))
+        self.literals = None if found is None else found[0]
+        self.checks = joined(And, later)
+
+    @property
+    def has_checks(self) -> bool:
+        """Whether something is checked after the selection."""
+        return self.checks != TRUE or bool(self.groups)
+
+    def has(self, stage: str) -> bool:
+        """Whether there is something to do in the stage ``check`` or ``undo``."""
+        return self.has_checks if stage == "check" else bool(self.early)
+
+    def fires(self, group: int) -> Atom:
+        """The fact that the condition of a group of effects holds."""
+        return own_fact("condition holds", *self.selected.args, str(group))
+
+
+def selected(team: Selectors, robot: int, label: str) -> Atom:
+    """The fact that a robot has selected an action, or to idle."""
+    return own_fact("has chosen", team.names[robot], label)
