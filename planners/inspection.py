@@ -71,8 +71,8 @@ def inspect(loaded: PlanningInstance) -> Inspection:
     O(pairs of subactions) for the interference count.
     """
     model, domain = loaded.model, loaded.domain
-    start = model.codec.decode(loaded.tasks[0].init)
-    possible = {fact.predicate for fact in model.codec.facts} | {a.predicate for a in model.statics}
+    start = model.codec.true_facts(loaded.tasks[0].init)
+    acting = {action.schema for action in model.actions}
     return Inspection(
         domain=domain.name,
         problem=loaded.problems[0].name,
@@ -81,9 +81,7 @@ def inspect(loaded: PlanningInstance) -> Inspection:
         robots_by=loaded.team.by,
         objects=_objects(loaded),
         subactions=_subactions(model),
-        impossible=tuple(
-            s.name for s in domain.schemas if s.name not in {a.schema for a in model.actions}
-        ),
+        impossible=tuple(s.name for s in domain.schemas if s.name not in acting),
         idle=_idle(model),
         shared=_counted(a.schema for a in model.actions if len(a.owners) > 1 and not a.parts),
         unowned=loaded.options.robots.unowned,
@@ -94,12 +92,18 @@ def inspect(loaded: PlanningInstance) -> Inspection:
         interfering=model.stepper.interfering_pairs(),
         example=_example(model, loaded.tasks[0].init),
         fluents=_counted(fact.predicate for fact in model.codec.facts),
-        start=_counted(fact[1:-1].split(" ")[0] for fact in start if not fact.startswith("(last ")),
+        start=_counted(model.codec.facts.atoms[fact].predicate for fact in start),
         statics=_counted(a.predicate for a in model.statics),
-        never=tuple(sorted(set(domain.predicates) - possible)),
+        never=_never_true(domain, model),
         facts=len(model.codec.facts),
         goal=formula_text(loaded.problems[0].goal),
     )
+
+
+def _never_true(domain: Domain, model: JointModel) -> tuple[str, ...]:
+    """The predicates that no state can make true."""
+    possible = {atom.predicate for atom in (*model.codec.facts, *model.statics)}
+    return tuple(sorted(set(domain.predicates) - possible))
 
 
 def _style(domain: Domain) -> str:

@@ -4,10 +4,9 @@
 Tarski finds the reachable arguments, we evaluate the rest exactly.
 """
 
+from planners.grounding.actions import GroundAction, GroundEffect
 from planners.grounding.instantiate import (
     FEWER,
-    GroundAction,
-    GroundEffect,
     ground_actions,
     ground_goal,
 )

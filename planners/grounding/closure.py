@@ -122,10 +122,8 @@ class _Joins:
         A row gives the values of the ``known`` variables; a known name that is declared again is
         another variable.
         """
-        columns = {name: n for n, name in enumerate(known)}
-        for variable in variables:
-            columns.pop(variable.name, None)
         typed = {variable.name: self._objects(variable.types) for variable in variables}
+        columns = {name: n for n, name in enumerate(known) if name not in typed}
         width = len(known)
         left = list(atoms)
         while left:
@@ -135,12 +133,11 @@ class _Joins:
             rows = self._extended(rows, atom, dict(columns), [(name, typed[name]) for name in new])
             columns.update((name, width + n) for n, name in enumerate(new))
             width += len(new)
-        free = [variable.name for variable in variables if variable.name not in columns]
+        free = [name for name in typed if name not in columns]
         columns.update((name, width + n) for n, name in enumerate(free))
-        order = [*range(len(known)), *(columns[variable.name] for variable in variables)]
-        pools = [tuple(typed[name]) for name in free]
+        order = [*range(len(known)), *(columns[name] for name in typed)]
         for row in rows:
-            for choice in product(*pools):
+            for choice in product(*(typed[name] for name in free)):
                 values = row + choice
                 yield tuple([values[n] for n in order])
 

@@ -6,14 +6,14 @@ Static atoms, equalities and types are evaluated.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from itertools import product
+from collections.abc import Iterable, Iterator
 
 from planners.errors import BadInput, Unsupported
+from planners.grounding.actions import GroundAction, GroundEffect
+from planners.grounding.bindings import Binding, Bindings
 from planners.grounding.reachability import reachable_arguments
 from planners.limits import reaching
-from planners.pddl.formula_tree import distinct, joined, label, literals, negated, required_atoms
+from planners.pddl.formula_tree import distinct, joined, label, literals
 from planners.pddl.formulas import MAX_COST
 from planners.pddl.lifted import (
     FALSE,
@@ -32,55 +32,11 @@ from planners.pddl.lifted import (
     Schema,
     StepAtom,
     Truth,
-    Variable,
 )
-from planners.pddl.robots import Team, fluent_predicates, objects_of, static_atoms
+from planners.pddl.robots import Team, fluent_predicates, static_atoms
 
 #: What to try when grounding is too much.
 FEWER = "fewer objects, or actions with fewer parameters"
-Binding = dict[str, str]
-
-
-@dataclass(frozen=True, slots=True)
-class GroundEffect:
-    """``atom`` becomes true (``adds``) or false if ``condition`` holds before the step."""
-
-    atom: Atom
-    adds: bool
-    condition: Formula
-
-
-@dataclass(frozen=True, slots=True)
-class GroundAction:
-    """A ground action in negation normal form over fluent atoms and step atoms.
-
-    ``owners`` are the indices of the robots that choose it together; for joint-action PDDL they are
-    all robots and ``parts`` holds each robot's own label (None: idle).  ``cost`` is the PDDL action
-    cost.  ``does_nothing`` says that the action is as good as idling: it has no effect, no cost
-    that is counted, and no formula or network names it. ``links`` are the actions that a
-    concurrency network joins it with: they are meant to be done together.
-    """
-
-    schema: str
-    args: tuple[str, ...]
-    owners: tuple[int, ...]
-    precondition: Formula
-    effects: tuple[GroundEffect, ...]
-    parts: tuple[str | None, ...] = ()
-    cost: int = 1
-    does_nothing: bool = False
-    links: frozenset[StepAtom] = frozenset()
-
-    @property
-    def label(self) -> str:
-        """The action in PDDL syntax."""
-        return label(self.schema, self.args)
-
-    def part_of(self, robot: int) -> str | None:
-        """The label of a robot in it; None if the robot idles or does not take part."""
-        if self.parts:
-            return self.parts[robot]
-        return self.label if robot in self.owners else None
 
 
 def ground_actions(
@@ -136,14 +92,7 @@ class _Grounder:
         self._schemas = {schema.name: schema for schema in domain.schemas}
         self._named = {atom.action for schema in domain.schemas for atom in _step_atoms(schema)}
         self._named |= {name for constraint in domain.constraints for name, _ in constraint.actions}
-        self._members: dict[tuple[str, ...], dict[str, int]] = {}
-        self._facts: dict[tuple[str, int, str], list[tuple[str, ...]]] = {}
-        for fact in self._statics:
-            for position, arg in enumerate(fact.args):
-                self._facts.setdefault((fact.predicate, position, arg), []).append(fact.args)
-        self._guards: dict[
-            int, tuple[Formula, tuple[Atom, ...]]
-        ] = {}  # by identity; the formula stays alive here
+        self._bindings = Bindings(domain, problem, self._fluents, self._statics)
         self._atoms: dict[tuple[str, tuple[str, ...]], Atom] = {}
 
     def action(self, schema: Schema, args: tuple[str, ...], costs: bool) -> GroundAction | None:
@@ -184,33 +133,39 @@ class _Grounder:
         them.
         """
         match f:
-            case Truth(value):
-                return TRUE if value == positive else FALSE
-            case Atom(predicate, args):
-                atom = self._atom(predicate, args, binding)
-                if predicate in self._fluents:
-                    return atom if positive else Not(atom)
-                return TRUE if (atom in self._statics) == positive else FALSE
-            case Equal(left, right):
-                same = binding.get(left, left) == binding.get(right, right)
-                return TRUE if same == positive else FALSE
-            case StepAtom(action, args):
-                return self._step_atom(
-                    action, tuple(binding.get(a, a) for a in args), positive, acting
-                )
             case Not(part):
                 return self.formula(part, binding, not positive, acting)
-            case And(parts) | Or(parts):
-                ground = (self.formula(part, binding, positive, acting) for part in parts)
-                return distinct(joined(And if isinstance(f, And) == positive else Or, ground))
-            case Forall(variables, part) | Exists(variables, part):
-                guards = self._guards_of(f)
-                ground = (
-                    self.formula(part, inner, positive, acting)
-                    for inner in self._bindings(variables, binding, guards)
-                )
-                return distinct(joined(And if isinstance(f, Forall) == positive else Or, ground))
-        raise AssertionError(f)
+            case And() | Or() | Forall() | Exists():
+                kind = And if isinstance(f, And | Forall) == positive else Or
+                instances = self._instances(f, binding)
+                ground = (self.formula(part, inner, positive, acting) for part, inner in instances)
+                return distinct(joined(kind, ground))
+            case StepAtom(action, args):
+                values = tuple(binding.get(a, a) for a in args)
+                return self._step_atom(action, values, positive, acting)
+        return self._state_literal(f, binding, positive)
+
+    def _instances(
+        self, f: And | Or | Forall | Exists, binding: Binding
+    ) -> Iterator[tuple[Formula, Binding]]:
+        """The parts of a formula with the values of their variables."""
+        if isinstance(f, And | Or):
+            yield from ((part, binding) for part in f.parts)
+        else:
+            guards = self._bindings.guards_of(f)
+            for inner in self._bindings.values(f.variables, binding, guards):
+                yield f.part, inner
+
+    def _state_literal(self, f: Truth | Equal | Atom, binding: Binding, positive: bool) -> Formula:
+        if isinstance(f, Truth):
+            return Truth(f.value == positive)
+        if isinstance(f, Equal):
+            same = binding.get(f.left, f.left) == binding.get(f.right, f.right)
+            return Truth(same == positive)
+        atom = self._atom(f.predicate, f.args, binding)
+        if f.predicate not in self._fluents:
+            return Truth((atom in self._statics) == positive)
+        return atom if positive else Not(atom)
 
     def _step_atom(
         self, action: str, args: tuple[str, ...], positive: bool, acting: tuple[int, ...]
@@ -223,7 +178,7 @@ class _Grounder:
                 remedy="A joint action already says what every robot does: use predicates only.",
             )
         for parameter, arg in zip(schema.parameters, args, strict=True):
-            if arg not in self._objects(parameter.types):
+            if arg not in self._bindings.objects(parameter.types):
                 return FALSE if positive else TRUE
         if not positive and set(self._team.owners(schema, args)) & set(acting):
             return TRUE
@@ -231,8 +186,8 @@ class _Grounder:
         return atom if positive else Not(atom)
 
     def _effect(self, effect: Effect, binding: Binding) -> Iterator[GroundEffect]:
-        guards = self._static_atoms(effect.condition) if effect.variables else ()
-        for inner in self._bindings(effect.variables, binding, guards):
+        guards = self._bindings.static_atoms(effect.condition) if effect.variables else ()
+        for inner in self._bindings.values(effect.variables, binding, guards):
             condition = self.formula(effect.condition, inner, True)
             if condition != FALSE:
                 atom = self._atom(effect.atom.predicate, effect.atom.args, inner)
@@ -244,96 +199,6 @@ class _Grounder:
         if atom is None:
             atom = self._atoms[key] = Atom(*key)
         return atom
-
-    def _guards_of(self, f: Forall | Exists) -> tuple[Atom, ...]:
-        """Static atoms without which an instance of the quantified part is no matter.
-
-        False under ``exists``, true under ``forall``.
-        """
-        if id(f) not in self._guards:
-            part = f.part if isinstance(f, Exists) else negated(f.part)
-            self._guards[id(f)] = f, self._static_atoms(part)
-        return self._guards[id(f)][1]
-
-    def _static_atoms(self, f: Formula) -> tuple[Atom, ...]:
-        """The static atoms among the parts that must all hold."""
-        return tuple(a for a in required_atoms(f) if a.args and a.predicate not in self._fluents)
-
-    def _bindings(
-        self, variables: tuple[Variable, ...], binding: Binding, guards: tuple[Atom, ...] = ()
-    ) -> Iterator[Binding]:
-        """Values for the variables, in the order of the objects.
-
-        Without such as make one of the guards false.
-
-        The first guard that leaves the fewest facts is looked up; the others are left to the
-        formula.
-        """
-        if not variables:
-            yield binding
-            return
-        names = [v.name for v in variables]
-        members = [self._objects(v.types) for v in variables]
-        outer = {name: value for name, value in binding.items() if name not in names}
-        known = [
-            one for guard in guards if (one := self._facts_of(guard, outer, names)) is not None
-        ]
-        rows: Iterable[tuple[str, ...]] = product(*members)
-        if known:
-            rows = self._unified(*min(known, key=lambda one: len(one[1])), outer, names, members)
-        for values in rows:
-            yield {**binding, **dict(zip(names, values, strict=True))}
-
-    def _facts_of(
-        self, guard: Atom, outer: Binding, names: Sequence[str]
-    ) -> tuple[Atom, list[tuple[str, ...]]] | None:
-        """A guard with the facts that may match it.
-
-        The facts are looked up by an argument that is known, if there is one.
-        """
-        known = [(n, outer.get(arg, arg)) for n, arg in enumerate(guard.args) if arg not in names]
-        lists = [self._facts.get((guard.predicate, n, value), []) for n, value in known]
-        return (guard, min(lists, key=len)) if lists else None
-
-    @staticmethod
-    def _unified(
-        guard: Atom,
-        facts: Iterable[tuple[str, ...]],
-        outer: Binding,
-        names: Sequence[str],
-        members: Sequence[dict[str, int]],
-    ) -> list[tuple[str, ...]]:
-        """All values under which the guard is one of the facts, in the order of the objects."""
-        rows: set[tuple[str, ...]] = set()
-        for fact in facts:
-            if len(fact) != len(guard.args):
-                continue
-            values: Binding = {}
-            for arg, value in zip(guard.args, fact, strict=True):
-                wanted = values.setdefault(arg, value) if arg in names else outer.get(arg, arg)
-                if wanted != value:
-                    break
-            else:
-                options = [
-                    (values[n],) if n in values else tuple(own)
-                    for n, own in zip(names, members, strict=True)
-                ]
-                rows.update(product(*options))
-        typed = (
-            row
-            for row in rows
-            if all(value in own for value, own in zip(row, members, strict=True))
-        )
-        return sorted(
-            typed, key=lambda row: [own[value] for value, own in zip(row, members, strict=True)]
-        )
-
-    def _objects(self, types: tuple[str, ...]) -> dict[str, int]:
-        """The objects of some types, numbered in their order."""
-        if types not in self._members:
-            found = objects_of(self._domain, self._problem, types)
-            self._members[types] = {name: number for number, name in enumerate(found)}
-        return self._members[types]
 
     def _parts(self, schema: Schema, binding: Binding) -> tuple[str | None, ...]:
         if not schema.parts:

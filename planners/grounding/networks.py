@@ -11,7 +11,7 @@ from dataclasses import replace
 from itertools import combinations, product
 
 from planners.errors import BadInput
-from planners.grounding.instantiate import GroundAction
+from planners.grounding.actions import GroundAction
 from planners.pddl.formula_tree import conjuncts
 from planners.pddl.lifted import And, Constraint, Domain, Formula, Not, Or, Problem, StepAtom
 from planners.pddl.robots import objects_of

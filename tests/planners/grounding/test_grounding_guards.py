@@ -8,7 +8,9 @@ from __future__ import annotations
 import pytest
 
 from planners.grounding import ground_actions
-from planners.grounding.instantiate import GroundAction, _Grounder
+from planners.grounding.actions import GroundAction
+from planners.grounding.bindings import Bindings
+from planners.grounding.instantiate import _Grounder
 from planners.loading import build
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.robots import RobotSelection, Unowned, find_team
@@ -66,7 +68,7 @@ def both(
 ) -> tuple[tuple[GroundAction, ...], ...]:
     fast = grounded(domain, problem, unowned)
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(_Grounder, "_facts_of", lambda *_: None)
+        patched.setattr(Bindings, "_facts_of", lambda *_: None)
         return fast, grounded(domain, problem, unowned)
 
 
@@ -98,7 +100,7 @@ def test_the_facts_are_looked_up(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = PROBLEM.replace("p1 - place", f"p1 {places} - place")
     grounded(DOMAIN.format(condition=CONDITIONS[0]), problem)
     few, tried = tried, 0
-    monkeypatch.setattr(_Grounder, "_facts_of", lambda *_: None)
+    monkeypatch.setattr(Bindings, "_facts_of", lambda *_: None)
     grounded(DOMAIN.format(condition=CONDITIONS[0]), problem)
     assert 20 * few < tried
 
