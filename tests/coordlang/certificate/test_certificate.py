@@ -157,7 +157,13 @@ def test_nothing_to_refute() -> None:
 
 @pytest.mark.parametrize(
     ("folder", "remember"),
-    [("tray", False), ("lock", True), ("charger", False), ("push-box", True)],
+    [
+        ("tray", False),
+        ("lock", True),
+        ("charger", False),
+        # Minutes, nearly all of them in the search for the language; lock remembers actions, too.
+        pytest.param("push-box", True, marks=pytest.mark.slow),
+    ],
 )
 def test_three_robots(folder: str, remember: bool) -> None:
     domain = read_domain(DOMAINS / folder / "domain.pddl")
