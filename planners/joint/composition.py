@@ -20,9 +20,6 @@ from planners.pddl.formula_tree import conjuncts, formula_text, signed
 from planners.pddl.lifted import Atom, Formula, StepAtom
 from planners.tables import Bools, Ints, Rows, ranges, spans
 
-#: Joint steps composed at a time, before compatibility is looked up.
-_CHUNK = 1_000_000
-
 
 class ComposingStepper:
     """The `Stepper` of PDDL with one action per robot: every robot picks one subaction or idles.
@@ -36,7 +33,17 @@ class ComposingStepper:
         For each robot its ground actions, shared ones in the lists of all their owners.
     keeps_idle
         For each robot whether it may do nothing at all.
+
+    Attributes
+    ----------
+    piece
+        Joint steps composed at a time, before compatibility is looked up; it changes no result.
+    memory_left
+        Bytes that are left; combinations that need more are not made.
     """
+
+    piece = 1_000_000
+    memory_left = staticmethod(memory_left)
 
     def __init__(
         self,
@@ -66,7 +73,7 @@ class ComposingStepper:
         sizes = np.ones(len(rows))
         for first, _ in options:
             sizes *= np.diff(first)
-        parts = [self._compose(rows, options, span) for span in spans(sizes, _CHUNK)] or [
+        parts = [self._compose(rows, options, span) for span in spans(sizes, self.piece)] or [
             self._compose(rows, options, slice(0, 0))
         ]
         return Steps(
@@ -192,12 +199,12 @@ class ComposingStepper:
         """Stop before combinations with one more robot's labels take more memory than there is."""
         # A number of the state and one of each label so far, in two copies, and what compares them.
         needed = 8 * (2 * robot + 6) * combinations
-        if combinations > _CHUNK and needed > memory_left():
+        if combinations > self.piece and needed > self.memory_left():
             raise OutOfMemory(
                 f"{robot + 1} of {len(self._robots)} robots have {combinations:,} combinations of "
                 f"subactions in {states:,} "
                 f"state{'s' * (states != 1)}: about {needed / 2**30:,.1f} GiB, "
-                f"and {memory_left() / 2**30:.1f} GiB are left",
+                f"and {self.memory_left() / 2**30:.1f} GiB are left",
                 remedy="Use fewer robots, or a larger --memory-limit.",
             )
 

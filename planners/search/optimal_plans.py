@@ -17,20 +17,16 @@ from planners.joint.conditions import Labels
 from planners.joint.model import Goal, JointModel, PlanningTask, Steps
 from planners.limits import reaching
 from planners.search.plan_space import PlanSpace
-from planners.search.reachable import Space, blocks
+from planners.search.reachable import PIECES, PieceSizes, Space, blocks
 from planners.tables import Bools, Ints, Rows, find_rows, unique_rows
 
-#: (goal, state) pairs handled in one plan space when many tasks are asked for.
-_BATCH = 2_000_000
-#: Joint steps kept from the forward search; beyond, layers are expanded again on the way back.
-_KEEP = 8_000_000
 _FAR = np.iinfo(np.int64).max // 4
 
 #: The steps of a layer in pieces: (number of the first state, steps).
 Stored = list[tuple[int, Steps]]
 
 
-def search(model: JointModel, task: PlanningTask) -> PlanSpace:
+def search(model: JointModel, task: PlanningTask, pieces: PieceSizes = PIECES) -> PlanSpace:
     """All optimal plans of one task, expanding only states nearer than the goal.
 
     Forward search to the first layer that holds a goal state, then back along optimal edges.
@@ -47,12 +43,16 @@ def search(model: JointModel, task: PlanningTask) -> PlanSpace:
         )
 
     with reaching(so_far, "a task with a shorter plan, fewer objects or fewer robots"):
-        _forward(model, task, layers, kept)
-        return _backward(model, task, layers, kept)
+        _forward(model, task, layers, kept, pieces)
+        return _backward(model, task, layers, kept, pieces)
 
 
 def _forward(
-    model: JointModel, task: PlanningTask, layers: list[Rows], kept: list[Stored | None]
+    model: JointModel,
+    task: PlanningTask,
+    layers: list[Rows],
+    kept: list[Stored | None],
+    pieces: PieceSizes,
 ) -> None:
     """Fill ``layers`` with the states by their distance from the start.
 
@@ -65,9 +65,9 @@ def _forward(
     while not model.holds(task.goal, layer).any():
         fresh: list[Rows] = []
         steps_here: Stored | None = []
-        for start, steps in blocks(model, layer):
+        for start, steps in blocks(model, layer, pieces):
             total += len(steps)
-            if total > _KEEP:
+            if total > pieces.kept:
                 steps_here = None
             if steps_here is not None:
                 steps_here.append((start, steps))
@@ -98,6 +98,7 @@ def _backward(
     task: PlanningTask,
     layers: list[Rows],
     kept: list[Stored | None],
+    pieces: PieceSizes,
 ) -> PlanSpace:
     """Keep the edges that lead to the goal in time and at least cost, from the last layer back."""
     goal_rows = layers[-1][model.holds(task.goal, layers[-1])]
@@ -105,7 +106,7 @@ def _backward(
     best = [np.zeros(len(goal_rows), np.int64)]
     edges: list[tuple[Ints, Ints, Labels, Ints]] = []
     for rows, stored in zip(reversed(layers[:-1]), reversed(kept), strict=True):
-        source, target, labels, cost = _edges_into(model, rows, stored, tables[-1])
+        source, target, labels, cost = _edges_into(model, rows, stored, tables[-1], pieces)
         value = np.full(len(rows), _FAR)
         np.minimum.at(value, source, cost + best[-1][target])
         tight = cost + best[-1][target] == value[source]
@@ -136,11 +137,11 @@ def _backward(
 
 
 def _edges_into(
-    model: JointModel, rows: Rows, stored: Stored | None, table: Rows
+    model: JointModel, rows: Rows, stored: Stored | None, table: Rows, pieces: PieceSizes
 ) -> tuple[Ints, Ints, Labels, Ints]:
     """The steps from ``rows`` into the sorted ``table``."""
     parts: list[tuple[Ints, Ints, Labels, Ints]] = []
-    for start, block in stored if stored is not None else blocks(model, rows):
+    for start, block in stored if stored is not None else blocks(model, rows, pieces):
         target = find_rows(table, block.result)
         hit = target >= 0
         parts.append((block.source[hit] + start, target[hit], block.labels[hit], block.cost[hit]))
@@ -186,9 +187,11 @@ def joined(spaces: Sequence[PlanSpace]) -> PlanSpace:
     return together.reordered(np.lexsort((together.state, together.goal, together.layer)))
 
 
-def solvable(space: Space, tasks: Sequence[tuple[Goal, Rows]]) -> list[tuple[Goal, Rows]]:
+def solvable(
+    space: Space, tasks: Sequence[tuple[Goal, Rows]], pieces: PieceSizes = PIECES
+) -> list[tuple[Goal, Rows]]:
     """Leave out the tasks whose goal cannot be reached; goals with tables of initial states."""
-    size = max(1, _BATCH // max(1, len(space)))
+    size = max(1, pieces.pairs // max(1, len(space)))
     kept = []
     for start in range(0, len(tasks), size):
         batch = tasks[start : start + size]
@@ -200,7 +203,9 @@ def solvable(space: Space, tasks: Sequence[tuple[Goal, Rows]]) -> list[tuple[Goa
     return kept
 
 
-def plan_spaces(space: Space, tasks: Sequence[tuple[Goal, Rows | None]]) -> Iterator[PlanSpace]:
+def plan_spaces(
+    space: Space, tasks: Sequence[tuple[Goal, Rows | None]], pieces: PieceSizes = PIECES
+) -> Iterator[PlanSpace]:
     """The optimal plans of many tasks over one explored space, in batches of goals.
 
     One backward pass per goal serves every initial state.
@@ -211,13 +216,15 @@ def plan_spaces(space: Space, tasks: Sequence[tuple[Goal, Rows | None]]) -> Iter
         The reachable states.
     tasks
         Goals with tables of initial states; None: every other state that can reach the goal.
+    pieces
+        How many pairs of a goal and a state make a batch.
 
     Raises
     ------
     ProvedImpossible
         For a task whose goal cannot be reached.
     """
-    size = max(1, _BATCH // max(1, len(space)))
+    size = max(1, pieces.pairs // max(1, len(space)))
     for start in range(0, len(tasks), size):
 
         def so_far(done: int = start) -> str:

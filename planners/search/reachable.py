@@ -13,10 +13,28 @@ from planners.joint.model import JointModel, Steps
 from planners.limits import reaching
 from planners.tables import Ints, Rows, find_rows, ranges, unique_rows
 
-#: States expanded at a time, and the joint steps that this should give: they bound the memory of
-#: one expansion.
-_BLOCK = 20_000
-_STEPS = 4_000_000
+
+@dataclass(frozen=True, slots=True)
+class PieceSizes:
+    """How much is handled at a time: bounds of memory, which change no result.
+
+    Parameters
+    ----------
+    states, steps
+        States expanded at a time, and the joint steps that this should give.
+    kept
+        Joint steps kept from a forward search; beyond, layers are expanded again on the way back.
+    pairs
+        (goal, state) pairs handled in one plan space when many tasks are asked for.
+    """
+
+    states: int = 20_000
+    steps: int = 4_000_000
+    kept: int = 8_000_000
+    pairs: int = 2_000_000
+
+
+PIECES = PieceSizes()
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,22 +76,24 @@ class Space:
         return find_rows(self.rows, rows)
 
 
-def blocks(model: JointModel, rows: Rows) -> Iterator[tuple[int, Steps]]:
+def blocks(
+    model: JointModel, rows: Rows, pieces: PieceSizes = PIECES
+) -> Iterator[tuple[int, Steps]]:
     """`JointModel.successors` of a long table in pieces.
 
     (number of the piece's first row, its steps).
 
     The first piece is short; how many steps its states have says how long the next ones may be.
     """
-    start, size = 0, min(_BLOCK, 500)
+    start, size = 0, min(pieces.states, 500)
     while start < len(rows):
         steps = model.successors(rows[start : start + size])
         yield start, steps
         start += size
-        size = max(1, min(_BLOCK, int(_STEPS * size / max(1, len(steps)))))
+        size = max(1, min(pieces.states, int(pieces.steps * size / max(1, len(steps)))))
 
 
-def explore(model: JointModel, inits: Rows) -> Space:
+def explore(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> Space:
     """Breadth-first search from all ``inits`` (a table of rows) to the end.
 
     Time and memory are linear in the number of joint steps.
@@ -94,7 +114,7 @@ def explore(model: JointModel, inits: Rows) -> Space:
     with reaching(so_far, "fewer objects or robots"):
         while len(layer):
             fresh: list[Rows] = []
-            for start, steps in blocks(model, layer):
+            for start, steps in blocks(model, layer, pieces):
                 sources.append(layer[start:])
                 found.append(steps)
                 fresh.append(unique_rows(steps.result)[0])
@@ -105,7 +125,7 @@ def explore(model: JointModel, inits: Rows) -> Space:
         return _joined(model, seen, sources, found)
 
 
-def count(model: JointModel, inits: Rows) -> tuple[int, int]:
+def count(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> tuple[int, int]:
     """How many states `explore` finds, and how many joint steps between them.
 
     Needs only the memory that the states take.
@@ -123,7 +143,7 @@ def count(model: JointModel, inits: Rows) -> tuple[int, int]:
     with reaching(so_far, "fewer objects or robots"):
         while len(layer):
             fresh = seen[:0]
-            for _, steps in blocks(model, layer):
+            for _, steps in blocks(model, layer, pieces):
                 steps_counted += len(steps)
                 new, _ = unique_rows(steps.result)
                 fresh, _ = unique_rows(np.concatenate((fresh, new[find_rows(seen, new) < 0])))

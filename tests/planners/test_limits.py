@@ -20,12 +20,13 @@ from coordlang.verification import by_definition as verify
 from planners import grounding
 from planners.errors import CoordlangError, OutOfMemory, OutOfTime
 from planners.grounding import instantiate
+from planners.joint.composition import ComposingStepper
 from planners.joint.model import Stepper, Steps
 from planners.limits import reaching, time_left, time_limit
 from planners.loading import PlanningInstance, load
 from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plan_space import PlanSpace
-from planners.search.reachable import count, explore
+from planners.search.reachable import PieceSizes, count, explore
 from planners.tables import Rows
 from tests.support.domains import DOMAINS
 
@@ -205,8 +206,7 @@ def test_the_goals_done_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     loaded = corners()
     space = explore(loaded.model, loaded.tasks[0].init[None, :])
     groups = [(loaded.tasks[0].goal, None)] * 3
-    monkeypatch.setattr("planners.search.optimal_plans._BATCH", len(space))
-    batches = plan_spaces(space, groups)
+    batches = plan_spaces(space, groups, PieceSizes(pairs=len(space)))
     next(batches)
 
     def fail(*_: object) -> None:
@@ -303,28 +303,28 @@ def test_verification_and_the_search_for_a_break_say_how_far_they_got(
 
 
 @pytest.mark.parametrize("problem", ["corners-4x4", "three-robots-3x3"])
-def test_work_in_pieces_is_the_same_work(problem: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_work_in_pieces_is_the_same_work(problem: str) -> None:
     loaded = corners(problem)
     init = loaded.tasks[0].init[None, :]
     whole, space = search(loaded.model, loaded.tasks[0]), explore(loaded.model, init)
-    monkeypatch.setattr("planners.search.reachable._BLOCK", 7)
-    monkeypatch.setattr("planners.search.reachable._STEPS", 40)
-    monkeypatch.setattr("planners.joint.composition._CHUNK", 11)
-    for keep in (8_000_000, 100, 0):
-        monkeypatch.setattr("planners.search.optimal_plans._KEEP", keep)
-        pieces = search(loaded.model, loaded.tasks[0])
+    assert isinstance(loaded.model.stepper, ComposingStepper)
+    loaded.model.stepper.piece = 11
+    small = PieceSizes(states=7, steps=40)
+    for kept in (8_000_000, 100, 0):
+        pieces = search(loaded.model, loaded.tasks[0], replace(small, kept=kept))
         for name in ("rows", "state", "layer", "first", "target", "labels", "cost", "starts"):
             assert (getattr(pieces, name) == getattr(whole, name)).all(), name
-    assert count(loaded.model, init) == (len(space), len(space.target))
-    again = explore(loaded.model, init)
+    assert count(loaded.model, init, small) == (len(space), len(space.target))
+    again = explore(loaded.model, init, small)
     for name in ("rows", "first", "target", "labels", "cost"):
         assert (getattr(again, name) == getattr(space, name)).all(), name
 
 
-def test_combinations_that_do_not_fit_are_not_made(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_combinations_that_do_not_fit_are_not_made() -> None:
     loaded = corners("three-robots-3x3")
-    monkeypatch.setattr("planners.joint.composition._CHUNK", 10)
-    monkeypatch.setattr("planners.joint.composition.memory_left", lambda: 1000)
+    assert isinstance(loaded.model.stepper, ComposingStepper)
+    loaded.model.stepper.piece = 10
+    loaded.model.stepper.memory_left = lambda: 1000
     # Each robot in its corner may go two ways or stay; two of them may not go to the one cell
     # between them.
     with pytest.raises(
