@@ -16,12 +16,13 @@ import numpy as np
 from planners.joint.states import StateCodec
 from planners.tables import Bools, Ints, Rows
 
-_BLOCK = 50_000
+#: Keys handled at a time, by default.
+BLOCK = 50_000
 _BETWEEN = ") ("
 
 
-def read_keys(codec: StateCodec, keys: Iterable[str]) -> tuple[Rows, Ints]:
-    """Read keys into rows.
+def read_keys(codec: StateCodec, keys: Iterable[str], block_size: int = BLOCK) -> tuple[Rows, Ints]:
+    """Read keys into rows, ``block_size`` of them at a time.
 
     Returns
     -------
@@ -34,7 +35,7 @@ def read_keys(codec: StateCodec, keys: Iterable[str]) -> tuple[Rows, Ints]:
     number = {text[1:-1]: n for n, text in enumerate(atoms.texts)}
     blocks, wrong, start = [], [], 0
     iterator = iter(keys)
-    while block := list(islice(iterator, _BLOCK)):
+    while block := list(islice(iterator, block_size)):
         rows, bad = _read(codec, block, number, atoms)
         blocks.append(rows)
         wrong.append(np.flatnonzero(bad) + start)
@@ -71,13 +72,13 @@ def _read(
     return codec.remembering(rows, labels), bad | (seen != 1).any(axis=1)
 
 
-def keys_of(codec: StateCodec, rows: Rows) -> list[str]:
-    """The keys of states: `StateCodec.key` of each row."""
+def keys_of(codec: StateCodec, rows: Rows, block_size: int = BLOCK) -> list[str]:
+    """The keys of states: `StateCodec.key` of each row, so many at a time."""
     atoms = _KeyAtoms.of(codec)
     number_of_fact = np.flatnonzero(atoms.robot < 0)  # facts are in the order of their texts
     keys: list[str] = []
-    for start in range(0, len(rows), _BLOCK):
-        block = rows[start : start + _BLOCK]
+    for start in range(0, len(rows), block_size):
+        block = rows[start : start + block_size]
         state, fact = np.nonzero(codec.truth(block))
         found = number_of_fact[fact]
         if codec.memory is not None:

@@ -11,7 +11,7 @@ layer, in numpy.  Proposition 2 of docs/concepts.md says why this decides RC.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -24,10 +24,6 @@ from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 from planners.tables import Bools, Ints, spans, unique_tuples
 
-#: Walk edges handled at a time.
-_CHUNK = 1_000_000
-#: More walk edges out of one layer than this are not tried: hours of work.
-_MOST = 1e10
 #: What else may help.
 INSTEAD = "fewer robots, smaller tasks or --cost makespan+actions"
 #: Mixtures that failed have no state: this in place of ``y``.
@@ -98,7 +94,30 @@ class _Layer:
             numbers[known] = place[numbers[known]]
 
 
-def walk(space: PlanSpace) -> Walk:
+@dataclass(frozen=True, slots=True)
+class WalkLimits:
+    """How much of a walk is handled at a time, and how much is tried at all.
+
+    Parameters
+    ----------
+    piece
+        Walk edges handled at a time; it changes no result.
+    most
+        Walk edges out of one layer; more are hours of work.
+    memory_left, time_left
+        Bytes and seconds that are left, asked anew for every estimate.
+    """
+
+    piece: int = 1_000_000
+    most: float = 1e10
+    memory_left: Callable[[], float] = memory_left
+    time_left: Callable[[], float] = time_left
+
+
+_LIMITS = WalkLimits()
+
+
+def walk(space: PlanSpace, limits: WalkLimits = _LIMITS) -> Walk:
     """Walk from every node ``p`` of the plan space with all plans and the mixture in ``p``.
 
     Where no plans are inseparable (`inseparable`), the divergences at ``p`` depend on ``p`` only,
@@ -119,12 +138,17 @@ def walk(space: PlanSpace) -> Walk:
         )
 
     with reaching(so_far, INSTEAD):
-        _forward(space, index, layers)
+        _forward(space, index, layers, limits)
         return _backward(space, layers)
 
 
 def moves(
-    space: PlanSpace, index: EdgeIndex, nodes: Ints, *, together: bool = False
+    space: PlanSpace,
+    index: EdgeIndex,
+    nodes: Ints,
+    *,
+    together: bool = False,
+    limits: WalkLimits = _LIMITS,
 ) -> Iterator[Moves]:
     """All moves of n plans and their mixture out of walk nodes ``(x_1 .. x_n, y)``, in chunks.
 
@@ -133,8 +157,8 @@ def moves(
     robots = nodes.shape[1] - 1
     sizes = edges_out_of(space, nodes)
     if not together:
-        _check_size(sizes, robots)
-    for span in spans(sizes, _CHUNK):
+        _check_size(sizes, robots, limits)
+    for span in spans(sizes, limits.piece):
         source = np.arange(span.start, span.stop)
         prefix = nodes[span, robots]
         edges: list[Ints] = []
@@ -166,17 +190,17 @@ def edges_out_of(space: PlanSpace, nodes: Ints) -> NDArray[np.float64]:
     return product
 
 
-def _check_size(sizes: NDArray[np.float64], robots: int) -> None:
+def _check_size(sizes: NDArray[np.float64], robots: int, limits: WalkLimits) -> None:
     """Stop before one node needs too much at once, or a layer too much work."""
     largest, total = sizes.max(initial=0), sizes.sum()
     # One row of a chunk holds its source, a prefix and an edge for each robot, and copies of them.
-    if 100 * largest > memory_left():
+    if 100 * largest > limits.memory_left():
         raise OutOfMemory(
             f"a state has {largest:,.0f} combinations of {robots} plans' next steps: about "
             f"{100 * largest / 2**30:,.1f} GiB at once",
             remedy=f"Use {INSTEAD}, or a larger --memory-limit.",
         )
-    if total > _MOST:
+    if total > limits.most:
         raise OutOfMemory(
             f"the {len(sizes):,} nodes of one layer of the walk have {total:.1e} combinations "
             f"of {robots} plans' next steps",
@@ -184,7 +208,7 @@ def _check_size(sizes: NDArray[np.float64], robots: int) -> None:
         )
 
 
-def _forward(space: PlanSpace, index: EdgeIndex, layers: list[_Layer]) -> None:
+def _forward(space: PlanSpace, index: EdgeIndex, layers: list[_Layer], limits: WalkLimits) -> None:
     """Walk down from the highest layer into ``layers``.
 
     Every plan-space node starts at its own layer.
@@ -205,13 +229,18 @@ def _forward(space: PlanSpace, index: EdgeIndex, layers: list[_Layer]) -> None:
         if number == 0:
             layers.append(_goal_layer(table))
             break
-        layer, arriving = _expand(space, index, table, spans[number - 1], held)
+        layer, arriving = _expand(space, index, table, spans[number - 1], held, limits)
         held += layer.nodes.nbytes + layer.links.nbytes + layer.parting.nbytes
         layers.append(layer)
 
 
 def _expand(
-    space: PlanSpace, index: EdgeIndex, table: Ints, below: slice, held: int
+    space: PlanSpace,
+    index: EdgeIndex,
+    table: Ints,
+    below: slice,
+    held: int,
+    limits: WalkLimits,
 ) -> tuple[_Layer, Ints]:
     """One layer's moves.  A node that fails at once needs no children, unless it is diagonal."""
     columns = table.shape[1]
@@ -224,7 +253,7 @@ def _expand(
     count = 0
     ends = np.cumsum(edges_out_of(space, table))
     begin = perf_counter()
-    for move in moves(space, index, table):
+    for move in moves(space, index, table, limits=limits):
         broken = move.mixed == FAILED
         fails[move.source[broken]] = True
         follow = ~broken & (~fails[move.source] | diagonal[move.source])
@@ -247,6 +276,7 @@ def _expand(
                 ends[done] / ends[-1],
                 ends,
                 perf_counter() - begin,
+                limits,
             )
     nodes, number = unique_tuples(np.concatenate(children), bounds)
     layer = _Layer(table, fails, np.concatenate(links), np.concatenate(parting))
@@ -323,7 +353,12 @@ def _sorted_different(states: Ints) -> Ints:
 
 
 def _check_rest(
-    held: int, parts: Sequence[Ints], progress: float, ends: NDArray[np.float64], seconds: float
+    held: int,
+    parts: Sequence[Ints],
+    progress: float,
+    ends: NDArray[np.float64],
+    seconds: float,
+    limits: WalkLimits,
 ) -> None:
     """Stop when the part of a layer that is done shows that the rest of it does not fit.
 
@@ -336,17 +371,17 @@ def _check_rest(
     size = f"{len(ends):,} nodes and {ends[-1]:,.0f} edges ({100 * progress:.2g} % of it done)"
     # What the sorting at the end needs for a moment is about twice what is kept.
     more = 3 * used / progress - used
-    if more > memory_left():
+    if more > limits.memory_left():
         raise OutOfMemory(
             f"the composition walk needs about {more / 2**30:.1f} GiB more to pass one layer "
             f"of {size}; it holds "
-            f"{(held + used) / 2**30:.1f} GiB, and {memory_left() / 2**30:.1f} GiB are left",
+            f"{(held + used) / 2**30:.1f} GiB, and {limits.memory_left() / 2**30:.1f} GiB are left",
             remedy=f"Use {INSTEAD}, or a larger --memory-limit.",
         )
     left = seconds / progress - seconds
-    if left > 2 * time_left():
+    if left > 2 * limits.time_left():
         raise OutOfTime(
             f"the composition walk needs about {left:.0f} s more to pass one layer "
-            f"of {size}; {time_left():.0f} s are left",
+            f"of {size}; {limits.time_left():.0f} s are left",
             remedy=f"Use {INSTEAD}, or a larger --time-limit.",
         )

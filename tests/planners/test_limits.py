@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 
 from coordlang.language.partition import Partition
-from coordlang.required import composition_walk as coordination
-from coordlang.required.composition_walk import walk
+from coordlang.required.composition_walk import WalkLimits, walk
 from coordlang.required.miscoordination import miscoordination
 from coordlang.verification import by_definition as verify
 from planners import grounding
@@ -253,32 +252,25 @@ def test_a_walk_that_will_not_fit_is_not_begun_in_earnest(
     seconds: float,
     error: type[CoordlangError],
     said: str,
-    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     space = plans("three-robots-3x3")
     whole = walk(space)
-    monkeypatch.setattr(coordination, "_CHUNK", 300)
-    monkeypatch.setattr(coordination, "memory_left", lambda: left)
-    monkeypatch.setattr(coordination, "time_left", lambda: seconds)
     with pytest.raises(error, match=said) as caught:
-        walk(space)
+        walk(space, WalkLimits(300, memory_left=lambda: left, time_left=lambda: seconds))
     assert "layers of the composition walk" in str(caught.value)
     assert "Use fewer robots" in str(caught.value)
     # Where it fits, pieces of any size give the same.
-    monkeypatch.setattr(coordination, "memory_left", lambda: 2**40)
-    monkeypatch.setattr(coordination, "time_left", lambda: float("inf"))
-    again = walk(space)
+    again = walk(space, WalkLimits(300))
     assert (again.nodes, len(again.divergences)) == (whole.nodes, len(whole.divergences))
 
 
-def test_a_size_that_nobody_can_wait_for(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_size_that_nobody_can_wait_for() -> None:
     space = plans("three-robots-3x3")
-    monkeypatch.setattr(coordination, "_MOST", 1000.0)
     with pytest.raises(
         OutOfMemory,
         match=r"nodes of one layer of the walk have .* combinations of 3 plans' next steps",
     ):
-        walk(space)
+        walk(space, WalkLimits(most=1000.0))
 
 
 def test_verification_and_the_search_for_a_break_say_how_far_they_got(
