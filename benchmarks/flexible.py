@@ -26,7 +26,7 @@ from printed_table import PrintedTable
 from coordlang.building import Built, build_language
 from coordlang.evaluation.material.suite import ROWS, World, find_domains
 from coordlang.language.flexibility import flexibility
-from coordlang.required.composition_walk import walk
+from coordlang.required.divergences import required_nodes
 from coordlang.tasks.candidates import Candidates
 from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from planners.limits import time_limit
@@ -79,7 +79,7 @@ def measures(candidates: Candidates, built: Built) -> list[str]:
 def print_row(row: World, seconds: float, table: PrintedTable) -> None:
     """Build all languages of a row, each in at most so many seconds."""
     candidates = row.candidates(find_domains(None))
-    requires = [walk(space).requires for space in candidates.spaces]
+    requires = [required_nodes(space) for space in candidates.spaces]
     bound = f"{np.mean(flexibility_bounds(candidates.spaces, requires)):.2f}"
     if row.name == PAPER[0]:
         table.print(*PAPER)

@@ -4,7 +4,7 @@
     python benchmarks/pairs.py [FOLDER/PROBLEM ..]
 
 "FOLDER/PROBLEM all": every pair of states as tasks, otherwise the problem's own.  Columns: tasks,
-words of a smallest language for all robots and of one for each pair, nodes of the composition walks
+words of a smallest language for all robots and of one for each pair, nodes of plan spaces
 and seconds of both, and whether robots that say a sentence for each pair are safe: checked for the
 words of all pairs together.
 """
@@ -84,7 +84,7 @@ def main(wanted: list[str]) -> None:
         ("tasks", 6),
         ("words", 5),
         ("pairs", 10),
-        ("walk nodes", 11),
+        ("plan nodes", 11),
         ("of pairs", 10),
         ("s", 6),
         ("s pairs", 7),

@@ -7,7 +7,7 @@ from collections.abc import Callable, Hashable, Sequence
 
 from coordlang.language.sentences import Sentence, sentence
 from coordlang.language.words import Language
-from coordlang.required.composition_walk import walk
+from coordlang.required.divergences import required_nodes
 from coordlang.tasks.candidates import Candidates
 from planners.search.plans import Plans
 
@@ -80,7 +80,7 @@ def agreement(
     figures = dict.fromkeys(("different", "told", "open", "left"), 0)
     for space in candidates.spaces:
         word = partition.word_of(space.rows).tolist()
-        requires = walk(space).requires[space.starts]
+        requires = required_nodes(space)[space.starts]
         for task in requires.nonzero()[0].tolist():
             plans = Plans.of(space, task)
             if plans.count <= MANY:

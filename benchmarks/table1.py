@@ -4,7 +4,7 @@
     python benchmarks/table1.py [ROW ..]
 
 Columns: candidate tasks and reachable states (must equal the paper's), divergences, words beside
-the paper's, nodes and edges of the composition walks, nodes of the verification, and seconds (from
+the paper's, nodes and edges of the plan spaces, nodes of the verification, and seconds (from
 PDDL text to verified language) beside the paper's.  Exit code 1 if tasks or states differ.
 """
 
@@ -29,7 +29,7 @@ def main(wanted: list[str]) -> int:
         ("diverg.", 8),
         ("words", 5),
         ("paper", 5),
-        ("walk nodes", 10),
+        ("plan nodes", 10),
         ("walk edges", 10),
         ("verify", 8),
         ("s", 6),

@@ -13,8 +13,12 @@ from coordlang.language.partition import Partition
 from coordlang.language.provenance import Guarantee, provenance_of
 from coordlang.language.warping import Clause
 from coordlang.language.words import Language
-from coordlang.required.composition_walk import walk
-from coordlang.required.divergences import FirstDifferences, first_differences, states_on_plans
+from coordlang.required.divergences import (
+    FirstDifferences,
+    first_differences,
+    required_nodes,
+    states_on_plans,
+)
 from coordlang.required.miscoordination import require_separable
 from coordlang.tasks.candidates import Candidates, require_solvable
 from coordlang.verification.by_definition import Verdict, verify
@@ -230,7 +234,7 @@ def _enlarged(
     word = partition.word_of(candidates.rows)
     enlarged = enlarge(
         spaces,
-        [walk(space).requires for space in spaces],
+        [required_nodes(space) for space in spaces],
         {state: int(word[state]) for state in outcome.partition},
     )
     partition = partition.enlarged(candidates.rows, enlarged.words)

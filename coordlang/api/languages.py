@@ -113,6 +113,8 @@ class BuiltLanguage(Presented):
             "method": guarantee.method,
             "walk_nodes": first.nodes,
             "walk_edges": first.edges,
+            "label_sets": first.sets,
+            "mixtures": first.evaluations,
             "verify_nodes": self.built.verdict.nodes,
             "verified": self.built.verdict.holds,
             "proved_minimal": guarantee.proved_minimal,

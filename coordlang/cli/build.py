@@ -216,7 +216,7 @@ def _summary(figures: dict[str, Any], output: str) -> str:
         f"{figures['tasks_requiring_coordination']:,} of which require coordination\n"
         f"{figures['states_on_plans']:,} states on optimal plans, "
         f"{figures['divergences']:,} divergences, "
-        f"{figures['walk_nodes']:,} walk nodes, {total:.2f} s\n"
+        f"{figures['walk_nodes']:,} nodes of plans, {total:.2f} s\n"
         f"{_flexibility(figures)}"
         f"written to {'stdout' if output == '-' else output}"
     )

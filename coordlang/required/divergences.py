@@ -11,43 +11,74 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coordlang.required.composition_walk import Divergences, Walk, unique_divergences, walk
+from coordlang.required.choices import Choices
+from coordlang.required.label_sets import LabelSets
+from coordlang.required.partings import Partings
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints
+from planners.tables import Bools, Ints
+
+
+@dataclass(frozen=True, slots=True)
+class Divergences:
+    """First differences of sets of plans that introduce RC.
+
+    ``last`` (k): the last shared state; ``following`` (k, robots): the different next states,
+    sorted, filled up with -1. States are numbers in the plan space's table.  With two robots a row
+    is ``alpha* = {last, s1, s2}``.
+    """
+
+    last: Ints
+    following: Ints
+
+    def __len__(self) -> int:
+        return len(self.last)
 
 
 @dataclass(frozen=True, slots=True)
 class FirstDifferences:
     """The first differences of all candidate tasks (the paper's ``alpha*``, each once).
 
-    ``requiring`` counts the tasks that require coordination; ``nodes`` and ``edges`` are the
-    composition walks' work.
+    ``requiring`` counts the tasks that require coordination.  ``nodes`` and ``edges`` are those of
+    the plan spaces; ``sets`` counts the different sets of a robot's label sequences and
+    ``evaluations`` the mixtures of such sets that were looked at: the work.
     """
 
     divergences: Divergences
     requiring: int
     nodes: int
     edges: int
+    sets: int
+    evaluations: int
 
 
 def first_differences(spaces: Sequence[PlanSpace]) -> FirstDifferences:
-    """Walk every plan space; see `coordlang.required.composition_walk.walk` for cost and errors."""
-    walks: list[Walk] = []
-    requiring = 0
+    """Find them from the robots' choices, one look at each node (`coordlang.required.choices`).
+
+    Where no plans are inseparable, the divergences at a node depend on that node only, whatever was
+    done before: Proposition 2 of docs/concepts.md.
+    """
+    sets = LabelSets()
+    partings = Partings(spaces[0].robots)
+    requiring = evaluations = 0
     for space in spaces:
-        result = walk(space)
-        requiring += int(result.requires[space.starts].sum())
-        walks.append(result)
-    joined = Divergences(
-        np.concatenate([w.divergences.last for w in walks]),
-        np.concatenate([w.divergences.following for w in walks]),
-    )
+        choices = Choices(space, sets)
+        requiring += int(choices.requires[space.starts].sum())
+        partings.add(choices)
+        evaluations += choices.evaluations
+    table = partings.table()
     return FirstDifferences(
-        unique_divergences(joined),
+        Divergences(table[:, 0], table[:, 1:]),
         requiring,
-        sum(w.nodes for w in walks),
-        sum(w.edges for w in walks),
+        sum(map(len, spaces)),
+        sum(len(space.target) for space in spaces),
+        len(sets),
+        evaluations,
     )
+
+
+def required_nodes(space: PlanSpace) -> Bools:
+    """Say of each node whether some plans from it introduce RC."""
+    return Choices(space).requires
 
 
 def states_on_plans(spaces: Sequence[PlanSpace]) -> Ints:

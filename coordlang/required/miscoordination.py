@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from coordlang.required.choices import Choices
 from coordlang.required.composition_walk import FAILED, INSTEAD, moves
 from coordlang.tasks.candidates import describe
 from planners.errors import ProvedImpossible
@@ -18,6 +19,8 @@ from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.tables import Ints, unique_tuples
 
+#: Moves of the walk along all plans up to which the earliest break is looked for.
+_WIDEST = 20_000_000
 #: One joint step as text: each robot's subaction, None for idling.
 Step = tuple[str | None, ...]
 
@@ -44,12 +47,38 @@ class Miscoordination:
 
 
 def miscoordination(space: PlanSpace, task: int) -> Miscoordination | None:
-    """The plans of a task whose mixture breaks earliest.
+    """The plans of a task whose mixture breaks earliest; None if none does.
 
-    None if the task requires no coordination.
+    Where the walk along all plans could be wide, some plans whose mixture breaks.
     """
-    trail = _trail(space, np.array([space.starts[task]]), together=False)
+    choices = Choices(space)
+    start = int(space.starts[task])
+    if not choices.requires[start]:
+        return None
+    if _width(space, start) <= _WIDEST:
+        trail = _trail(space, np.array([start]), together=False)
+    else:
+        trail = _trail_of_choices(choices, start)
     return describe_failure(space, trail) if trail is not None else None
+
+
+def _width(space: PlanSpace, start: int) -> float:
+    """At most so many moves does the walk along all plans from a node make."""
+    reached = space.descendants(np.array([start]))
+    edges = (np.count_nonzero(reached[layer.source]) for layer in space.edges_by_layer())
+    return sum(float(number) ** space.robots for number in edges)
+
+
+def _trail_of_choices(choices: Choices, start: int) -> Trail:
+    """Plans from a node that requires coordination, one for each robot, up to where they break."""
+    space = choices.space
+    labels = choices.breaking(start)
+    paths = [
+        space.path_of_robot(start, robot, [step[robot] for step in labels])
+        for robot in range(space.robots)
+    ]
+    steps = zip(*(path[: len(labels)] for path in paths if path is not None), strict=True)
+    return Trail(start, tuple(steps))
 
 
 class Inseparable(ProvedImpossible):

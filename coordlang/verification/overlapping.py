@@ -19,7 +19,7 @@ import numpy as np
 
 from coordlang.language.overlapping import Sentence
 from coordlang.language.partition import Partition
-from coordlang.required.composition_walk import walk
+from coordlang.required.choices import Choices
 from coordlang.required.miscoordination import Miscoordination, Trail, describe_failure
 from coordlang.verification.by_definition import Verdict, verify
 from planners.errors import OutOfMemory
@@ -51,7 +51,7 @@ def verify_overlapping(partition: Partition, spaces: Sequence[PlanSpace]) -> Ver
         starts = np.unique(space.starts)
         # A guess at what is left to look at; that the others are RC-free altogether is checked here
         # and now.
-        guessed = walk(space).requires[starts]
+        guessed = Choices(space).requires[starts]
         together = verify(
             Partition(("",), space.rows[:0], starts[:0], 0), [_from(space, starts[~guessed])]
         )

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from coordlang.language.flexibility import Flexibility, Floats, flexibility
-from coordlang.required.composition_walk import walk
+from coordlang.required.divergences import required_nodes
 from coordlang.vocabulary.annealing import Annealing, AnnealingSettings, Violations
 from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from coordlang.vocabulary.job import Assignment, Job, Outcome
@@ -92,7 +92,7 @@ class _Search:
     def run(self) -> None:
         """Anneal until the bound is reached, or it does not pay any more."""
         spaces = self._job.candidates.spaces
-        requires = [walk(space).requires for space in spaces]
+        requires = [required_nodes(space) for space in spaces]
         self._bound = flexibility_bounds(spaces, requires)
         if self._found.size < 2:
             return

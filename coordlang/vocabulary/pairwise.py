@@ -21,7 +21,7 @@ from itertools import combinations
 import numpy as np
 
 from coordlang.language.warping import Clause
-from coordlang.required.composition_walk import walk
+from coordlang.required.divergences import required_nodes
 from coordlang.required.miscoordination import Inseparable, inseparable, separable
 from coordlang.vocabulary.clauses import most_constrained_first, without_implied
 from coordlang.vocabulary.counterexamples import counterexamples
@@ -104,10 +104,9 @@ def language_for(spaces: Sequence[PlanSpace], pairs: Sequence[tuple[int, int]]) 
         With two plans, when there is none.
     """
     views = [view for space in spaces for view in _separable_views(space, pairs)]
-    walks = [walk(view) for view in views]
     parts = []
-    for view, found in zip(views, walks, strict=True):
-        starts = view.starts[found.requires[view.starts]]
+    for view in views:
+        starts = view.starts[required_nodes(view)[view.starts]]
         if len(starts):
             parts.append(TaskPart(view, EdgeIndex.of(view), np.unique(starts)))
     states = np.unique(np.concatenate([space.state for space in spaces])).tolist()
@@ -119,8 +118,8 @@ def language_for(spaces: Sequence[PlanSpace], pairs: Sequence[tuple[int, int]]) 
         pairs=tuple(pairs),
         words=words,
         size=len(set(words.values())),
-        nodes=sum(found.nodes for found in walks),
-        edges=sum(found.edges for found in walks),
+        nodes=sum(map(len, views)),
+        edges=sum(len(view.target) for view in views),
         clauses=len(clauses),
     )
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from coordlang.language.warping import Pair, pair
-from coordlang.required.composition_walk import Divergences
+from coordlang.required.divergences import Divergences
 from coordlang.required.last_differences import Difference
 
 

@@ -285,7 +285,7 @@ def distances(space: Space, reached: Bools) -> Ints:
         tail = np.concatenate((space.target, goal + len(space)))
         head = np.concatenate((source, state))
         nodes = len(space) + goals
-        graph = csr_matrix((np.ones(len(tail), np.int8), (tail, head)), shape=(nodes, nodes))
+        graph = csr_matrix((np.ones(len(tail)), (tail, head)), shape=(nodes, nodes))
         far = dijkstra(graph, unweighted=True, indices=np.arange(len(space), nodes))
         far = far[:, : len(space)]
         result[start : start + goals] = np.where(np.isinf(far), 0, far) - 1

@@ -158,6 +158,28 @@ class PlanSpace:
             node = int(self.target[edge])
         return path
 
+    def path_of_robot(self, node: int, robot: int, labels: Sequence[int]) -> list[int] | None:
+        """The edges of a plan from a node that begins with these labels of one robot.
+
+        None if there is none.  It goes on with first edges to a goal.  O(edges).
+        """
+        layers: list[dict[int, tuple[int, int]]] = [{node: (-1, -1)}]  # node -> (before, edge)
+        for label in labels:
+            reached: dict[int, tuple[int, int]] = {}
+            for before in layers[-1]:
+                for edge in self.out_edges(before):
+                    if self.labels[edge, robot] == label:
+                        reached.setdefault(self.target_of(edge), (before, edge))
+            layers.append(reached)
+        if not layers[-1]:
+            return None
+        end = at = next(iter(layers[-1]))
+        path: list[int] = []
+        for layer in reversed(layers[1:]):
+            at, edge = layer[at]
+            path.append(edge)
+        return [*reversed(path), *self.first_path(end)]
+
     def nodes_on(self, node: int, path: Sequence[int]) -> list[int]:
         """The nodes that a path passes through: the one that it starts from, then its targets."""
         return [node, *self.target[list(path)].tolist()] if path else [node]

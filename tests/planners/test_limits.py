@@ -13,16 +13,19 @@ import numpy as np
 import pytest
 
 from coordlang.language.partition import Partition
-from coordlang.required.composition_walk import WalkLimits, walk
+from coordlang.required.choices import Choices
+from coordlang.required.composition_walk import WalkLimits, moves
+from coordlang.required.label_sets import LabelSets
 from coordlang.required.miscoordination import miscoordination
 from coordlang.verification import by_definition as verify
 from planners import grounding
-from planners.errors import CoordlangError, OutOfMemory, OutOfTime
+from planners.errors import OutOfMemory, OutOfTime
 from planners.grounding import instantiate
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import Stepper, Steps
 from planners.limits import reaching, time_left, time_limit
 from planners.loading import PlanningInstance, load
+from planners.search.edge_index import EdgeIndex
 from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PieceSizes, count, explore
@@ -240,28 +243,15 @@ def plans(problem: str) -> PlanSpace:
     return search(loaded.model, loaded.tasks[0])
 
 
-@pytest.mark.parametrize(
-    ("left", "seconds", "error", "said"),
-    [
-        (2e6, float("inf"), OutOfMemory, "GiB more to pass one layer of"),
-        (1e12, 1e-9, OutOfTime, "s more to pass one layer of"),
-    ],
-)
-def test_a_walk_that_will_not_fit_is_not_begun_in_earnest(
-    left: float,
-    seconds: float,
-    error: type[CoordlangError],
-    said: str,
-) -> None:
+def test_required_coordination_says_how_far_it_got(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise late()
+
     space = plans("three-robots-3x3")
-    whole = walk(space)
-    with pytest.raises(error, match=said) as caught:
-        walk(space, WalkLimits(300, memory_left=lambda: left, time_left=lambda: seconds))
-    assert "layers of the composition walk" in str(caught.value)
-    assert "Use fewer robots" in str(caught.value)
-    # Where it fits, pieces of any size give the same.
-    again = walk(space, WalkLimits(300))
-    assert (again.nodes, len(again.divergences)) == (whole.nodes, len(whole.divergences))
+    monkeypatch.setattr(LabelSets, "unions", fail)
+    with pytest.raises(OutOfTime) as caught:
+        Choices(space)
+    assert f"choices in 1 sets, over {len(space):,} states on optimal plans" in str(caught.value)
 
 
 def test_a_size_that_nobody_can_wait_for() -> None:
@@ -270,7 +260,8 @@ def test_a_size_that_nobody_can_wait_for() -> None:
         OutOfMemory,
         match=r"nodes of one layer of the walk have .* combinations of 3 plans' next steps",
     ):
-        walk(space, WalkLimits(most=1000.0))
+        every = np.repeat(np.arange(len(space))[:, None], space.robots + 1, axis=1)
+        next(moves(space, EdgeIndex.of(space), every, limits=WalkLimits(most=1000.0)))
 
 
 def test_verification_and_the_search_for_a_break_say_how_far_they_got(

@@ -8,7 +8,6 @@ from functools import cache
 from itertools import product
 from random import Random
 
-from coordlang.required.composition_walk import walk
 from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
 from coordlang.tasks.listed import ListedTask
 from planners.errors import ProvedImpossible
@@ -19,6 +18,7 @@ from planners.pddl.sexpr import Source
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan
 from tests.support import naive
+from tests.support.composition_walk import walk
 from tests.support.random_models import graph_text
 
 #: More plans of one task are not listed.

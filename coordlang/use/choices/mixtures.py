@@ -179,21 +179,9 @@ def _violation(
 
 def _with_beginning(fits: PlanSpace, robot: int, subplan: Sequence[int]) -> list[tuple[int, ...]]:
     """A plan, as labels, in which a robot begins with these labels of its own."""
-    layers = [{int(fits.starts[0]): (-1, -1)}]  # node -> the node before it and the edge from there
-    for label in subplan:
-        found: dict[int, tuple[int, int]] = {}
-        for node in layers[-1]:
-            for edge in fits.out_edges(node):
-                if fits.labels_of(edge)[robot] == label:
-                    found.setdefault(fits.target_of(edge), (node, edge))
-        layers.append(found)
-    end = node = next(iter(layers[-1]))
-    path: list[int] = []
-    for layer in reversed(layers[1:]):
-        node, edge = layer[node]
-        path.append(edge)
-    path.reverse()
-    return [fits.labels_of(edge) for edge in [*path, *fits.first_path(end)]]
+    path = fits.path_of_robot(int(fits.starts[0]), robot, subplan)
+    assert path is not None, "the robot's automaton accepts its subplans only"
+    return [fits.labels_of(edge) for edge in path]
 
 
 def _check(

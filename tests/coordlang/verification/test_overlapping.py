@@ -18,7 +18,6 @@ from coordlang.building import build_language
 from coordlang.language.file import language_from_bytes, read_language, to_bytes, write_language
 from coordlang.language.overlapping import Overlap, Readings, Sentence, readings
 from coordlang.language.partition import Partition
-from coordlang.required.composition_walk import walk
 from coordlang.required.miscoordination import inseparable
 from coordlang.tasks.candidates import Candidates
 from coordlang.verification.overlapping import verify_overlapping
@@ -28,6 +27,7 @@ from planners.errors import BadInput, Position
 from planners.search.plans import Plan
 from tests.support import naive
 from tests.support.candidates import listed, on_graph, some_tasks
+from tests.support.composition_walk import walk
 from tests.support.domains import all_tasks
 
 

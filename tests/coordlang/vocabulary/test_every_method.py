@@ -11,7 +11,6 @@ from functools import cache
 import pytest
 
 from coordlang.building import build_language
-from coordlang.required.composition_walk import walk
 from coordlang.required.miscoordination import inseparable
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.vocabulary import METHODS, Job, Outcome
@@ -20,6 +19,7 @@ from coordlang.vocabulary.job import Assignment
 from planners.errors import OutOfMemory, OutOfTime, ProvedImpossible
 from tests.support import naive
 from tests.support.candidates import states_of
+from tests.support.composition_walk import walk
 from tests.support.domains import all_tasks
 from tests.support.random_models import random_model
 

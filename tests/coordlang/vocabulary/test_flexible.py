@@ -14,7 +14,6 @@ import pytest
 
 from coordlang.building import build_language
 from coordlang.language.flexibility import flexibility
-from coordlang.required.composition_walk import walk
 from coordlang.tasks.candidates import Candidates, from_listed, from_problems
 from coordlang.tasks.task_file import read_task_file
 from coordlang.vocabulary.annealing import AnnealingSettings
@@ -28,6 +27,7 @@ from planners.pddl import read_domain, read_problem
 from planners.search.plans import Plan
 from tests.support import naive
 from tests.support.candidates import listed, on_graph, partitions, requiring, some_tasks
+from tests.support.composition_walk import walk
 from tests.support.domains import DOMAINS, all_tasks
 from tests.support.random_models import random_model
 

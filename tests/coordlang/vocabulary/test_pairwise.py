@@ -185,4 +185,6 @@ def test_what_pairs_cost() -> None:
     languages = pair_languages(candidates.spaces)
     assert [language.size for language in languages] == [2, 2, 2]
     assert joint.language.guarantee.size == 2
-    assert sum(language.nodes for language in languages) < joint.first_differences.nodes / 3
+    # Two ways to divide the three robots for each pair: the plan graph is looked at six times.
+    nodes = joint.first_differences.nodes
+    assert [language.nodes for language in languages] == [2 * nodes] * 3

@@ -12,7 +12,6 @@ from itertools import combinations, count
 import pytest
 
 from coordlang.building import build_language
-from coordlang.required.composition_walk import walk
 from coordlang.required.last_differences import DifferenceWalk
 from coordlang.required.miscoordination import inseparable
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
@@ -21,6 +20,7 @@ from coordlang.vocabulary.separations import alternatives, constraints
 from planners.errors import ProvedImpossible
 from tests.support import naive
 from tests.support.candidates import states_of
+from tests.support.composition_walk import walk
 from tests.support.domains import all_tasks
 from tests.support.random_models import random_model
 

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Required coordination and divergences from choices against the composition walk, their twin."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+from random import Random
+
+import numpy as np
+import pytest
+
+from coordlang.required.choices import Choices
+from coordlang.required.divergences import first_differences
+from coordlang.required.label_sets import LabelSets
+from coordlang.required.miscoordination import Miscoordination, inseparable, miscoordination
+from coordlang.required.partings import Partings
+from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
+from planners.errors import BadInput, ProvedImpossible
+from planners.loading import ModelOptions
+from planners.pddl import parse_domain, parse_problem
+from planners.pddl.robots import RobotSelection
+from planners.pddl.sexpr import Source
+from planners.search.plan_space import PlanSpace
+from tests.support.composition_walk import walk
+from tests.support.random_models import random_model
+from tests.support.random_pddl import random_model as random_pddl
+
+#: Nodes of a plan space up to which the walk is waited for, by the number of robots.
+MOST = {2: 3_000, 3: 250, 4: 60}
+
+
+def candidates_of(seed: int, robots: int) -> Candidates:
+    random = Random(seed)
+    domain, problem, options = random_model(seed, robots)
+    options = replace(options, remember_actions=random.random() < 0.3)
+    if random.random() < 0.5:
+        return from_problems(domain, [problem], options)
+    return all_pairs(domain, [problem], options)
+
+
+def candidates_of_kinds(seed: int) -> Candidates:
+    """MA-PDDL with formulas, plain PDDL with shared actions, joint-action PDDL with drift."""
+    random = Random(seed)
+    text = random_pddl(seed, random.choice(["agent", "plain", "joint"]))
+    domain = parse_domain(Source("domain", text.domain))
+    problem = parse_problem(Source("problem", text.problem), domain)
+    selection = RobotSelection(unowned=text.unowned)
+    options = ModelOptions(selection, remember_actions=random.random() < 0.3)
+    make = from_problems if random.random() < 0.3 else all_pairs
+    return make(domain, [problem], options)
+
+
+def separable_spaces(seeds: range, robots: int | None) -> Iterator[PlanSpace]:
+    """Plan spaces of random candidate tasks without inseparable plans, small enough for the twin."""
+    for seed in seeds:
+        try:
+            found = candidates_of(seed, robots) if robots else candidates_of_kinds(seed)
+        except (ProvedImpossible, BadInput):
+            continue
+        for space in found.spaces:
+            if 0 < len(space) <= MOST.get(space.robots, 0) and inseparable(space) is None:
+                yield space
+
+
+def agree(space: PlanSpace, chunk: int) -> bool:
+    """Compare with the walk; whether any coordination is required."""
+    twin = walk(space)
+    choices = Choices(space)
+    assert (choices.requires == twin.requires).all()
+    partings = Partings(space.robots, chunk)
+    partings.add(choices)
+    table = partings.table()
+    assert table[:, 0].tolist() == twin.divergences.last.tolist()
+    assert table[:, 1:].tolist() == twin.divergences.following.tolist()
+    return bool(twin.requires.any())
+
+
+def compared(seeds: range, robots: int | None) -> Counter[bool]:
+    answers: Counter[bool] = Counter()
+    for number, space in enumerate(separable_spaces(seeds, robots)):
+        answers[agree(space, chunk=(7, 100, 1_000_000)[number % 3])] += 1
+    return answers
+
+
+@pytest.mark.parametrize(("robots", "number"), [(2, 40), (3, 20), (None, 25)])
+def test_choices_equal_the_walk(robots: int | None, number: int) -> None:
+    answers = compared(range(number), robots)
+    assert answers[True] >= 3
+    assert answers[False] >= 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("robots", "first", "last"),
+    [(2, 1_000, 1_700), (3, 2_000, 2_800), (4, 3_000, 3_300), (None, 4_000, 4_400)],
+)
+def test_choices_equal_the_walk_on_many_models(robots: int | None, first: int, last: int) -> None:
+    answers = compared(range(first, last), robots)
+    print(
+        f"{robots or 'any'} robots: {answers[True]} spaces require coordination, {answers[False]} not"
+    )
+    assert answers[True] >= 10
+    assert answers[False] >= 10
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_many_plan_spaces_share_their_sets(seed: int) -> None:
+    """Divergences over all candidate tasks: the walks' together, each once."""
+    domain, problem, options = random_model(seed, 2)
+    candidates = all_pairs(domain, [problem], options)
+    spaces = [space for space in candidates.spaces if len(space)]
+    if not spaces or any(inseparable(space) is not None for space in spaces):
+        pytest.skip("this model has no task, or inseparable plans")
+    found = first_differences(spaces)
+    walks = [walk(space) for space in spaces]
+    expected = {
+        (last, *following)
+        for twin in walks
+        for last, following in zip(
+            twin.divergences.last.tolist(), twin.divergences.following.tolist(), strict=True
+        )
+    }
+    rows = zip(found.divergences.last.tolist(), found.divergences.following.tolist(), strict=True)
+    assert [(last, *following) for last, following in rows] == sorted(expected)
+    requiring = sum(
+        int(twin.requires[space.starts].sum()) for twin, space in zip(walks, spaces, strict=True)
+    )
+    assert found.requiring == requiring
+    sets = LabelSets()
+    assert [Choices(space, sets).requires.tolist() for space in spaces] == [
+        twin.requires.tolist() for twin in walks
+    ]
+
+
+@pytest.mark.parametrize("robots", [2, 3])
+def test_a_break_is_found_without_a_walk(robots: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The plans shown where the walk would be wide are optimal, and their mixture breaks."""
+    shown = 0
+    for space in separable_spaces(range(40), robots):
+        requires = walk(space).requires[space.starts]
+        some = [*np.flatnonzero(requires)[:5].tolist(), *np.flatnonzero(~requires)[:2].tolist()]
+        for task in some:
+            earliest = miscoordination(space, task)
+            monkeypatch.setattr("coordlang.required.miscoordination._WIDEST", -1)
+            found = miscoordination(space, task)
+            monkeypatch.undo()
+            assert (found is None) == (earliest is None)
+            if found is not None and earliest is not None:
+                shown += 1
+                assert found.step >= earliest.step
+                breaks(space, int(space.starts[task]), found)
+    assert shown >= 3
+
+
+def breaks(space: PlanSpace, start: int, found: Miscoordination) -> None:
+    """The plans are optimal, their mixture is theirs, and its last step is no edge."""
+    for robot, plan in enumerate(found.plans):
+        steps = [space.model.numbers(step) for step in plan]
+        assert space.path_with(start, [step for step in steps if step is not None]) is not None
+        assert len(steps) == space.layer[start]
+        own = [step[robot] for step in plan[: found.step + 1]]
+        assert own == [step[robot] for step in found.mixture]
+    mixed = [space.model.numbers(step) or () for step in found.mixture]
+    assert space.path_with(start, mixed[:-1]) is not None
+    assert space.path_with(start, mixed) is None
