@@ -11,15 +11,12 @@ from time import perf_counter
 from typing import Any, Unpack
 
 import coordlang
-from coordlang.api.inputs import (
-    DomainSource,
-    File,
+from coordlang.api.inputs import DomainSource, File, PlanningInput, ProblemSource, read_planning
+from coordlang.api.language_inputs import (
     LanguageSource,
-    PlanningInput,
-    ProblemSource,
     TasksSource,
+    candidates_of,
     read_language_source,
-    read_planning,
 )
 from coordlang.api.options import (
     UNSOLVABLE,
@@ -299,7 +296,7 @@ def verify(
     if tasks is None:
         candidates = recorded_candidates(read, files.domain, files.problems, options, position)
     else:
-        candidates = files.candidates(tasks, options)
+        candidates = candidates_of(files, tasks, options)
     verdict = _verdict(read, candidates)
     checked = None
     if proof and verdict.holds:
@@ -334,7 +331,9 @@ def _candidates(
     files: PlanningInput, tasks: TasksSource | None, unsolvable: Unsolvable
 ) -> Candidates:
     try:
-        return files.candidates(tasks, files.given.options(), skip_unsolvable=unsolvable == "skip")
+        return candidates_of(
+            files, tasks, files.given.options(), skip_unsolvable=unsolvable == "skip"
+        )
     except ProvedImpossible as error:
         if unsolvable == "fail":
             advice = (error.remedy, "--unsolvable skip leaves out such tasks.")
