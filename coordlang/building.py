@@ -30,6 +30,7 @@ from coordlang.vocabulary.job import Assignment, Evidence
 from coordlang.vocabulary.minimal import refuting_clauses
 from planners.errors import UsageError
 from planners.limits import run_until_stopped
+from planners.messages import echoed
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,13 +87,14 @@ class BuildOptions:
     def __post_init__(self) -> None:
         if self.method not in METHODS:
             raise UsageError(
-                f"there is no method {self.method!r}", remedy=f"Methods are {', '.join(METHODS)}."
+                f"there is no method {echoed(self.method)}",
+                remedy=f"Methods are {', '.join(METHODS)}.",
             )
         if self.alpha_only and self.method != "separating":
             raise UsageError("--alpha-only belongs to --method separating")
         if self.prefer not in (None, "flexible"):
             raise UsageError(
-                f"there is no preference {self.prefer!r}", remedy="--prefer takes flexible."
+                f"there is no preference {echoed(self.prefer)}", remedy="--prefer takes flexible."
             )
         if self.prefer and not self.is_exact:
             raise UsageError(f"--prefer {self.prefer} belongs to --method minimal or exhaustive")

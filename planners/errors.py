@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from planners.messages import sentence
+
 
 @dataclass(frozen=True, slots=True)
 class Position:
@@ -19,9 +21,8 @@ class Position:
     column: int = 0
 
     def __str__(self) -> str:
-        if not self.line:
-            return self.file
-        return f"{self.file}:{self.line}:{self.column}"
+        file = sentence(self.file)
+        return f"{file}:{self.line}:{self.column}" if self.line else file
 
 
 class CoordlangError(Exception):
@@ -37,6 +38,9 @@ class CoordlangError(Exception):
         One sentence: what the user can do.
 
     ``reached`` says how far the work got that a limit ended (`planners.limits.reaching`).
+
+    The text of an error may be shown as it is, whatever it quotes: characters that steer a terminal
+    are escaped, and what is very long is cut (`planners.messages`).
     """
 
     #: A program that coordlang relies on failed (the other codes are set below).
@@ -52,8 +56,10 @@ class CoordlangError(Exception):
         self.reached: str | None = None
 
     def __str__(self) -> str:
-        text = f"{self.position}: {self.what}" if self.position else self.what
-        return "\n  ".join((text, *(line for line in (self.reached, self.remedy) if line)))
+        what = sentence(self.what)
+        lines = [f"{self.position}: {what}" if self.position else what]
+        lines += [sentence(line, keep="\n") for line in (self.reached, self.remedy) if line]
+        return "\n  ".join(lines)
 
 
 class Refuted(CoordlangError):

@@ -18,6 +18,7 @@ from typing import Any, Generic, TypeVar
 import msgspec
 
 from planners.errors import BadInput, Position, UsageError
+from planners.messages import UNSEEN, echoed
 
 T = TypeVar("T")
 
@@ -62,6 +63,7 @@ class FileFormat(Generic[T]):
             For a text that is no JSON, of another format or version, or that does not fit the
             record.
         """
+        check_utf8(data, position)
         data = data.removeprefix(_BYTE_ORDER_MARK)
         try:
             if self.format is not None:
@@ -69,7 +71,7 @@ class FileFormat(Generic[T]):
             return msgspec.json.decode(data, type=self.record)
         except msgspec.ValidationError as error:
             raise self._refused(error, position) from None
-        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        except (msgspec.DecodeError, RecursionError) as error:
             raise BadInput(
                 f"this is no JSON, or it is cut off: {error}", position=position
             ) from None
@@ -89,10 +91,13 @@ class FileFormat(Generic[T]):
 
     def _check_format(self, head: _Head, position: Position) -> None:
         if head.format != self.format:
-            raise BadInput(f"format {head.format!r}, expected {self.format!r}", position=position)
+            raise BadInput(
+                f"format {echoed(head.format)}, expected {self.format!r}", position=position
+            )
         if head.version != self.version or isinstance(head.version, bool):
             raise BadInput(
-                f"{self.title} version {head.version!r}; this program reads version {self.version}",
+                f"{self.title} version {echoed(head.version)}; "
+                f"this program reads version {self.version}",
                 position=position,
             )
 
@@ -140,6 +145,52 @@ def read_bytes(path: str | Path) -> bytes:
         raise BadInput(f"cannot be read: {error.strerror or error}", position=position) from None
     except (EOFError, zlib.error) as error:
         raise BadInput(f"cannot be read: {error}", position=position) from None
+
+
+def read_text(path: str | Path) -> str:
+    """Read a text in UTF-8, or standard input for ``-``.
+
+    Raises
+    ------
+    BadInput
+        A file that is missing or cannot be read, or that is not UTF-8, with the byte that is not.
+    """
+    data = read_bytes(path)
+    check_utf8(data, Position(str(path)))
+    return data.decode("utf-8-sig")
+
+
+def check_utf8(data: bytes, position: Position) -> None:
+    """Raise `BadInput`, with the first byte that is wrong, for bytes that are not UTF-8."""
+    try:
+        if not data.isascii():
+            data.decode()
+    except UnicodeDecodeError as error:
+        raise not_utf8(data, error.start, position) from None
+
+
+def not_utf8(data: bytes, offset: int, position: Position) -> BadInput:
+    """The error for a byte that no UTF-8 text has there (the caller raises it)."""
+    return BadInput(
+        f"this is no UTF-8 text: byte 0x{data[offset]:02x} at offset {offset}",
+        position=position,
+        remedy="Save the file in UTF-8.",
+    )
+
+
+def require_seen(name: str, position: Position, what: str = "name") -> None:
+    """Raise `BadInput` for a name or a word with a character of `planners.messages.UNSEEN`.
+
+    Control characters could steer a terminal, and characters that nobody sees could make one name
+    look like another.
+    """
+    found = UNSEEN.search(name)
+    if found is not None:
+        raise BadInput(
+            f"the {what} {echoed(name)} holds the character U+{ord(found[0]):04X}",
+            position=position,
+            remedy="Names and words hold no control characters and none that cannot be seen.",
+        )
 
 
 def write_atomically(path: str | Path, data: bytes) -> None:

@@ -14,6 +14,7 @@ from planners.grounding.networks import apply_network
 from planners.joint.assembly import assemble
 from planners.joint.model import Cost, JointModel, PlanningTask, show
 from planners.limits import reaching
+from planners.messages import echoed
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Atom, Domain, Problem
 from planners.pddl.robots import (
@@ -135,7 +136,8 @@ def task_of(model: JointModel, domain: Domain, problem: Problem) -> PlanningTask
 def _require_one_of(option: str, value: str, values: Sequence[str]) -> None:
     if value not in values:
         raise UsageError(
-            f"{value!r} is no value of the option {option}", remedy=f"It is {' or '.join(values)}."
+            f"{echoed(value)} is no value of the option {option}",
+            remedy=f"It is {' or '.join(values)}.",
         )
 
 
@@ -148,7 +150,7 @@ def _check_same_world(domain: Domain, first: Problem, other: Problem) -> None:
     if first.objects != other.objects:
         odd = sorted({*first.objects.items()} ^ {*other.objects.items()})[0][0]
         raise BadInput(
-            f"object {odd!r} is not the same in all problems", position=objects, remedy=remedy
+            f"object {echoed(odd)} is not the same in all problems", position=objects, remedy=remedy
         )
     changed = static_atoms(domain, first) ^ static_atoms(domain, other)
     if changed:

@@ -11,12 +11,15 @@ from time import perf_counter
 from typing import Any, Unpack
 
 import coordlang
-from coordlang.api.inputs import DomainSource, File, PlanningInput, ProblemSource, read_planning
-from coordlang.api.language_inputs import (
+from coordlang.api.inputs import (
+    DomainSource,
+    File,
     LanguageSource,
+    PlanningInput,
+    ProblemSource,
     TasksSource,
-    candidates_of,
     read_language_source,
+    read_planning,
 )
 from coordlang.api.options import (
     UNSOLVABLE,
@@ -296,7 +299,7 @@ def verify(
     if tasks is None:
         candidates = recorded_candidates(read, files.domain, files.problems, options, position)
     else:
-        candidates = candidates_of(files, tasks, options)
+        candidates = files.candidates(tasks, options)
     verdict = _verdict(read, candidates)
     checked = None
     if proof and verdict.holds:
@@ -331,9 +334,7 @@ def _candidates(
     files: PlanningInput, tasks: TasksSource | None, unsolvable: Unsolvable
 ) -> Candidates:
     try:
-        return candidates_of(
-            files, tasks, files.given.options(), skip_unsolvable=unsolvable == "skip"
-        )
+        return files.candidates(tasks, files.given.options(), skip_unsolvable=unsolvable == "skip")
     except ProvedImpossible as error:
         if unsolvable == "fail":
             advice = (error.remedy, "--unsolvable skip leaves out such tasks.")

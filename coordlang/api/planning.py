@@ -7,10 +7,17 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Unpack
 
-from coordlang.api.inputs import DomainSource, File, ProblemSource, read_instance, read_planning
+from coordlang.api.inputs import (
+    DomainSource,
+    File,
+    ProblemSource,
+    read_instance,
+    read_planning,
+)
 from coordlang.api.optimal_plans import OptimalPlans
 from coordlang.api.options import GivenOptions, ModelKeywords
 from coordlang.api.presenting import Presented
+from planners.classical.fast_downward import optimal_cost
 from planners.errors import ProvedImpossible
 from planners.inspection import Inspection
 from planners.inspection import inspect as inspect_instance
@@ -241,8 +248,6 @@ def check(
     CoordlangError
         If Fast Downward gives no answer.
     """
-    from planners.classical.fast_downward import optimal_cost
-
     loaded = read_instance(domain, problem, factored, GivenOptions.of(**model))
     task = loaded.tasks[0]
     try:

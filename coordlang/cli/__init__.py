@@ -10,6 +10,7 @@ import errno
 import os
 import sys
 import traceback
+from io import StringIO
 from typing import NoReturn
 
 import click
@@ -17,6 +18,7 @@ import click
 from coordlang.cli.exit_codes import BROKEN_PIPE, INTERRUPTED
 from coordlang.cli.group import cli
 from planners.errors import CoordlangError, OutOfMemory
+from planners.messages import sentence, visible
 
 
 def main() -> NoReturn:
@@ -43,7 +45,7 @@ def run(arguments: list[str]) -> int:
         )
     except CoordlangError as error:
         if debug:
-            traceback.print_exc()
+            _show(traceback.format_exc())
         return _fail(str(error), error.exit_code)
     except Exception as error:
         return _internal(error, debug)
@@ -59,7 +61,9 @@ def _run(arguments: list[str]) -> int:
     except click.exceptions.Exit as done:
         return int(done.exit_code)
     except click.ClickException as error:
-        error.show(file=sys.stderr)
+        shown = StringIO()
+        error.show(file=shown)
+        _show(sentence(shown.getvalue(), keep="\n"))
         return 2
     except BrokenPipeError:
         # The reader has gone (`| head`): no more output, and no complaint at exit.
@@ -72,11 +76,15 @@ def _run(arguments: list[str]) -> int:
 def _internal(error: Exception, debug: bool) -> int:
     """A bug: reported as one, with an exit code of its own, and never hidden."""
     if debug:
-        traceback.print_exception(error)
-    what = f"internal error: {type(error).__name__}: {error}"
+        _show("".join(traceback.format_exception(error)))
+    what = f"internal error: {type(error).__name__}: {sentence(str(error))}"
     return _fail(f"{what}\n  This is a bug; --debug shows where.", CoordlangError.exit_code)
 
 
 def _fail(message: str, code: int) -> int:
-    print(f"coordlang: {message}", file=sys.stderr)
+    _show(f"coordlang: {message}\n")
     return code
+
+
+def _show(text: str) -> None:
+    print(visible(text, keep="\n"), end="", file=sys.stderr)

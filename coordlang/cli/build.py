@@ -19,10 +19,12 @@ from coordlang.api.options import (
     Method,
     Unsolvable,
 )
+from coordlang.cli.echo import echo
 from coordlang.cli.exit_codes import INTERRUPTED, UNPROVED
 from coordlang.cli.files import PlanningFiles, check_outputs, never_stdout, planning_files
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import note_single_robot, working
+from planners.messages import visible
 from planners.notebook import counted
 
 if TYPE_CHECKING:
@@ -126,9 +128,9 @@ def command(
     uncertified = _certify(built, certificate, left) if certificate else None
     figures = built.data()
     if as_json and output != "-":
-        click.echo(json.dumps(figures))
+        echo(json.dumps(figures))
     else:
-        click.echo(_summary(figures, output), err=output == "-")
+        echo(_summary(figures, output), err=output == "-")
     return _exit_code(built, uncertified)
 
 
@@ -142,10 +144,10 @@ def _build(pddl: PlanningFiles, **keywords: Any) -> BuiltLanguage:
                 *pddl.files, factored=pddl.factored, progress=progress, **keywords
             )
     except coordlang.Inseparable as error:
-        click.echo(witness_text(error.witness), err=True)
+        echo(witness_text(error.witness), err=True)
         raise
     for name in built.skipped:
-        click.echo(f"coordlang: left out, it has no plan: {name}", err=True)
+        echo(f"coordlang: left out, it has no plan: {name}", err=True)
     note_single_robot(built.candidates.model.robots)
     return built
 
@@ -154,12 +156,12 @@ def _save(built: BuiltLanguage, output: str) -> None:
     """Write the language; its file records the arguments of the command line."""
     from coordlang.language.file import to_bytes
 
-    arguments = [argument.encode("utf-8", "replace").decode() for argument in sys.argv[1:]]
+    arguments = [visible(argument) for argument in sys.argv[1:]]
     provenance = built.language.provenance
     producer = {**provenance.producer, "arguments": arguments}
     language = replace(built.language, provenance=replace(provenance, producer=producer))
     if output == "-":
-        click.echo(to_bytes(language).decode(), nl=False)
+        echo(to_bytes(language).decode(), nl=False)
     else:
         language.save(output)
 
@@ -170,7 +172,7 @@ def _certify(built: BuiltLanguage, path: str, seconds: float) -> BaseException |
     from planners.limits import run_until_stopped, stop_clock, time_limit
 
     if built.stopped is not None and not built.guarantee.proved_minimal:
-        click.echo("coordlang: no certificate is written: the search was stopped", err=True)
+        echo("coordlang: no certificate is written: the search was stopped", err=True)
         return None
 
     def write() -> None:
@@ -182,7 +184,7 @@ def _certify(built: BuiltLanguage, path: str, seconds: float) -> BaseException |
 
     stopped = run_until_stopped(write)
     if stopped is not None:
-        click.echo(
+        echo(
             "coordlang: no certificate is written: there was no time or memory left for it",
             err=True,
         )
@@ -194,12 +196,12 @@ def _exit_code(built: BuiltLanguage, uncertified: BaseException | None) -> int:
     proved, exact = built.guarantee.proved_minimal, built.options.is_exact
     stopped = uncertified or built.stopped
     if isinstance(stopped, KeyboardInterrupt):
-        click.echo("coordlang: interrupted; the best language so far is written", err=True)
+        echo("coordlang: interrupted; the best language so far is written", err=True)
         return INTERRUPTED
     if stopped is not None:
         reason = str(stopped).splitlines()[0] if str(stopped) else "out of memory"
         short_of = "" if proved and exact else ", without proof"
-        click.echo(f"coordlang: {reason}; the best language so far is written{short_of}", err=True)
+        echo(f"coordlang: {reason}; the best language so far is written{short_of}", err=True)
     if exact:
         return 0 if proved and uncertified is None else UNPROVED
     return 0 if stopped is None else UNPROVED
@@ -218,7 +220,7 @@ def _summary(figures: dict[str, Any], output: str) -> str:
         f"{figures['divergences']:,} divergences, "
         f"{figures['walk_nodes']:,} nodes of plans, {total:.2f} s\n"
         f"{_flexibility(figures)}"
-        f"written to {'stdout' if output == '-' else output}"
+        f"written to {'stdout' if output == '-' else visible(output)}"
     )
 
 

@@ -8,6 +8,7 @@ import json
 import click
 
 import coordlang
+from coordlang.cli.echo import echo
 from coordlang.cli.exit_codes import IMPOSSIBLE, REFUTED
 from coordlang.cli.files import PlanningFiles, planning_files
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
@@ -27,14 +28,14 @@ def command(as_json: bool, pddl: PlanningFiles, model: ModelKeywords) -> int:
     with working("solving the task twice"):
         found = coordlang.check(*pddl.files, factored=pddl.factored, **model)
     if as_json:
-        click.echo(json.dumps(found.data()))
+        echo(json.dumps(found.data()))
     else:
         kind = model.get("cost") or "makespan"
         plain = f"({found.form} form, {found.actions} plain actions)"
-        click.echo(f"coordlang      {_cost(found.cost, kind)}")
-        click.echo(f"Fast Downward  {_cost(found.fast_downward, kind)}   {plain}")
+        echo(f"coordlang      {_cost(found.cost, kind)}")
+        echo(f"Fast Downward  {_cost(found.fast_downward, kind)}   {plain}")
     if not found.agree:
-        click.echo("coordlang: the optimal costs differ", err=True)
+        echo("coordlang: the optimal costs differ", err=True)
         return REFUTED
     return IMPOSSIBLE if found.cost is None else 0
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import coordlang
+from coordlang.cli.echo import echo
 from coordlang.cli.exit_codes import REFUTED
 from coordlang.cli.files import (
     check_outputs,
@@ -135,11 +136,11 @@ def _guarantee_code(found: RobotsChoices, check: bool) -> int:
         why = "the language does not cover it"
         if found.covered:
             why = "the file holds no coordination language"
-        click.echo(f"coordlang: refuted: choices of this task miscoordinate; {why}", err=True)
-        click.echo(witness_text(found.witness), err=True)
+        echo(f"coordlang: refuted: choices of this task miscoordinate; {why}", err=True)
+        echo(witness_text(found.witness), err=True)
         return REFUTED
     if check and not found.covered:
-        click.echo(
+        echo(
             "coordlang: note: the language does not cover this task; --check proved this sentence",
             err=True,
         )

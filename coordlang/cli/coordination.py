@@ -8,6 +8,7 @@ import json
 import click
 
 import coordlang
+from coordlang.cli.echo import echo
 from coordlang.cli.files import PlanningFiles, planning_files
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import note_single_robot, working
@@ -26,4 +27,4 @@ def command(pddl: PlanningFiles, as_json: bool, model: ModelKeywords) -> None:
     with working("walking pairs of plans"):
         found = coordlang.coordination(*pddl.files, factored=pddl.factored, **model)
     note_single_robot(found.robots)
-    click.echo(json.dumps(found.data()) if as_json else str(found))
+    echo(json.dumps(found.data()) if as_json else str(found))

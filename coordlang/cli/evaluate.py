@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING
 
 import click
 
+from coordlang.cli.echo import echo
 from coordlang.cli.exit_codes import UNPROVED
 from coordlang.cli.files import check_outputs
 from coordlang.cli.group import RenamedOptions
 from coordlang.cli.shared_options import limits, was_given
 from coordlang.cli.terminal import bar
+from planners.messages import echoed
 from planners.notebook import counted
 
 if TYPE_CHECKING:
@@ -94,15 +96,13 @@ def command(
     written = write_page(RECIPES, kept, Path(page) if page else folder / "evaluation.md")
     seconds = perf_counter() - begin
     if as_json:
-        click.echo(json.dumps(_data(found, written, seconds)))
+        echo(json.dumps(_data(found, written, seconds)))
     else:
         for name, section in sections(RECIPES, found).items():
-            click.echo(f"# {RECIPES[name].title}\n")
-            click.echo(as_text(section))
+            echo(f"# {RECIPES[name].title}\n")
+            echo(as_text(section))
     units = counted(sum(map(len, found.values())), "piece")
-    click.echo(
-        f"{units} of work in {seconds:.1f} s; results in {folder}, page {written[0]}", err=True
-    )
+    echo(f"{units} of work in {seconds:.1f} s; results in {folder}, page {written[0]}", err=True)
     return _exit_code(found)
 
 
@@ -113,7 +113,7 @@ def _chosen(names: tuple[str, ...]) -> list[Recipe]:
     for name in names:
         if name != "all" and name not in RECIPES:
             raise click.UsageError(
-                f"there is no experiment {name!r}; there are {', '.join(RECIPES)}, all"
+                f"there is no experiment {echoed(name)}; there are {', '.join(RECIPES)}, all"
             )
     return [recipe for name, recipe in RECIPES.items() if name in names or "all" in names]
 
@@ -128,7 +128,7 @@ def _exit_code(found: dict[str, list[Record]]) -> int:
     ]
     if not unfinished:
         return 0
-    click.echo(f"coordlang: met their limit: {', '.join(unfinished)}", err=True)
+    echo(f"coordlang: met their limit: {', '.join(unfinished)}", err=True)
     return UNPROVED
 
 
@@ -148,7 +148,7 @@ def _run(
 
             return run(recipes, settings, kept, jobs or len(os.sched_getaffinity(0)), report)
     except (KeyboardInterrupt, OutOfTime):
-        click.echo("coordlang: what is done is kept; the same command goes on from there", err=True)
+        echo("coordlang: what is done is kept; the same command goes on from there", err=True)
         raise
 
 

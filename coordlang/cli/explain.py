@@ -8,6 +8,7 @@ import json
 import click
 
 import coordlang
+from coordlang.cli.echo import echo
 from coordlang.cli.files import domain_argument, language_argument, problem_argument
 from coordlang.cli.group import RenamedOptions
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
@@ -57,10 +58,10 @@ def command(
     if as_json:
         with working("listing the sentences of the task"):
             data = found.data()
-        click.echo(json.dumps(data))
+        echo(json.dumps(data))
     else:
-        click.echo(f"{found.words}\n")  # first: a task may have too many sentences to list
+        echo(f"{found.words}\n")  # first: a task may have too many sentences to list
         with working("listing the sentences of the task"):
             text = found.task_text()
-        click.echo(text)
+        echo(text)
     return covered_code(found.covered) if task else 0

@@ -5,14 +5,13 @@ from __future__ import annotations
 
 import json
 import os
-import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 import coordlang
 from coordlang.api.options import TARGETS, Target
+from coordlang.cli.echo import echo
 from coordlang.cli.files import (
     check_outputs,
     domain_argument,
@@ -23,6 +22,7 @@ from coordlang.cli.files import (
 from coordlang.cli.group import RenamedOptions
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options, was_given
 from coordlang.cli.terminal import covered_code, working
+from planners.messages import visible
 from planners.notebook import counted
 
 if TYPE_CHECKING:
@@ -123,12 +123,12 @@ def _write_pddl(exported: ExportedTask, output: str | None, as_json: bool) -> No
     if as_json:
         write(json.dumps(exported.data()) + "\n", output)
     elif output is None or output == "-":
-        click.echo(exported.domain + exported.problem, nl=False)
+        echo(exported.domain + exported.problem, nl=False)
     else:
         exported.save(output)
         size = f"{counted(exported.actions, 'action')} ({exported.form})"
         terms = f"{counted(exported.terms, 'term')} for the words"
-        click.echo(f"written to {output}: domain.pddl, problem.pddl: {size}, {terms}")
+        echo(f"written to {visible(output)}: domain.pddl, problem.pddl: {size}, {terms}")
 
 
 def _write_formula(formula: ExportedFormula, output: str | None, as_json: bool) -> None:
@@ -138,22 +138,13 @@ def _write_formula(formula: ExportedFormula, output: str | None, as_json: bool) 
     write(formula.formula + "\n", output)
     if output is None or output == "-":
         symbols = counted(len(formula.symbols), "symbol")
-        click.echo(f"{symbols}; --json says which atom each stands for", err=True)
+        echo(f"{symbols}; --json says which atom each stands for", err=True)
 
 
 def _write_plan(exported: ExportedTask, path: str, output: str | None, as_json: bool) -> None:
     """Write a plan of the exported problem, which must be an optimal one, as a plan file."""
-    plan = exported.translate_text(_read(path), path)
+    from planners.files import read_text
+
+    plan = exported.translate_text(read_text(path), path)
     plans = exported.open_plans
     write(json.dumps(plans.data([plan])) + "\n" if as_json else plans.ipc(plan), output)
-
-
-def _read(path: str) -> str:
-    from planners.errors import BadInput, Position
-
-    try:
-        return sys.stdin.read() if path == "-" else Path(path).read_text()
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(
-            f"cannot be read: {getattr(error, 'strerror', error)}", position=Position(path)
-        ) from None

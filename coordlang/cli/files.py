@@ -12,6 +12,7 @@ from pathlib import Path
 
 import click
 
+from coordlang.cli.echo import echo
 from coordlang.cli.shared_options import CommandFunction
 
 domain_argument = click.argument("domain", type=click.Path())
@@ -125,7 +126,7 @@ def write(text: str, output: str | None) -> None:
     from planners.files import write_atomically
 
     if output is None or output == "-":
-        click.echo(text, nl=False)
+        echo(text, nl=False)
     else:
         write_atomically(output, text.encode())
 

@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 import coordlang
+from coordlang.cli.echo import echo
 
 #: Command -> one line about it, so that ``--help`` need not import them all.  A command is the
 #: module of this name in `coordlang.cli`, imported when it is called.
@@ -69,7 +70,7 @@ class RenamedOptions(click.Command):
         end = args.index("--") if "--" in args else len(args)
         former = {arg.partition("=")[0] for arg in args[:end]} & self.renamed.keys()
         for name in sorted(former):
-            click.echo(
+            echo(
                 f"coordlang: note: {name} is deprecated: it is called {self.renamed[name]} now",
                 err=True,
             )

@@ -8,6 +8,7 @@ import json
 import click
 
 import coordlang
+from coordlang.cli.echo import echo
 from coordlang.cli.files import PlanningFiles, planning_files
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import note_single_robot, working
@@ -29,4 +30,4 @@ def command(count_states: bool, as_json: bool, pddl: PlanningFiles, model: Model
     with working("reading and grounding"):
         found = coordlang.inspect(*pddl.files, factored=pddl.factored, states=count_states, **model)
     note_single_robot(found.robots)
-    click.echo(json.dumps(found.data()) if as_json else str(found))
+    echo(json.dumps(found.data()) if as_json else str(found))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from coordlang.cli.echo import echo
 from coordlang.cli.shared_options import CommandFunction, was_given
 
 if TYPE_CHECKING:
@@ -63,9 +64,7 @@ class Listing:
     def note_more(self, plans: OptimalPlans, listed: Sequence[PlanSteps], what: str) -> None:
         """Write to stderr that there are more plans, where there are."""
         if not self.sample and len(listed) < plans.count:
-            click.echo(
-                f"{len(listed)} of {plans.count} {what} listed; --max N lists more", err=True
-            )
+            echo(f"{len(listed)} of {plans.count} {what} listed; --max N lists more", err=True)
 
 
 def listing_options(function: CommandFunction) -> CommandFunction:

@@ -10,6 +10,7 @@ import click
 
 import coordlang
 from coordlang.api.options import HEURISTICS, HeuristicName
+from coordlang.cli.echo import echo
 from coordlang.cli.files import domain_argument, language_argument, problem_argument
 from coordlang.cli.group import RenamedOptions
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
@@ -62,14 +63,14 @@ def command(
             language, domain, problem, sentence, prefer=prefer, heuristic=heuristic, **model
         )
     if as_json:
-        click.echo(json.dumps(found.data()))
+        echo(json.dumps(found.data()))
         return covered_code(found.covered)
-    click.echo(found.ipc(), nl=False)
+    echo(found.ipc(), nl=False)
     for entry in found.fulfilled:
         _comment(entry)
     expanded = counted(found.expanded, "node")
     without = f"without the sentence {found.without_sentence.expanded:,}"
-    click.echo(f"A* ({heuristic}) expanded {expanded}; {without}", err=True)
+    echo(f"A* ({heuristic}) expanded {expanded}; {without}", err=True)
     return covered_code(found.covered)
 
 
@@ -86,4 +87,4 @@ def _comment(entry: Fulfilled) -> None:
     else:
         lines.append(f"leaves {counted(entry.value, 'plan')} open")
     for line in lines:
-        click.echo(f"{entry.preference}: {line}", err=True)
+        echo(f"{entry.preference}: {line}", err=True)

@@ -8,6 +8,7 @@ import json
 import click
 
 import coordlang
+from coordlang.cli.echo import echo
 from coordlang.cli.files import PlanningFiles, planning_files
 from coordlang.cli.listing import Listing, form_of, listing_options
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
@@ -47,9 +48,9 @@ def command(
         data = plans.data(listed)
         if sample:
             data["complete"] = False
-        click.echo(json.dumps(data))
+        echo(json.dumps(data))
     elif only_count:
-        click.echo(plans.count)
+        echo(plans.count)
     else:
-        click.echo(listing.text(plans, listed), nl=False)
+        echo(listing.text(plans, listed), nl=False)
         listing.note_more(plans, listed, "optimal plans")

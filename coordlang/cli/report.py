@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from coordlang.cli.echo import echo
 from coordlang.cli.files import (
     check_outputs,
     domain_argument,
@@ -16,6 +17,7 @@ from coordlang.cli.files import (
 )
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import working
+from planners.messages import visible
 from planners.notebook import counted
 
 if TYPE_CHECKING:
@@ -59,8 +61,7 @@ def command(
     It has the words, and the sentences and plans in the tasks of PROBLEM.. and in some of the
     candidate tasks.
     """
-    from coordlang.api.inputs import read_planning
-    from coordlang.api.language_inputs import read_language_source
+    from coordlang.api.inputs import read_language_source, read_planning
     from coordlang.api.options import GivenOptions
     from coordlang.language.recorded import check_source
     from coordlang.report.page import make_report
@@ -83,12 +84,12 @@ def command(
             position=position,
         )
     if output == "-":
-        click.echo(report.html.decode(), nl=False)
+        echo(report.html.decode(), nl=False)
     else:
         write_atomically(output, report.html)
     shown = f"{counted(report.tasks, 'task')} of {report.candidates:,}"
-    place = "stdout" if output == "-" else output
-    click.echo(f"{shown}, {len(report.html):,} bytes, written to {place}", err=output == "-")
+    place = "stdout" if output == "-" else visible(output)
+    echo(f"{shown}, {len(report.html):,} bytes, written to {place}", err=output == "-")
 
 
 def _beside(problem: str) -> Path:

@@ -8,6 +8,7 @@ import json
 import click
 
 import coordlang
+from coordlang.cli.echo import echo
 from coordlang.cli.files import domain_argument, language_argument, problem_argument
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import covered_code, working
@@ -31,5 +32,5 @@ def command(
     """
     with working("finding all optimal plans"):
         said = coordlang.say(language, domain, problem, plan, **model)
-    click.echo(json.dumps(said.data()) if as_json else str(said))
+    echo(json.dumps(said.data()) if as_json else str(said))
     return covered_code(said.covered)

@@ -8,6 +8,8 @@ from importlib import import_module
 
 import click
 
+from coordlang.cli.echo import echo
+
 #: The modules whose ``json_schema`` describes a file format.
 SCHEMAS = {
     "language": "coordlang.language.record",
@@ -23,4 +25,4 @@ SCHEMAS = {
 @click.argument("name", type=click.Choice(list(SCHEMAS)), default="language")
 def command(name: str) -> None:
     """Print the JSON Schema of a file format: language files unless NAME is another one."""
-    click.echo(json.dumps(import_module(SCHEMAS[name]).json_schema(), indent=2))
+    echo(json.dumps(import_module(SCHEMAS[name]).json_schema(), indent=2))

@@ -8,6 +8,7 @@ import json
 import click
 
 import coordlang
+from coordlang.cli.echo import echo
 from coordlang.cli.files import check_outputs, domain_argument, problem_argument, write
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import working
@@ -62,7 +63,7 @@ def command(
         "goals": len({task.goal for task in tasks}),
     }
     if as_json and output != "-":
-        click.echo(json.dumps(figures))
+        echo(json.dumps(figures))
         return
     line = ", ".join((counted(figures["starts"], "start"), counted(figures["goals"], "goal")))
-    click.echo(f"{counted(figures['tasks'], 'task')}: {line}", err=output == "-")
+    echo(f"{counted(figures['tasks'], 'task')}: {line}", err=output == "-")

@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from threading import Lock, Timer
 from typing import TYPE_CHECKING
 
-import click
-
+from coordlang.cli.echo import echo
 from coordlang.cli.exit_codes import REFUTED
+from planners.messages import visible
 
 if TYPE_CHECKING:
     from coordlang.api.languages import Progress
@@ -29,9 +29,9 @@ def working(message: str) -> Iterator[Progress]:
     if sys.stderr is None or not sys.stderr.isatty():
         yield lambda _: None
         return
-    spinner = _Spinner(message)
+    spinner = _Spinner(visible(message))
     try:
-        yield spinner.say
+        yield lambda text: spinner.say(visible(text))
     finally:
         spinner.stop()
 
@@ -89,14 +89,14 @@ def bar() -> Iterator[Callable[[int, int, str], None]]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("")
         yield lambda done, number, text: progress.update(
-            task, completed=done, total=number, description=text
+            task, completed=done, total=number, description=visible(text)
         )
 
 
 def note_single_robot(robots: tuple[str, ...]) -> None:
     """Write a note where there is one robot: it is no error, but there is nothing to coordinate."""
     if len(robots) == 1:
-        click.echo(
+        echo(
             f"coordlang: note: {robots[0]} is the only robot: there is nothing to coordinate",
             err=True,
         )
@@ -106,7 +106,7 @@ def covered_code(is_covered: bool) -> int:
     """Return the exit code of an answer: 1, with a warning, for a task that is not covered."""
     if is_covered:
         return 0
-    click.echo(
+    echo(
         "coordlang: warning: the language does not cover this task: it guarantees nothing here",
         err=True,
     )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 import coordlang
+from coordlang.cli.echo import echo
 from coordlang.cli.files import (
     check_outputs,
     domain_argument,
@@ -82,7 +83,7 @@ def command(
         text = _text(plans, form, listing, nodes)
     write(text, output)
     if form in _DRAWN and (note := plans.cut_note(nodes or _DEFAULT_NODES)):
-        click.echo(f"coordlang: note: {note}; --nodes N draws more", err=True)
+        echo(f"coordlang: note: {note}; --nodes N draws more", err=True)
     if form == "ipc" and not only_count:
         listing.note_more(plans, listing.chosen(plans), "plans")
     return covered_code(plans.covered)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 import coordlang
+from coordlang.cli.echo import echo
 from coordlang.cli.exit_codes import REFUTED
 from coordlang.cli.files import (
     PlanningFiles,
@@ -78,7 +79,7 @@ def command(
             progress=progress,
             **model,
         )
-    click.echo(json.dumps(found.data()) if as_json else _text(found))
+    echo(json.dumps(found.data()) if as_json else _text(found))
     if not found.holds:
         return REFUTED
     if found.certificate is not None:
@@ -128,4 +129,4 @@ def _show_bound(
             f"{counted(checked.lower_bound - 1, 'word')} they contradict each other "
             f"({counted(len(checked.cnf.clauses), 'clause')})"
         )
-    click.echo(f"lower bound {checked.lower_bound}: {why}")
+    echo(f"lower bound {checked.lower_bound}: {why}")

@@ -16,7 +16,8 @@ from coordlang.language.provenance import Guarantee, Provenance
 from coordlang.language.record import LANGUAGE, LanguageRecord, TasksRecord
 from coordlang.language.words import Language
 from planners.errors import BadInput, Position
-from planners.files import read_bytes, write_compressed
+from planners.files import read_bytes, require_seen, write_compressed
+from planners.messages import echoed
 
 
 def to_bytes(language: Language) -> bytes:
@@ -64,11 +65,12 @@ def language_from_bytes(data: bytes, position: Position) -> Language:
         raise BadInput(f"this is no JSON that can be read: {error}", position=position) from None
     if twice is not None:
         raise BadInput(
-            f"the key {twice!r} occurs twice",
+            f"the key {echoed(twice)} occurs twice",
             position=position,
             remedy="Of two entries one would be lost.",
         )
     _check_words(record, position)
+    _check_seen(record, position)
     robots = [] if record.robots is UNSET else record.robots
     if len(set(robots)) < len(robots) or (not robots and record.robots is not UNSET):
         raise BadInput("the robots must be different, and at least one", position=position)
@@ -100,21 +102,36 @@ def _check_words(record: LanguageRecord, position: Position) -> None:
     for word in record.words:
         if word.split() != [word]:
             raise BadInput(
-                f"{word!r} is no word",
+                f"{echoed(word)} is no word",
                 position=position,
                 remedy="Words are not empty and have no blanks in them.",
             )
     if not {*record.states.values(), record.default} <= words:
         given = [*record.states.items(), ("default", record.default)]
         key, word = next((key, word) for key, word in given if word not in words)
-        raise BadInput(f"{word!r} (of {key!r}) is not among the words", position=position)
+        raise BadInput(
+            f"{echoed(word)} (of {echoed(key)}) is not among the words", position=position
+        )
     for key, further in record.also.items():
         others = words - {record.states.get(key)}
         if key not in record.states or not further or not _all_different(further, others):
             raise BadInput(
-                f"'also' of {key!r} must hold further words of a state that 'states' has",
+                f"'also' of {echoed(key)} must hold further words of a state that 'states' has",
                 position=position,
             )
+
+
+def _check_seen(record: LanguageRecord, position: Position) -> None:
+    """Raise `BadInput` for what is shown to people with characters that nobody sees."""
+    for word in record.words:
+        require_seen(word, position, "word")
+    if record.robots is not UNSET:
+        for robot in record.robots:
+            require_seen(robot, position, "robot")
+    if record.domain is not UNSET:
+        require_seen(record.domain.name, position, "domain name")
+    if record.guarantee is not UNSET:
+        require_seen(record.guarantee.method, position, "method")
 
 
 def _all_different(words: Sequence[str], among: set[str]) -> bool:

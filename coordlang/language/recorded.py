@@ -18,6 +18,7 @@ from coordlang.tasks.candidates import (
 from coordlang.tasks.listed import ListedTask
 from planners.errors import BadInput, Position, UsageError
 from planners.loading import ModelOptions
+from planners.messages import echoed
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.robots import ENVIRONMENT, RobotSelection
 
@@ -78,7 +79,7 @@ def check_source(
     if wanted is not None and wanted != domain.source.sha256:
         raise BadInput(
             "this language belongs to another domain "
-            f"({language.provenance.domain.get('name')!r}): the text of "
+            f"({echoed(language.provenance.domain.get('name'))}): the text of "
             f"{domain.source.name} has another hash",
             position=position,
             remedy="Give the domain file that the language was built from.",

@@ -17,6 +17,7 @@ from coordlang.language.partition import Partition
 from coordlang.language.provenance import Guarantee, Provenance
 from planners.errors import BadInput
 from planners.joint.model import JointModel
+from planners.messages import echoed
 from planners.notebook import counted, html_table
 from planners.tables import Rows, find_rows
 
@@ -147,6 +148,6 @@ def _refuse(model: JointModel, key: str) -> NoReturn:
             remedy="Give the problem that the language was built for.",
         ) from None
     raise BadInput(
-        f"{key!r} is no key of a state; it would be {model.codec.key(row)!r}",
+        f"{echoed(key)} is no key of a state; it would be {echoed(model.codec.key(row))}",
         remedy="A key lists the true fluents, sorted, joined by one space.",
     )

@@ -16,6 +16,7 @@ from msgspec import Meta
 from coordlang.report.layout import graph_layout
 from planners.errors import BadInput, Position
 from planners.files import FileFormat, read_bytes
+from planners.messages import echoed
 
 Point = tuple[float, float]
 
@@ -89,10 +90,16 @@ def read_coordinates(path: str | Path) -> dict[str, Point]:
     for name, point in entries.items():
         if not all(abs(value) < _LARGEST for value in point):
             raise BadInput(
-                f"{name!r}: the coordinates must be between {-_LARGEST:g} and {_LARGEST:g}",
+                f"{echoed(name)}: the coordinates must be between {-_LARGEST:g} and {_LARGEST:g}",
                 position=position,
             )
     points = {name.lower(): point for name, point in entries.items()}
+    if len(points) < len(entries):
+        raise BadInput(
+            "a place occurs twice, in upper and in lower case",
+            position=position,
+            remedy="PDDL does not distinguish them: of two entries one would be lost.",
+        )
     if len(set(points.values())) < len(points):
         raise BadInput("two places have the same coordinates", position=position)
     return points

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import product
 
 from planners.errors import BadInput
+from planners.messages import echoed
 from planners.pddl.lifted import (
     And,
     Atom,
@@ -145,7 +146,7 @@ class Meaning:
         schema = self._schemas[formula.action]
         if self._domain.is_joint_action:
             raise BadInput(
-                f"action {schema.name!r} is used as a formula in a joint-action domain",
+                f"action {echoed(schema.name)} is used as a formula in a joint-action domain",
                 position=self._domain.source.position(schema.offset),
                 remedy="A joint action already says what every robot does: use predicates only.",
             )

@@ -81,7 +81,13 @@ def _safe_names(texts: Iterable[str]) -> list[str]:
     return names
 
 
-#: Names that are words of PDDL itself.
+#: Names that are words of PDDL itself, of any version: readers know them wherever they stand.
 _RESERVED = frozenset(
-    ["and", "or", "not", "imply", "forall", "exists", "when", "either", "object", "total-cost"]
+    [
+        *("and", "or", "not", "imply", "forall", "exists", "when", "either", "object", "number"),
+        *("define", "domain", "problem", "total-cost", "total-time", "increase", "decrease"),
+        *("assign", "scale-up", "scale-down", "minimize", "maximize", "preference", "is-violated"),
+        *("always", "sometime", "within", "at-most-once", "sometime-after", "sometime-before"),
+        *("always-within", "hold-during", "hold-after", "at", "over", "start", "end", "all"),
+    ]
 )

@@ -13,6 +13,7 @@ from planners.grounding.actions import GroundAction, GroundEffect
 from planners.grounding.bindings import Binding, Bindings
 from planners.grounding.reachability import reachable_arguments
 from planners.limits import reaching
+from planners.messages import echoed
 from planners.pddl.formula_tree import distinct, joined, label, literals
 from planners.pddl.formulas import MAX_COST
 from planners.pddl.lifted import (
@@ -173,7 +174,7 @@ class _Grounder:
         schema = self._schemas[action]
         if self._domain.is_joint_action:
             raise BadInput(
-                f"action {action!r} is used as a formula in a joint-action domain",
+                f"action {echoed(action)} is used as a formula in a joint-action domain",
                 position=self._domain.source.position(schema.offset),
                 remedy="A joint action already says what every robot does: use predicates only.",
             )

@@ -12,6 +12,7 @@ from itertools import combinations, product
 
 from planners.errors import BadInput
 from planners.grounding.actions import GroundAction
+from planners.messages import echoed
 from planners.pddl.formula_tree import conjuncts
 from planners.pddl.lifted import And, Constraint, Domain, Formula, Not, Or, Problem, StepAtom
 from planners.pddl.robots import objects_of
@@ -69,7 +70,7 @@ def _check_types(domain: Domain, problem: Problem, constraint: Constraint) -> No
                 f"argument {position} of {name} is {argument.name} "
                 f"- {' or '.join(argument.types)}, which is never "
                 f"{parameter.name} - {' or '.join(parameter.types)}: the "
-                f"constraint {constraint.name!r} would never match",
+                f"constraint {echoed(constraint.name)} would never match",
                 position=domain.source.position(offset),
                 remedy="Positions count from 0; if the action has an :agent, it is argument 0.",
             )

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from planners.errors import BadInput
 from planners.joint.facts import FactTable
+from planners.messages import echoed
 from planners.tables import Bools, Ints, Rows
 
 _BLOCK_BITS = 64
@@ -193,7 +194,7 @@ def split_atoms(text: str) -> list[str]:
             break
     if depth != 0 or text[end:].strip():
         raise BadInput(
-            f"cannot read the atoms {text[:60]!r}", remedy="Expected '(p a b) (q c) ..'."
+            f"cannot read the atoms {echoed(text[:60])}", remedy="Expected '(p a b) (q c) ..'."
         )
     return parts
 

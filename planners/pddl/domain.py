@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from planners.limits import reaching
+from planners.messages import echoed
 from planners.pddl.lifted import Domain
 from planners.pddl.names import Names, group, read_objects, token, typed_list
 from planners.pddl.network import read_network
@@ -157,5 +158,5 @@ def _complain_about_double_action(document: Document, sections: Sections) -> Non
     for item in sections.get(":action", ()):
         name = action_name(document, item)
         if name.text in seen:
-            raise document.fail(f"action {name.text!r} is declared twice", name)
+            raise document.fail(f"action {echoed(name.text)} is declared twice", name)
         seen.add(name.text)

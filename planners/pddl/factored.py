@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from planners.errors import BadInput, Position
+from planners.messages import echoed
 from planners.pddl.domain import read_domain
 from planners.pddl.lifted import And, Atom, Domain, Formula, Problem, Schema
 from planners.pddl.problem import read_problem
@@ -56,7 +57,7 @@ def _of_robot(robot: str, domain: Domain, problem: Problem) -> tuple[Domain, Pro
     """The robot's view with its own parameter in every action marked as the agent."""
     if robot not in problem.objects:
         raise BadInput(
-            f"robot {robot!r} of the file name is no object of its problem",
+            f"robot {echoed(robot)} of the file name is no object of its problem",
             position=problem.source.section(":objects"),
         )
     schemas = tuple(replace(s, agent=_agent(robot, s, domain, problem)) for s in domain.schemas)
@@ -74,7 +75,7 @@ def _agent(robot: str, schema: Schema, domain: Domain, problem: Problem) -> int:
         if fitting == [robot]:
             return number
     raise BadInput(
-        f"action {schema.name!r} has no parameter that can only be {robot!r}",
+        f"action {echoed(schema.name)} has no parameter that can only be {echoed(robot)}",
         position=domain.source.position(schema.offset),
         remedy="Give the robot a type of its own and a parameter of this type.",
     )
@@ -87,7 +88,7 @@ def _join_domains(domains: list[Domain], name: str) -> Domain:
     for domain in domains:
         if domain.name != first.name:
             raise BadInput(
-                f"domain {domain.name!r}, expected {first.name!r}",
+                f"domain {echoed(domain.name)}, expected {echoed(first.name)}",
                 position=domain.source.section("domain"),
             )
         for schema in domain.schemas:
@@ -96,7 +97,7 @@ def _join_domains(domains: list[Domain], name: str) -> Domain:
             )
             if replace(known, offset=0) != replace(schema, offset=0):
                 raise BadInput(
-                    f"action {schema.name!r} differs between the robots' files",
+                    f"action {echoed(schema.name)} differs between the robots' files",
                     position=domain.source.position(schema.offset),
                 )
     return replace(
@@ -152,7 +153,7 @@ def _join_problems(problems: list[Problem], domain: Domain, name: str) -> Proble
         for obj, types in problem.objects.items():
             if objects.setdefault(obj, types) != types:
                 raise BadInput(
-                    f"object {obj!r} has other types elsewhere",
+                    f"object {echoed(obj)} has other types elsewhere",
                     position=problem.source.section(":objects"),
                 )
         init |= problem.init

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 from planners.errors import BadInput, Unsupported
+from planners.messages import echoed
 from planners.pddl.lifted import (
     TRUE,
     And,
@@ -112,7 +113,7 @@ def _no_formula(names: Names, item: Group, head: str) -> BadInput | Unsupported:
     timed = head == "at" and len(item) > 1 and is_token(item.items[1], "end", "start")
     if head in _TEMPORAL or timed:
         return _unsupported(names, f"trajectory constraint '({head} ..)'", item)
-    return _unknown(names, f"unknown predicate {head!r}", item, head)
+    return _unknown(names, f"unknown predicate {echoed(head)}", item, head)
 
 
 def read_effects(names: Names, item: Expression) -> tuple[tuple[Effect, ...], int | Atom | None]:
@@ -156,7 +157,7 @@ class _EffectReader:
         elif head in ("oneof", "probabilistic", "unknown"):
             raise _unsupported(names, f"non-deterministic effect '({head} ..)'", item)
         else:
-            raise _unknown(names, f"unknown predicate {head!r} in an effect", item, head)
+            raise _unknown(names, f"unknown predicate {echoed(head)} in an effect", item, head)
 
     def _add(self, scope: _Scope, atom: Atom, adds: bool) -> None:
         self.effects.append(Effect(atom, adds, scope.condition, scope.variables))
@@ -218,7 +219,7 @@ def _cost(names: Names, item: Group, *, conditional: bool) -> int | Atom:
         if amount.head in ("+", "-", "*", "/"):
             raise _unsupported(names, "arithmetic in an action cost", amount)
         raise document.fail(
-            f"unknown function {amount.head!r}",
+            f"unknown function {echoed(amount.head)}",
             amount,
             known(names.functions, amount.head, "function"),
         )
@@ -228,7 +229,7 @@ def _cost(names: Names, item: Group, *, conditional: bool) -> int | Atom:
 
 def _constant_cost(names: Names, item: Group, amount: Token) -> int:
     if not NUMBER.match(amount.text):
-        raise names.document.fail(f"expected a number, found {amount.text!r}", amount)
+        raise names.document.fail(f"expected a number, found {echoed(amount.text)}", amount)
     # Costs that are too large are refused where costs are used.
     value = min(float(amount.text), 2.0 * MAX_COST)
     if value < 0 or value % 1 != 0:

@@ -8,16 +8,20 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 
 from planners.errors import BadInput, Unsupported
+from planners.messages import echoed
 from planners.pddl.lifted import Variable
 from planners.pddl.sexpr import Document, Expression, Group, Token
+
+#: Characters of a wrong name that are compared with the declared names.
+_LONGEST_COMPARED = 200
 
 
 def known(names: Iterable[str], wrong: str, what: str) -> str:
     """A remedy: the close match among ``names`` if there is one, else the first ten of them."""
     names = sorted(names)
-    close = get_close_matches(wrong, names, n=1)
+    close = get_close_matches(wrong[:_LONGEST_COMPARED], names, n=1)
     if close:
-        return f"Did you mean {close[0]!r}?"
+        return f"Did you mean {echoed(close[0])}?"
     if not names:
         return f"No {what} is declared."
     listed = ", ".join(names[:10]) + (", .." if len(names) > 10 else "")
@@ -40,7 +44,7 @@ def group(document: Document, item: Expression, what: str) -> Group:
     """``item`` as a list, or an error that says what was expected there."""
     if isinstance(item, Group):
         return item
-    raise document.fail(f"expected {what}, found {item.text!r}", item)
+    raise document.fail(f"expected {what}, found {echoed(item.text)}", item)
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +121,7 @@ class Names:
         for entry in typed_list(self.document, items, "a variable"):
             if not entry.token.text.startswith("?"):
                 raise self.document.fail(
-                    f"expected a variable, found {entry.token.text!r}",
+                    f"expected a variable, found {echoed(entry.token.text)}",
                     entry.token,
                     f"Variables start with '?': ?{entry.token.text}.",
                 )
@@ -134,7 +138,7 @@ class Names:
         for name in entry.types:
             if name not in self.types and name != "object":
                 raise self.document.fail(
-                    f"type {name!r} of {entry.token.text!r} is not declared",
+                    f"type {echoed(name)} of {echoed(entry.token.text)} is not declared",
                     entry.token,
                     known(self.types, name, "type"),
                 )
@@ -161,7 +165,7 @@ class Names:
             title = self.document.root.items[1:2]
             if title and isinstance(title[0], Group) and title[0].head == "domain":
                 remedy += " An object that a domain names belongs in its (:constants ..)."
-            raise self.document.fail(f"object {item.text!r} is not declared", item, remedy)
+            raise self.document.fail(f"object {echoed(item.text)} is not declared", item, remedy)
         return item.text
 
     def arity(self, item: Group, name: str, arities: Iterable[int], what: str) -> BadInput | None:
@@ -170,7 +174,9 @@ class Names:
         if found in arities:
             return None
         wanted = " or ".join(str(n) for n in sorted(arities))
-        return self.document.fail(f"{what} {name!r} takes {wanted} arguments, found {found}", item)
+        return self.document.fail(
+            f"{what} {echoed(name)} takes {wanted} arguments, found {found}", item
+        )
 
 
 def read_objects(

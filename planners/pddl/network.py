@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from planners.messages import echoed
 from planners.pddl.lifted import Constraint, Schema
 from planners.pddl.names import Names, group, known, token
 from planners.pddl.sexpr import Expression, Group, Token
@@ -40,7 +41,7 @@ def read_network(
         for item in pair:
             if item.text not in by_name:
                 raise names.document.fail(
-                    f"unknown constraint {item.text!r}",
+                    f"unknown constraint {echoed(item.text)}",
                     item,
                     known(by_name, item.text, "constraint"),
                 )
@@ -78,7 +79,7 @@ def _constraint(names: Names, arities: dict[str, int], section: Group) -> Constr
         entry = group(document, item, "'(action POSITION ..)'")
         if entry.head not in arities:
             raise document.fail(
-                f"unknown action {entry.head!r}", entry, known(arities, entry.head, "action")
+                f"unknown action {echoed(entry.head)}", entry, known(arities, entry.head, "action")
             )
         positions = tuple(_number(names, part) for part in entry.items[1:])
         if len(positions) != len(parameters) or any(p >= arities[entry.head] for p in positions):
@@ -112,6 +113,6 @@ def _bounds(names: Names, item: Group) -> tuple[int, int | None]:
 def _number(names: Names, item: Expression) -> int:
     text = token(names.document, item, "a number").text
     if not re.fullmatch(r"[0-9]+", text):
-        raise names.document.fail(f"expected a number from 0, found {text!r}", item)
+        raise names.document.fail(f"expected a number from 0, found {echoed(text)}", item)
     digits = text.lstrip("0") or "0"
     return int(digits) if len(digits) <= len(str(_MANY)) else _MANY

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from planners.errors import Unsupported
 from planners.limits import reaching
+from planners.messages import echoed
 from planners.pddl.formulas import NUMBER, read_formula
 from planners.pddl.lifted import Atom, Domain, Formula, Problem
 from planners.pddl.names import Names, group, read_objects, token
@@ -36,7 +37,7 @@ def parse_problem(source: Source, domain: Domain) -> Problem:
         )
         if other != domain.name:
             raise document.fail(
-                f"this is a problem for domain {other!r}, not for {domain.name!r}",
+                f"this is a problem for domain {echoed(other)}, not for {echoed(domain.name)}",
                 section,
                 f"The domain was read from {domain.source.name}.",
             )
@@ -108,7 +109,7 @@ def _read_value(names: Names, item: Group, values: dict[Atom, float]) -> None:
     function = group(document, item.items[1], "a function in parentheses")
     number = item.items[2]
     if function.head not in names.functions and function.head != "total-cost":
-        raise document.fail(f"unknown function {function.head!r}", function)
+        raise document.fail(f"unknown function {echoed(function.head)}", function)
     if not isinstance(number, Token) or not NUMBER.match(number.text):
         raise Unsupported(
             "a function value that is no number is not supported",

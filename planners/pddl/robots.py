@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from planners.errors import BadInput, UsageError
+from planners.messages import echoed
 from planners.pddl.lifted import And, Atom, Domain, Problem, Schema
 
 Unowned = Literal["error", "environment", "shared"]
@@ -119,7 +120,7 @@ def _found(domain: Domain, problem: Problem, choice: RobotSelection) -> tuple[tu
         for name in choice.names:
             if name not in problem.objects:
                 raise UsageError(
-                    f"--robots: there is no object {name!r}",
+                    f"--robots: there is no object {echoed(name)}",
                     remedy=f"Objects: {', '.join(sorted(problem.objects, key=natural))}.",
                 )
         return tuple(sorted(set(choice.names), key=natural)), "--robots"
@@ -127,7 +128,7 @@ def _found(domain: Domain, problem: Problem, choice: RobotSelection) -> tuple[tu
         robots = _of_kind(domain, problem, choice.type)
         if not robots:
             raise UsageError(
-                f"--robot-type: nothing has type or predicate {choice.type!r}",
+                f"--robot-type: nothing has type or predicate {echoed(choice.type)}",
                 remedy=f"Candidates: {', '.join(_kinds(domain, problem)) or 'none'}.",
             )
         return robots, f"--robot-type {choice.type}"

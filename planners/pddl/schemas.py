@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import re
 
+from planners.files import require_seen
+from planners.messages import echoed
 from planners.pddl.formulas import read_effects, read_formula
 from planners.pddl.lifted import TRUE, Formula, Part, Schema
 from planners.pddl.names import Names, group, is_token, token, typed_list
@@ -34,7 +36,7 @@ def _fields(document: Document, item: Group) -> dict[str, tuple[Expression, ...]
             key = part.text
             if key not in _FIELDS:
                 raise document.fail(
-                    f"unknown keyword {key!r} in an action",
+                    f"unknown keyword {echoed(key)} in an action",
                     part,
                     "Known here: " + ", ".join(_FIELDS) + ".",
                 )
@@ -110,7 +112,7 @@ def read_schema(names: Names, item: Group) -> Schema:
     parameters = names.read_variables(items)
     agent = next((i for i, v in enumerate(parameters) if v.name == agent_name), None)
     if agent_name is not None and agent is None:
-        raise document.fail(f"expected a variable after ':agent', found {agent_name!r}", item)
+        raise document.fail(f"expected a variable after ':agent', found {echoed(agent_name)}", item)
     inner = names.with_variables(parameters)
     precondition: Formula = TRUE
     if fields.get(":precondition"):
@@ -138,13 +140,14 @@ def _read_parts(names: Names, item: Group) -> tuple[Part, ...]:
             part = _read_part(names, comment)
             if part.robot in parts:
                 raise names.document.fail(
-                    f"robot {part.robot!r} has two subactions in one action", comment
+                    f"robot {echoed(part.robot)} has two subactions in one action", comment
                 )
             parts[part.robot] = part
     return tuple(parts.values())
 
 
 def _read_part(names: Names, comment: Comment) -> Part:
+    require_seen(comment.text, names.document.source.position(comment.offset), "comment")
     found = _PART.match(comment.text)
     if not found:
         raise names.document.fail(
@@ -168,12 +171,12 @@ def check_parts(document: Document, schemas: tuple[Schema, ...], actions: dict[s
         item = actions[schema.name]
         if not schema.parts:
             raise document.fail(
-                f"action {schema.name!r} has no '; subaction' comment, but others in this "
+                f"action {echoed(schema.name)} has no '; subaction' comment, but others in this "
                 "domain have",
                 item,
                 "In joint-action PDDL every action says what each robot does in it.",
             )
         if schema.agent is not None:
             raise document.fail(
-                f"action {schema.name!r} has both ':agent' and subaction comments", item
+                f"action {echoed(schema.name)} has both ':agent' and subaction comments", item
             )

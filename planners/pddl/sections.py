@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from planners.errors import Unsupported
+from planners.messages import echoed
 from planners.pddl.names import group, token
 from planners.pddl.sexpr import Document, Group
 
@@ -56,7 +57,7 @@ def _require_known(document: Document, section: Group, kind: str) -> None:
         )
     if head not in _SECTIONS[kind]:
         raise document.fail(
-            f"unknown section {head!r} in a {kind}",
+            f"unknown section {echoed(head)} in a {kind}",
             section,
             "Known here: " + ", ".join(sorted(_SECTIONS[kind])) + ".",
         )

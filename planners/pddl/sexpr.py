@@ -16,9 +16,17 @@ from itertools import accumulate
 from pathlib import Path
 
 from planners.errors import BadInput, Position
+from planners.files import not_utf8, require_seen
+from planners.messages import UNSEEN, echoed
 
 #: Deeper nesting than this is refused: no domain needs it, and the passes behind recurse.
 MAX_DEPTH = 200
+
+#: A byte that is not UTF-8, as Python's ``surrogateescape`` decodes it.
+_NOT_DECODED = re.compile("[\udc80-\udcff]")
+
+#: A character that no name may hold, and that separates no names.
+_UNSEEN_IN_NAME = re.compile(rf"(?!\s){UNSEEN.pattern}")
 
 _TOKEN = re.compile(r";[^\n\r]*|[()]|[^\s();]+")
 
@@ -128,7 +136,7 @@ class Document:
 def read_source(path: str | Path) -> Source:
     """The text of a file; ``-`` is standard input.
 
-    Raises `BadInput` for a file that is missing, unreadable or no text.
+    Raises `BadInput` for a file that is missing, unreadable or no text in UTF-8.
     """
     name = str(path)
     try:
@@ -140,25 +148,46 @@ def read_source(path: str | Path) -> Source:
     try:
         return Source(name, data.decode("utf-8-sig"))
     except UnicodeDecodeError:
-        # Old benchmark files hold Latin-1 in their comments; a zero byte is no text in any
-        # encoding.
-        if b"\0" in data:
-            raise BadInput(
-                "this is a binary file, not PDDL text", position=Position(name)
-            ) from None
-        return Source(name, data.decode("latin-1"))
+        return Source(name, _with_old_comments(data, name))
+
+
+def _with_old_comments(data: bytes, name: str) -> str:
+    """The text of a file that is not UTF-8 in its comments only, as old benchmark files are.
+
+    Bytes there that are not UTF-8 are read as Latin-1.  Raises `BadInput` for such bytes elsewhere.
+    """
+    if b"\0" in data:
+        raise BadInput("this is a binary file, not PDDL text", position=Position(name))
+    # Such a byte b is chr(0xdc00 + b) here, so that it comes back as it was.
+    text = data.decode("utf-8-sig", "surrogateescape")
+    for match in _TOKEN.finditer(text):
+        if match[0][0] != ";" and (wrong := _NOT_DECODED.search(match[0])):
+            offset = match.start() + wrong.start()
+            read = len(data) - len(text[offset:].encode("utf-8", "surrogateescape"))
+            raise not_utf8(data, read, Source(name, text).position(offset))
+    return _NOT_DECODED.sub(lambda byte: chr(ord(byte[0]) - 0xDC00), text)
 
 
 def parse(source: Source) -> Document:
     """Read the one top-level expression of ``source``.
 
-    Raises `BadInput` for unbalanced parentheses, text outside of them, or nesting beyond
-    `MAX_DEPTH`.
+    Raises `BadInput` for unbalanced parentheses, text outside of them, nesting beyond `MAX_DEPTH`,
+    or names with characters of `planners.messages.UNSEEN`.
     """
     reader = _Reader(source)
+    _require_seen(source)
     for match in _TOKEN.finditer(source.text):
         reader.take(match.group(), match.start())
     return reader.document()
+
+
+def _require_seen(source: Source) -> None:
+    """Raise `BadInput` for a control character or another unseen one outside of comments."""
+    if not _UNSEEN_IN_NAME.search(source.text):
+        return
+    for match in _TOKEN.finditer(source.text):
+        if match[0][0] != ";":
+            require_seen(match[0], source.position(match.start()))
 
 
 class _Reader:
@@ -175,7 +204,7 @@ class _Reader:
             self._comments.append(Comment(text.lstrip(";").strip().lower(), offset))
         elif self._root is not None:
             raise self._error(
-                f"unexpected {text[:40]!r} after the end of the definition",
+                f"unexpected {echoed(text[:40])} after the end of the definition",
                 offset,
                 "Expected the end of the file: a parenthesis too many before this position?",
             )
@@ -186,7 +215,7 @@ class _Reader:
         elif text == ")":
             self._close(offset)
         elif not self._open:
-            raise self._error(f"expected '(define ...', found {text[:40]!r}", offset)
+            raise self._error(f"expected '(define ...', found {echoed(text[:40])}", offset)
         else:
             self._open[-1][1].append(Token(text.lower(), offset))
 

@@ -12,8 +12,9 @@ import msgspec
 from msgspec import Meta
 
 from planners.errors import BadInput, Position
-from planners.files import FileFormat, read_bytes
+from planners.files import FileFormat, read_text
 from planners.joint.model import JointModel
+from planners.messages import echoed
 from planners.search.plans import Plan, Plans
 
 #: Each robot's subaction, None for idling.
@@ -130,10 +131,7 @@ def to_json(plans: Plans, listed: Sequence[Plan], task: int = 0) -> dict[str, An
 def read_plans(path: str | Path, model: JointModel) -> list[tuple[Texts, ...]]:
     """The plans of a plan file, JSON or IPC text.  Raises `BadInput` with the line."""
     position = Position(str(path))
-    try:
-        text = read_bytes(path).decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise BadInput(f"this is no text: {error}", position=position) from None
+    text = read_text(path)
     if text.lstrip().startswith("{"):
         return _from_json(text, model, position)
     return [_from_ipc(text, model, str(path))]
@@ -209,7 +207,7 @@ def _from_ipc(text: str, model: JointModel, name: str) -> tuple[Texts, ...]:
         match = _LINE.match(line)
         if match is None:
             raise BadInput(
-                f"expected '0: (action args)', found {raw.strip()!r}",
+                f"expected '0: (action args)', found {echoed(raw.strip())}",
                 position=Position(name, number, 1),
             )
         action = "(" + " ".join(match["action"][1:-1].split()) + ")"

@@ -41,6 +41,7 @@ from planners.classical import (
 )
 from planners.errors import BadInput
 from planners.joint.model import IDLE, JointModel, PlanningTask
+from planners.messages import echoed
 from planners.search.plans import Plan
 
 
@@ -108,7 +109,7 @@ class PddlExport:
         labels = self.labels.get(name.lower())
         if labels is None:
             raise BadInput(
-                f"action {number} of the plan, {name!r}, is none of the exported problem",
+                f"action {number} of the plan, {echoed(name)}, is none of the exported problem",
                 remedy="Give a plan of the problem that this command exports, with the same "
                 "arguments.",
             )
@@ -173,7 +174,9 @@ def plan_names(text: str) -> list[str]:
         if match:
             names.append(match[1] or match[2])
         elif line:
-            raise BadInput(f"line {number} of the plan: expected '(action)', found {raw.strip()!r}")
+            raise BadInput(
+                f"line {number} of the plan: expected '(action)', found {echoed(raw.strip())}"
+            )
     return names
 
 

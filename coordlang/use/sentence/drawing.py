@@ -129,8 +129,10 @@ def _dot_node(node: DagNode, lines: list[str], ink: dict[str, Ink]) -> str:
 
 
 def quoted(text: str) -> str:
-    """A string of Graphviz' language."""
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n") + '"'
+    """A string of Graphviz' language, in which ``&`` begins a character reference."""
+    for character, written in (("&", "&amp;"), ("\\", "\\\\"), ('"', '\\"'), ("\n", "\\n")):
+        text = text.replace(character, written)
+    return f'"{text}"'
 
 
 def _without_parentheses(atom: str) -> str:

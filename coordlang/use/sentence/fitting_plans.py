@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from planners.errors import Refuted
+from planners.messages import echoed
 from planners.search.plan_space import PlanSpace, UnfoldingStep
 from planners.tables import Ints
 
@@ -43,9 +44,9 @@ class NoPlanFits(Refuted):
     ) -> None:
         text = " ".join(names[word] for word in sentence)
         prefix = " ".join(names[word] for word in sentence[:length])
-        following = [f"say {names[w]!r}" if w is not None else "end" for w in next_words]
+        following = [f"say {echoed(names[w])}" if w is not None else "end" for w in next_words]
         where = f'after "{prefix}"' if length else "at the beginning"
-        wrong = f"says {names[sentence[length]]!r}" if length < len(sentence) else "ends"
+        wrong = f"says {echoed(names[sentence[length]])}" if length < len(sentence) else "ends"
         super().__init__(
             f'no optimal plan has the sentence "{text}": {where} no plan {wrong}',
             remedy=f"There plans {' or '.join(following)}.",

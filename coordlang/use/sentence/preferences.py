@@ -10,6 +10,7 @@ from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import BadInput, UsageError
 from planners.joint.model import JointModel
 from planners.joint.states import split_atoms
+from planners.messages import echoed
 
 #: What a preference remembers of a plan's beginning.
 Memory = tuple[int, ...]
@@ -59,7 +60,7 @@ def read_preference(task_language: TaskLanguage, text: str) -> Preference:
     if kind == "avoid":
         return avoids(task_language, argument)
     raise UsageError(
-        f"--prefer {text!r}: there is no such preference",
+        f"--prefer {echoed(text)}: there is no such preference",
         remedy='Use shortest, most-plans, first:ROBOT or avoid:"(ATOM) ..".',
     )
 

@@ -18,6 +18,7 @@ from coordlang.use.sentence.fitting_plans import plans_with_sentence
 from planners.errors import BadInput, Position
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask
 from planners.loading import ModelOptions
+from planners.messages import echoed
 from planners.pddl.formula_tree import conjuncts
 from planners.pddl.lifted import Domain, Problem
 from planners.search.optimal_plans import search
@@ -78,13 +79,14 @@ class TaskLanguage:
         for index, word in enumerate(words, 1):
             if word not in number:
                 raise BadInput(
-                    f"word {index} of the sentence, {word!r}, is no word of this language",
+                    f"word {index} of the sentence, {echoed(word)}, is no word of this language",
                     remedy=f"Its words are {', '.join(self.partition.words)}.",
                 )
         for index, (before, word) in enumerate(pairwise(words), 1):
             if before == word:
                 raise BadInput(
-                    f"the sentence says {word!r} twice in a row (words {index} and {index + 1})",
+                    f"the sentence says {echoed(word)} twice in a row "
+                    f"(words {index} and {index + 1})",
                     remedy="Write a word once, however long the plan stays in it.",
                 )
         return tuple(number[word] for word in words)

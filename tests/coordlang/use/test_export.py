@@ -466,7 +466,7 @@ def test_the_command_as_json(
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
-        ((SENTENCE, "--translate-plan", "missing"), 31, "cannot be read"),
+        ((SENTENCE, "--translate-plan", "missing"), 31, "there is no such file"),
         ((SENTENCE, "--translate-plan", "other"), 31, "none of the exported problem"),
         ((SENTENCE, "--translate-plan", "empty"), 1, "no optimal plan"),
         ((SENTENCE, "--translate-plan", "two"), 31, "two:3:1: this file holds several plans"),
