@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A run-time monitor over many steps: time of each step, and memory before and after.
 
     python benchmarks/monitor.py [--steps 10000000] [--length 150000] [--file MONITOR.PY]
@@ -8,9 +9,8 @@ again, each time with a copy of the monitor that was read at first, until STEPS 
 
 Columns: steps done; microseconds a step at the median, at 99.9 % and at worst, by the clock; worst
 by the thread's own CPU time, which leaves out what other programs on the machine do; resident
-memory in MB; how often the garbage collector ran.  The first row measures nothing at all, as often
-as the others measure a step: what is left in it is the clock and the machine.  The others are
-tenths of the run, each alone.
+memory in MB; how often the garbage collector ran.  The first row is no step, but a sum that takes
+about as long and allocates nothing: its worst is the machine's.  The others are tenths of the run.
 """
 
 from __future__ import annotations
@@ -125,10 +125,12 @@ def load(path: Path) -> ModuleType:
     return module
 
 
-def nothing(steps: int, times: Times) -> None:
-    """Measure nothing, so often."""
-    for _ in range(steps):
+def sums(often: int, times: Times) -> None:
+    """Measure a sum of small numbers, so often."""
+    numbers = bytes(480)
+    for _ in range(often):
         cpu, clock = thread_time_ns(), perf_counter_ns()
+        sum(numbers)
         clock, cpu = perf_counter_ns() - clock, thread_time_ns() - cpu
         times.add(clock, cpu)
 
@@ -155,7 +157,7 @@ def run(start: Any, steps: int) -> None:
     for tenth in range(11):
         times = Times()
         if tenth == 0:
-            nothing(steps // 10, times)
+            sums(steps // 10, times)
         else:
             at = walk(start, at, steps // 10, times)
         figures = (times.at(0.5), times.at(0.999), times.worst / 1e3, times.worst_cpu / 1e3)

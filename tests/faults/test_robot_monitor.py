@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The monitor in a robot that runs for days: constant time and memory; no file breaks it."""
 
 from __future__ import annotations
