@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tracemalloc
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -313,7 +314,7 @@ def test_deep_data_in_every_place() -> None:
         data = copy.deepcopy(whole)
         place, key = list(places(data))[number]
         place[key] = deep
-        ignored += message(lambda taken=data: Monitor(taken, "r1")) is None
+        ignored += message(partial(Monitor, data, "r1")) is None
     assert ignored == 3  # "robots" and its members
 
 
@@ -476,7 +477,7 @@ def check_is_sound(at: Monitor) -> None:
             after.did(text)
             open_ends.append(after)
         for atom in ("(at r1 c0)", "(at r1 c1)", "(at r2 c0)"):
-            said = message(lambda atom=atom, here=here: here.known(atom))
+            said = message(partial(here.known, atom))
             assert said is None or "is no atom that can change" in said
     assert at.remaining == subplans
     assert at.can().subplans == subplans
@@ -540,7 +541,7 @@ def test_messages_are_short_and_harmless(said: str) -> None:
         lambda text: at.can(visit=text),
         lambda text: at.commit(do=text),
     ):
-        assert message(lambda call=call: call(said)) is not None
+        assert message(partial(call, said)) is not None
     assert (at.step, at.history, at.remaining) == (0, (), 4)
 
 
