@@ -461,7 +461,7 @@ NASTY = st.one_of(
     st.sampled_from(["", "idle", "(x)", "(at r1 c1)", "((x))", "\ud800", "\x1b[2J", "x" * 10_000]),
     st.recursive(st.integers(-1, 8), lambda inner: st.lists(inner, max_size=3), max_leaves=5),
     st.dictionaries(st.sampled_from(["idle", "(x)", "step", "next"]), st.integers(-1, 8)),
-    st.just(nested(500)),
+    st.builds(nested, st.just(60)),
 )
 
 
