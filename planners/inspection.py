@@ -176,7 +176,7 @@ def _some(atoms: frozenset[StepAtom]) -> str:
 
 def _impossible(atoms: frozenset[StepAtom]) -> str:
     """Subactions that a formula names and that no robot has: often a mistake in the domain."""
-    return f"{_some(atoms)}, which nobody can ever do,"
+    return f"{_some(atoms)}, which no robot can ever do,"
 
 
 def _example(model: JointModel, init: Rows) -> str | None:

@@ -16,7 +16,7 @@ from planners.errors import UsageError
 from planners.joint.conditions import split_condition
 from planners.joint.model import FullState, Goal, JointModel
 from planners.pddl.formula_tree import required_atoms
-from planners.pddl.lifted import Formula
+from planners.pddl.lifted import Atom, Formula
 from planners.tables import Ints, Rows
 
 #: The value of a state from which the goal is proved unreachable.
@@ -44,8 +44,8 @@ def blind(model: JointModel, goal: Goal) -> Heuristic:
 def relaxed(model: JointModel, goal: Goal) -> Heuristic:
     """h^max with all robots acting at once.
 
-    The steps until all atoms of the goal have been true, if nothing were ever deleted and nobody
-    were in anybody's way (Bonet and Geffner 2001, here with joint steps as the unit of time).
+    The steps until all atoms of the goal have been true, if nothing were ever deleted and no robot
+    were in another's way (Bonet and Geffner 2001, here with joint steps as the unit of time).
 
     On a map it is the longest of the robots' own shortest paths.  O(literals of the ground actions)
     a state and layer.
@@ -90,12 +90,12 @@ def manhattan(model: JointModel, goal: Goal) -> Heuristic:
 
     Places are objects whose names end in two numbers, such as ``c2-3``.  ``(at r1 c2-3)`` and all
     atoms that differ from it in the place only are where one thing is.  The distance is divided by
-    the farthest that any action moves the thing; if an action puts it somewhere wherever it was
-    before, it has no say.  So the bound is admissible in every domain.
+    the farthest that any action moves the thing; a thing that some action puts somewhere wherever
+    it was before is left out.  So the bound is admissible in every domain.
 
     Raises `UsageError` if no atom of the goal has a place.
     """
-    facts = {fact: _thing(text) for fact, text in enumerate(model.codec.facts.texts)}
+    facts = {fact: _thing(atom) for fact, atom in enumerate(model.codec.facts)}
     things: dict[_Thing, dict[int, _Place]] = {}
     for fact, found in facts.items():
         if found is not None:
@@ -139,19 +139,19 @@ _Thing = tuple[str, tuple[str, ...], int]
 _Place = tuple[int, int]
 
 
-def _thing(text: str) -> tuple[_Thing, _Place] | None:
+def _thing(atom: Atom) -> tuple[_Thing, _Place] | None:
     """The thing and the place that an atom speaks of, if it has exactly one place."""
-    name, *args = text[1:-1].split(" ")
     places = [
         (n, m)
-        for n, arg in enumerate(args)
+        for n, arg in enumerate(atom.args)
         if (m := re.search(r"(?<!\d)(\d{1,9})\D+(\d{1,9})$", arg))
     ]
     if len(places) != 1:
         return None
     [(number, match)] = places
-    rest = tuple(arg for n, arg in enumerate(args) if n != number)
-    return (name, (*rest, re.split(r"\d", args[number])[0]), number), (int(match[1]), int(match[2]))
+    rest = tuple(arg for n, arg in enumerate(atom.args) if n != number)
+    stem = re.split(r"\d", atom.args[number])[0]
+    return (atom.predicate, (*rest, stem), number), (int(match[1]), int(match[2]))
 
 
 def _speeds(model: JointModel, facts: dict[int, tuple[_Thing, _Place] | None]) -> dict[_Thing, int]:

@@ -86,9 +86,17 @@ class World:
     def write(self, coordlang: Command) -> World:
         """Write the files that commands read, by commands."""
         built = coordlang(
-            "build", *self.pddl, "--tasks", "all", "-o", self.language, "--method", "minimal",
-            "--certificate", self.certificate,
-        )  # fmt: skip
+            "build",
+            *self.pddl,
+            "--tasks",
+            "all",
+            "-o",
+            self.language,
+            "--method",
+            "minimal",
+            "--certificate",
+            self.certificate,
+        )
         assert built.code == 0, built.err
         self.plan.write_text(coordlang("plans", *self.pddl, "--max", 1).out)
         assert coordlang("tasks", *self.pddl, "-o", self.tasks).code == 0
@@ -240,12 +248,24 @@ def fast_downward(folder: Path) -> list[str]:
     driver = files("up_fast_downward") / "downward" / "fast-downward.py"
     done = subprocess.run(
         [
-            sys.executable, str(driver), "--plan-file", "sas_plan", "domain.pddl", "problem.pddl",
-            "--translate-options", "--invariant-generation-max-time", "0",
-            "--search-options", "--search", "astar(blind())",
+            sys.executable,
+            str(driver),
+            "--plan-file",
+            "sas_plan",
+            "domain.pddl",
+            "problem.pddl",
+            "--translate-options",
+            "--invariant-generation-max-time",
+            "0",
+            "--search-options",
+            "--search",
+            "astar(blind())",
         ],
-        cwd=folder, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr
     return (folder / "sas_plan").read_text().splitlines()
 
@@ -461,9 +481,14 @@ def test_names_of_files(coordlang: Command, tmp_path: Path) -> None:
 def test_coordinates_of_names_that_differ_in_case_only(coordlang: Command, corridor: World) -> None:
     corridor.coordinates.write_text('{"coordinates": {"A": [0, 0], "a": [1, 1], "b": [2, 2]}}')
     done = coordlang(
-        "report", corridor.language, *corridor.pddl, "-o", "-",
-        "--coordinates", corridor.coordinates,
-    )  # fmt: skip
+        "report",
+        corridor.language,
+        *corridor.pddl,
+        "-o",
+        "-",
+        "--coordinates",
+        corridor.coordinates,
+    )
     assert done.code == 31
     assert "twice" in done.err
 

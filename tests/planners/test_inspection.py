@@ -62,7 +62,7 @@ def test_formulas_are_shown_with_what_is_there() -> None:
     misread = PUSHING.replace("(push ?o ?x ?from ?to)", "(push ?o ?x ?from ?from)")
     shown = inspect(made(misread, TASK)).formulas
     assert (
-        "(push r1 anvil a b) speaks of (push r2 anvil a a), which nobody can ever do, in the same step"
+        "(push r1 anvil a b) speaks of (push r2 anvil a a), which no robot can ever do, in the same step"
         in shown
     )
 

@@ -256,12 +256,13 @@ def test_required_coordination_says_how_far_it_got(monkeypatch: pytest.MonkeyPat
 
 def test_a_size_that_nobody_can_wait_for() -> None:
     space = plans("three-robots-3x3")
+    every = np.repeat(np.arange(len(space))[:, None], space.robots + 1, axis=1)
+    walked = moves(space, EdgeIndex.of(space), every, limits=WalkLimits(most=1000.0))
     with pytest.raises(
         OutOfMemory,
         match=r"nodes of one layer of the walk have .* combinations of 3 plans' next steps",
     ):
-        every = np.repeat(np.arange(len(space))[:, None], space.robots + 1, axis=1)
-        next(moves(space, EdgeIndex.of(space), every, limits=WalkLimits(most=1000.0)))
+        next(walked)
 
 
 def test_verification_and_the_search_for_a_break_say_how_far_they_got(

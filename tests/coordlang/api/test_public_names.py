@@ -16,9 +16,21 @@ import coordlang
 from tests.support.domains import ROOT
 
 FUNCTIONS = {
-    "load", "inspect", "plans", "check", "coordination", "build", "verify", "say", "understand",
-    "plan", "choices", "explain", "export", "load_language",
-}  # fmt: skip
+    "load",
+    "inspect",
+    "plans",
+    "check",
+    "coordination",
+    "build",
+    "verify",
+    "say",
+    "understand",
+    "plan",
+    "choices",
+    "explain",
+    "export",
+    "load_language",
+}
 
 
 def python(*arguments: str, cwd: Path = ROOT) -> tuple[int, str, str]:
