@@ -54,17 +54,31 @@ class Results:
             If another process has locked the folder.
         """
         lock = self.folder / ".lock"
-        with open(lock, "w") as file:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                raise UsageError(
-                    f"another run writes its results into {self.folder}",
-                    remedy="Wait for it, or say --results DIR.",
-                ) from None
-            yield
-        with suppress(OSError):
-            lock.unlink()
+        while True:
+            with open(lock, "w") as file:
+                self._lock(file.fileno())
+                if not _is_file_of(file.fileno(), lock):
+                    continue  # removed by the process that held it: the next one locks another file
+                try:
+                    yield
+                finally:  # while it is held: nobody else can hold what has this name
+                    with suppress(OSError):
+                        lock.unlink()
+                return
+
+    def _lock(self, file: int) -> None:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise UsageError(
+                f"another run writes its results into {self.folder}",
+                remedy="Wait for it, or say --results DIR.",
+            ) from None
+        except OSError as error:
+            raise UsageError(
+                f"{self.folder} cannot be locked: {error.strerror}",
+                remedy="Say --results DIR, with a folder on a disk of this machine.",
+            ) from None
 
     def lines(self, experiment: str) -> dict[str, Line]:
         """Return the lines of an experiment by ``id``, without a last line that was cut off.
@@ -130,6 +144,14 @@ class Results:
 
     def _write(self, experiment: str, lines: Sequence[Line]) -> None:
         write_atomically(self.path(experiment), b"".join(map(_text, lines)))
+
+
+def _is_file_of(file: int, path: Path) -> bool:
+    """Whether an open file is the one of this name."""
+    try:
+        return os.path.samestat(os.fstat(file), os.stat(path))
+    except FileNotFoundError:
+        return False
 
 
 def name_of(unit: Unit) -> str:
