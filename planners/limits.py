@@ -163,20 +163,14 @@ def memory_left() -> int:
 
 
 def _available() -> int:
-    try:
-        with open("/proc/meminfo") as lines:
-            for line in lines:
-                if line.startswith("MemAvailable:"):
-                    return int(line.split()[1]) * 1024
-    except OSError:
-        pass  # no /proc on this system: the limit alone counts
-    return 2**62
+    """Bytes that the machine has free or can free at once."""
+    import psutil  # some milliseconds, and only long work asks
+
+    return int(psutil.virtual_memory().available)
 
 
 def _used() -> int:
-    try:
-        with open("/proc/self/statm") as text:
-            return int(text.read().split()[0]) * resource.getpagesize()
-    except OSError:
-        unit = 1 if sys.platform == "darwin" else 1024
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
+    """Bytes of address space that this process has."""
+    import psutil
+
+    return int(psutil.Process().memory_info().vms)

@@ -187,7 +187,9 @@ def _in_orders(columns: _Columns) -> list[int]:
 
 
 def _starred(record: Record | None) -> str | None:
-    return None if record is None else f"{record.result['words']}{'*' if _proved(record) else ''}"
+    if record is None:
+        return None
+    return f"{record.result['words']}{'*' * _proved(record)}"
 
 
 def _proved(record: Record) -> bool:
