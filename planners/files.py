@@ -1,15 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files in and out: written whole or not at all, JSON read against the record of its format."""
+"""Files in: decompressed, and JSON read against the record of its format."""
 
 from __future__ import annotations
 
-import errno
 import gzip
-import os
 import sys
-import tempfile
 import zlib
-from contextlib import suppress
 from dataclasses import dataclass
 from inspect import cleandoc
 from pathlib import Path
@@ -17,7 +13,7 @@ from typing import Any, Generic, TypeVar
 
 import msgspec
 
-from planners.errors import BadInput, Position, UsageError
+from planners.errors import BadInput, Position
 from planners.messages import UNSEEN, echoed
 
 T = TypeVar("T")
@@ -191,50 +187,3 @@ def require_seen(name: str, position: Position, what: str = "name") -> None:
             position=position,
             remedy="Names and words hold no control characters and none that cannot be seen.",
         )
-
-
-def write_atomically(path: str | Path, data: bytes) -> None:
-    """Write beside, then rename, so that a file is whole or as it was before.
-
-    Raises
-    ------
-    UsageError
-        A file that cannot be written.
-    """
-    target = Path(os.path.realpath(path))
-    try:
-        if target.exists() and not target.is_file():
-            # A device or a pipe: written to, never replaced.
-            if target.is_dir():
-                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
-            with open(path, "wb") as file:
-                file.write(data)
-            return
-        handle, beside = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(data)
-            os.chmod(beside, 0o666 & ~_umask())
-            os.replace(beside, target)
-        except BaseException:
-            with suppress(FileNotFoundError):
-                os.unlink(beside)
-            raise
-    except OSError as error:
-        raise UsageError(
-            f"{path} cannot be written: {error.strerror}",
-            remedy="Name a file in a folder that you may write to.",
-        ) from None
-
-
-def write_compressed(path: str | Path, data: bytes, level: int = 9) -> None:
-    """Write like `write_atomically`; compressed for a name that ends in ``.gz``."""
-    if str(path).endswith(".gz"):
-        data = gzip.compress(data, compresslevel=level, mtime=0)
-    write_atomically(path, data)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

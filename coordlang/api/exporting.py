@@ -31,9 +31,9 @@ from coordlang.use.export.ltlf import SentenceFormula, export_ltlf
 from coordlang.use.export.pddl import PddlExport, export_pddl, plan_names
 from coordlang.use.sentence.open_plans import OpenPlans
 from planners.errors import BadInput, Position, Refuted, UsageError
-from planners.files import write_atomically
 from planners.joint.model import JointModel
 from planners.search.plan_file import only_one_plan
+from planners.writing import write_atomically
 
 #: Beyond this many joint actions robots choose one after another in the exported PDDL.
 MAX_ACTIONS = 2000

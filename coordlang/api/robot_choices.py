@@ -26,9 +26,9 @@ from coordlang.use.choices.dot import to_dot
 from coordlang.use.choices.file import monitor, to_bytes, to_data
 from coordlang.use.choices.monitor import Monitor
 from planners.errors import UsageError
-from planners.files import write_atomically
 from planners.notebook import html_table
 from planners.search.plans import Plans
+from planners.writing import write_atomically
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -10,7 +10,8 @@ import msgspec
 from msgspec import Meta
 
 from planners.errors import Position
-from planners.files import FileFormat, read_bytes, write_compressed
+from planners.files import FileFormat, read_bytes
+from planners.writing import write_compressed
 
 FORMAT = "coordlang/certificate"
 VERSION = 1

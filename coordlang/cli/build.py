@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -124,14 +125,18 @@ def command(
     )
     left = time_left()
     stop_clock()  # the work is done; from here on it is saved
-    _save(built, output)
-    uncertified = _certify(built, certificate, left) if certificate else None
-    figures = built.data()
-    if as_json and output != "-":
-        echo(json.dumps(figures))
-    else:
-        echo(_summary(figures, output), err=output == "-")
-    return _exit_code(built, uncertified)
+    stopped = _save(built, output, certificate)
+    try:
+        if certificate and stopped is None:
+            stopped = _certify(built, output, certificate, left)
+        figures = built.data()
+        if as_json and output != "-":
+            echo(json.dumps(figures))
+        else:
+            echo(_summary(figures, output), err=output == "-")
+    except KeyboardInterrupt as error:
+        stopped = error
+    return _exit_code(built, output, certificate, stopped)
 
 
 def _build(pddl: PlanningFiles, **keywords: Any) -> BuiltLanguage:
@@ -152,21 +157,34 @@ def _build(pddl: PlanningFiles, **keywords: Any) -> BuiltLanguage:
     return built
 
 
-def _save(built: BuiltLanguage, output: str) -> None:
-    """Write the language; its file records the arguments of the command line."""
-    from coordlang.language.file import to_bytes
+def _save(built: BuiltLanguage, output: str, certificate: str | None) -> BaseException | None:
+    """Write the language; its file records the arguments of the command line.
+
+    The certificate of a language that stood there before goes with it.  An interrupt does not lose
+    the language: it is written, and the interrupt returned.
+    """
+    from coordlang.language.file import to_bytes, write_language
+    from planners.writing import is_device, remove_file
 
     arguments = [visible(argument) for argument in sys.argv[1:]]
     provenance = built.language.provenance
     producer = {**provenance.producer, "arguments": arguments}
     language = replace(built.language, provenance=replace(provenance, producer=producer))
     if output == "-":
+        remove_file(certificate)
         echo(to_bytes(language).decode(), nl=False)
-    else:
-        language.save(output)
+        return None
+    try:
+        write_language(language, output, outdated=certificate)
+    except KeyboardInterrupt as error:
+        if is_device(output):
+            raise  # part of it may be out: no second time
+        write_language(language, output, outdated=certificate)
+        return error
+    return None
 
 
-def _certify(built: BuiltLanguage, path: str, seconds: float) -> BaseException | None:
+def _certify(built: BuiltLanguage, output: str, path: str, seconds: float) -> BaseException | None:
     """Write the certificate, within ``seconds``; the error that ended it early, or None."""
     from coordlang.certificate import write_certificate
     from planners.limits import run_until_stopped, stop_clock, time_limit
@@ -182,8 +200,12 @@ def _certify(built: BuiltLanguage, path: str, seconds: float) -> BaseException |
             stop_clock()
             write_certificate(proof, path)
 
-    stopped = run_until_stopped(write)
-    if stopped is not None:
+    try:
+        stopped = run_until_stopped(write)
+    except coordlang.UsageError as error:
+        error.reached = _written(built, output)
+        raise
+    if stopped is not None and not isinstance(stopped, KeyboardInterrupt):
         echo(
             "coordlang: no certificate is written: there was no time or memory left for it",
             err=True,
@@ -191,20 +213,41 @@ def _certify(built: BuiltLanguage, path: str, seconds: float) -> BaseException |
     return stopped
 
 
-def _exit_code(built: BuiltLanguage, uncertified: BaseException | None) -> int:
-    """Return the exit code, and write to stderr what ended the work early."""
+def _exit_code(
+    built: BuiltLanguage, output: str, certificate: str | None, ended: BaseException | None
+) -> int:
+    """Return the exit code, and write to stderr what ended the work early.
+
+    ``ended`` is what ended it after the language was built.
+    """
     proved, exact = built.guarantee.proved_minimal, built.options.is_exact
-    stopped = uncertified or built.stopped
+    stopped = ended or built.stopped
     if isinstance(stopped, KeyboardInterrupt):
-        echo("coordlang: interrupted; the best language so far is written", err=True)
+        echo(f"coordlang: interrupted; {_written(built, output, certificate)}", err=True)
         return INTERRUPTED
     if stopped is not None:
         reason = str(stopped).splitlines()[0] if str(stopped) else "out of memory"
         short_of = "" if proved and exact else ", without proof"
         echo(f"coordlang: {reason}; the best language so far is written{short_of}", err=True)
     if exact:
-        return 0 if proved and uncertified is None else UNPROVED
+        return 0 if proved and ended is None else UNPROVED
     return 0 if stopped is None else UNPROVED
+
+
+def _written(built: BuiltLanguage, output: str, certificate: str | None = None) -> str:
+    """What is written when the work ends early, and what is proved of it."""
+    from planners.writing import is_device
+
+    where = "" if output == "-" else f" to {output}"
+    if built.guarantee.proved_minimal:
+        text = f"the language is written{where}: it is verified and proved minimal"
+    else:
+        text = f"the best language so far is written{where}: it is verified"
+    if certificate is None or is_device(certificate):
+        return text
+    # The certificate of another language went when this one was written.
+    is_there = os.path.isfile(certificate)
+    return f"{text}; {'and so is its certificate' if is_there else 'no certificate is written'}"
 
 
 def _summary(figures: dict[str, Any], output: str) -> str:

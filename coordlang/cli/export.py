@@ -90,7 +90,8 @@ def command(
     inputs = [language, domain, problem, translate_plan]
     writes_folder = target == "pddl" and translate_plan is None and not as_json
     if output is not None and output != "-" and writes_folder:
-        written = [("-o", os.path.join(output, name)) for name in ("domain.pddl", "problem.pddl")]
+        names = ("domain.pddl", "problem.pddl")
+        written = [("-o", os.path.join(output, name) if output else output) for name in names]
         check_outputs(written, inputs, makes_folder=True)
     else:
         check_outputs([("-o", output)], inputs)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import errno
 import functools
 import os
 from collections.abc import Callable, Iterable, Sequence
@@ -90,15 +89,16 @@ def check_outputs(
         For an output that cannot be written, or that would overwrite something.
     """
     from planners.errors import UsageError
+    from planners.writing import is_device, why_unwritable
 
     read = [path for path in inputs if path is not None and path != "-" and os.path.isfile(path)]
     named = [(option, path) for option, path in outputs if path is not None and path != "-"]
     written: dict[str, str] = {}
     for option, path in named:
-        if reason := _unwritable(path, makes_folder):
+        if reason := why_unwritable(path, makes_folder=makes_folder):
             what = f"{option} {path} cannot be written: {reason}"
             raise UsageError(what, remedy="Name a file in a folder that you may write to.")
-        if _is_device(path):
+        if is_device(path):
             continue  # a device or a pipe is written to, and never replaced
         if os.path.exists(path) and any(os.path.samefile(path, other) for other in read):
             raise UsageError(
@@ -123,33 +123,9 @@ def never_stdout(option: str, path: str | None) -> None:
 
 def write(text: str, output: str | None) -> None:
     """Write to a file, or to stdout without one (or for ``-``)."""
-    from planners.files import write_atomically
+    from planners.writing import write_atomically
 
     if output is None or output == "-":
         echo(text, nl=False)
     else:
         write_atomically(output, text.encode())
-
-
-def _is_device(path: str) -> bool:
-    return os.path.exists(path) and not os.path.isfile(path)
-
-
-def _unwritable(path: str, makes_folder: bool) -> str | None:
-    """Why no file can be written there, or None."""
-    if os.path.isdir(path):
-        return os.strerror(errno.EISDIR)
-    if _is_device(path):
-        return _denied(path, os.W_OK)
-    folder = Path(os.path.realpath(path)).parent
-    while makes_folder and not folder.exists():
-        folder = folder.parent
-    if folder.is_dir():
-        return _denied(folder, os.W_OK | os.X_OK)
-    if makes_folder:
-        return f"the folder {Path(path).parent} cannot be made: {os.strerror(errno.ENOTDIR)}"
-    return f"there is no folder {Path(path).parent}"
-
-
-def _denied(path: str | Path, mode: int) -> str | None:
-    return None if os.access(path, mode) else os.strerror(errno.EACCES)

@@ -65,7 +65,7 @@ def command(
     from coordlang.api.options import GivenOptions
     from coordlang.language.recorded import check_source
     from coordlang.report.page import make_report
-    from planners.files import write_atomically
+    from planners.writing import write_atomically
 
     places = coordinates if coordinates is not None else str(_beside(problems[0]))
     check_outputs([("-o", output)], [language, domain, *problems, places])

@@ -111,7 +111,7 @@ def _show_bound(
     Refuted
         If that is less than the language claims.
     """
-    from planners.files import write_atomically
+    from planners.writing import write_atomically
 
     if dimacs:
         write_atomically(dimacs, checked.dimacs().encode())

@@ -16,8 +16,9 @@ from coordlang.language.provenance import Guarantee, Provenance
 from coordlang.language.record import LANGUAGE, LanguageRecord, TasksRecord
 from coordlang.language.words import Language
 from planners.errors import BadInput, Position
-from planners.files import read_bytes, require_seen, write_compressed
+from planners.files import read_bytes, require_seen
 from planners.messages import echoed
+from planners.writing import write_compressed
 
 
 def to_bytes(language: Language) -> bytes:
@@ -41,9 +42,15 @@ def to_bytes(language: Language) -> bytes:
     return msgspec.json.format(msgspec.json.encode(data), indent=1) + b"\n"
 
 
-def write_language(language: Language, path: str | Path) -> None:
-    """Write a language file (gzip for ``.gz``).  The file is complete or not there at all."""
-    write_compressed(path, to_bytes(language), level=6)
+def write_language(
+    language: Language, path: str | Path, *, outdated: str | Path | None = None
+) -> None:
+    """Write a language file (gzip for ``.gz``).  The file is complete or not there at all.
+
+    ``outdated`` belongs to the language of before, as its certificate does: it is removed before
+    the new language stands there.
+    """
+    write_compressed(path, to_bytes(language), level=6, outdated=outdated)
 
 
 def read_language(path: str | Path) -> Language:

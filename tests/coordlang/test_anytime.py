@@ -83,7 +83,7 @@ def test_an_interrupt_writes_the_best_language(tmp_path: Path) -> None:
     path = tmp_path / "language.json"
     code, _, said = stopped(signal.SIGINT, "-o", str(path))
     assert code == 130, said
-    assert "interrupted; the best language so far is written" in said
+    assert "interrupted; the best language so far is written to" in said
     check_file(path)
 
 
@@ -134,7 +134,7 @@ def test_the_language_is_written_without_its_certificate(
     def stop(_: object) -> None:
         raise error
 
-    monkeypatch.setattr("coordlang.building.certificate_of", stop)
+    monkeypatch.setattr("coordlang.api.languages.certificate_of", stop)
     path, proof = tmp_path / "l.json", tmp_path / "c.json"
     files = [DOMAINS / "three-cells" / name for name in ("domain.pddl", "problem.pddl")]
     outcome = coordlang("build", *files, "--method", "minimal", "-o", path, "--certificate", proof)

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from planners.files import write_atomically
+from planners.writing import write_atomically
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

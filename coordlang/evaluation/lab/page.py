@@ -10,7 +10,7 @@ from pathlib import Path
 from coordlang.evaluation.lab.figure_style import save
 from coordlang.evaluation.lab.recipe import Figure, Recipe, Record, Section, table
 from coordlang.evaluation.lab.results import Line, Results, name_of, record_of
-from planners.files import write_atomically
+from planners.writing import write_atomically
 
 
 def sections(

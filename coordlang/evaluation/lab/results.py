@@ -14,7 +14,7 @@ from typing import Any
 from coordlang.evaluation.lab.identity import code_hash, identity, inputs, versions
 from coordlang.evaluation.lab.recipe import Record, Settings, Unit
 from planners.errors import BadInput, Position, UsageError
-from planners.files import write_atomically
+from planners.writing import write_atomically
 
 #: A line of a results file, as JSON data.
 Line = dict[str, Any]

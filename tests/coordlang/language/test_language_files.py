@@ -15,10 +15,10 @@ from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary.symmetry import symmetry_group
 from planners.errors import BadInput
-from planners.files import write_atomically
 from planners.pddl import parse_domain, parse_problem, read_domain
 from planners.pddl.sexpr import Source
 from planners.search.plans import Plans, counts
+from planners.writing import write_atomically
 from tests.support import naive
 from tests.support.command import Command
 from tests.support.domains import DOMAINS, all_tasks
