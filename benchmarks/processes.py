@@ -36,7 +36,7 @@ class Done:
 
 def coordlang(*arguments: str) -> Done:
     """Run ``coordlang ARGUMENTS`` as a process of its own."""
-    return run_python(("-c", "from coordlang.cli import main; main()", *arguments))
+    return run_python(("-c", "from coordlang.__main__ import main; main()", *arguments))
 
 
 def run_python(arguments: Sequence[str]) -> Done:

@@ -1,7 +1,42 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``python -m coordlang``: the command line."""
+"""``python -m coordlang`` and the program ``coordlang``: the command line.
 
-from coordlang.cli import main
+Signals are looked after before anything else is imported.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import NoReturn
+
+from planners.signals import Interruptions
+
+
+def main() -> NoReturn:
+    """Run the command line and end the process with its exit code.
+
+    Ctrl-C (SIGINT), SIGTERM and SIGHUP end the work at any moment, imports included: what is half
+    done is removed, and the exit code is 128 and the number of the signal.
+    """
+    interruptions = Interruptions()
+    code = 0
+    try:
+        try:
+            from coordlang.cli import run
+
+            code = run(sys.argv[1:], interruptions)
+        finally:
+            interruptions.end()
+    except Exception:
+        if interruptions.first is None:
+            raise
+        # A library that was being imported has made another error of the interrupt.
+    except KeyboardInterrupt:
+        pass
+    if interruptions.first is not None:
+        code = 128 + interruptions.first
+    sys.exit(code)
+
 
 if __name__ == "__main__":
     main()

@@ -13,6 +13,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from planners.errors import UsageError
+from planners.signals import postponed_signals
 
 #: Characters of a file's name that its temporary file repeats: with what is added, at most 90
 #: bytes, which every file system takes.
@@ -58,6 +59,8 @@ def remove_file(path: str | Path | None) -> None:
 def write_atomically(path: str | Path, data: bytes, *, outdated: str | Path | None = None) -> None:
     """Write beside, flush to the disk, then rename: a file is whole or as it was before.
 
+    Signals wait until that is done; devices and pipes apart, which may block.
+
     Parameters
     ----------
     path, data
@@ -82,7 +85,7 @@ def write_atomically(path: str | Path, data: bytes, *, outdated: str | Path | No
                 file.write(data)
             return
         target = Path(os.path.realpath(path))
-        with _written_beside(target, data) as beside:
+        with postponed_signals(), _written_beside(target, data) as beside:
             _replace(target, beside, outdated)
     except BrokenPipeError:
         raise

@@ -8,47 +8,37 @@ from __future__ import annotations
 
 import errno
 import os
+import signal
 import sys
 import traceback
+from contextlib import suppress
 from io import StringIO
-from typing import NoReturn
 
 import click
 
-from coordlang.cli.exit_codes import BROKEN_PIPE, INTERRUPTED
+from coordlang.cli.exit_codes import BROKEN_PIPE, INTERRUPTED, interrupted_by
 from coordlang.cli.group import cli
 from planners.errors import CoordlangError, OutOfMemory
 from planners.messages import sentence, visible
+from planners.signals import Interruptions
 
 
-def main() -> NoReturn:
-    """Run the command line and end the process with its exit code."""
-    sys.exit(run(sys.argv[1:]))
+def run(arguments: list[str], interruptions: Interruptions | None = None) -> int:
+    """Run one command; the exit code.  No traceback reaches a user without ``--debug``.
 
-
-def run(arguments: list[str]) -> int:
-    """Run one command; the exit code.  No traceback reaches a user without ``--debug``."""
-    debug = "--debug" in arguments
+    Parameters
+    ----------
+    interruptions
+        What looks after the signals that end the process, None if nothing does.
+    """
     try:
         return _run(arguments)
     except (KeyboardInterrupt, click.Abort):
-        return _fail("interrupted", INTERRUPTED)
-    except OSError as error:
-        if error.errno not in (errno.ENOSPC, errno.EIO, errno.EBADF):
-            return _internal(error, debug)
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - open to the end
-        return _fail(f"the output cannot be written: {error.strerror}", 2)
-    except MemoryError:
-        return _fail(
-            "out of memory\n  Use a smaller task, or a larger --memory-limit.",
-            OutOfMemory.exit_code,
-        )
-    except CoordlangError as error:
-        if debug:
-            _show(traceback.format_exc())
-        return _fail(str(error), error.exit_code)
+        return _interrupted(interruptions)
     except Exception as error:
-        return _internal(error, debug)
+        if interruptions is not None and interruptions.first is not None:
+            return _interrupted(interruptions)  # that is what a library made of the interrupt
+        return _failed(error, "--debug" in arguments)
 
 
 def _run(arguments: list[str]) -> int:
@@ -71,6 +61,33 @@ def _run(arguments: list[str]) -> int:
         return BROKEN_PIPE
     except SystemExit:
         return BROKEN_PIPE  # so ends click a command whose reader has gone
+
+
+def _interrupted(interruptions: Interruptions | None) -> int:
+    """Say what has ended the work, if the terminal is still there; the exit code."""
+    number = None if interruptions is None else interruptions.first
+    by = "" if number in (None, signal.SIGINT) else f" by {signal.Signals(number).name}"
+    with suppress(OSError):
+        _fail(f"interrupted{by}", INTERRUPTED)
+    return INTERRUPTED if number is None else interrupted_by(number)
+
+
+def _failed(error: Exception, debug: bool) -> int:
+    """Say what is wrong and what to do; the exit code."""
+    match error:
+        case OSError(errno=errno.ENOSPC | errno.EIO | errno.EBADF):
+            sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - open to the end
+            return _fail(f"the output cannot be written: {error.strerror}", 2)
+        case MemoryError():
+            return _fail(
+                "out of memory\n  Use a smaller task, or a larger --memory-limit.",
+                OutOfMemory.exit_code,
+            )
+        case CoordlangError():
+            if debug:
+                _show("".join(traceback.format_exception(error)))
+            return _fail(str(error), error.exit_code)
+    return _internal(error, debug)
 
 
 def _internal(error: Exception, debug: bool) -> int:

@@ -21,12 +21,13 @@ from coordlang.api.options import (
     Unsolvable,
 )
 from coordlang.cli.echo import echo
-from coordlang.cli.exit_codes import INTERRUPTED, UNPROVED
+from coordlang.cli.exit_codes import INTERRUPTED, UNPROVED, interrupted_by
 from coordlang.cli.files import PlanningFiles, check_outputs, never_stdout, planning_files
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import note_single_robot, working
 from planners.messages import visible
 from planners.notebook import counted
+from planners.signals import Interrupted
 
 if TYPE_CHECKING:
     from coordlang.api.languages import BuiltLanguage
@@ -224,7 +225,7 @@ def _exit_code(
     stopped = ended or built.stopped
     if isinstance(stopped, KeyboardInterrupt):
         echo(f"coordlang: interrupted; {_written(built, output, certificate)}", err=True)
-        return INTERRUPTED
+        return interrupted_by(stopped.number) if isinstance(stopped, Interrupted) else INTERRUPTED
     if stopped is not None:
         reason = str(stopped).splitlines()[0] if str(stopped) else "out of memory"
         short_of = "" if proved and exact else ", without proof"

@@ -13,3 +13,8 @@ IMPOSSIBLE = 11
 INTERRUPTED = 130
 #: As a shell reports a process whose reader has gone: the answer did not arrive.
 BROKEN_PIPE = 141
+
+
+def interrupted_by(number: int) -> int:
+    """The exit code of a process that a signal has ended, as a shell reports it."""
+    return 128 + number

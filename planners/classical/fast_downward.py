@@ -24,6 +24,7 @@ from typing import Any
 from planners.classical import LONGEST, ClassicalTask, Form, compile_classical
 from planners.errors import CoordlangError, OutOfMemory, OutOfTime
 from planners.joint.model import JointModel, PlanningTask
+from planners.signals import Postponed, postponed_signals
 
 #: Fast Downward adds up costs in 32-bit integers.
 _GREATEST = 2**31 - 1
@@ -131,11 +132,15 @@ def _solve(
     classical: ClassicalTask, left: float | None, time_limit: float | None, memory_limit: int | None
 ) -> int | None:
     """The cost of an optimal plan of a classical task, None if there is no plan."""
-    with tempfile.TemporaryDirectory(prefix="coordlang-") as name:
+    task = as_json(classical, memory_limit)
+    with (
+        postponed_signals() as signals,
+        tempfile.TemporaryDirectory(prefix="coordlang-") as name,
+    ):
         directory = Path(name)
-        (directory / "task.json").write_text(as_json(classical, memory_limit))
+        (directory / "task.json").write_text(task)
         try:
-            code = _run(directory, left)
+            code = _run(directory, left, signals)
         except subprocess.TimeoutExpired:
             raise OutOfTime(
                 f"Fast Downward found no answer in {time_limit:g} s",
@@ -164,10 +169,10 @@ def _solve(
     raise _crash(f"Fast Downward {answer['status']}", answer["log"])
 
 
-def _run(directory: Path, left: float | None) -> int:
+def _run(directory: Path, left: float | None, signals: Postponed) -> int:
     """Run the worker in a directory; its exit code.
 
-    However this ends, the worker and its children are gone.
+    However this ends, the worker and its children are gone.  Signals are heard while it runs.
     """
     home = str(Path(__file__).resolve().parents[2])
     path = os.pathsep.join(p for p in (home, os.environ.get("PYTHONPATH")) if p)
@@ -191,7 +196,8 @@ def _run(directory: Path, left: float | None) -> int:
                 stderr=errors,
                 start_new_session=True,
             )
-            return process.wait(None if left is None else max(left, 0.0))
+            with signals.heard():
+                return process.wait(None if left is None else max(left, 0.0))
         finally:
             if process is not None:
                 _end(process)

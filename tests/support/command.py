@@ -23,7 +23,7 @@ Command = Callable[..., Outcome]
 _MAIN = """
 import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)
-from coordlang.cli import main
+from coordlang.__main__ import main
 main()
 """
 

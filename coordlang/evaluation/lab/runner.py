@@ -8,19 +8,26 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from time import perf_counter, process_time
+from types import FrameType
 
 from coordlang.evaluation.lab.recipe import Recipe, Record, Result, Settings, Status, Unit
 from coordlang.evaluation.lab.results import Results, name_of
 from planners.errors import CoordlangError, OutOfMemory, OutOfTime
 from planners.limits import time_limit
+from planners.signals import ENDING, postponed_signals
 
 #: Seconds after its limit at which a work unit that does not stop by itself is killed.
 _GRACE = 30.0
+#: Seconds in which a process that is asked to end cleans up.
+_STOPPING = 1.0
+#: What asks it: no signal that a terminal or a scheduler of jobs would send to all processes.
+_STOP = signal.SIGUSR1
 
 #: What does a unit of each experiment.  The functions are sent to worker processes by name.
 _Runs = Mapping[str, Callable[[Unit, Settings], Result]]
@@ -152,8 +159,16 @@ class _Worker:
         """Whether the process runs."""
         return self._process.is_alive()
 
+    def stop(self) -> None:
+        """Ask the process to end, and to remove what it is half through writing."""
+        with suppress(ProcessLookupError):
+            if self._process.pid is not None and self.alive:
+                os.kill(self._process.pid, _STOP)
+
     def kill(self) -> None:
-        """End the process at once."""
+        """End the process, by force where it does not end by itself."""
+        self.stop()
+        self._process.join(_STOPPING)
         self._process.kill()
         self._process.join()
         self.connection.close()
@@ -172,8 +187,11 @@ class _Pool:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for worker in self._workers:
-            worker.kill()
+        with postponed_signals():
+            for worker in self._workers:
+                worker.stop()
+            for worker in self._workers:
+                worker.kill()
 
     def records(
         self, todo: Sequence[Unit], report: Callable[[tuple[Unit, ...]], None]
@@ -205,8 +223,11 @@ class _Pool:
 
 def _work(connection: Connection, runs: _Runs, settings: Settings, parent: int) -> None:
     """Do units until the connection is closed: the life of a worker process."""
-    # A Ctrl-C goes to all processes of the terminal; the parent stores results and ends us.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # What ends the run goes to all processes of the terminal or of the job; the parent stores
+    # results and ends us.
+    for number in ENDING:
+        signal.signal(number, signal.SIG_IGN)
+    signal.signal(_STOP, _leave)
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     while True:
         try:
@@ -214,6 +235,10 @@ def _work(connection: Connection, runs: _Runs, settings: Settings, parent: int) 
         except EOFError:
             return
         connection.send(_attempt(runs[unit.experiment], unit, settings))
+
+
+def _leave(_signal: int, _frame: FrameType | None) -> None:
+    raise SystemExit
 
 
 def _end_with(parent: int) -> None:
