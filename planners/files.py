@@ -4,21 +4,37 @@
 from __future__ import annotations
 
 import gzip
+import re
 import sys
 import zlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from inspect import cleandoc
+from io import BytesIO
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import IO, Any, Generic, TypeVar
 
 import msgspec
 
-from planners.errors import BadInput, Position
+from planners.errors import BadInput, OutOfMemory, Position
+from planners.limits import memory_left
 from planners.messages import UNSEEN, echoed
 
 T = TypeVar("T")
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+
+#: Bytes of text that are read from one file, decompressed.
+MAX_TEXT = 2**30
+#: What JSON text takes in memory at least while it is read, in bytes per byte.
+_READING = 4
+#: Deeper nesting of arrays and objects in a JSON text is refused: no format needs it.
+MAX_DEPTH = 200
+_CHUNK = 2**20
+_ESCAPED = re.compile(rb"\\.", re.DOTALL)
+_TEXT = re.compile(rb'"[^"]*"?')
+_ALIKE = bytes.maketrans(b"{}", b"[]")
+_NOT_NESTING = bytes(set(range(256)) - set(b'[]{}"'))
 
 
 class _Head(msgspec.Struct):
@@ -61,6 +77,7 @@ class FileFormat(Generic[T]):
         """
         check_utf8(data, position)
         data = data.removeprefix(_BYTE_ORDER_MARK)
+        _require_shallow(data, position)
         try:
             if self.format is not None:
                 self.check_head(data, position)
@@ -123,24 +140,43 @@ class FileFormat(Generic[T]):
         }
 
 
-def read_bytes(path: str | Path) -> bytes:
+def read_bytes(path: str | Path, *, most: int = MAX_TEXT) -> bytes:
     """Read a file, or standard input for ``-``; what gzip compressed is decompressed.
 
     Raises
     ------
     BadInput
-        A file that is missing or cannot be read.
+        A file that is missing, cannot be read, or holds more than ``most`` bytes.
+    OutOfMemory
+        A file that would take more memory than is left.
     """
+    data = read_stored_bytes(path, most=most)
+    if data[:2] != b"\x1f\x8b":
+        return data
     position = Position(str(path))
     try:
-        data = sys.stdin.buffer.read() if str(path) == "-" else Path(path).read_bytes()
-        return gzip.decompress(data) if data[:2] == b"\x1f\x8b" else data
+        size = _decompressed_size(data, most)
+        _require_size(size, most, position)
+        return gzip.GzipFile(fileobj=BytesIO(data)).read(size)
+    except (OSError, EOFError, zlib.error) as error:
+        raise BadInput(f"cannot be read: {error}", position=position) from None
+
+
+def read_stored_bytes(path: str | Path, *, most: int = MAX_TEXT) -> bytes:
+    """Read a file as it is, or standard input for ``-``; see `read_bytes`."""
+    position = Position(str(path))
+    try:
+        if str(path) == "-":
+            data = b"".join(_pieces(sys.stdin.buffer, most))
+        else:
+            with open(path, "rb") as file:
+                data = b"".join(_pieces(file, most))
     except FileNotFoundError:
         raise BadInput("there is no such file", position=position) from None
     except OSError as error:
         raise BadInput(f"cannot be read: {error.strerror or error}", position=position) from None
-    except (EOFError, zlib.error) as error:
-        raise BadInput(f"cannot be read: {error}", position=position) from None
+    _require_size(len(data), most, position)
+    return data
 
 
 def read_text(path: str | Path) -> str:
@@ -187,3 +223,54 @@ def require_seen(name: str, position: Position, what: str = "name") -> None:
             position=position,
             remedy="Names and words hold no control characters and none that cannot be seen.",
         )
+
+
+def _decompressed_size(data: bytes, most: int) -> int:
+    """The size of what gzip compressed, counted to a little more than ``most``; nothing is kept."""
+    return sum(len(piece) for piece in _pieces(gzip.GzipFile(fileobj=BytesIO(data)), most))
+
+
+def _pieces(file: IO[bytes] | gzip.GzipFile, most: int) -> Iterator[bytes]:
+    """The bytes of a file, until there are more than ``most``."""
+    size = 0
+    while size <= most and (piece := file.read(_CHUNK)):
+        size += len(piece)
+        yield piece
+
+
+def _require_size(size: int, most: int, position: Position) -> None:
+    if size > most:
+        raise BadInput(
+            f"the file holds more than {most / 2**20:,.0f} MiB of text",
+            position=position,
+            remedy="No file of coordlang is as large: is it the right one?",
+        )
+    if size * _READING > (left := memory_left()):
+        raise OutOfMemory(
+            f"reading {size / 2**20:,.0f} MiB takes {size * _READING / 2**20:,.0f} MiB of memory "
+            f"or more, {left / 2**20:,.0f} MiB are left",
+            position=position,
+            remedy="Use a larger --memory-limit, or a smaller file.",
+        )
+
+
+def _require_shallow(data: bytes, position: Position) -> None:
+    """Raise `BadInput` for JSON that is nested more than `MAX_DEPTH` deep.
+
+    Readers recurse, and they would end wherever the stack is full.
+    """
+    if data.count(b"[") + data.count(b"{") <= MAX_DEPTH:
+        return
+    # Two quotation marks in a row end a text and begin the next, or are an empty one: with both
+    # gone, the same brackets stand outside of texts.
+    if b"\\" in data:
+        data = _ESCAPED.sub(b"", data)
+    marks = data.translate(_ALIKE, _NOT_NESTING).replace(b'""', b"")
+    marks = _TEXT.sub(b"", marks)
+    for _ in range(MAX_DEPTH):  # level by level, from inside
+        outer = marks.replace(b"[]", b"")
+        if len(outer) == len(marks):
+            break
+        marks = outer
+    if len(marks) > MAX_DEPTH or b"[]" in marks:
+        raise BadInput(f"this JSON is nested more than {MAX_DEPTH} deep", position=position)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from coordlang.certificate.encoding import Cnf, encode
+from coordlang.certificate.encoding import Cnf, encode, states_of
 from coordlang.certificate.file import Certificate, PlanTexts, Reason, WarpingPath
 from coordlang.language.warping import Clause, Pair, pair
 from coordlang.tasks.candidates import Candidates
@@ -21,6 +21,7 @@ from coordlang.tasks.listed import goal_text
 from planners.errors import BadInput, Refuted
 from planners.joint.model import JointModel
 from planners.joint.states import split_atoms
+from planners.messages import echoed
 from planners.pddl.sexpr import Expression, Source, Token, parse
 from planners.search.plan_space import PlanSpace
 from planners.tables import find_rows
@@ -54,10 +55,16 @@ def check(
 
     For every reason: its plans are optimal plans of one candidate task, their mixture is not, and
     its cells are warping paths.  Then no partition of states into the refuted number of words
-    separates a pair on every reason's paths. Raises `Refuted` with the reason that is wrong.
+    separates a pair on every reason's paths. Raises `Refuted` with the reason that is wrong, and
+    `OutOfMemory` before a formula is made that would not fit.
     """
     if tuple(certificate.robots) != candidates.model.robots:
         raise Refuted(f"the certificate is about other robots: {', '.join(certificate.robots)}")
+    domain = candidates.loaded.domain.name
+    if certificate.domain != domain:
+        raise Refuted(
+            f"the certificate is about the domain {echoed(certificate.domain)}, not {domain!r}"
+        )
     if certificate.refuted < 0:
         raise Refuted(f"the certificate speaks of {certificate.refuted} words")
     tasks = _Tasks(candidates)
@@ -69,14 +76,23 @@ def check(
         except (Refuted, BadInput) as error:
             raise Refuted(f"reason {number} of the certificate is wrong: {error.what}") from None
     progress(f"refuting {certificate.refuted} words")
+    # A word for each state of its own satisfies every reason: no solver is needed to see it, and
+    # no formula, which a number of a million words would make large.
+    states = len(states_of(clauses))
+    if certificate.refuted >= max(1, states) and all(clauses):
+        raise _leaves_languages(certificate)
     cnf = encode(clauses, certificate.refuted)
     if certificate.refuted and not cnf.refuted():
-        raise Refuted(
-            f"the certificate's {len(clauses):,} reasons leave languages "
-            f"with {certificate.refuted} words"
-        )
+        raise _leaves_languages(certificate)
     names = {state: candidates.model.codec.key(candidates.rows[state]) for state in cnf.word}
     return Checked(certificate.refuted + 1, len(clauses), cnf, names)
+
+
+def _leaves_languages(certificate: Certificate) -> Refuted:
+    return Refuted(
+        f"the certificate's {len(certificate.reasons):,} reasons leave languages "
+        f"with {certificate.refuted} words"
+    )
 
 
 def _clause(reason: Reason, tasks: _Tasks) -> Clause:

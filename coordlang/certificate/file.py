@@ -9,8 +9,10 @@ from typing import Annotated, Any
 import msgspec
 from msgspec import Meta
 
-from planners.errors import Position
+from coordlang.language.duplicate_keys import duplicate_key
+from planners.errors import BadInput, Position
 from planners.files import FileFormat, read_bytes
+from planners.messages import echoed
 from planners.writing import write_compressed
 
 FORMAT = "coordlang/certificate"
@@ -84,5 +86,18 @@ def write_certificate(certificate: Certificate, path: str | Path) -> None:
 
 
 def read_certificate(path: str | Path) -> Certificate:
-    """Read a certificate file.  Raises `BadInput` for anything else."""
-    return CERTIFICATE.decode(read_bytes(path), Position(str(path)))
+    """Read a certificate file.
+
+    Raises `BadInput` for anything else, and for a key that occurs twice: readers disagree about
+    which of two entries counts.
+    """
+    data, position = read_bytes(path), Position(str(path))
+    certificate = CERTIFICATE.decode(data, position)
+    twice = duplicate_key(data.removeprefix(b"\xef\xbb\xbf"), b"", 0)
+    if twice is not None:
+        raise BadInput(
+            f"the key {echoed(twice)} occurs twice",
+            position=position,
+            remedy="Of two entries one would be lost.",
+        )
+    return certificate

@@ -13,20 +13,30 @@ in it is checked (`planners.grounding.closure`).
 
 from __future__ import annotations
 
+import re
 import signal
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from math import prod
 from threading import current_thread, main_thread
 from typing import TYPE_CHECKING, Any
 
-from planners.errors import CoordlangError
+from planners.errors import CoordlangError, OutOfMemory
 from planners.grounding.closure import Arguments, RelaxedModel, require_closed
+from planners.limits import memory_left
 from planners.pddl.formula_tree import required_atoms
 from planners.pddl.lifted import Atom, Domain, Formula, Schema, Variable
 from planners.pddl.robots import natural
 
 if TYPE_CHECKING:
-    from clingo import Control
+    from clingo import Control, Symbol
+
+
+#: Combinations of values from which on clingo may look for an instance of a rule for seconds.
+_LONG_JOIN = 10**8
+#: Bytes that an instance of a schema takes at least, in clingo and here.
+_INSTANCE = 150
+_VARIABLE = re.compile(r"\bV\d+\b")
 
 
 def reachable_arguments(
@@ -50,6 +60,8 @@ def reachable_arguments(
 
     Raises
     ------
+    OutOfMemory
+        If the instances of a schema without conditions alone would not fit.
     MemoryError
         If clingo meets the memory limit.
     CoordlangError
@@ -58,19 +70,44 @@ def reachable_arguments(
     from tarski.reachability import create_reachability_lp
 
     init = list(init)
+    _require_memory(domain, objects)
     core = _Core(domain, objects)
     for atom in init:
         core.add_initial(atom)
     for schema in domain.schemas:
         core.add_action(schema)
     program, _ = create_reachability_lp(core.problem)
-    model = core.translated(_least_model(program.rules))
+    model = core.translated(
+        _least_model([_interruptible(rule, len(objects)) for rule in program.rules])
+    )
     require_closed(model, domain, objects, init)
     number = {name: n for n, name in enumerate(core.objects.values())}
     return {
         name: sorted(instances, key=lambda args: [number[a] for a in args])
         for name, instances in model.instances.items()
     }
+
+
+def _require_memory(domain: Domain, objects: Mapping[str, tuple[str, ...]]) -> None:
+    """Raise `OutOfMemory` if what surely is reachable would not fit.
+
+    Of a schema that requires no atom these are all arguments of the right types.
+    """
+    types = [frozenset().union(*map(domain.supertypes, own)) for own in objects.values()]
+    for schema in domain.schemas:
+        if required_atoms(schema.precondition):
+            continue
+        count = prod(
+            sum(not own.isdisjoint(parameter.types) for own in types)
+            for parameter in schema.parameters
+        )
+        if count * _INSTANCE > (left := memory_left()):
+            raise OutOfMemory(
+                f"action {schema.name!r} has {count:,} instances: they take "
+                f"{count * _INSTANCE / 2**20:,.0f} MiB, {left / 2**20:,.0f} MiB are left",
+                position=domain.source.position(schema.offset),
+                remedy="Use fewer objects, or an action with fewer parameters.",
+            )
 
 
 def _least_model(rules: Sequence[str]) -> dict[str, list[Arguments]]:
@@ -105,6 +142,19 @@ def _least_model(rules: Sequence[str]) -> dict[str, list[Arguments]]:
     }
 
 
+def _interruptible(rule: str, objects: int) -> str:
+    """A rule that calls ``tick`` (see `_ground`) at the values of its variables, if it may be long.
+
+    It has the same instances: ``tick`` is the identity.  A join of many values that derives nothing
+    would otherwise hear no signal.
+    """
+    variables = sorted(set(_VARIABLE.findall(rule)))
+    if ":-" not in rule or objects ** len(variables) < _LONG_JOIN:
+        return rule
+    ticks = [f"@tick({name}) = {name}" for name in variables[:-1]]
+    return f"{rule.rstrip().removesuffix('.')}, {', '.join(ticks)}."
+
+
 class _Stopped(Exception):
     """A signal has arrived."""
 
@@ -113,8 +163,8 @@ def _ground(control: Control) -> None:
     """Ground clingo's program; a signal (Ctrl-C, an alarm) ends it soon.
 
     clingo runs no signal handler, and an exception that a handler raises in one of its callbacks
-    does not leave clingo as it was.  So signals are noted only, until the next ground rule ends
-    the work, and their handlers run thereafter.
+    does not leave clingo as it was.  So signals are noted only, until the next ground rule or the
+    next value in a long join (`_interruptible`) ends the work, and their handlers run thereafter.
     """
     from clingo.backend import Observer
 
@@ -125,10 +175,16 @@ def _ground(control: Control) -> None:
             if arrived:
                 raise _Stopped
 
-    control.register_observer(Watch(), replace=True)
+        def tick(self, value: Symbol) -> Symbol:
+            if arrived:
+                raise _Stopped
+            return value
+
+    watch = Watch()
+    control.register_observer(watch, replace=True)
     try:
         with _signals_into(arrived):
-            control.ground([("base", [])])
+            control.ground([("base", [])], context=watch)
     except _Stopped:
         pass
     finally:

@@ -89,30 +89,32 @@ def _read_types(document: Document, sections: Sections) -> dict[str, tuple[str, 
             for parent in parents:
                 types.setdefault(parent, ())
     types.pop("object", None)
-    for name in types:
-        cycle = _cycle(types, name)
-        if cycle:
-            raise document.fail(
-                "the types form a cycle: " + " - ".join(cycle), offsets.get(name, document.root)
-            )
+    cycle = _cycle(types)
+    if cycle:
+        raise document.fail(
+            "the types form a cycle: " + " - ".join(cycle), offsets.get(cycle[0], document.root)
+        )
     return types
 
 
-def _cycle(types: dict[str, tuple[str, ...]], start: str) -> list[str] | None:
-    """A chain of supertypes that leads from ``start`` back to it."""
-    came: dict[str, str] = {}
-    todo = [start]
-    while todo:
-        name = todo.pop()
-        for parent in types.get(name, ()):
-            if parent == start:
-                chain = [name]
-                while chain[-1] != start:
-                    chain.append(came[chain[-1]])
-                return [*reversed(chain), start]
-            if parent not in came:
-                came[parent] = name
-                todo.append(parent)
+def _cycle(types: dict[str, tuple[str, ...]]) -> list[str] | None:
+    """A chain of supertypes that leads from a type back to it, or None; each type is met once."""
+    done: set[str] = set()
+    for start in types:
+        if start in done:
+            continue
+        chain = {start: iter(types[start])}  # the way to the type that is looked at, in its order
+        while chain:
+            name = next(reversed(chain))
+            parent = next(chain[name], None)
+            if parent is None:
+                done.add(name)
+                del chain[name]
+            elif parent in chain:
+                names = list(chain)
+                return [*names[names.index(parent) :], parent]
+            elif parent not in done:
+                chain[parent] = iter(types[parent])
     return None
 
 

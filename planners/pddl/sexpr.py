@@ -7,7 +7,6 @@ The reader is iterative, so deep nesting costs an error message and not the stac
 from __future__ import annotations
 
 import re
-import sys
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from itertools import accumulate
 from pathlib import Path
 
 from planners.errors import BadInput, Position
-from planners.files import not_utf8, require_seen
+from planners.files import not_utf8, read_stored_bytes, require_seen
 from planners.messages import UNSEEN, echoed
 
 #: Deeper nesting than this is refused: no domain needs it, and the passes behind recurse.
@@ -139,12 +138,7 @@ def read_source(path: str | Path) -> Source:
     Raises `BadInput` for a file that is missing, unreadable or no text in UTF-8.
     """
     name = str(path)
-    try:
-        data = sys.stdin.buffer.read() if name == "-" else Path(path).read_bytes()
-    except FileNotFoundError:
-        raise BadInput("there is no such file", position=Position(name)) from None
-    except OSError as error:
-        raise BadInput(f"cannot be read: {error.strerror}", position=Position(name)) from None
+    data = read_stored_bytes(path)
     try:
         return Source(name, data.decode("utf-8-sig"))
     except UnicodeDecodeError:

@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from itertools import count
 from pathlib import Path
+from random import Random
 
 import msgspec
 import pytest
@@ -64,6 +66,66 @@ def test_any_solver_refutes_the_dimacs(built: Built, certificate: Certificate) -
     for name in ("minisat22", "lingeling"):
         with Solver(name=name, bootstrap_with=formula) as solver:
             assert solver.solve() is False
+
+
+Meaning = Callable[[dict[str, int]], bool]
+
+
+def meaning_of(comment: str, states: list[str]) -> tuple[int, Meaning]:
+    """A variable, and what it says of a partition (state -> word), by its comment."""
+    number, _, text = comment.removeprefix("c ").partition(": ")
+    if found := re.fullmatch(r"word (\d+) holds one of the first (\d+) states", text):
+        word, first = int(found[1]), states[: int(found[2])]
+        return int(number), lambda words: any(words[s] == word for s in first)
+    if found := re.fullmatch(r"word (\d+) holds (.*)", text):
+        word, state = int(found[1]), found[2]
+        return int(number), lambda words: words[state] == word
+    one, other = text.removesuffix(" have different words").split(" and ")
+    return int(number), lambda words: words[one] != words[other]
+
+
+def passed(reason: Reason, plan: int) -> list[str]:
+    """The states that a plan of the grid passes through."""
+    cells = {atom.split()[1]: atom.split()[2][:-1] for atom in reason.init}
+    states = [f"(at r1 {cells['r1']}) (at r2 {cells['r2']})"]
+    for step in reason.plans[plan]:
+        for subaction in filter(None, step):
+            _, robot, _, to = subaction[1:-1].split()
+            cells[robot] = to
+        states.append(f"(at r1 {cells['r1']}) (at r2 {cells['r2']})")
+    return states
+
+
+def separated(reason: Reason, words: dict[str, int]) -> bool:
+    """Whether two states on a cell of the reason's paths have different words."""
+    cells = [(path.plans, cell) for path in reason.paths for cell in path.cells]
+    pairs = [(passed(reason, a)[i], passed(reason, b)[j]) for (a, b), (i, j) in cells]
+    return any(words[one] != words[other] for one, other in pairs if one != other)
+
+
+def test_comments_say_what_variables_and_clauses_mean(
+    built: Built, certificate: Certificate
+) -> None:
+    lines = check(certificate, built.job.candidates).dimacs().splitlines()
+    header = next(number for number, line in enumerate(lines) if line.startswith("p cnf"))
+    comments = lines[1:header]
+    states = [m[1] for line in comments if (m := re.fullmatch(r"c \d+: word 0 holds (\(.*)", line))]
+    meaning = dict(meaning_of(line, states) for line in comments if re.match(r"c \d+: ", line))
+    clauses = [[int(literal) for literal in line.split()[:-1]] for line in lines[header + 1 :]]
+    assert lines[header] == f"p cnf {len(meaning)} {len(clauses)}"
+    assert sorted(meaning) == [*range(1, len(meaning) + 1)]
+    kinds = [m for line in comments if (m := re.match(r"c clauses (\d+) to (\d+): ", line))]
+    reasons = [m for line in comments if (m := re.match(r"c clause (\d+): reason (\d+)$", line))]
+    numbers = [n for m in kinds for n in range(int(m[1]), int(m[2]) + 1)]
+    assert numbers + [int(m[1]) for m in reasons] == [*range(1, len(clauses) + 1)]
+    assert [int(m[2]) for m in reasons] == [*range(1, len(certificate.reasons) + 1)]
+    random = Random(0)
+    for _ in range(50):  # partitions whose words are named in the order of the states
+        words = {state: random.randrange(2) if n else 0 for n, state in enumerate(states)}
+        true = {v if says(words) else -v for v, says in meaning.items()}
+        holds = [not true.isdisjoint(clause) for clause in clauses]
+        assert all(holds[: len(numbers)])
+        assert holds[len(numbers) :] == [separated(r, words) for r in certificate.reasons]
 
 
 def test_a_language_satisfies_the_clauses_of_more_words(

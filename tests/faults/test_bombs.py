@@ -1,0 +1,323 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Small inputs that ask for much: refused, or stopped at a limit, before they take the machine."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import subprocess
+import tracemalloc
+from collections.abc import Callable
+from itertools import combinations
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from coordlang.building import Built, build_language, certificate_of
+from coordlang.certificate import Certificate, check, encode, read_certificate
+from coordlang.language.file import read_language
+from coordlang.tasks.task_file import read_task_file
+from planners.errors import BadInput, OutOfMemory, Refuted
+from planners.files import read_bytes
+from planners.limits import time_limit
+from planners.pddl import parse_domain
+from planners.pddl.sexpr import Source
+from planners.search.plan_file import read_plans
+from tests.support.command import Command, own_process
+from tests.support.domains import DOMAINS, all_tasks
+
+MIB = 2**20
+
+
+@pytest.fixture(scope="module")
+def built() -> Built:
+    return build_language(all_tasks("grid", "gw1-2x2"), "minimal")
+
+
+@pytest.fixture(scope="module")
+def certificate(built: Built) -> Certificate:
+    return certificate_of(built)
+
+
+# Sizes
+
+
+def bomb(path: Path, mib: int) -> Path:
+    """A file of gzip that holds so many MiB."""
+    path.write_bytes(gzip.compress(b" " * MIB) * mib)
+    return path
+
+
+def test_a_gzip_bomb_is_refused_before_it_takes_memory(tmp_path: Path) -> None:
+    path = bomb(tmp_path / "bomb.json.gz", 1025)
+    assert path.stat().st_size < 2 * MIB
+    with pytest.raises(BadInput, match=r"bomb\.json\.gz: the file holds more than 1,024 MiB"):
+        read_language(path)
+    tracemalloc.start()
+    try:
+        with pytest.raises(BadInput, match="more than 64 MiB"):
+            read_bytes(path, most=64 * MIB)
+        assert tracemalloc.get_traced_memory()[1] < 16 * MIB
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_file_without_end_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="more than 2 MiB"):
+        read_bytes("/dev/zero", most=2 * MIB)
+    with pytest.raises(BadInput, match="more than 2 MiB"):
+        read_bytes(bomb(tmp_path / "b.gz", 3), most=2 * MIB)
+    assert len(read_bytes(bomb(tmp_path / "b.gz", 2), most=2 * MIB)) == 2 * MIB
+
+
+def test_what_would_not_fit_is_out_of_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("planners.files.memory_left", lambda: 64 * MIB)
+    assert read_bytes(bomb(tmp_path / "fits.gz", 16))
+    with pytest.raises(OutOfMemory, match=r"bomb\.gz: reading 17 MiB takes 68 MiB.* 64 MiB are"):
+        read_bytes(bomb(tmp_path / "bomb.gz", 17))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda data: data,
+        lambda data: data + b"\0" * 700,  # gzip pads with zeros
+        lambda data: data + data,
+        lambda data: data[:-9],
+        lambda data: data[:30] + b"??" + data[32:],
+        lambda data: data + b"x",
+    ],
+)
+def test_other_gzip_is_read_as_before(change: Callable[[bytes], bytes], tmp_path: Path) -> None:
+    data = change(gzip.compress(bytes(range(256)) * 20_000))
+    (tmp_path / "f.gz").write_bytes(data)
+    try:
+        expected = gzip.decompress(data)
+    except Exception:  # whatever Python's own reader refuses
+        with pytest.raises(BadInput, match="cannot be read"):
+            read_bytes(tmp_path / "f.gz")
+    else:
+        assert read_bytes(tmp_path / "f.gz") == expected
+
+
+# Nesting
+
+SHELLS = {
+    "language": '{"format": "coordlang/language", "version": 1, "words": ["a"], "default": "a", '
+    '"states": {}, "producer": {"x": %s}}',
+    "certificate": '{"format": "coordlang/certificate", "version": 1, "domain": "grid", '
+    '"robots": ["r1", "r2"], "refuted": 0, "reasons": [], "producer": {"x": %s}}',
+    "tasks": '{"format": "coordlang/tasks", "version": 1, "x": %s, '
+    '"tasks": [{"init": ["(p)"], "goal": ["(q)"]}]}',
+    "plans": '{"x": %s, "plans": [{"actions": [[null, null]]}]}',
+}
+READERS: dict[str, Callable[[Path], object]] = {
+    "language": read_language,
+    "certificate": read_certificate,
+    "tasks": read_task_file,
+    "plans": lambda path: read_plans(path, all_tasks("grid", "gw1-2x2").model),
+}
+
+
+@pytest.mark.parametrize("depth", [201, 100_000])
+@pytest.mark.parametrize("brackets", ["[]", "{}", "mixed"])
+@pytest.mark.parametrize("kind", SHELLS)
+def test_deep_nesting_is_refused(kind: str, brackets: str, depth: int, tmp_path: Path) -> None:
+    inside = {
+        "[]": "[" * depth + "]" * depth,
+        "{}": '{"k":' * depth + "0" + "}" * depth,
+        "mixed": '[{"[\\"]": ' * (depth // 2 + 1) + "0" + "}]" * (depth // 2 + 1),
+    }[brackets]
+    path = tmp_path / "deep.json"
+    path.write_text(SHELLS[kind] % inside)
+    with pytest.raises(BadInput, match=r"deep\.json: this JSON is nested more than 200 deep"):
+        READERS[kind](path)
+
+
+@pytest.mark.parametrize("kind", SHELLS)
+def test_flat_text_with_many_brackets_is_read(kind: str, tmp_path: Path) -> None:
+    flat = [["]" * 300 + '\\"' + "[{" * 300 + "\\"] * 300, {"[": '\n"['}, "[" * 300, ""] * 3
+    for value in (json.dumps(flat), "[" * 150 + "]" * 150):
+        path = tmp_path / "flat.json"
+        path.write_text(SHELLS[kind] % value)
+        assert READERS[kind](path)
+
+
+# Certificates
+
+
+def test_a_large_claim_is_refused_before_it_takes_memory(
+    built: Built, certificate: Certificate
+) -> None:
+    large = msgspec.structs.replace(certificate, refuted=1_000_000)
+    tracemalloc.start()
+    try:
+        with pytest.raises(Refuted, match="leave languages with 1000000 words"):
+            check(large, built.job.candidates)
+        assert tracemalloc.get_traced_memory()[1] < 16 * MIB
+    finally:
+        tracemalloc.stop()
+    for refuted in (10**30, 12, 11):  # 12 states
+        with pytest.raises(Refuted, match=f"leave languages with {refuted} words"):
+            check(msgspec.structs.replace(certificate, refuted=refuted), built.job.candidates)
+
+
+def test_nothing_is_said_of_no_states(built: Built, certificate: Certificate) -> None:
+    empty = msgspec.structs.replace(certificate, reasons=[], refuted=1_000_000)
+    with pytest.raises(Refuted, match="0 reasons leave languages with 1000000 words"):
+        check(empty, built.job.candidates)
+
+
+def test_a_formula_that_would_not_fit_is_not_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("coordlang.certificate.encoding.memory_left", lambda: 60 * MIB)
+    clauses = [frozenset({two}) for two in combinations(range(80), 2)]
+    tracemalloc.start()
+    try:
+        with pytest.raises(OutOfMemory, match=r"79 words for 80 states has [\d,]+ clauses"):
+            encode(clauses, 79)
+        assert tracemalloc.get_traced_memory()[1] < 32 * MIB
+        cnf = encode(clauses, 20)
+        made = tracemalloc.get_traced_memory()[0]
+    finally:
+        tracemalloc.stop()
+    # The estimate has room for the solver, and is of the right size.
+    monkeypatch.setattr("coordlang.certificate.encoding.memory_left", lambda: made)
+    with pytest.raises(OutOfMemory, match="20 words for 80 states"):
+        encode(clauses, 20)
+    monkeypatch.setattr("coordlang.certificate.encoding.memory_left", lambda: 4 * made)
+    assert encode(clauses, 20) == cnf
+
+
+def test_another_domain_and_keys_that_occur_twice(
+    built: Built, certificate: Certificate, tmp_path: Path
+) -> None:
+    other = msgspec.structs.replace(certificate, domain="t-map")
+    with pytest.raises(Refuted, match="about the domain 't-map', not 'grid'"):
+        check(other, built.job.candidates)
+    text = msgspec.json.encode(certificate).decode()
+    for before, twice, key in (
+        ('"refuted":2', '"refuted":1,"refuted":2', "refuted"),
+        ('"init":', '"init":[],"init":', "init"),
+        ('"producer":{}', '"producer":{"a":1,"a":2}', "a"),
+    ):
+        assert before in text
+        path = tmp_path / "twice.json"
+        path.write_text(text.replace(before, twice, 1))
+        with pytest.raises(BadInput, match=rf"twice\.json: the key '{key}' occurs twice"):
+            read_certificate(path)
+
+
+# PDDL
+
+ACTION = "(:action act :parameters () :effect (p))"
+
+
+def test_ten_thousand_types_one_below_the_other() -> None:
+    types = " ".join(f"t{n} - t{n + 1}" for n in range(10_000))
+    text = f"(define (domain chain) (:types {types}) (:predicates (p) (q ?x - t10000)) {ACTION})"
+    with time_limit(15):  # with a look at all types above each type: minutes
+        domain = parse_domain(Source("domain", text))
+        assert len(domain.supertypes("t0")) == 10_002
+        with pytest.raises(BadInput, match="the types form a cycle: t4000 - t4001 - "):
+            parse_domain(Source("domain", text.replace("t9999 - t10000", "t9999 - t4000")))
+
+
+@pytest.mark.parametrize(
+    ("types", "cycle"),
+    [
+        ("a - b b - c c - a", "a - b - c - a"),
+        ("x - a a - b b - (either c a) c - d", "a - b - a"),
+        ("d - (either b c) b - a c - a e - (either d a)", None),
+        ("a - a", None),
+    ],
+)
+def test_cycles_of_types(types: str, cycle: str | None) -> None:
+    text = f"(define (domain d) (:types {types}) (:predicates (p)) {ACTION})"
+    if cycle is None:
+        assert parse_domain(Source("d", text))
+    else:
+        with pytest.raises(BadInput, match=f"the types form a cycle: {cycle}$"):
+            parse_domain(Source("d", text))
+
+
+DOMAIN = """(define (domain d) (:requirements :typing :multi-agent) (:types robot thing)
+  (:predicates (done ?r - robot) (linked ?a ?b - thing) (p ?a ?b ?c ?d ?e ?f - thing))
+  (:action finish :agent ?r - robot :parameters () :effect (done ?r))
+  (:action act :agent ?r - robot :parameters (%s) :precondition (and %s) :effect (and %s)))"""
+SIX = "?a ?b ?c ?d ?e ?f - thing"
+ATOM = "(p ?a ?b ?c ?d ?e ?f)"
+CLIQUE = " ".join(f"(linked ?{a} ?{b})" for a, b in combinations("abcdef", 2))
+#: Two hundred things and a predicate of six: all instances, all effects, all conditions, and a
+#: join that looks at 40^5 combinations and finds none.
+LARGE = {
+    "instances": DOMAIN % (SIX, "", ATOM),
+    "effects": DOMAIN % ("", "", f"(forall ({SIX}) {ATOM})"),
+    "conditions": DOMAIN % ("", f"(forall ({SIX}) (not {ATOM}))", "(p o1 o1 o1 o1 o1 o1)"),
+    "join": DOMAIN % (SIX, CLIQUE, "(done ?r)"),
+}
+
+
+def large(name: str, folder: Path) -> list[str]:
+    """The files of a domain with two hundred objects."""
+    names = [f"o{n}" for n in range(200)]
+    links = " ".join(
+        f"(linked {a} {b})"
+        for m, a in enumerate(names)
+        for n, b in enumerate(names)
+        if m % 5 < n % 5
+    )
+    domain, problem = folder / "domain.pddl", folder / "problem.pddl"
+    domain.write_text(LARGE[name].replace("(:predicates", "(:constants o1 - thing) (:predicates"))
+    problem.write_text(
+        f"(define (problem large) (:domain d) (:objects r1 r2 - robot {' '.join(names)} - thing) "
+        f"(:init {links if name == 'join' else ''}) (:goal (and (done r1) (done r2))))"
+    )
+    return [str(domain), str(problem)]
+
+
+@pytest.mark.parametrize("name", ["effects", "conditions", "join"])
+def test_six_parameters_and_two_hundred_objects_in_time(name: str, tmp_path: Path) -> None:
+    command = own_process("plans", *large(name, tmp_path), "--count", "--time-limit", 2)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 23, done.stderr
+    assert "the time limit of 2 s is over\n  Reached: " in done.stderr
+
+
+def test_six_parameters_and_two_hundred_objects_in_memory(
+    coordlang: Command, tmp_path: Path
+) -> None:
+    done = coordlang("plans", *large("instances", tmp_path), "--count", "--time-limit", 100)
+    assert done.code == 22
+    assert "action 'act' has 128,000,000,000,000 instances: they take" in done.err
+    assert done.err.startswith(f"coordlang: {tmp_path}/domain.pddl:4:3: ")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LARGE)
+@pytest.mark.parametrize("limit", ["400M", "2G"])
+def test_six_parameters_and_two_hundred_objects_under_a_limit(
+    name: str, limit: str, tmp_path: Path
+) -> None:
+    limits = ("--memory-limit", limit, "--time-limit", 300)
+    command = own_process("plans", *large(name, tmp_path), "--count", *limits)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=400)
+    assert done.returncode in (22, 23), done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.slow
+def test_ten_thousand_types_for_every_command(coordlang: Command, tmp_path: Path) -> None:
+    """The grid, its cells at the foot of ten thousand types."""
+    text = (DOMAINS / "grid" / "domain.pddl").read_text()
+    chain = " ".join(f"t{n} - t{n + 1}" for n in range(10_000))
+    assert "cell" in text
+    domain = tmp_path / "domain.pddl"
+    domain.write_text(text.replace("(:types", f"(:types cell - t0 {chain}", 1))
+    files = domain, DOMAINS / "grid" / "gw1-2x2.pddl"
+    for command in ("inspect", "plans", "coordination", "check"):
+        assert coordlang(command, *files).code == 0
+    assert coordlang("build", *files, "-o", tmp_path / "l.json").code == 0
+    assert coordlang("verify", tmp_path / "l.json", *files).code == 0
