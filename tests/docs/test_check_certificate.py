@@ -33,8 +33,8 @@ def formula(coordlang: Command, t_map: tuple[Path, Path], tmp_path: Path) -> Pat
     language, proof, formula = tmp_path / "l.json", tmp_path / "c.json", tmp_path / "f.cnf"
     options = ("--tasks", "all", "--method", "minimal", "-o", language, "--certificate", proof)
     assert coordlang("build", *t_map, *options).code == 0
-    options = ("--certificate", proof, "--dimacs", formula)
-    assert coordlang("verify", language, *t_map, *options).code == 0
+    made = coordlang("verify", language, *t_map, "--certificate", proof, "--dimacs", formula)
+    assert made.code == 0
     return formula
 
 
