@@ -23,8 +23,11 @@ def main() -> NoReturn:
     try:
         try:
             from coordlang.cli import run
+            from coordlang.cli.standard_error import flush_stdout, whatever_stderr
 
+            sys.stderr = whatever_stderr()
             code = run(sys.argv[1:], interruptions)
+            flush_stdout()
         finally:
             interruptions.end()
     except Exception:

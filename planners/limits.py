@@ -10,7 +10,9 @@ anytime methods catch it and return what they have.  The memory limit is the ope
 
 from __future__ import annotations
 
+import errno
 import math
+import os
 import resource
 import signal
 import sys
@@ -31,6 +33,14 @@ _SOON = 0.01
 _FOR_EVER = 1e9
 #: What ends work early, so that an anytime method returns what it has.
 STOPPING = (OutOfTime, OutOfMemory, MemoryError, KeyboardInterrupt)
+#: How loaders and libraries say that there is no memory.
+_NO_MEMORY = (
+    "failed to map segment",
+    "cannot allocate memory",
+    "cannot create thread",
+    "can't start new thread",
+    "std::bad_alloc",
+)
 _LONGER = "Use a larger --time-limit."
 
 
@@ -151,6 +161,48 @@ def require_memory(size: int) -> None:
             f"the program alone needs {_used() / 2**20:.0f} MiB of address space",
             remedy="Use a larger --memory-limit.",
         )
+
+
+def require_libraries() -> None:
+    """Raise `OutOfMemory` if numpy does not load under the limit that the process started with.
+
+    BLAS ends the process then (``ulimit -v``), so that a child process tries it.
+    """
+    soft, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if soft == resource.RLIM_INFINITY or "numpy" in sys.modules:
+        return
+    child = os.fork()
+    if child == 0:
+        os._exit(_load_quietly())
+    _, status = os.waitpid(child, 0)
+    if status != 0:
+        raise OutOfMemory(
+            f"the libraries do not load in {soft / 2**20:.0f} MiB of address space",
+            remedy="Use a larger limit (ulimit -v).",
+        )
+
+
+def _load_quietly() -> int:
+    """Load numpy, silently: the exit code of the process that tries it."""
+    try:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 1)
+        os.dup2(nowhere, 2)
+        import numpy as np
+
+        np.zeros((8, 8)) @ np.zeros((8, 8))
+    except (ImportError, MemoryError, OSError, RuntimeError, SystemError):
+        return 1
+    return 0
+
+
+def lacks_memory(error: BaseException) -> bool:
+    """Whether this error, of whatever library, means that the memory is used up."""
+    if isinstance(error, MemoryError):
+        return True
+    if isinstance(error, OSError) and error.errno == errno.ENOMEM:
+        return True
+    return any(text in str(error).lower() for text in _NO_MEMORY)
 
 
 def memory_left() -> int:

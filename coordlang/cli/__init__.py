@@ -18,9 +18,14 @@ import click
 
 from coordlang.cli.exit_codes import BROKEN_PIPE, INTERRUPTED, interrupted_by
 from coordlang.cli.group import cli
+from coordlang.cli.standard_error import drop_stdout
 from planners.errors import CoordlangError, OutOfMemory
+from planners.limits import lacks_memory
 from planners.messages import sentence, visible
 from planners.signals import Interruptions
+
+#: The output cannot be written: what stdout is connected to is full, or of limited size.
+_UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO, errno.EBADF)
 
 
 def run(arguments: list[str], interruptions: Interruptions | None = None) -> int:
@@ -75,14 +80,9 @@ def _interrupted(interruptions: Interruptions | None) -> int:
 def _failed(error: Exception, debug: bool) -> int:
     """Say what is wrong and what to do; the exit code."""
     match error:
-        case OSError(errno=errno.ENOSPC | errno.EIO | errno.EBADF):
-            sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - open to the end
+        case OSError() if error.errno in _UNWRITABLE:
+            drop_stdout()
             return _fail(f"the output cannot be written: {error.strerror}", 2)
-        case MemoryError():
-            return _fail(
-                "out of memory\n  Use a smaller task, or a larger --memory-limit.",
-                OutOfMemory.exit_code,
-            )
         case CoordlangError():
             if debug:
                 _show("".join(traceback.format_exception(error)))
@@ -91,7 +91,15 @@ def _failed(error: Exception, debug: bool) -> int:
 
 
 def _internal(error: Exception, debug: bool) -> int:
-    """A bug: reported as one, with an exit code of its own, and never hidden."""
+    """A bug: reported as one, with an exit code of its own, and never hidden.
+
+    Memory that is used up is none, whatever the error that a library makes of it.
+    """
+    if lacks_memory(error):
+        return _fail(
+            "out of memory\n  Use a smaller task, or a larger --memory-limit.",
+            OutOfMemory.exit_code,
+        )
     if debug:
         _show("".join(traceback.format_exception(error)))
     what = f"internal error: {type(error).__name__}: {sentence(str(error))}"
@@ -104,4 +112,5 @@ def _fail(message: str, code: int) -> int:
 
 
 def _show(text: str) -> None:
-    print(visible(text, keep="\n"), end="", file=sys.stderr)
+    if sys.stderr is not None:  # None: it is closed; stdout is for data
+        print(visible(text, keep="\n"), end="", file=sys.stderr)

@@ -85,6 +85,12 @@ def command(
 
     chosen = _chosen(names)
     check_outputs([("--page", page)], [])
+    if results is not None:
+        check_outputs(
+            [("--results", os.path.join(results, ".lock") if results else "")],
+            [],
+            makes_folder=True,
+        )
     if quick and not was_given("samples"):
         samples = 10
     folder = Path(results or ("evaluation/quick" if quick else "evaluation"))

@@ -36,11 +36,12 @@ def limits(function: CommandFunction) -> CommandFunction:
     def wrapped(
         time_limit: float | None, memory_limit: int | None, debug: bool, **arguments: object
     ) -> int | None:
-        from planners.limits import limit_memory, require_memory
+        from planners.limits import limit_memory, require_libraries, require_memory
         from planners.limits import time_limit as limit_time
 
         if time_limit is not None and math.isnan(time_limit):
             raise click.UsageError("--time-limit: expected a number of seconds")
+        require_libraries()
         if memory_limit is not None:
             require_memory(memory_limit)
             limit_memory(memory_limit)

@@ -55,7 +55,7 @@ def options_of(
         )
     idle = model.get("idle")
     return ModelOptions(
-        RobotSelection(own, None, recorded["--unowned"]),
+        RobotSelection(own, None, recorded["--unowned"], recorded=bool(own)),
         recorded["--cost"],
         recorded["--remember-actions"],
         tuple(idle) if idle is not None else None,

@@ -33,11 +33,15 @@ def natural(name: str) -> tuple[tuple[int, int, str], ...]:
 
 @dataclass(frozen=True, slots=True)
 class RobotSelection:
-    """What the user said about robots (``--robots``, ``--robot-type``, ``--unowned``)."""
+    """What the user said about robots (``--robots``, ``--robot-type``, ``--unowned``).
+
+    ``recorded``: a language file said it, not the user.
+    """
 
     names: tuple[str, ...] = ()
     type: str | None = None
     unowned: Unowned = "error"
+    recorded: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,10 +123,13 @@ def _found(domain: Domain, problem: Problem, choice: RobotSelection) -> tuple[tu
     if choice.names:
         for name in choice.names:
             if name not in problem.objects:
-                raise UsageError(
-                    f"--robots: there is no object {echoed(name)}",
-                    remedy=f"Objects: {', '.join(sorted(problem.objects, key=natural))}.",
-                )
+                objects = f"Objects: {', '.join(sorted(problem.objects, key=natural))}."
+                if choice.recorded:
+                    what = f"the language file's robot {echoed(name)} is no object of the problem"
+                    raise BadInput(
+                        what, position=problem.source.section(":objects"), remedy=objects
+                    )
+                raise UsageError(f"--robots: there is no object {echoed(name)}", remedy=objects)
         return tuple(sorted(set(choice.names), key=natural)), "--robots"
     if choice.type:
         robots = _of_kind(domain, problem, choice.type)
@@ -138,8 +145,14 @@ def _found(domain: Domain, problem: Problem, choice: RobotSelection) -> tuple[tu
 def _require_agreement(
     domain: Domain, problem: Problem, choice: RobotSelection, robots: tuple[str, ...], by: str
 ) -> None:
-    """Raise `UsageError` if the user names other robots than the domain."""
+    """Raise `UsageError` if the user names other robots than the domain, `BadInput` if a file does."""
     contradicting = None
+    if choice.recorded and set(choice.names) != set(robots):
+        raise BadInput(
+            f"the language file's robots {', '.join(choice.names)} contradict the domain",
+            position=problem.source.section(":objects"),
+            remedy=f"The robots are {', '.join(robots)} (by {by}).",
+        )
     if choice.type and set(_of_kind(domain, problem, choice.type)) != set(robots):
         contradicting = f"--robot-type {choice.type}"
     elif choice.names and set(choice.names) != set(robots):

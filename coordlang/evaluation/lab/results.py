@@ -9,7 +9,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO, Literal
 
 from coordlang.evaluation.lab.identity import code_hash, identity, inputs, versions
 from coordlang.evaluation.lab.recipe import Record, Settings, Unit
@@ -55,7 +55,7 @@ class Results:
         """
         lock = self.folder / ".lock"
         while True:
-            with open(lock, "w") as file:
+            with self._opened(lock, "wb") as file:
                 self._lock(file.fileno())
                 if not _is_file_of(file.fileno(), lock):
                     continue  # removed by the process that held it: the next one locks another file
@@ -65,6 +65,18 @@ class Results:
                     with suppress(OSError):
                         lock.unlink()
                 return
+
+    def _opened(self, path: Path, mode: Literal["wb", "ab"]) -> BinaryIO:
+        try:
+            return open(path, mode)
+        except OSError as error:
+            raise self._unwritable(path, error) from None
+
+    def _unwritable(self, path: Path, error: OSError) -> UsageError:
+        return UsageError(
+            f"{path} cannot be written: {error.strerror}",
+            remedy="Say --results DIR, with a folder that you may write to.",
+        )
 
     def _lock(self, file: int) -> None:
         try:
@@ -92,7 +104,12 @@ class Results:
         if not path.exists():
             return {}
         found: dict[str, Line] = {}
-        text = path.read_text("utf-8", errors="replace")
+        try:
+            text = path.read_text("utf-8", errors="replace")
+        except OSError as error:
+            raise BadInput(
+                f"cannot be read: {error.strerror}", position=Position(str(path))
+            ) from None
         for number, line in enumerate(text.splitlines(keepends=True), 1):
             try:
                 data = json.loads(line)
@@ -133,10 +150,15 @@ class Results:
 
     def append(self, record: Record, settings: Settings) -> None:
         """Append a record's line and flush it to the disk."""
-        with open(self.path(record.unit.experiment), "ab") as file:
-            file.write(_text(_line(record, settings)))
-            file.flush()
-            os.fsync(file.fileno())
+        path = self.path(record.unit.experiment)
+        line = _text(_line(record, settings))
+        with self._opened(path, "ab") as file:
+            try:
+                file.write(line)
+                file.flush()
+                os.fsync(file.fileno())
+            except OSError as error:
+                raise self._unwritable(path, error) from None
 
     def finish(self, experiment: str, records: Sequence[Record], settings: Settings) -> None:
         """Write the final file: exactly these records, in this order."""

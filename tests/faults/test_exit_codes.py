@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Each fault ends with the documented exit code (docs/cli.md): 1 means *refuted*, nothing else."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from tests.support.command import Command
+from tests.support.domains import DOMAINS
+
+CELLS = [str(DOMAINS / "three-cells" / name) for name in ("domain.pddl", "problem.pddl")]
+COUNT = ("plans", *CELLS, "--count")
+EVALUATE = ("evaluate", "game", "--quick", "--domains", str(DOMAINS), "--results")
+
+
+def shell(
+    redirection: str, arguments: Sequence[str], before: str = ""
+) -> subprocess.CompletedProcess[str]:
+    """Run a command as a shell does, ``before`` included."""
+    script = f'{before} exec {sys.executable} -m coordlang "$@" {redirection}'
+    return subprocess.run(
+        ["bash", "-c", script, "bash", *arguments], capture_output=True, text=True, timeout=120
+    )
+
+
+@pytest.mark.parametrize("redirection", ["2>&-", "2>/dev/full"])
+@pytest.mark.parametrize(
+    ("arguments", "code"), [(("plans", "missing", "x"), 31), (("plans", "--missing"), 2)]
+)
+def test_without_stderr_an_error_keeps_its_code(
+    arguments: tuple[str, ...], code: int, redirection: str
+) -> None:
+    done = shell(redirection, arguments)
+    assert (done.returncode, done.stdout, done.stderr) == (code, "", "")
+
+
+@pytest.mark.parametrize("redirection", [">/dev/full", ">/dev/full 2>/dev/full"])
+def test_a_full_stdout(redirection: str) -> None:
+    assert shell(redirection, COUNT).returncode == 2
+
+
+def test_an_answer_needs_no_stderr(tmp_path: Path) -> None:
+    output = str(tmp_path / "l.json")
+    done = shell("2>/dev/full", ("build", *CELLS, "--unsolvable", "skip", "-o", output))
+    assert done.returncode == 0
+    assert done.stdout.endswith(f"written to {output}\n")
+
+
+def test_the_working_directory_is_removed(tmp_path: Path) -> None:
+    gone = f"mkdir {tmp_path}/gone; cd {tmp_path}/gone; rmdir {tmp_path}/gone;"
+    assert shell("", COUNT, gone).stdout == "4\n"
+    refused = shell("", ("tasks", *CELLS, "-o", "t.json"), gone)
+    assert refused.returncode == 2
+    assert "cannot be written: the working directory has been removed" in refused.stderr
+
+
+@pytest.mark.parametrize("mebibytes", [60, 90, 120, 150, 180])
+def test_too_little_memory_for_the_libraries(mebibytes: int, tmp_path: Path) -> None:
+    arguments = ("build", *CELLS, "-o", str(tmp_path / "l.json"))
+    done = shell("", arguments, f"ulimit -v {mebibytes * 1024};")
+    assert done.returncode in (0, 22), done.stderr
+    if done.returncode == 22:
+        assert done.stderr.startswith("coordlang: ")
+        assert "Traceback" not in done.stderr
+        assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("name", "code"), [(".lock", 2), ("game.jsonl", 31)])
+def test_a_folder_of_results_in_which_a_file_is_a_folder(
+    name: str, code: int, coordlang: Command, tmp_path: Path
+) -> None:
+    (tmp_path / name).mkdir()
+    outcome = coordlang(*EVALUATE, tmp_path)
+    assert outcome.code == code
+    assert str(tmp_path / name) in outcome.err
+    assert "internal error" not in outcome.err
+
+
+@pytest.mark.parametrize("folder", ["", "file", "file/results", "readonly", "x" * 300])
+def test_results_that_cannot_be_kept_are_refused_before_the_work(
+    folder: str, coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(
+        "coordlang.evaluation.lab.runner.run", lambda *_: pytest.fail("no work before")
+    )
+    Path("file").touch()
+    Path("readonly").mkdir()
+    access = os.access  # the superuser may write everywhere
+    monkeypatch.setattr(
+        "os.access", lambda path, mode: Path(path).name != "readonly" and access(path, mode)
+    )
+    outcome = coordlang(*EVALUATE, folder)
+    assert outcome.code == 2
+    assert "cannot be" in outcome.err
+
+
+def test_results_on_a_full_disk(
+    coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_: int) -> None:
+        raise OSError(errno.EDQUOT, os.strerror(errno.EDQUOT))
+
+    monkeypatch.setattr(os, "fsync", full)
+    outcome = coordlang(*EVALUATE, tmp_path)
+    assert outcome.code == 2
+    assert "cannot be written: Disk quota exceeded" in outcome.err
+
+
+@pytest.mark.parametrize("robots", [["r1", "r3"], ["r1"], ["a", "b"]])
+@pytest.mark.parametrize("place", ["t-map", "three-cells"])
+def test_robots_of_a_language_file_that_contradict_the_domain(
+    place: str, robots: list[str], coordlang: Command, tmp_path: Path
+) -> None:
+    files = [DOMAINS / place / name for name in ("domain.pddl", "problem.pddl")]
+    path = tmp_path / "l.json"
+    assert coordlang("build", *files, "-o", path).code == 0
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"robots": robots}))
+    outcome = coordlang("verify", path, *files)
+    assert outcome.code == 31, outcome.err
+    assert "--robots" not in outcome.err
