@@ -88,8 +88,7 @@ class Postponed:
     def heard(self) -> Iterator[None]:
         """Hear signals in the block, those that have arrived at its beginning.
 
-        After one that raised an exception the others wait again, so that none disturbs what
-        cleans up.
+        After it they wait again, so that none disturbs what cleans up.
         """
         self._heard = True
         try:
@@ -121,12 +120,8 @@ class Postponed:
                 all_of_them.callback(signal.raise_signal, self._arrived.pop())
 
     def _arrive(self, number: int, frame: FrameType | None) -> None:
-        if self._over:
+        if self._over or self._heard:
             self._handlers[number](number, frame)
-        elif self._heard:
-            self._heard = False
-            self._handlers[number](number, frame)
-            self._heard = True
         else:
             self._arrived.append(number)
 

@@ -14,6 +14,7 @@ from typing import Any, BinaryIO, Literal
 from coordlang.evaluation.lab.identity import code_hash, identity, inputs, versions
 from coordlang.evaluation.lab.recipe import Record, Settings, Unit
 from planners.errors import BadInput, Position, UsageError
+from planners.signals import postponed_signals
 from planners.writing import write_atomically
 
 #: A line of a results file, as JSON data.
@@ -55,12 +56,13 @@ class Results:
         """
         lock = self.folder / ".lock"
         while True:
-            with self._opened(lock, "wb") as file:
+            with postponed_signals() as signals, self._opened(lock, "wb") as file:
                 self._lock(file.fileno())
                 if not _is_file_of(file.fileno(), lock):
                     continue  # removed by the process that held it: the next one locks another file
                 try:
-                    yield
+                    with signals.heard():
+                        yield
                 finally:  # while it is held: nobody else can hold what has this name
                     with suppress(OSError):
                         lock.unlink()

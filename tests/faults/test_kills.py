@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Kills at random moments: an output is the old file or the new one, and nothing else is left."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import os
+import random
+import re
+import signal
+import subprocess
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+import coordlang
+from tests.support.command import own_process
+from tests.support.domains import DOMAINS
+
+FILES = [str(DOMAINS / "grid" / name) for name in ("domain.pddl", "gw1-2x2.pddl")]
+ALL = [*FILES, "--tasks", "all", "--method", "minimal"]
+SIGNALS = (signal.SIGKILL, signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+OLD = b"the old file\n"
+#: What a kill that nobody can hear may leave, beside an output and in the temporary directory.
+LEFT = re.compile(r"\.[^/]{1,16}\.[a-z0-9_]{8}|coordlang-[a-z0-9_]{8}(/.*)?|\.lock")
+
+
+@dataclass(frozen=True)
+class Writing:
+    """A command that writes: its arguments, and its outputs in the working directory."""
+
+    arguments: tuple[str, ...]
+    outputs: tuple[str, ...] = ()
+
+
+SAID = ("LANGUAGE", *FILES, "SENTENCE")
+WRITING = {
+    "build": Writing(("build", *ALL, "-o", "l.json"), ("l.json",)),
+    "certificate": Writing(
+        ("build", *ALL, "-o", "l.json.gz", "--certificate", "c.json.gz"),
+        ("l.json.gz", "c.json.gz"),
+    ),
+    "tasks": Writing(
+        ("tasks", *FILES, "--start", "(at r1 ?)", "--goal", "(at r1 ?)", "-o", "t.json"),
+        ("t.json",),
+    ),
+    "understand": Writing(("understand", *SAID, "--max", "5", "-o", "p.txt"), ("p.txt",)),
+    "choices": Writing(("choices", *SAID, "--json", "-o", "c.json"), ("c.json",)),
+    "export": Writing(("export", *SAID, "-o", "."), ("domain.pddl", "problem.pddl")),
+    "report": Writing(("report", "LANGUAGE", *FILES, "-o", "page.html"), ("page.html",)),
+    "check": Writing(("check", *FILES)),
+    "evaluate": Writing(
+        (
+            *("evaluate", "scenario", "--quick", "--samples", "1", "--jobs", "2"),
+            *("--results", ".", "--domains", str(DOMAINS)),
+        ),
+        ("scenario.jsonl", "evaluation.md"),
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """A language file and a sentence of it, by the names that `WRITING` has for them."""
+    path = tmp_path_factory.mktemp("given") / "language.json"
+    built = coordlang.build(*FILES, tasks="all", method="minimal")
+    built.language.save(path)
+    plan = coordlang.plan(built.language, *FILES, prefer=["shortest"])
+    return {"LANGUAGE": str(path), "SENTENCE": plan.sentence}
+
+
+@dataclass
+class Kills:
+    """One command, killed again and again in one folder."""
+
+    writing: Writing
+    folder: Path
+    said: dict[str, str]
+    seen: set[tuple[str, bytes]] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        for name in ("work", "tmp"):
+            (self.folder / name).mkdir()
+
+    def start(self) -> subprocess.Popen[bytes]:
+        arguments = [self.said.get(argument, argument) for argument in self.writing.arguments]
+        return subprocess.Popen(
+            own_process(*arguments),
+            cwd=self.folder / "work",
+            env={**os.environ, "TMPDIR": str(self.folder / "tmp")},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+        )
+
+    def files(self) -> set[str]:
+        """All files and folders there are, the outputs and stored languages apart."""
+        roots = (self.folder / "work", self.folder / "tmp")
+        found = {str(p.relative_to(root)) for root in roots for p in root.rglob("*")}
+        kept = re.compile(r"cache(/[0-9a-f]{24}\.json\.gz(\.lock)?)?|png(/\w+\.png)?|\w+\.svg")
+        return {name for name in found - {*self.writing.outputs} if not kept.fullmatch(name)}
+
+    def note(self) -> None:
+        """Keep what the outputs hold."""
+        for name in self.writing.outputs:
+            path = self.folder / "work" / name
+            if path.exists():
+                self.seen.add((name, normal(name, path.read_bytes())))
+
+    def kill(self, number: signal.Signals, choice: random.Random) -> int:
+        """Send the signal at a random moment, or when something in the folder changes."""
+        for name in self.writing.outputs:
+            if choice.random() < 0.5 and not name.endswith(".jsonl"):
+                (self.folder / "work" / name).write_bytes(OLD)
+        before = self.files()
+        process = self.start()
+        end = time.monotonic() + (60 if choice.random() < 0.4 else choice.uniform(0.0, 1.5))
+        while time.monotonic() < end and process.poll() is None and self.files() == before:
+            time.sleep(0.0003)
+        process.send_signal(number)
+        _, said = process.communicate(timeout=120)
+        self.note()
+        left = self.files() - before
+        if number == signal.SIGKILL:
+            assert process.returncode in (0, -number), said
+            assert all(map(LEFT.fullmatch, left)), left
+        else:
+            # Before the first line of the program it is Python that hears the signal.
+            assert process.returncode in (0, 128 + number, -number), said
+            assert left == set(), (left, number, said)
+            if process.returncode == 128 + number:
+                assert b"Traceback" not in said
+        return process.returncode
+
+    def finish(self) -> None:
+        """What a run writes that nobody disturbs, and that each file seen was this or the old."""
+        process = self.start()
+        _, said = process.communicate(timeout=300)
+        assert process.returncode == 0, said
+        for name in self.writing.outputs:
+            new = normal(name, (self.folder / "work" / name).read_bytes())
+            for other in (held for at, held in self.seen if at == name):
+                if name.endswith(".jsonl"):  # a line is added when its work is done
+                    assert {*other.split(b"\n")} <= {*new.split(b"\n")}
+                else:
+                    assert other in (OLD, new), (name, other[:300], new[:300])
+
+
+def normal(name: str, data: bytes) -> bytes:
+    """The content, without the seconds that work took; the last line of results may be cut off."""
+    if data[:2] == b"\x1f\x8b":
+        data = gzip.decompress(data)
+    if name.endswith(".jsonl"):
+        lines = [json.loads(line) for line in data.split(b"\n")[:-1]]
+        for line in lines:
+            line.pop("seconds"), line.pop("cpu")
+        return b"\n".join(sorted(json.dumps(line).encode() for line in lines))
+    return re.sub(rb"\d+\.\d+( s)?(?=\D)", b"0.0", data)
+
+
+def killed(name: str, number: int, folder: Path, said: dict[str, str]) -> None:
+    kills, choice = Kills(WRITING[name], folder, said), random.Random(name)
+    signals = [SIGNALS[(k + len(name)) % len(SIGNALS)] for k in range(number)]
+    for which in signals:
+        kills.kill(which, choice)
+    kills.finish()
+
+
+@pytest.mark.parametrize("name", [name for name in WRITING if name != "evaluate"])
+def test_some_kills(name: str, tmp_path: Path, said: dict[str, str]) -> None:
+    killed(name, 2, tmp_path, said)
+
+
+def test_an_evaluation_is_killed(tmp_path: Path, said: dict[str, str]) -> None:
+    killed("evaluate", 4, tmp_path, said)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", WRITING)
+def test_many_kills(name: str, tmp_path: Path, said: dict[str, str]) -> None:
+    killed(name, 40, tmp_path, said)
+
+
+def test_two_processes_write_one_output(tmp_path: Path, said: dict[str, str]) -> None:
+    kills = Kills(WRITING["tasks"], tmp_path, said)
+    both = [kills.start(), kills.start()]
+    for process in both:
+        _, error = process.communicate(timeout=120)
+        assert process.returncode == 0, error
+    kills.note()
+    assert kills.files() == set()
+    kills.finish()
