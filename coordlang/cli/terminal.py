@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from threading import Lock, Timer
+from threading import Timer
 from typing import TYPE_CHECKING
 
 from coordlang.cli.echo import echo
@@ -41,7 +42,7 @@ class _Spinner:
 
     def __init__(self, message: str) -> None:
         self._message = message
-        self._lock = Lock()
+        self._lock = threading.Lock()
         self._ended = False
         self._update: Callable[[str], None] = lambda _: None
         self._stop: Callable[[], None] = lambda: None

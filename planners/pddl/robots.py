@@ -145,7 +145,7 @@ def _found(domain: Domain, problem: Problem, choice: RobotSelection) -> tuple[tu
 def _require_agreement(
     domain: Domain, problem: Problem, choice: RobotSelection, robots: tuple[str, ...], by: str
 ) -> None:
-    """Raise `UsageError` if the user names other robots than the domain, `BadInput` if a file does."""
+    """Raise `UsageError` for robots that are not the domain's, `BadInput` if a file names them."""
     contradicting = None
     if choice.recorded and set(choice.names) != set(robots):
         raise BadInput(

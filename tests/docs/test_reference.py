@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib
 import re
+import signal
 import subprocess
 import sys
 from functools import cache
@@ -113,6 +114,7 @@ def test_exit_codes() -> None:
         0,
         INTERRUPTED,
         BROKEN_PIPE,
+        *(128 + number for number in (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)),
         *(kind.exit_code for kind in error_tree(CoordlangError)),
     }
 

@@ -110,8 +110,13 @@ def test_names_of_every_length_are_written(letter: str, less: int, here: Path) -
 def _shell(script: str, *arguments: object) -> subprocess.CompletedProcess[str]:
     program = f'{sys.executable} -m coordlang "$@"'
     return subprocess.run(
-        ["bash", "-c", f"set -o pipefail; {script.replace('COORDLANG', program)}", "bash"]
-        + list(map(str, arguments)),
+        [
+            "bash",
+            "-c",
+            f"set -o pipefail; {script.replace('COORDLANG', program)}",
+            "bash",
+            *list(map(str, arguments)),
+        ],
         capture_output=True,
         text=True,
         timeout=60,
