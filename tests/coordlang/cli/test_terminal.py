@@ -16,16 +16,17 @@ from tests.support.domains import ROOT
 
 CODE = """
 import sys, time
+import rich.console, rich.progress, rich.status, rich.text  # now, so that the pauses are enough
 from coordlang.cli import terminal
 terminal._DELAY = 0.0
 with terminal.working("first thing") as say:
-    time.sleep(0.5)
+    time.sleep(1)
     say("[second] thing")
-    time.sleep(0.5)
+    time.sleep(1)
 print("answer")
 with terminal.bar() as show:
     show(1, 3, "piece")
-    time.sleep(0.3)
+    time.sleep(1)
 """
 
 
