@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import heapq
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -63,22 +63,45 @@ def holds(conditions: Sequence[tuple[int, bool]], state: PlainState) -> bool:
     return all((fact in state) == positive for fact, positive in conditions)
 
 
+def successors(
+    plain: ClassicalTask,
+) -> Callable[[PlainState], Iterator[tuple[int, int, PlainState]]]:
+    """Of a state the (action number, cost, next state) of all actions that apply.
+
+    An action is looked at only where the first fact that it needs is true.
+    """
+    by_fact = defaultdict(list)
+    for n, action in enumerate(plain.actions):
+        needs = frozenset(fact for fact, positive in action.preconditions if positive)
+        forbids = frozenset(fact for fact, positive in action.preconditions if not positive)
+        entry = (n, action.cost, needs, forbids, {*action.deletes}, {*action.adds})
+        by_fact[min(needs, default=None)].append(entry)
+
+    def after(state: PlainState) -> Iterator[tuple[int, int, PlainState]]:
+        applicable = (
+            (n, cost, (state - deletes) | adds)
+            for fact in (None, *state)
+            for n, cost, needs, forbids, deletes, adds in by_fact.get(fact, ())
+            if needs <= state and forbids.isdisjoint(state)
+        )
+        yield from sorted(applicable, key=lambda step: step[0])
+
+    return after
+
+
 def optimal_plans(plain: ClassicalTask) -> OptimalPlans:
     """Everything that can be reached, and Dijkstra's algorithm from the goals back."""
     edges: dict[PlainState, list[tuple[int, int, PlainState]]] = {}
     into = defaultdict(list)
     todo = [plain.init]
+    after = successors(plain)
     while todo:
         if (state := todo.pop()) in edges:
             continue
-        edges[state] = [
-            (n, a.cost, (state - {*a.deletes}) | {*a.adds})
-            for n, a in enumerate(plain.actions)
-            if holds(a.preconditions, state)
-        ]
-        for _, cost, after in edges[state]:
-            into[after].append((cost, state))
-            todo.append(after)
+        edges[state] = [*after(state)]
+        for _, cost, target in edges[state]:
+            into[target].append((cost, state))
+            todo.append(target)
     number = {state: n for n, state in enumerate(edges)}
     distance = {state: 0 for state in edges if holds(plain.goal, state)}
     queue = [(0, number[state]) for state in distance]

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
@@ -36,6 +35,7 @@ from tests.support.classical_models import (
     random_state,
     read,
 )
+from tests.support.naive_classical import holds, successors
 from tests.support.random_pddl import KINDS, Kind, random_model
 
 
@@ -65,22 +65,17 @@ def dijkstra(plain: ClassicalTask) -> int | None:
 def reached(plain: ClassicalTask) -> dict[frozenset[int], int]:
     """The least total cost of every plain state."""
     best = {plain.init: 0}
+    steps = successors(plain)
     queue: list[tuple[int, int, frozenset[int]]] = [(0, 0, plain.init)]
     while queue:
         cost, _, state = heapq.heappop(queue)
         if cost > best[state]:
             continue
-        for action in plain.actions:
-            if holds(action.preconditions, state):
-                after = (state - {*action.deletes}) | {*action.adds}
-                if cost + action.cost < best.get(after, 10**9):
-                    best[after] = cost + action.cost
-                    heapq.heappush(queue, (best[after], len(best), after))
+        for _, step, after in steps(state):
+            if cost + step < best.get(after, 10**9):
+                best[after] = cost + step
+                heapq.heappush(queue, (best[after], len(best), after))
     return best
-
-
-def holds(conditions: Sequence[tuple[int, bool]], state: frozenset[int]) -> bool:
-    return all((fact in state) == positive for fact, positive in conditions)
 
 
 @pytest.mark.parametrize("form", FORMS)
