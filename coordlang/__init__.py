@@ -25,12 +25,12 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from coordlang.api.coordination_tasks import coordination as coordination
+    from coordlang.api.cross_check import check as check
     from coordlang.api.explaining import explain as explain
     from coordlang.api.exporting import export as export
     from coordlang.api.languages import build as build
     from coordlang.api.languages import load_language as load_language
     from coordlang.api.languages import verify as verify
-    from coordlang.api.planning import check as check
     from coordlang.api.planning import inspect as inspect
     from coordlang.api.planning import load as load
     from coordlang.api.planning import plans as plans
@@ -61,7 +61,8 @@ __version__ = "0.1.0"
 
 #: Module -> the public names that it defines.
 _DEFINED_IN = {
-    "coordlang.api.planning": ("load", "inspect", "plans", "check"),
+    "coordlang.api.planning": ("load", "inspect", "plans"),
+    "coordlang.api.cross_check": ("check",),
     "coordlang.api.coordination_tasks": ("coordination",),
     "coordlang.api.languages": ("build", "verify", "load_language"),
     "coordlang.api.speaking": ("say", "understand", "plan"),

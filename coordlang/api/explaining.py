@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Unpack
 
-from coordlang.api.inputs import DomainSource, LanguageSource, ProblemSource, read_task_language
+from coordlang.api.inputs import DomainSource, ProblemSource
+from coordlang.api.language_inputs import LanguageSource, read_task_language
 from coordlang.api.options import GivenOptions, ModelKeywords
 from coordlang.api.presenting import Presented
 from coordlang.api.speaking import SentenceSource

@@ -10,13 +10,8 @@ from os import fspath
 from pathlib import Path
 from typing import Any, Literal, Unpack, overload
 
-from coordlang.api.inputs import (
-    DomainSource,
-    File,
-    LanguageSource,
-    ProblemSource,
-    read_task_language,
-)
+from coordlang.api.inputs import DomainSource, File, ProblemSource
+from coordlang.api.language_inputs import LanguageSource, read_task_language
 from coordlang.api.optimal_plans import PlanSteps
 from coordlang.api.options import (
     TARGETS,

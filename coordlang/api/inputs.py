@@ -1,31 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the functions read: paths, or objects that were parsed before."""
+"""Domains, problems and tasks that the functions read: paths, or objects parsed before."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike, fspath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from coordlang.api.options import GivenOptions
-from coordlang.language.file import read_language
-from coordlang.language.words import Language
 from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
 from coordlang.tasks.listed import ListedTask
 from coordlang.tasks.task_file import TASKS, read_task_file, tasks_from_data
-from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
 from planners.errors import Position, UsageError
 from planners.loading import ModelOptions, PlanningInstance, build
 from planners.pddl import read_domain, read_problem
 from planners.pddl.factored import read_factored
 from planners.pddl.lifted import Domain, Problem
 
+if TYPE_CHECKING:
+    from coordlang.language.words import Language
+
 File = str | PathLike[str]
 #: A domain file, a parsed domain, or domain and problems together (`coordlang.load`).
 DomainSource = File | Domain | PlanningInstance
 ProblemSource = File | Problem
-LanguageSource = File | Language
 #: ``"all"``, a task file, its data, or tasks: each with ``init`` and ``goal``, lists of PDDL texts.
 TasksSource = File | Mapping[str, Any] | Sequence[ListedTask | Mapping[str, Any]]
 
@@ -110,25 +109,6 @@ def read_instance(
     if isinstance(domain, PlanningInstance) and given == GivenOptions() and problem is None:
         return domain
     return read_planning(domain, [problem], factored, given, most=1).instance()
-
-
-def read_language_source(language: LanguageSource) -> tuple[Language, Position]:
-    """Read a language, with what messages call it."""
-    if isinstance(language, Language):
-        return language, Position("the language")
-    return read_language(fspath(language)), Position(str(language))
-
-
-def read_task_language(
-    language: LanguageSource,
-    domain: DomainSource,
-    problem: ProblemSource | None,
-    given: GivenOptions,
-) -> TaskLanguage:
-    """Read a language and put it into the task of a problem."""
-    read, position = read_language_source(language)
-    files = read_planning(domain, [problem], None, given, most=1)
-    return language_in_task(read, files.domain, files.problems[0], files.options_of(read), position)
 
 
 def read_tasks(tasks: TasksSource) -> tuple[tuple[ListedTask, ...], Position]:

@@ -14,13 +14,12 @@ import coordlang
 from coordlang.api.inputs import (
     DomainSource,
     File,
-    LanguageSource,
     PlanningInput,
     ProblemSource,
     TasksSource,
-    read_language_source,
     read_planning,
 )
+from coordlang.api.language_inputs import LanguageSource, read_language_source
 from coordlang.api.options import (
     UNSOLVABLE,
     BuildPreference,

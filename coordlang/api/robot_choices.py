@@ -9,13 +9,8 @@ from math import prod
 from os import fspath
 from typing import Any, Unpack
 
-from coordlang.api.inputs import (
-    DomainSource,
-    File,
-    LanguageSource,
-    ProblemSource,
-    read_task_language,
-)
+from coordlang.api.inputs import DomainSource, File, ProblemSource
+from coordlang.api.language_inputs import LanguageSource, read_task_language
 from coordlang.api.options import GivenOptions, ModelKeywords
 from coordlang.api.presenting import Presented
 from coordlang.api.speaking import SentenceSource

@@ -8,13 +8,8 @@ from dataclasses import dataclass
 from os import PathLike, fspath
 from typing import Any, Unpack
 
-from coordlang.api.inputs import (
-    DomainSource,
-    File,
-    LanguageSource,
-    ProblemSource,
-    read_task_language,
-)
+from coordlang.api.inputs import DomainSource, File, ProblemSource
+from coordlang.api.language_inputs import LanguageSource, read_task_language
 from coordlang.api.optimal_plans import OptimalPlans, PlanSteps
 from coordlang.api.options import (
     HEURISTICS,

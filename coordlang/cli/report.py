@@ -61,7 +61,8 @@ def command(
     It has the words, and the sentences and plans in the tasks of PROBLEM.. and in some of the
     candidate tasks.
     """
-    from coordlang.api.inputs import read_language_source, read_planning
+    from coordlang.api.inputs import read_planning
+    from coordlang.api.language_inputs import read_language_source
     from coordlang.api.options import GivenOptions
     from coordlang.language.recorded import check_source
     from coordlang.report.page import make_report

@@ -264,7 +264,7 @@ class _Subactions:
         """Clear ``fits`` where a formula of this robot's subaction about the step is not met."""
         asks = np.flatnonzero(self._has_step_formula[labels[:, robot]])
         own = labels[asks, robot]
-        for label in np.unique(own):
+        for label in np.flatnonzero(np.bincount(own)):
             there = asks[own == label]
             for formula in self._operators.step_formulas[int(label) - 1]:
                 fits[there] &= self._evaluator.holds(formula, rows, source[there], labels[there])

@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import TypeVar
 
 from planners.pddl.lifted import (
-    FALSE,
     TRUE,
     And,
     Atom,
@@ -118,17 +117,18 @@ def negated(formula: Formula) -> Formula:
 
 def joined(kind: type[And] | type[Or], parts: Iterable[Formula]) -> Formula:
     """A flat conjunction or disjunction, with truth values simplified away."""
-    neutral, decisive = (TRUE, FALSE) if kind is And else (FALSE, TRUE)
+    neutral = kind is And
     kept: list[Formula] = []
     for part in parts:
-        if part == decisive:
-            return decisive
-        if isinstance(part, And | Or) and isinstance(part, kind):
+        if isinstance(part, Truth):
+            if part.value != neutral:
+                return part
+        elif isinstance(part, And | Or) and isinstance(part, kind):
             kept += part.parts
-        elif part != neutral:
+        else:
             kept.append(part)
     if not kept:
-        return neutral
+        return Truth(neutral)
     return kept[0] if len(kept) == 1 else kind(tuple(kept))
 
 
