@@ -132,32 +132,6 @@ class Choices:
                 return True
         return False
 
-    def breaking(self, node: int) -> list[tuple[int, ...]]:
-        """Labels of all robots, step by step, that begin a failing choice; the last step breaks.
-
-        The node must require coordination.
-        """
-        chosen = tuple(self.of_node[:, node].tolist())
-        path: list[tuple[int, ...]] = []
-        at: int | None = node
-        while at is not None:
-            labels, chosen, at = self._failing_move(chosen, at)
-            path.append(labels)
-        return path
-
-    def _failing_move(
-        self, chosen: tuple[int, ...], node: int
-    ) -> tuple[tuple[int, ...], tuple[int, ...], int | None]:
-        """Labels with which a failing choice goes on, what follows, and where (None: a break)."""
-        moves = [self.sets.moves(number) for number in chosen]
-        edges = self.edges_of(node)
-        for labels in product(*moves):
-            after = tuple(own[label] for own, label in zip(moves, labels, strict=True))
-            target = edges.get(labels)
-            if target is None or self.fails(after, target):
-                return labels, after, target
-        raise AssertionError("these choices do not fail")
-
     def edges_of(self, node: int) -> dict[tuple[int, ...], int]:
         """The targets of a node's edges, by labels."""
         if node not in self._edges:

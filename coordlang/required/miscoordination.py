@@ -8,19 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from coordlang.required.breaks import Trail as Trail
+from coordlang.required.breaks import break_in_same_states, earliest_break
 from coordlang.required.choices import Choices
-from coordlang.required.composition_walk import FAILED, INSTEAD, moves
 from coordlang.tasks.candidates import describe
 from planners.errors import ProvedImpossible
 from planners.joint.model import PlanningTask
-from planners.limits import reaching
-from planners.search.edge_index import EdgeIndex
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints, unique_tuples
 
-#: Moves of the walk along all plans up to which the earliest break is looked for.
-_WIDEST = 20_000_000
 #: One joint step as text: each robot's subaction, None for idling.
 Step = tuple[str | None, ...]
 
@@ -47,38 +43,12 @@ class Miscoordination:
 
 
 def miscoordination(space: PlanSpace, task: int) -> Miscoordination | None:
-    """The plans of a task whose mixture breaks earliest; None if none does.
-
-    Where the walk along all plans could be wide, some plans whose mixture breaks.
-    """
+    """Plans of a task whose mixture breaks earliest; None if none does."""
     choices = Choices(space)
     start = int(space.starts[task])
     if not choices.requires[start]:
         return None
-    if _width(space, start) <= _WIDEST:
-        trail = _trail(space, np.array([start]), together=False)
-    else:
-        trail = _trail_of_choices(choices, start)
-    return describe_failure(space, trail) if trail is not None else None
-
-
-def _width(space: PlanSpace, start: int) -> float:
-    """At most so many moves does the walk along all plans from a node make."""
-    reached = space.descendants(np.array([start]))
-    edges = (np.count_nonzero(reached[layer.source]) for layer in space.edges_by_layer())
-    return sum(float(number) ** space.robots for number in edges)
-
-
-def _trail_of_choices(choices: Choices, start: int) -> Trail:
-    """Plans from a node that requires coordination, one for each robot, up to where they break."""
-    space = choices.space
-    labels = choices.breaking(start)
-    paths = [
-        space.path_of_robot(start, robot, [step[robot] for step in labels])
-        for robot in range(space.robots)
-    ]
-    steps = zip(*(path[: len(labels)] for path in paths if path is not None), strict=True)
-    return Trail(start, tuple(steps))
+    return describe_failure(space, earliest_break(choices, start))
 
 
 class Inseparable(ProvedImpossible):
@@ -100,7 +70,7 @@ class Inseparable(ProvedImpossible):
 
 def inseparable(space: PlanSpace) -> Miscoordination | None:
     """Plans of some task that pass through the same states and yet introduce RC, or None."""
-    trail = _inseparable(space)
+    trail = break_in_same_states(space)
     return describe_failure(space, trail) if trail is not None else None
 
 
@@ -114,84 +84,7 @@ def require_separable(spaces: Sequence[PlanSpace]) -> None:
 
 def separable(space: PlanSpace) -> bool:
     """Whether plans that introduce RC always pass through different states."""
-    return _inseparable(space) is None
-
-
-def _inseparable(space: PlanSpace) -> Trail | None:
-    ends = np.column_stack((space.sources, space.targets()))
-    if len(ends) == len(unique_tuples(ends, [len(space)] * 2)[0]):
-        return None  # no two edges join the same two nodes
-    return _trail(space, np.unique(space.starts), together=True)
-
-
-@dataclass(frozen=True, slots=True)
-class Trail:
-    """A walk to a breaking step: where it started and the edges of each plan, step by step."""
-
-    start: int
-    edges: tuple[tuple[int, ...], ...]
-
-
-def _trail(space: PlanSpace, starts: Ints, *, together: bool) -> Trail | None:
-    """Breadth first through the layers, until a mixture breaks.
-
-    Of several breaks the first in order.
-    """
-    walked = [0, 0]
-
-    def so_far() -> str:
-        return (
-            f"{walked[0]} of {len(space.layers) - 1} steps of the composition "
-            f"walk, {walked[1]:,} nodes"
-        )
-
-    with reaching(so_far, INSTEAD):
-        return _walk_to_a_break(space, starts, walked, together=together)
-
-
-def _walk_to_a_break(
-    space: PlanSpace, starts: Ints, walked: list[int], *, together: bool
-) -> Trail | None:
-    """See `_trail`; ``walked`` counts layers and nodes."""
-    robots = space.robots
-    index = EdgeIndex.of(space)
-    table = np.zeros((0, robots + 1), np.int64)
-    history: list[
-        tuple[Ints, Ints, Ints]
-    ] = []  # per layer: nodes, parents, the edges that led there
-    parents, came = np.zeros(0, np.int64), np.zeros((0, robots), np.int64)
-    for number in range(len(space.layers) - 1, 0, -1):
-        fresh = starts[space.layer[starts] == number]
-        table = np.concatenate((table, np.repeat(fresh[:, None], robots + 1, axis=1)))
-        parents = np.concatenate((parents, np.full(len(fresh), -1)))
-        came = np.concatenate((came, np.full((len(fresh), robots), -1)))
-        history.append((table, parents, came))
-        walked[1] += len(table)
-        found: list[Ints] = []
-        for move in moves(space, index, table, together=together):
-            broken = np.flatnonzero(move.mixed == FAILED)
-            if len(broken):
-                first = broken[0]
-                return _retrace(history, int(move.source[first]), tuple(move.edges[first].tolist()))
-            target = space.targets(move.edges)
-            found.append(np.column_stack((target, move.mixed, move.source, move.edges)))
-        step = np.concatenate(found) if found else np.zeros((0, 2 * robots + 2), np.int64)
-        table, number_of = unique_tuples(step[:, : robots + 1], [len(space)] * (robots + 1))
-        one = np.zeros(len(table), np.int64)
-        one[number_of[::-1]] = np.arange(len(step))[::-1]
-        parents, came = step[one, robots + 1], step[one, robots + 2 :]
-        walked[0] += 1
-    return None
-
-
-def _retrace(history: list[tuple[Ints, Ints, Ints]], row: int, last: tuple[int, ...]) -> Trail:
-    edges = [last]
-    for table, parents, came in reversed(history):
-        if parents[row] < 0:
-            return Trail(int(table[row, 0]), tuple(reversed(edges)))
-        edges.append(tuple(came[row].tolist()))
-        row = int(parents[row])
-    raise AssertionError("a walk starts somewhere")
+    return break_in_same_states(space) is None
 
 
 def describe_failure(

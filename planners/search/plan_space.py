@@ -158,18 +158,27 @@ class PlanSpace:
             node = int(self.target[edge])
         return path
 
-    def path_of_robot(self, node: int, robot: int, labels: Sequence[int]) -> list[int] | None:
-        """The edges of a plan from a node that begins with these labels of one robot.
+    def path_of_robots(
+        self, node: int, robots: Sequence[int], steps: Sequence[Sequence[int]]
+    ) -> list[int] | None:
+        """The edges of a plan from a node that begins with these labels of some robots.
 
         None if there is none.  It goes on with first edges to a goal.  O(edges).
+
+        Parameters
+        ----------
+        robots, steps
+            The robots, and step by step the labels of each of them.
         """
         layers: list[dict[int, tuple[int, int]]] = [{node: (-1, -1)}]  # node -> (before, edge)
-        for label in labels:
+        for labels in steps:
             reached: dict[int, tuple[int, int]] = {}
             for before in layers[-1]:
-                for edge in self.out_edges(before):
-                    if self.labels[edge, robot] == label:
-                        reached.setdefault(self.target_of(edge), (before, edge))
+                edges = self.out_edges(before)
+                own = self.labels[edges.start : edges.stop][:, list(robots)]
+                for position in np.flatnonzero((own == np.asarray(labels)).all(axis=1)).tolist():
+                    edge = edges.start + position
+                    reached.setdefault(self.target_of(edge), (before, edge))
             layers.append(reached)
         if not layers[-1]:
             return None

@@ -280,10 +280,10 @@ def test_verification_and_the_search_for_a_break_say_how_far_they_got(
     with pytest.raises(OutOfTime) as caught:
         verify.verify(table, [space])
     assert "layer 1 of 5 of the verification, 1 nodes of its walk" in str(caught.value)
-    monkeypatch.setattr("coordlang.required.miscoordination.moves", fail)
+    monkeypatch.setattr(Choices, "edges_of", fail)
     with pytest.raises(OutOfTime) as caught:
         miscoordination(space, 0)
-    assert "0 of 4 steps of the composition walk, 1 nodes" in str(caught.value)
+    assert "0 of 4 steps to the first break of a mixture, 1 nodes" in str(caught.value)
 
 
 @pytest.mark.parametrize("problem", ["corners-4x4", "three-robots-3x3"])

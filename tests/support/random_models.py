@@ -76,7 +76,7 @@ def graph_text(random: Random, robots: int) -> tuple[str, str]:
     """Robots on a small random directed graph, each with edges of its own; random rules of the
     road.  Much RC.
     """
-    places = [f"c{n}" for n in range(random.choice([3, 3, 4]))]
+    places = [f"c{n}" for n in range(max(robots, random.choice([3, 3, 4])))]
     names = [f"r{n + 1}" for n in range(robots)]
     rules = ["(forall (?o - robot ?z - place) (not (go ?o ?z ?y)))"]
     if random.random() < 0.7:

@@ -179,7 +179,7 @@ def _violation(
 
 def _with_beginning(fits: PlanSpace, robot: int, subplan: Sequence[int]) -> list[tuple[int, ...]]:
     """A plan, as labels, in which a robot begins with these labels of its own."""
-    path = fits.path_of_robot(int(fits.starts[0]), robot, subplan)
+    path = fits.path_of_robots(int(fits.starts[0]), [robot], [[label] for label in subplan])
     assert path is not None, "the robot's automaton accepts its subplans only"
     return [fits.labels_of(edge) for edge in path]
 

@@ -8,13 +8,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 from random import Random
 
-import numpy as np
 import pytest
 
 from coordlang.required.choices import Choices
 from coordlang.required.divergences import first_differences
 from coordlang.required.label_sets import LabelSets
-from coordlang.required.miscoordination import Miscoordination, inseparable, miscoordination
+from coordlang.required.miscoordination import inseparable
 from coordlang.required.partings import Partings
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from planners.errors import BadInput, ProvedImpossible
@@ -132,36 +131,3 @@ def test_many_plan_spaces_share_their_sets(seed: int) -> None:
     assert [Choices(space, sets).requires.tolist() for space in spaces] == [
         twin.requires.tolist() for twin in walks
     ]
-
-
-@pytest.mark.parametrize("robots", [2, 3])
-def test_a_break_is_found_without_a_walk(robots: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The plans shown where the walk would be wide are optimal, and their mixture breaks."""
-    shown = 0
-    for space in separable_spaces(range(40), robots):
-        requires = walk(space).requires[space.starts]
-        some = [*np.flatnonzero(requires)[:5].tolist(), *np.flatnonzero(~requires)[:2].tolist()]
-        for task in some:
-            earliest = miscoordination(space, task)
-            monkeypatch.setattr("coordlang.required.miscoordination._WIDEST", -1)
-            found = miscoordination(space, task)
-            monkeypatch.undo()
-            assert (found is None) == (earliest is None)
-            if found is not None and earliest is not None:
-                shown += 1
-                assert found.step >= earliest.step
-                breaks(space, int(space.starts[task]), found)
-    assert shown >= 3
-
-
-def breaks(space: PlanSpace, start: int, found: Miscoordination) -> None:
-    """The plans are optimal, their mixture is theirs, and its last step is no edge."""
-    for robot, plan in enumerate(found.plans):
-        steps = [space.model.numbers(step) for step in plan]
-        assert space.path_with(start, [step for step in steps if step is not None]) is not None
-        assert len(steps) == space.layer[start]
-        own = [step[robot] for step in plan[: found.step + 1]]
-        assert own == [step[robot] for step in found.mixture]
-    mixed = [space.model.numbers(step) or () for step in found.mixture]
-    assert space.path_with(start, mixed[:-1]) is not None
-    assert space.path_with(start, mixed) is None
