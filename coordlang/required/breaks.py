@@ -9,7 +9,7 @@ labels.  Plans that stay in the same states share all of them: their walk is ove
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -68,19 +68,28 @@ def _earliest_labels(choices: Choices, start: int) -> list[Labels]:
 
     with reaching(so_far, "smaller tasks or --cost makespan+actions"):
         while True:
-            below: dict[tuple[int, ...], tuple[Labels, ...]] = {}
-            for (*chosen, node), path in layer.items():
-                moves = [choices.sets.moves(number) for number in chosen]
-                edges = choices.edges_of(node)
-                # Idling is the first label: a break in which robots act says more.
-                for labels in product(*(reversed(own) for own in moves)):
-                    target = edges.get(labels)
-                    if target is None:
-                        return [*path, labels]
-                    after = tuple(own[label] for own, label in zip(moves, labels, strict=True))
-                    if (*after, target) not in below and choices.fails(after, target):
-                        below[*after, target] = (*path, labels)
+            below, broken = _steps_of_choices(choices, layer)
+            if broken is not None:
+                return broken
             layer = below
+
+
+def _steps_of_choices(
+    choices: Choices, layer: Mapping[tuple[int, ...], tuple[Labels, ...]]
+) -> tuple[dict[tuple[int, ...], tuple[Labels, ...]], list[Labels] | None]:
+    """The failing choices one step on; or none, and the labels up to the first break."""
+    below: dict[tuple[int, ...], tuple[Labels, ...]] = {}
+    for (*chosen, node), path in layer.items():
+        moves = [choices.sets.moves(number) for number in chosen]
+        edges = choices.edges_of(node)
+        for labels in product(*moves):
+            target = edges.get(labels)
+            if target is None:
+                return {}, [*path, labels]
+            after = tuple(own[label] for own, label in zip(moves, labels, strict=True))
+            if (*after, target) not in below and choices.fails(after, target):
+                below[*after, target] = (*path, labels)
+    return below, None
 
 
 def _shared_plans(
