@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The child process in which Fast Downward solves one classical task.
 
-``python -m planners.classical.fast_downward_worker TASK RESULT`` reads the task (JSON, see
+``python -P fast_downward_worker.py TASK RESULT`` reads the task (JSON, see
 `planners.classical.fast_downward.as_json`) and writes one JSON object: ``{"status": .., "total":
 cost of the plan or null, "log": the end of what Fast Downward said}``.
 """
@@ -15,6 +15,7 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from planners.limits import limit_memory
@@ -59,6 +60,7 @@ def _end_with_parent() -> None:
 
 def solve(task: dict[str, Any]) -> dict[str, Any]:
     """Build the task with unified-planning and ask ``fast-downward-opt`` for an optimal plan."""
+    sys.modules.setdefault("ConfigSpace", _config_space())
     from unified_planning.engines import PlanGenerationResultStatus as Status
     from unified_planning.shortcuts import OneshotPlanner, get_environment
 
@@ -86,6 +88,16 @@ def solve(task: dict[str, Any]) -> dict[str, Any]:
         else None
     )
     return {"status": outcome, "total": total, "log": log[-2000:]}
+
+
+def _config_space() -> ModuleType:
+    """What unified-planning takes from ConfigSpace: one class, as the type of a parameter.
+
+    ConfigSpace itself loads statistics for longer than most tasks are solved in.
+    """
+    module = ModuleType("ConfigSpace")
+    module.ConfigurationSpace = object  # type: ignore[attr-defined]
+    return module
 
 
 def build(task: dict[str, Any]) -> tuple[Any, dict[str, int]]:

@@ -16,11 +16,37 @@ class TooLarge(Exception):
     """More plans than a twin should list."""
 
 
+class _Listing:
+    """The plans of a plan space's tasks, each listed once."""
+
+    def __init__(self, space: PlanSpace) -> None:
+        self.space = space
+        self.counted = counts(space)
+        self.plans: dict[int, list[Plan]] = {}
+        self.states: dict[int, list[tuple[int, ...]]] = {}
+
+
+#: The listings of the plan spaces looked at last, by the space's identity (they keep it alive).
+_LISTINGS: dict[int, _Listing] = {}
+_MOST_LISTINGS = 400
+
+
+def _listing(space: PlanSpace) -> _Listing:
+    if id(space) not in _LISTINGS:
+        if len(_LISTINGS) == _MOST_LISTINGS:
+            _LISTINGS.clear()
+        _LISTINGS[id(space)] = _Listing(space)
+    return _LISTINGS[id(space)]
+
+
 def listed(space: PlanSpace, task: int, most: int) -> list[Plan]:
-    plans = Plans(space, int(space.starts[task]), counts(space))
-    if plans.count > most:
+    listing = _listing(space)
+    start = int(space.starts[task])
+    if listing.counted[start] > most:
         raise TooLarge
-    return list(plans)
+    if task not in listing.plans:
+        listing.plans[task] = list(Plans(space, start, listing.counted))
+    return listing.plans[task]
 
 
 def known(labels: tuple[int, ...] | None) -> tuple[int, ...]:
@@ -76,10 +102,13 @@ def is_language(space: PlanSpace, word_of_state: dict[int, int], most: int) -> b
     robots = len(space.model.robots)
     for task in range(len(space.starts)):
         plans = listed(space, task, most)
+        passed = _listing(space).states
+        if task not in passed:
+            passed[task] = [states(space, task, plan) for plan in plans]
         good = set(plans)
         groups: dict[tuple[int, ...], list[Plan]] = {}
-        for plan in plans:
-            key = sentence([word_of_state[s] for s in states(space, task, plan)])
+        for plan, through in zip(plans, passed[task], strict=True):
+            key = sentence([word_of_state[s] for s in through])
             groups.setdefault(key, []).append(plan)
         for group in groups.values():
             if any(mixture(chosen) not in good for chosen in product(group, repeat=robots)):
