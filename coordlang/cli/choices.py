@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from coordlang.use.choices.choices import RobotChoices
     from coordlang.use.choices.monitor import Answer, Monitor
 
-_STATES_SHOWN = 40
+#: States of an automaton beyond which a table is cut.
+STATES_SHOWN = 40
 
 
 @click.command(name="choices", cls=RenamedOptions, renamed={"--did": "--history"})
@@ -171,7 +172,7 @@ def _table(found: RobotsChoices, own: RobotChoices) -> list[str]:
     subplans = counted(automaton.count, "subplan")
     states = counted(len(automaton), "state")
     lines = [f"{model.robots[own.robot]} may follow {subplans} ({states}):"]
-    rows = _rows(found, own)[:_STATES_SHOWN]
+    rows = _rows(found, own)[:STATES_SHOWN]
     if rows:
         rows.insert(0, ("step", "state", "left", "may do", "knows"))
         widths = [max(len(row[k]) for row in rows) for k in range(4)]
@@ -191,7 +192,7 @@ def _rows(found: RobotsChoices, own: RobotChoices) -> list[tuple[str, str, str, 
     model, automaton = found.found.task_language.model, own.automaton
     rows = []
     for step, states in enumerate(automaton.layers[:-1], 1):
-        if states.start >= _STATES_SHOWN:
+        if states.start >= STATES_SHOWN:
             break
         for state, atoms in zip(states, distinguishing(found.found, own, states), strict=True):
             moves = " | ".join(

@@ -41,7 +41,7 @@ _TERMS = 40
 #: States of a word that are listed where no formula was sought.
 _EXAMPLES = 3
 #: Places beyond which no map is drawn.
-_PLACES = 600
+MOST_PLACES = 600
 
 
 def page_data(
@@ -49,10 +49,11 @@ def page_data(
     selection: Selection,
     parts: Sequence[TaskPart],
     known: Mapping[str, Point] | None = None,
+    most_places: int = MOST_PLACES,
 ) -> dict[str, Any]:
     """Return the page's data for a language and the tasks to be shown.
 
-    ``known`` are coordinates of places from a file.
+    ``known`` are coordinates of places from a file; with more than ``most_places`` no map is drawn.
     """
     first = parts[0].shown.language
     model = first.model
@@ -60,7 +61,7 @@ def page_data(
     listed = _listed_states(language, tables)
     tasks = [task_data(part, tables) for part in parts]
     states = [model.codec.decode(row) for row in tables.rows]
-    world = _drawn_world(model, states)
+    world = _drawn_world(model, states, most_places)
     facts = sorted({fact for state in states for fact in state})
     number = {fact: k for k, fact in enumerate(facts)}
     for task, part in zip(tasks, parts, strict=True):
@@ -90,10 +91,10 @@ def page_data(
     }
 
 
-def _drawn_world(model: JointModel, states: Sequence[Sequence[str]]) -> World:
+def _drawn_world(model: JointModel, states: Sequence[Sequence[str]], most_places: int) -> World:
     """What is drawn; without a map, where there are too few or too many places, atoms are text."""
     world = find_world(model, states)
-    if 1 < len(world.places) <= _PLACES:
+    if 1 < len(world.places) <= most_places:
         return world
     return replace(world, places=(), links=(), roles={})
 

@@ -71,14 +71,14 @@ class ShownSentences:
     total: int | None
 
 
-def plan_graph(language: TaskLanguage, seed: int) -> Graph:
-    """Return the plans of a task as a graph of at most `EDGES` edges.
+def plan_graph(language: TaskLanguage, seed: int, most: int = EDGES) -> Graph:
+    """Return the plans of a task as a graph of at most ``most`` edges.
 
     Of a larger plan space it holds the plans drawn with ``seed``.
     """
     space = language.space
-    complete = len(space.target) <= EDGES
-    edges = np.arange(len(space.target)) if complete else _drawn_edges(language, seed)
+    complete = len(space.target) <= most
+    edges = np.arange(len(space.target)) if complete else _drawn_edges(language, seed, most)
     source, target = space.sources[edges], space.targets(edges)
     nodes = np.unique(np.concatenate((source, target, [language.start])))
     makespan = int(space.layer[language.start])
@@ -94,33 +94,36 @@ def plan_graph(language: TaskLanguage, seed: int) -> Graph:
     return Graph(nodes[drawn], tuple(order[drawn].tolist()), out[np.isin(out, edges)], complete)
 
 
-def _drawn_paths(language: TaskLanguage, seed: int) -> Iterator[list[int]]:
+def _drawn_paths(language: TaskLanguage, seed: int, most: int) -> Iterator[list[int]]:
     """Yield the edges of plans drawn uniformly."""
     space = language.space
     plans = Plans.of(space, language.task)
-    for plan in plans.sample(EDGES, seed):
+    for plan in plans.sample(most, seed):
         path = space.path_with(plans.start, plan)
         assert path is not None, "a plan is a path of its plan space"
         yield path
 
 
-def _drawn_edges(language: TaskLanguage, seed: int) -> Ints:
+def _drawn_edges(language: TaskLanguage, seed: int, most: int) -> Ints:
     """Return the edges of plans drawn uniformly, as many as fit."""
     kept: set[int] = set()
-    for path in _drawn_paths(language, seed):
-        if len(kept.union(path)) > EDGES // 4:
+    for path in _drawn_paths(language, seed, most):
+        if len(kept.union(path)) > most // 4:
             break
         kept.update(path)
     return np.array(sorted(kept), np.int64)
 
 
-def shown_sentences(language: TaskLanguage, graph: Graph, seed: int) -> ShownSentences:
+def shown_sentences(
+    language: TaskLanguage, graph: Graph, seed: int, most: int = EDGES
+) -> ShownSentences:
     """Return the task's sentences that leave most plans open.
 
-    If there are too many to count them all, those of the drawn plans are compared.
+    If there are too many to count them all, or more than ``most`` edges, those of the drawn plans
+    are compared.
     """
-    every = _all_sentences(language) if len(language.space.target) <= EDGES else None
-    plans = _drawn_sentences(language, graph, seed) if every is None else every
+    every = _all_sentences(language) if len(language.space.target) <= most else None
+    plans = _drawn_sentences(language, graph, seed, most) if every is None else every
     ranked = sorted(plans.items(), key=lambda entry: (-entry[1], entry[0]))[:SENTENCES]
     listed = tuple(
         ShownSentence(words, number, _own_counts(language, words)) for words, number in ranked
@@ -139,11 +142,13 @@ def _all_sentences(language: TaskLanguage) -> Mapping[Sentence, int] | None:
     return counted[language.start]
 
 
-def _drawn_sentences(language: TaskLanguage, graph: Graph, seed: int) -> dict[Sentence, int]:
+def _drawn_sentences(
+    language: TaskLanguage, graph: Graph, seed: int, most: int
+) -> dict[Sentence, int]:
     """Count the plans of the sentences of plans within the drawn part."""
     inside = set(graph.edges.tolist())
     found: dict[Sentence, int] = {}
-    for path in _drawn_paths(language, seed):
+    for path in _drawn_paths(language, seed, most):
         if not inside.issuperset(path) or len(found) >= SENTENCES:
             break
         nodes = language.space.nodes_on(language.start, path)

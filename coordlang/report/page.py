@@ -12,7 +12,7 @@ from typing import Any
 
 from coordlang.explanation.text import counted
 from coordlang.language.words import Language
-from coordlang.report.data import page_data
+from coordlang.report.data import MOST_PLACES, page_data
 from coordlang.report.places import Point
 from coordlang.report.shown import select_tasks
 from coordlang.report.task import task_part
@@ -20,7 +20,7 @@ from planners.errors import OutOfMemory, Position
 from planners.loading import ModelOptions
 from planners.pddl.lifted import Domain, Problem
 
-#: A page is smaller than this, in bytes.
+#: What a page has at most, in bytes.
 LARGEST = 5_000_000
 #: Terms of a word's formula that are seen at once.
 _TERMS_OPEN = 3
@@ -47,11 +47,13 @@ def make_report(
     options: ModelOptions | None = None,
     coordinates: Mapping[str, Point] | None = None,
     position: Position | None = None,
+    largest: int = LARGEST,
+    most_places: int = MOST_PLACES,
 ) -> Report:
     """Render the report of a language; the same arguments give the same bytes.
 
     It shows the problems' tasks and candidate tasks drawn with ``seed``, at most ``tasks_shown``,
-    fewer if the page would become larger than 5 MB.
+    fewer if the page would become larger than ``largest``.
 
     Parameters
     ----------
@@ -61,6 +63,10 @@ def make_report(
         Of the places of the map, if they are known (`read_coordinates`).
     position
         What error messages name as the place of the language.
+    largest
+        Bytes that a page has at most.
+    most_places
+        With more places no map is drawn.
 
     Raises
     ------
@@ -72,13 +78,13 @@ def make_report(
     selection = select_tasks(language, domain, problems, tasks_shown, seed, options, position)
     parts = [task_part(shown, seed) for shown in selection.tasks]
     while True:
-        data = page_data(language, selection, parts, coordinates)
+        data = page_data(language, selection, parts, coordinates, most_places)
         html = _render(language, domain, problems, data, seed)
-        if len(html) <= LARGEST:
+        if len(html) <= largest:
             return Report(html, len(parts), int(language.provenance.tasks.get("count", 0)))
         if len(parts) == 1:
             raise OutOfMemory(
-                f"the page of one task would have {len(html):,} bytes, more than {LARGEST:,}",
+                f"the page of one task would have {len(html):,} bytes, more than {largest:,}",
                 remedy="Give a smaller problem.",
             )
         parts = parts[: len(parts) // 2]

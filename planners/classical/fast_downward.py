@@ -71,6 +71,7 @@ def optimal_cost(
     time_limit: float | None = None,
     memory_limit: int | None = None,
     limit: int = 2000,
+    longest: int = LONGEST,
 ) -> FastDownwardAnswer:
     """The optimal cost of a task according to Fast Downward.
 
@@ -79,8 +80,9 @@ def optimal_cost(
     time_limit, memory_limit
         Seconds of wall time for all of it; bytes of address space for Fast Downward's translator
         and its search.
-    limit
-        See `planners.classical.compile_classical`.
+    limit, longest
+        See `planners.classical.compile_classical`; where a plan turns out to have more steps than
+        ``longest``, it is asked again.
 
     Raises
     ------
@@ -90,7 +92,6 @@ def optimal_cost(
         unified-planning or Fast Downward broke down; the end of what they said is in the message.
     """
     start = time.monotonic()
-    longest = LONGEST
     while True:
         classical = compile_classical(model, task, limit, longest)
         left = None if time_limit is None else time_limit - (time.monotonic() - start)

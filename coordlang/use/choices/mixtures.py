@@ -27,7 +27,7 @@ from planners.tables import Ints, spans, unique_tuples
 #: Joint moves handled at a time.
 _CHUNK = 1_000_000
 #: Up to so many bytes the free memory is not looked up.
-_SMALL = 1 << 24
+SMALL = 1 << 24
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,7 +194,7 @@ def _check(
     moves = float(size.sum())
     needed = held + moves * (48 + 24 * len(automata))
     if (most is not None and moves + held / 40 > most) or (
-        needed > _SMALL and needed > memory_left()
+        needed > SMALL and needed > memory_left()
     ):
         states = " x ".join(f"{len(own.layers[step]):,}" for own in automata)
         raise OutOfMemory(

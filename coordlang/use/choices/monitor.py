@@ -577,11 +577,11 @@ def _entry(data: Any, robot: str | None) -> Mapping[str, Any]:
     if robot is not None:
         if robot not in entries:
             raise MonitorError(
-                f"the file has no choices of {_shown(robot)}; it has those of {names or 'nobody'}"
+                f"the file has no choices of {_shown(robot)}; it has those of {names or 'no robot'}"
             )
         return entries[robot]
     if len(entries) != 1:
-        raise MonitorError(f"whose choices? The file has those of {names or 'nobody'}")
+        raise MonitorError(f"whose choices? The file has those of {names or 'no robot'}")
     return next(iter(entries.values()))
 
 

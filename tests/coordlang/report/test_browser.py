@@ -376,16 +376,15 @@ def test_odd_names_stay_text(open_page: Opener) -> None:
     assert "</script>" in opened.page.inner_text("#now-word")
 
 
-def test_odd_languages_and_tasks(open_page: Opener, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_odd_languages_and_tasks(open_page: Opener) -> None:
     """No map; no state mapped; a task that is done before it begins."""
     language, domain, problem = make_language("t-map", "problem")
     bare = replace(language, states={})
     done = replace(
         problem, goal=And(tuple(atom for atom in problem.init if atom.predicate == "at"))
     )
-    monkeypatch.setattr("coordlang.report.data._PLACES", 1)
     for spoken, asked in [(language, problem), (bare, problem), (language, done)]:
-        opened = open_page(make_report(spoken, domain, [asked], tasks_shown=1).html)
+        opened = open_page(make_report(spoken, domain, [asked], tasks_shown=1, most_places=1).html)
         assert not opened.page.is_visible("#stage")
         for mode in (-1, 0, 1):
             opened.page.click(f"[data-mode='{mode}']")

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from coordlang.report import data
 from tests.coordlang.report.conftest import data_of
 from tests.support.command import Command, own_process
 from tests.support.domains import DOMAINS
@@ -100,15 +99,3 @@ def test_another_domain_is_refused(coordlang: Command, language: Path, tmp_path:
     page = tmp_path / "report.html"
     assert coordlang("report", language, *other, "-o", page).code == 31
     assert not page.exists()
-
-
-def test_without_a_map(
-    coordlang: Command, language: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(data, "_PLACES", 3)
-    page = tmp_path / "report.html"
-    assert coordlang("report", language, *FILES, "-o", page, "--tasks-shown", "1").code == 0
-    shown = data_of(page.read_bytes())
-    assert shown["places"] == []
-    assert {fact["role"][0] for fact in shown["facts"]} == {"other"}
-    assert all(label["moves"] == [] for own in shown["labels"] for label in own)

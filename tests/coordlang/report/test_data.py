@@ -154,12 +154,11 @@ def test_random_models() -> None:
     assert unmapped >= 2
 
 
-def test_large_tasks_are_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_large_tasks_are_drawn() -> None:
     spoken = language_in_task(*make_language("grid", "three-robots-3x3", None))
     whole = graph.plan_graph(spoken, 0)
     exact = {s.words: s.plans for s in graph.shown_sentences(spoken, whole, 0).listed}
-    monkeypatch.setattr(graph, "EDGES", 60)
-    part = graph.plan_graph(spoken, 0)
+    part = graph.plan_graph(spoken, 0, most=60)
     assert whole.complete
     assert not part.complete
     assert 10 < len(part.edges) <= 60
@@ -169,7 +168,7 @@ def test_large_tasks_are_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     # whole plan.
     assert set(targets) | {spoken.start} == nodes
     assert set(sources) | {n for n in nodes if space.layer[n] == 0} == nodes
-    drawn = graph.shown_sentences(spoken, part, 0)
+    drawn = graph.shown_sentences(spoken, part, 0, most=60)
     assert drawn.total is None
     assert drawn.listed
     assert all(exact.get(s.words, s.plans) == s.plans for s in drawn.listed)
@@ -212,13 +211,20 @@ def test_a_page_is_the_same_each_time_and_opens_offline() -> None:
     assert str(Path.cwd()) not in text
 
 
-def test_pages_that_would_be_too_large_show_fewer_tasks(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pages_that_would_be_too_large_show_fewer_tasks() -> None:
     language, domain, problem = make_language("t-map", "problem")
     full = make_report(language, domain, [problem], tasks_shown=12)
-    monkeypatch.setattr("coordlang.report.page.LARGEST", len(full.html) - 1)
-    less = make_report(language, domain, [problem], tasks_shown=12)
+    less = make_report(language, domain, [problem], tasks_shown=12, largest=len(full.html) - 1)
     assert less.tasks == full.tasks // 2
     assert not data_of(less.html)["candidates"]["complete"]
+
+
+def test_without_a_map() -> None:
+    language, domain, problem = make_language("t-map", "problem")
+    shown = data_of(make_report(language, domain, [problem], tasks_shown=1, most_places=3).html)
+    assert shown["places"] == []
+    assert {fact["role"][0] for fact in shown["facts"]} == {"other"}
+    assert all(label["moves"] == [] for own in shown["labels"] for label in own)
 
 
 def test_a_language_that_is_none_is_said_to_be_none() -> None:

@@ -355,7 +355,7 @@ def test_too_many_are_refused_with_an_estimate(monkeypatch: pytest.MonkeyPatch) 
         OutOfMemory, match=r"after 1 of 6 steps their subsets have 1 members, at this rate about"
     ):
         determinise(fits, 0, most=0)
-    monkeypatch.setattr("coordlang.use.choices.mixtures._SMALL", 0)
+    monkeypatch.setattr("coordlang.use.choices.mixtures.SMALL", 0)
     monkeypatch.setattr("coordlang.use.choices.mixtures.memory_left", lambda: 0)
     with pytest.raises(
         OutOfMemory, match=r"step 1 has \d+ combinations of what the robots may do"

@@ -181,10 +181,9 @@ def test_a_goal_that_holds_at_the_start() -> None:
     assert optimal_cost(loaded.model, loaded.tasks[0]).cost == (0, 0)
 
 
-def test_a_step_cost_that_was_too_small_is_raised(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_step_cost_that_was_too_small_is_raised() -> None:
     loaded = workshop(GOAL, "makespan+actions")
-    monkeypatch.setattr(fast_downward, "LONGEST", 1)
-    assert optimal_cost(loaded.model, loaded.tasks[0]).cost == search(
+    assert optimal_cost(loaded.model, loaded.tasks[0], longest=1).cost == search(
         loaded.model, loaded.tasks[0]
     ).cost_of(0)
 
