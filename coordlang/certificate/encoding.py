@@ -14,6 +14,7 @@ from coordlang.vocabulary.clauses import most_constrained_first, without_implied
 from coordlang.vocabulary.sat import PartitionProblem, Undecided, satisfiable
 from planners.errors import OutOfMemory
 from planners.limits import memory_left
+from planners.sat import sat_solver, solve_slice
 
 #: Conflicts after which the checking solver comes back.
 _SLICE = 10_000
@@ -86,13 +87,10 @@ class Cnf:
 
         Decided by a solver and a loop that the builders do not use.
         """
-        from pysat.solvers import Solver
-
-        with Solver(name=solver, bootstrap_with=self.clauses) as sat:
+        with sat_solver(solver, self.clauses) as sat:
             answer = None
-            while answer is None:  # in slices: no signal is heard inside of the solver
-                sat.conf_budget(_SLICE)
-                answer = sat.solve_limited()
+            while answer is None:
+                answer = solve_slice(sat, _SLICE)
             return answer is False
 
 
@@ -217,11 +215,9 @@ def _in_the_way(clauses: Sequence[Clause], size: int) -> list[Clause]:
 
 def _used(clauses: Sequence[Clause], size: int) -> list[Clause]:
     """The clauses that a solver's refutation used."""
-    from pysat.solvers import Solver
-
     cnf = encode(clauses, size)
     rest, asked = cnf.clauses[: -len(clauses)], cnf.clauses[-len(clauses) :]
-    with Solver(name="cadical153", bootstrap_with=rest) as sat:
+    with sat_solver("cadical153", rest) as sat:
         select = [cnf.variables + 1 + n for n in range(len(clauses))]
         for variable, clause in zip(select, asked, strict=True):
             sat.add_clause([*clause, -variable])

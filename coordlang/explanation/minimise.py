@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from coordlang.explanation.boxes import Bits, Points, conflicting, expand
 from coordlang.vocabulary.sat import Undecided, satisfiable
+from planners.sat import sat_solver
 
 #: Array elements looked at in expansions; decides how many passes are made.
 _WORK = 300_000_000
@@ -165,10 +166,8 @@ def _fewer(points: Points, number: int, needed: Sequence[int]) -> Bits | None:
     size = number * (len(points.on) + len(points.off)) * len(points.sizes)
     if size > _LITERALS:
         return None
-    from pysat.solvers import Glucose4
-
     width = sum(points.sizes)
-    with Glucose4(bootstrap_with=_box_clauses(points, number, needed)) as solver:
+    with sat_solver("glucose4", _box_clauses(points, number, needed)) as solver:
         try:
             answer = satisfiable(solver, conflicts=_CONFLICTS)
         except Undecided:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from coordlang.language.warping import Clause, Pair, pair
+from planners.sat import sat_solver, solve_slice
 
 #: Conflicts after which the solver comes back, to let signals (time limit, Ctrl-C) be heard.
 _SLICE = 2_000
@@ -29,11 +30,9 @@ class PartitionProblem:
     """
 
     def __init__(self, states: Sequence[int], size: int, solver: str = "cadical153") -> None:
-        from pysat.solvers import Solver
-
         self.size = size
         self._last = 0
-        self._solver = Solver(name=solver)
+        self._solver = sat_solver(solver)
         self._word = {s: [self._new() for _ in range(size)] for s in states}
         self._separated: dict[Pair, int] = {}
         self._equivalent: set[Pair] = set()
@@ -170,7 +169,7 @@ def satisfiable(solver: Any, assumptions: Sequence[int] = (), conflicts: int | N
     Parameters
     ----------
     solver
-        A ``pysat.solvers.Solver``; signals are heard between slices of its work.
+        Made by `planners.sat.sat_solver`; signals are heard between slices of its work.
     assumptions
         Literals that are assumed besides.
     conflicts
@@ -181,18 +180,10 @@ def satisfiable(solver: Any, assumptions: Sequence[int] = (), conflicts: int | N
     Undecided
         After so many conflicts.
     """
-    import pysolvers
-
     spent = 0
     while conflicts is None or spent < conflicts:
-        solver.conf_budget(_SLICE)
-        try:
-            answer = solver.solve_limited(assumptions=list(assumptions))
-        except pysolvers.error as error:  # how python-sat, which catches SIGINT, passes it on
-            if "interrupt" in str(error).lower():
-                raise KeyboardInterrupt from None
-            raise
+        answer = solve_slice(solver, _SLICE, assumptions)
         if answer is not None:
-            return bool(answer)
+            return answer
         spent += _SLICE
     raise Undecided

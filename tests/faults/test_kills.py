@@ -24,8 +24,9 @@ FILES = [str(DOMAINS / "grid" / name) for name in ("domain.pddl", "gw1-2x2.pddl"
 ALL = [*FILES, "--tasks", "all", "--method", "minimal"]
 SIGNALS = (signal.SIGKILL, signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 OLD = b"the old file\n"
-#: What a kill that nobody can hear may leave, beside an output and in the temporary directory.
-LEFT = re.compile(r"\.[^/]{1,16}\.[a-z0-9_]{8}|coordlang-[a-z0-9_]{8}(/.*)?|\.lock")
+#: What a kill that nobody can hear may leave, beside an output and in the temporary directory:
+#: there is also a file with which Python tries whether it can write to that directory.
+LEFT = re.compile(r"[a-z0-9_]{8}|\.[^/]{1,16}\.[a-z0-9_]{8}|coordlang-[a-z0-9_]{8}(/.*)?|\.lock")
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ FILES = [str(DOMAINS / "grid" / name) for name in ("domain.pddl", "gw1-2x2.pddl"
 _AT_IMPORT = """
 import os, signal, sys
 
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 signal.signal(signal.SIGINT, signal.default_int_handler)
 number, at = int(sys.argv[1]), sys.argv[2]
 sys.argv[1:] = sys.argv[3:]

@@ -19,9 +19,10 @@ class Outcome:
 
 Command = Callable[..., Outcome]
 
-#: Ctrl-C is heard even where this process ignores it, as jobs of a shell and under nohup do.
+#: Signals are heard even where this process ignores them, as jobs of a shell and under nohup do.
 _MAIN = """
 import signal
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 signal.signal(signal.SIGINT, signal.default_int_handler)
 from coordlang.__main__ import main
 main()

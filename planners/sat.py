@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""SAT solvers of python-sat, made safe against signals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import cache
+from typing import Any
+
+from planners.signals import postponed_signals
+
+
+def sat_solver(name: str, clauses: Iterable[Sequence[int]] = ()) -> Any:
+    """A solver of python-sat that a signal at any moment leaves whole.
+
+    Parameters
+    ----------
+    name
+        The name that python-sat has for it.
+    clauses
+        The first clauses.
+
+    Returns
+    -------
+    pysat.solvers.Solver
+        A context manager; it is given back by ``delete()``.
+    """
+    solver = _solver_class()(name=name)
+    for clause in clauses:
+        solver.add_clause(clause)
+    return solver
+
+
+def solve_slice(solver: Any, conflicts: int, assumptions: Sequence[int] = ()) -> bool | None:
+    """Whether the clauses can be satisfied; None if ``conflicts`` did not decide it.
+
+    Signals are heard before and after, and not while the solver works.  python-sat would leave it
+    at SIGINT by ``longjmp`` from wherever it is, the allocation of memory included, and would leave
+    its handler behind: then the process crashes or hangs.
+    """
+    from pysat.solvers import MainThread
+
+    solver.conf_budget(conflicts)
+    own = MainThread.check
+    MainThread.check = staticmethod(lambda: False)  # it takes no signals in another thread
+    try:
+        answer = solver.solve_limited(assumptions=list(assumptions))
+    finally:
+        MainThread.check = staticmethod(own)
+    return None if answer is None else bool(answer)
+
+
+@cache
+def _solver_class() -> Any:
+    from pysat.solvers import Solver
+
+    class Whole(Solver):  # type: ignore[misc]
+        """A solver that is freed once, though a signal arrives when it has just been freed."""
+
+        def delete(self) -> None:
+            with postponed_signals():
+                super().delete()
+
+    return Whole

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A signal at any moment of a SAT solver's life is heard, and does not crash the process."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections import Counter
+from contextlib import suppress
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from coordlang.vocabulary.sat import PartitionProblem
+from planners.limits import time_limit
+from planners.sat import sat_solver, solve_slice
+from planners.signals import Interruptions
+from tests.support.command import Outcome
+from tests.support.domains import DOMAINS
+from tests.support.forks import fork, fork_command
+
+HANDOVER = [str(DOMAINS / "handover" / name) for name in ("domain.pddl", "exchange.pddl")]
+
+
+def colouring(size: int, solver: str) -> PartitionProblem:
+    """Nearly half of all pairs of 60 states lie in different words: seconds with 12 words."""
+    choice = Random(5)
+    problem = PartitionProblem(range(60), size, solver)
+    for b in range(60):
+        for a in range(b):
+            if choice.random() < 0.45:
+                problem.separate_one([(a, b)])
+    return problem
+
+
+def solve_until_interrupted(solver: str) -> None:
+    """Solve again and again; after an interrupt the memory is used as before."""
+    Interruptions()
+    with suppress(KeyboardInterrupt):
+        while True:
+            problem = colouring(12, solver)
+            try:
+                problem.solve()
+            finally:
+                problem.close()
+    left = [bytearray(size) for size in range(1, 5000, 2)]
+    problem = colouring(20, solver)
+    problem.solve(2_000)
+    problem.close()
+    del left
+
+
+def interrupted(solver: str, wait: float, again: float | None) -> Outcome:
+    process = fork(lambda: solve_until_interrupted(solver))
+    time.sleep(wait)
+    process.send(signal.SIGINT)
+    if again is not None:
+        time.sleep(again)
+        with suppress(ProcessLookupError):
+            process.send(signal.SIGINT)
+    return process.join(30)
+
+
+def interrupt_often(solver: str, times: int) -> None:
+    choice, codes = Random(solver), Counter[int]()
+    for turn in range(times):
+        again = choice.uniform(0.0, 0.05) if turn % 2 else None
+        ended = interrupted(solver, choice.uniform(0.03, 0.25), again)
+        codes[ended.code] += 1
+        assert ended.code == 0 or "planners.signals.Interrupted: SIGINT" in ended.err, ended
+    assert set(codes) <= {0, 70}  # 70: the second signal came after the first was caught
+
+
+@pytest.mark.parametrize("solver", ["cadical153", "glucose4"])
+def test_interrupts_while_solvers_work(solver: str) -> None:
+    interrupt_often(solver, 5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("solver", ["cadical153", "glucose4", "maplechrono"])
+def test_many_interrupts_while_solvers_work(solver: str) -> None:
+    interrupt_often(solver, 400)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGALRM])
+@pytest.mark.parametrize("solver", ["cadical153", "glucose4", "maplechrono"])
+def test_a_solver_is_freed_once(
+    solver: str, number: signal.Signals, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The signal comes when the solver has been freed, and python-sat has not noted it yet."""
+    import pysolvers
+
+    name = {"glucose4": "glucose41"}.get(solver, solver) + "_del"
+    free = getattr(pysolvers, name)
+
+    def freed(*arguments: object) -> None:
+        free(*arguments)
+        signal.raise_signal(number)
+
+    def work() -> None:
+        Interruptions()
+        with time_limit(100):
+            sat = sat_solver(solver, [[1, 2], [-1]])
+            assert solve_slice(sat, 10) is True
+            monkeypatch.setattr(pysolvers, name, freed)
+            sat.delete()
+
+    ended = fork(work).join()
+    assert ended.code == 70, ended
+    said = {signal.SIGINT: "Interrupted: SIGINT", signal.SIGALRM: "OutOfTime: the time limit of"}
+    assert said[number] in ended.err
+
+
+@pytest.mark.parametrize("solver", ["cadical153", "glucose4", "maplechrono"])
+def test_no_solver_is_left_by_longjmp(solver: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its third argument says whether it takes SIGINT."""
+    import pysolvers
+
+    name = {"glucose4": "glucose41"}.get(solver, solver) + "_solve_lim"
+    solve, given = getattr(pysolvers, name), []
+
+    def noted(*arguments: object) -> object:
+        given.append(arguments[2])
+        return solve(*arguments)
+
+    monkeypatch.setattr(pysolvers, name, noted)
+    with sat_solver(solver, [[1, 2], [-1]]) as sat:
+        assert solve_slice(sat, 10) is True
+        assert solve_slice(sat, 10, [-2]) is False
+    assert given == [0, 0]
+
+
+@pytest.mark.slow
+def test_many_interrupts_of_a_search_for_the_minimum(tmp_path: Path) -> None:
+    """Three words are found soon; whether two suffice is open after minutes."""
+    choice, written = Random(7), 0
+    for turn in range(200):
+        folder = tmp_path / str(turn)
+        folder.mkdir()
+        arguments = ("build", *HANDOVER, "--tasks", "all", "--method", "minimal")
+        process = fork_command(*arguments, "-o", folder / "l.json")
+        time.sleep(choice.uniform(0.2, 3.0))
+        process.send(signal.SIGINT)
+        ended = process.join(60)
+        assert ended.code == 130, ended
+        assert "Traceback" not in ended.err
+        assert ended.err.startswith("coordlang: interrupted")
+        files = [path.name for path in folder.iterdir()]
+        assert files == (["l.json"] if "is written" in ended.err else [])
+        written += len(files)
+    print(f"of 200 interrupted builds {written} wrote the best language")
+    assert written > 50
