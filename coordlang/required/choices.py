@@ -18,7 +18,7 @@ import numpy as np
 from coordlang.required.label_sets import END, LabelSets
 from planners.limits import reaching
 from planners.search.plan_space import PlanSpace
-from planners.tables import Bools, Ints
+from planners.tables import Bools, Ints, unique_tuples
 
 #: A robot's choices below some node: each first label with the set of what may follow it.
 Moves = dict[int, int]
@@ -87,7 +87,7 @@ class Choices:
     def _robot_edges(self, robot: int, edges: Ints, source: Ints, target: Ints) -> _RobotEdges:
         labels = self.space.robot_labels(robot, edges)
         table = np.column_stack((source, labels, self.of_node[robot, target]))
-        rows, inverse = np.unique(table, axis=0, return_inverse=True)
+        rows, inverse = unique_tuples(table, [int(column.max()) + 1 for column in table.T])
         fresh = np.ones(len(rows), np.bool_)
         fresh[1:] = (rows[1:, :2] != rows[:-1, :2]).any(axis=1)
         first = np.flatnonzero(fresh)
@@ -97,7 +97,7 @@ class Choices:
         sizes = np.diff(np.append(start, len(groups)))
         here = self.sets.sets(start, sizes, groups[:, 1], following)
         group_of_row = np.cumsum(fresh) - 1
-        return _RobotEdges(here, sizes, following[group_of_row[inverse.reshape(-1)]])
+        return _RobotEdges(here, sizes, following[group_of_row[inverse]])
 
     # ---- does a mixture of given choices fail?
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planners.tables import Bools, Ints
+from planners.tables import Bools, Ints, unique_tuples
 
 #: The set that holds only the empty sequence.
 END = 0
@@ -100,29 +100,30 @@ class LabelSets:
         for position in range(1, int(sizes.max(initial=0))):
             open_groups = np.flatnonzero(sizes > position)
             pairs = np.column_stack((result[open_groups], members[first[open_groups] + position]))
-            different, inverse = np.unique(pairs, axis=0, return_inverse=True)
+            different, inverse = unique_tuples(pairs, [len(self)] * 2)
             united = [self.union(a, b) for a, b in different.tolist()]
-            result[open_groups] = np.array(united, np.int64)[inverse.reshape(-1)]
+            result[open_groups] = np.array(united, np.int64)[inverse]
         return result
 
     def sets(self, first: Ints, sizes: Ints, labels: Ints, after: Ints) -> Ints:
         """For each group of moves, sorted by label, the set that has them."""
         result = np.full(len(first), END, np.int64)
+        most = int(labels.max(initial=0)) + 1
         for position in range(int(sizes.max(initial=0))):
             open_groups = np.flatnonzero(sizes > position)
             at = first[open_groups] + position
             rows = np.column_stack((result[open_groups], labels[at], after[at]))
-            different, inverse = np.unique(rows, axis=0, return_inverse=True)
+            different, inverse = unique_tuples(rows, [len(self), most, len(self)])
             extended = [self._extended(*row) for row in different.tolist()]
-            result[open_groups] = np.array(extended, np.int64)[inverse.reshape(-1)]
+            result[open_groups] = np.array(extended, np.int64)[inverse]
         return result
 
     def within_each(self, one: Ints, other: Ints) -> Bools:
         """For each pair whether ``one[k]`` is `within` ``other[k]``."""
         pairs = np.column_stack((one, other))
-        different, inverse = np.unique(pairs, axis=0, return_inverse=True)
+        different, inverse = unique_tuples(pairs, [len(self)] * 2)
         answers = np.array([self.within(a, b) for a, b in different.tolist()], np.bool_)
-        return answers[inverse.reshape(-1)]
+        return answers[inverse]
 
     def all_within(self, one: Sequence[int], other: Sequence[int]) -> bool:
         """Whether each set of ``one`` is `within` its partner."""

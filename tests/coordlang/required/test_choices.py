@@ -8,13 +8,14 @@ from collections.abc import Iterator
 from dataclasses import replace
 from random import Random
 
+import numpy as np
 import pytest
 
 from coordlang.required.choices import Choices
 from coordlang.required.divergences import first_differences
 from coordlang.required.label_sets import LabelSets
 from coordlang.required.miscoordination import inseparable
-from coordlang.required.partings import Partings
+from coordlang.required.partings import Partings, _KnownSets
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from planners.errors import BadInput, ProvedImpossible
 from planners.loading import ModelOptions
@@ -22,6 +23,7 @@ from planners.pddl import parse_domain, parse_problem
 from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
 from planners.search.plan_space import PlanSpace
+from tests.support import naive_partings
 from tests.support.composition_walk import walk
 from tests.support.random_models import random_model
 from tests.support.random_pddl import random_model as random_pddl
@@ -51,15 +53,21 @@ def candidates_of_kinds(seed: int) -> Candidates:
     return make(domain, [problem], options)
 
 
-def separable_spaces(seeds: range, robots: int | None) -> Iterator[PlanSpace]:
-    """Plan spaces of random candidate tasks without inseparable plans, small enough for the twin."""
+def separable_spaces(
+    seeds: range, robots: int | None, most: int | None = None
+) -> Iterator[PlanSpace]:
+    """Plan spaces of random candidate tasks without inseparable plans, small enough for the twin.
+
+    ``most`` nodes, or as many as the walk is waited for.
+    """
     for seed in seeds:
         try:
             found = candidates_of(seed, robots) if robots else candidates_of_kinds(seed)
         except (ProvedImpossible, BadInput):
             continue
         for space in found.spaces:
-            if 0 < len(space) <= MOST.get(space.robots, 0) and inseparable(space) is None:
+            limit = MOST.get(space.robots, 0) if most is None else most
+            if 0 < len(space) <= limit and inseparable(space) is None:
                 yield space
 
 
@@ -102,6 +110,52 @@ def test_choices_equal_the_walk_on_many_models(robots: int | None, first: int, l
     )
     assert answers[True] >= 10
     assert answers[False] >= 10
+
+
+def tables_agree(seeds: range, robots: int | None, most: int) -> Counter[int]:
+    """Compare with the twin node by node; how many divergences have how many next states."""
+    sizes: Counter[int] = Counter()
+    for number, space in enumerate(separable_spaces(seeds, robots, most)):
+        choices = Choices(space)
+        partings = Partings(space.robots, chunk=(5, 70, 1_000_000)[number % 3])
+        partings.add(choices)
+        rows = [tuple(s for s in row if s >= 0) for row in partings.table().tolist()]
+        assert rows == naive_partings.divergences(choices)
+        sizes.update(len(row) - 1 for row in rows)
+    return sizes
+
+
+@pytest.mark.parametrize(("robots", "number"), [(2, 40), (3, 15), (4, 12), (None, 15)])
+def test_whole_tables_equal_node_by_node(robots: int | None, number: int) -> None:
+    sizes = tables_agree(range(500, 500 + number), robots, 1_000)
+    assert sizes[2] >= 20
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("robots", "first", "last"), [(3, 6_000, 6_500), (4, 7_000, 7_400), (None, 8_000, 8_300)]
+)
+def test_whole_tables_equal_node_by_node_on_many_models(
+    robots: int | None, first: int, last: int
+) -> None:
+    sizes = tables_agree(range(first, last), robots, 5_000)
+    print(f"{robots or 'any'} robots: divergences by number of next states {dict(sizes)}")
+    assert sizes[2] >= 20
+
+
+@pytest.mark.parametrize("packs", [True, False])
+def test_known_sets_are_found_packed_or_not(packs: bool) -> None:
+    """Where the number of states is too large to pack a row into one number, too."""
+    states = 50 if packs else 2**22
+    known = _KnownSets(2, states)
+    random = np.random.default_rng(0)
+    rows = random.integers(0, 50, (200, 3))
+    known.enter(rows[:60])
+    known.enter(rows[60:100])
+    listed = {tuple(row) for row in rows[:100].tolist()}
+    assert known.rows.tolist() == sorted(map(list, listed))
+    assert known.has(rows).tolist() == [tuple(row) in listed for row in rows.tolist()]
+    assert 0 < known.has(rows[100:]).sum() + len(listed) < 200
 
 
 @pytest.mark.parametrize("seed", range(8))
