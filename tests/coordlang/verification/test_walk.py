@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The verifier's walk against its twin: by nodes in place of views, every move of every plan."""
+
+from __future__ import annotations
+
+from collections import Counter
+from random import Random
+
+import numpy as np
+import pytest
+
+from coordlang.language.partition import Partition
+from coordlang.tasks.candidates import all_pairs, from_problems
+from coordlang.verification import leads
+from coordlang.verification.by_definition import verify
+from planners.errors import BadInput, ProvedImpossible
+from tests.support.random_models import random_model
+from tests.support.verification_walk import violation
+
+#: Edges to the power of the robots in a plan space that the twin is given.
+MOST = 4_000
+
+
+def compared(seeds: range, robots: int) -> Counter[bool]:
+    answers: Counter[bool] = Counter()
+    for seed in seeds:
+        random = Random(seed)
+        domain, problem, options = random_model(seed, robots)
+        make = from_problems if random.random() < 0.5 else all_pairs
+        try:
+            found = make(domain, [problem], options)
+        except (ProvedImpossible, BadInput):
+            continue
+        spaces = [space for space in found.spaces if len(space.starts)]
+        work = sum(float((space.out_degrees.astype(float) ** robots).sum()) for space in spaces)
+        if not spaces or work > MOST:
+            continue
+        for size in (1, 2, 3, 6):
+            word = np.array([random.randrange(size) for _ in found.rows])
+            table = Partition(tuple(f"w{n}" for n in range(size)), found.rows, word, 0)
+            expected = any(violation(space, word[space.state]) for space in spaces)
+            assert verify(table, spaces).holds == (not expected)
+            answers[expected] += 1
+    return answers
+
+
+@pytest.mark.parametrize(("robots", "number"), [(2, 30), (3, 25), (4, 25)])
+def test_the_walk_equals_its_twin(robots: int, number: int) -> None:
+    answers = compared(range(900, 900 + number), robots)
+    assert min(answers[True], answers[False]) >= 4
+
+
+def test_leads_are_the_same_beyond_the_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(leads, "_LARGEST_TABLE", 10)
+    answers = compared(range(900, 910), 2)
+    assert min(answers[True], answers[False]) >= 2
+
+
+def test_pieces_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("coordlang.verification.by_definition._CHUNK", 7)
+    answers = compared(range(915, 925), 2)
+    assert min(answers[True], answers[False]) >= 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("robots", "number"), [(2, 800), (3, 800), (4, 500)])
+def test_the_walk_equals_its_twin_on_many_models(robots: int, number: int) -> None:
+    answers = compared(range(10_000, 10_000 + number), robots)
+    print(f"{robots} robots: {answers[True]} partitions with a violation, {answers[False]} without")
+    assert min(answers[True], answers[False]) >= 50
