@@ -170,7 +170,7 @@ class _Walk:
     def _on_diagonal(self, child: Ints) -> Bools:
         """Which nodes are diagonal; they are entered in the mask."""
         y = child[:, self.robots]
-        same = (y != FAILED) & (child[:, self.robots + 1 :] == 0).all(axis=1)
+        same: Bools = (y != FAILED) & (child[:, self.robots + 1 :] == 0).all(axis=1)
         for robot, views in enumerate(self._views):
             same &= views.of[y] == child[:, robot]
         self._diagonal[y[same]] = True
@@ -216,4 +216,5 @@ def _different(table: Ints) -> Ints:
     low = table.min(axis=0, initial=0)
     bounds = [int(bound) for bound in table.max(axis=0, initial=0) - low + 1]
     different, _ = unique_tuples(table - low, bounds)
-    return different + low
+    different += low
+    return different

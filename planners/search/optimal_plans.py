@@ -7,7 +7,7 @@ The set ``Pi(I, G)`` of the paper, as the paths of a graph (Proposition 1 of doc
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +18,10 @@ from planners.joint.model import Goal, JointModel, PlanningTask, Steps
 from planners.limits import reaching
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, PieceSizes, Space, blocks
-from planners.tables import Bools, Ints, Rows, find_rows, unique_rows
+from planners.tables import Bools, Ints, Rows, find_rows, ranges, unique_rows
+
+#: Where fewer than one in so many states are new, only the joint steps into these are looked at.
+_FEW = 8
 
 _FAR = np.iinfo(np.int64).max // 4
 
@@ -269,27 +272,67 @@ def _batch(space: Space, tasks: Sequence[tuple[Goal, Rows | None]]) -> PlanSpace
 def distances(space: Space, reached: Bools) -> Ints:
     """Least makespan from every state to every goal, (goals, states), -1 where there is none.
 
-    ``reached`` (goals, states): which states satisfy which goal.  One backward search per goal,
-    O(goals x joint steps), by scipy.
+    ``reached`` (goals, states): which states satisfy which goal.  Breadth first from all goals at
+    once, backward, with a bit for each goal: O(joint steps x goals / 64) for a layer at most, and
+    only joint steps into states that are new for some goal where these are few.
     """
-    from scipy.sparse import csr_matrix
-    from scipy.sparse.csgraph import dijkstra
-
-    source = space.sources
-    result = np.empty(reached.shape, np.int64)
-    size = max(1, len(space))
-    for start in range(0, len(reached), size):
-        goal, state = np.nonzero(reached[start : start + size])
-        goals = len(reached[start : start + size])
-        # A node for each goal, with an edge to each of its states; all joint steps are reversed.
-        tail = np.concatenate((space.target, goal + len(space)))
-        head = np.concatenate((source, state))
-        nodes = len(space) + goals
-        graph = csr_matrix((np.ones(len(tail)), (tail, head)), shape=(nodes, nodes))
-        far = dijkstra(graph, unweighted=True, indices=np.arange(len(space), nodes))
-        far = far[:, : len(space)]
-        result[start : start + goals] = np.where(np.isinf(far), 0, far) - 1
+    result = np.where(reached, 0, -1)
+    new = _as_bits(reached.T)
+    seen = new.copy()
+    back = _BackwardSteps.of(space)
+    steps = 0
+    while len(changed := np.flatnonzero(new.any(axis=1))):
+        if steps:
+            which, goal = np.nonzero(
+                np.unpackbits(new[changed].view(np.uint8), axis=1, count=len(reached))
+            )
+            result[goal, changed[which]] = steps
+        new = back.before(new, changed) & ~seen
+        seen |= new
+        steps += 1
     return result
+
+
+def _as_bits(table: Bools) -> Rows:
+    """A table of truth values as 64-bit blocks, row by row."""
+    size = -(-table.shape[1] // 64) * 8
+    packed = np.zeros((len(table), size), np.uint8)
+    bits = np.packbits(table, axis=1)
+    packed[:, : bits.shape[1]] = bits
+    return packed.view(np.uint64)
+
+
+@dataclass(frozen=True, slots=True)
+class _BackwardSteps:
+    """The joint steps of a space by their target: ``first`` delimits their ``source``."""
+
+    space: Space
+    first: Ints
+    source: Ints
+
+    @classmethod
+    def of(cls, space: Space) -> _BackwardSteps:
+        order = np.argsort(space.target, kind="stable")
+        first = np.searchsorted(space.target[order], np.arange(len(space) + 1))
+        return cls(space, first, space.sources[order])
+
+    def before(self, bits: Rows, changed: Ints) -> Rows:
+        """For each state the bits of all states one joint step on; those not changed have none."""
+        found = np.zeros_like(bits)
+        if len(changed) * _FEW > len(bits):
+            leading = np.flatnonzero(np.diff(self.space.first))
+            if len(leading):
+                following = bits[self.space.target]
+                found[leading] = np.bitwise_or.reduceat(following, self.space.first[leading])
+            return found
+        counts = self.first[changed + 1] - self.first[changed]
+        source = self.source[ranges(self.first[changed], counts)]
+        order = np.argsort(source, kind="stable")
+        states, start = np.unique(source[order], return_index=True)
+        if len(states):
+            following = bits[np.repeat(changed, counts)[order]]
+            found[states] = np.bitwise_or.reduceat(following, start)
+        return found
 
 
 def _second_costs(space: Space, distance: Ints) -> tuple[Ints, PlanSpace]:

@@ -276,7 +276,7 @@ def test_verification_and_the_search_for_a_break_say_how_far_they_got(
     def fail(*_: object, **__: object) -> None:
         raise late()
 
-    monkeypatch.setattr(verify._Check, "_some_moves", fail)
+    monkeypatch.setattr(verify._Walk, "_children", fail)
     with pytest.raises(OutOfTime) as caught:
         verify.verify(table, [space])
     assert "layer 1 of 5 of the verification, 1 nodes of its walk" in str(caught.value)

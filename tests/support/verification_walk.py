@@ -23,7 +23,7 @@ def violation(space: PlanSpace, word: Ints) -> bool:
     starts = sorted(set(space.starts.tolist()), key=lambda node: -int(space.layer[node]))
     layers: dict[int, set[Node]] = {}
     for start in starts:
-        node = ((start,) * space.robots, start, (((), ()),) * (space.robots - 1))
+        node: Node = ((start,) * space.robots, start, (((), ()),) * (space.robots - 1))
         layers.setdefault(int(space.layer[start]), set()).add(node)
     for layer in range(max(layers, default=0), 0, -1):
         for node in layers.get(layer, ()):

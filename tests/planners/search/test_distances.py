@@ -31,8 +31,11 @@ def by_definition(space: Space, reached: Bools) -> list[list[int]]:
     return rows
 
 
-@pytest.mark.parametrize("seed", range(12))
-def test_distances(seed: int) -> None:
+@pytest.mark.parametrize("few", [0, 2, 8, 10**9])
+@pytest.mark.parametrize("seed", range(6))
+def test_distances(seed: int, few: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whether all joint steps are looked at in each layer, or only those into new states."""
+    monkeypatch.setattr("planners.search.optimal_plans._FEW", few)
     random = Random(seed)
     domain, problem, options = random_model(seed, random.choice([2, 3]))
     loaded = build(domain, [problem], options)
