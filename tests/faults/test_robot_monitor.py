@@ -255,7 +255,7 @@ MALFORMED: dict[str, tuple[Callable[[dict[str, Any]], None], str]] = {
     "a surrogate": (changed(["facts", 3], "(at \ud800)"), r"has \(at \\ud800\) in place"),
     "a robot twice": (lambda data: data["choices"].append(entry_of(data)), "choices of r1 twice"),
     "choices is an object": (lambda data: data.update(choices={"r1": 1}), "'choices' is a dict"),
-    "choices is empty": (lambda data: data["choices"].clear(), "it has those of nobody"),
+    "choices is empty": (lambda data: data["choices"].clear(), "it has those of no robot"),
     "sentence is a list": (lambda data: data.update(sentence=["w0"]), "'sentence' is a list"),
     "version is a float": (lambda data: data.update(version=1.0), r"version 1\.0; this program"),
 }
