@@ -44,11 +44,11 @@ class Moment:
     The state before the step, the subactions of the step, and who acts.
 
     A negative action formula never speaks of the robots in ``acting`` (empty for conditions of
-    effects and goals). ``step`` None leaves the step open: every literal about it then counts as
-    true.
+    effects and goals). ``step`` None leaves the step open, ``state`` None the state: every literal
+    about it then counts as true.
     """
 
-    state: State
+    state: State | None
     step: frozenset[StepAtom] | None = frozenset()
     acting: tuple[int, ...] = ()
 
@@ -76,7 +76,7 @@ class Meaning:
             return fixed
         atom = _ground(formula, binding)
         if isinstance(atom, Atom):
-            return (atom in moment.state) == positive
+            return moment.state is None or (atom in moment.state) == positive
         return moment.step is None or (atom in moment.step) == positive
 
     def why_not(self, formula: Formula, binding: Binding, positive: bool, moment: Moment) -> str:

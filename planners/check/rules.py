@@ -69,7 +69,7 @@ class Rules:
     schemas: dict[str, Schema]
     is_joint_action: bool
     _instances: dict[str, Instance | str] = field(default_factory=dict)
-    _touched: dict[StepAtom, Touched] = field(default_factory=dict)
+    _touched: dict[tuple[StepAtom, StepAtom | None], Touched] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -200,10 +200,10 @@ class Rules:
 
     def _clash(self, one: Instance, other: Instance) -> str | None:
         """How the changes of ``one`` interfere with ``other``."""
-        mine, theirs = self.touched(one), self.touched(other)
+        mine, theirs = self.touched(one, other), self.touched(other, one)
         if both := mine.deletes & theirs.adds:
             return f"{one.text} deletes {_first(both)}, which {other.text} adds"
-        if (other.name, True) in mine.needs or (one.name, True) in theirs.needs:
+        if self._names(one, other) or self._names(other, one):
             return None  # linked by a positive action formula: meant to be done together
         if self._joined(one, other):
             return None
@@ -258,13 +258,20 @@ class Rules:
             self._matches(by_name[v], one) & self._matches(by_name[w], other) for v, w in pairs
         )
 
-    def touched(self, action: Instance) -> Touched:
+    def _names(self, one: Instance, other: Instance) -> bool:
+        """Whether a positive literal of a condition of ``one`` is the subaction ``other``."""
+        return (other.name, True) in self.touched(one).needs
+
+    def touched(self, action: Instance, other: Instance | None = None) -> Touched:
         """Conditional effects count as if they fired and their conditions as required.
 
-        Adding wins over deleting.
+        Adding wins over deleting.  Beside ``other``, effects count whose conditions are true in
+        some state with exactly these two subactions in the step.
         """
-        if action.name in self._touched:
-            return self._touched[action.name]
+        key = action.name, other.name if other else None
+        if key in self._touched:
+            return self._touched[key]
+        pair = frozenset((action.name, other.name)) if other else None
         needs = set(
             self.meaning.required(action.schema.precondition, action.binding, True, action.owners)
             or ()
@@ -273,13 +280,14 @@ class Rules:
         for effect in action.schema.effects:
             for binding in self.meaning.bindings(effect.variables, action.binding):
                 required = self.meaning.required(effect.condition, binding, True, ())
-                if required is not None:
+                fires = self.meaning.holds(effect.condition, binding, True, Moment(None, pair))
+                if required is not None and fires:
                     needs |= required
                     changes[effect.adds].add(ground_atom(effect.atom, binding))
         touched = Touched(
             frozenset(needs), frozenset(changes[True]), frozenset(changes[False] - changes[True])
         )
-        self._touched[action.name] = touched
+        self._touched[key] = touched
         return touched
 
     def _after(self, state: State, actions: Iterable[Instance]) -> State:

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 from planners.grounding import GroundAction
 from planners.joint.model import JointModel
 from planners.pddl.formula_tree import forbidden_steps, literals
-from planners.pddl.lifted import Atom, Equal, StepAtom
+from planners.pddl.lifted import And, Atom, Equal, Formula, Not, Or, StepAtom, Truth
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,15 +116,20 @@ def clashes(actions: Sequence[GroundAction]) -> tuple[frozenset[int], ...]:
 
     In terms of literals ``(atom, value)``: two actions interfere when one writes the contrary of
     what the other writes or reads; the latter is forgiven when a positive formula links them.
-    Besides, a formula may forbid the other.
+    Besides, a formula may forbid the other.  Effects that cannot happen with just the two in the
+    step neither write nor read.
     """
     number = {StepAtom(a.schema, a.args): n for n, a in enumerate(actions)}
-    writers, readers = _writers(actions), _readers(actions)
     linked, forbidden = _linked(actions, number), _forbidden(actions, number)
-    pairs = set(forbidden)
-    for (atom, value), changing in writers.items():
-        pairs |= _pairs(changing, writers.get((atom, not value), set()))
-        pairs |= _pairs(changing, readers.get((atom, not value), set())) - linked
+    special = _decided_by_each_other(actions, number)
+    pairs = _contrary([_with_effects(action) for action in actions], linked) - special
+    both = frozenset((0, 1))
+    for pair in special:
+        two = [actions[n] for n in sorted(pair)]
+        alone = [_with_effects(action, *two) for action in two]
+        if both in _contrary(alone, {both} if pair in linked else set()):
+            pairs.add(pair)
+    pairs |= forbidden
     found: list[set[int]] = [set() for _ in actions]
     for pair in pairs:
         if len(pair) == 2:
@@ -132,6 +137,51 @@ def clashes(actions: Sequence[GroundAction]) -> tuple[frozenset[int], ...]:
             found[first].add(second)
             found[second].add(first)
     return tuple(frozenset(others) for others in found)
+
+
+def _contrary(actions: Sequence[GroundAction], linked: _Pairs) -> _Pairs:
+    """Pairs of which one writes the contrary of what the other writes, or reads unless linked."""
+    writers, readers = _writers(actions), _readers(actions)
+    pairs: _Pairs = set()
+    for (atom, value), changing in writers.items():
+        pairs |= _pairs(changing, writers.get((atom, not value), set()))
+        pairs |= _pairs(changing, readers.get((atom, not value), set())) - linked
+    return pairs
+
+
+def _decided_by_each_other(
+    actions: Sequence[GroundAction], number: Mapping[StepAtom, int]
+) -> _Pairs:
+    """Pairs of which the condition of an effect of one names the other."""
+    return {
+        frozenset((n, number[leaf]))
+        for n, action in enumerate(actions)
+        for effect in action.effects
+        for leaf, _ in literals(effect.condition)
+        if isinstance(leaf, StepAtom) and number.get(leaf, n) != n
+    }
+
+
+def _with_effects(action: GroundAction, *step: GroundAction) -> GroundAction:
+    """The action with those effects only that may happen with these, and itself, in the step."""
+    there = {StepAtom(a.schema, a.args) for a in (action, *step)}
+    kept = tuple(e for e in action.effects if _may_hold(e.condition, there))
+    return replace(action, effects=kept)
+
+
+def _may_hold(condition: Formula, there: set[StepAtom], positive: bool = True) -> bool:
+    """Whether a condition, or its negation, holds in some state: facts may be as they have to."""
+    match condition:
+        case Truth(value):
+            return value == positive
+        case StepAtom():
+            return (condition in there) == positive
+        case Not(part):
+            return _may_hold(part, there, not positive)
+        case And(parts) | Or(parts):
+            each = (_may_hold(part, there, positive) for part in parts)
+            return all(each) if isinstance(condition, And) == positive else any(each)
+    return True
 
 
 def _pairs(some: Iterable[int], others: Iterable[int]) -> _Pairs:

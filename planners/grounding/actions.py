@@ -24,9 +24,9 @@ class GroundAction:
 
     ``owners`` are the indices of the robots that choose it together; for joint-action PDDL they are
     all robots and ``parts`` holds each robot's own label (None: idle).  ``cost`` is the PDDL action
-    cost.  ``does_nothing`` says that the action is as good as idling: it has no effect, no cost
-    that is counted, and no formula or network names it. ``links`` are the actions that a
-    concurrency network joins it with: they are meant to be done together.
+    cost.  ``does_nothing`` says that the action is as good as idling: its schema has no
+    effect as written, no cost that is counted, and no formula or network names it.  ``links`` are
+    the actions that a concurrency network joins it with: they are meant to be done together.
     """
 
     schema: str

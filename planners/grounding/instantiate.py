@@ -122,7 +122,9 @@ class _Grounder:
             effects=effects,
             parts=self._parts(schema, binding),
             cost=cost,
-            does_nothing=not effects and schema.name not in self._named and not (costs and cost),
+            does_nothing=not schema.effects
+            and schema.name not in self._named
+            and not (costs and cost),
         )
 
     def formula(

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from itertools import combinations, product
 
 import numpy as np
@@ -151,6 +152,20 @@ class ComposingStepper:
 
     def conflict_in(self, rows: Rows) -> str | None:
         """Why two subactions interfere that are both possible in one of these states, or None."""
+        return next((why for pair in self._clashing(rows) if (why := self._conflict(pair))), None)
+
+    def frequent_conflict(self, rows: Rows) -> tuple[str, int] | None:
+        """The `conflict_in` that is met in most of these states, and in how many."""
+        counted = Counter(self._clashing(rows)).most_common()
+        return next(((why, n) for pair, n in counted if (why := self._conflict(pair))), None)
+
+    def _conflict(self, pair: tuple[int, int, int, int]) -> str | None:
+        i, j, mine, theirs = pair
+        first, second = self._choices[i][mine], self._choices[j][theirs]
+        return conflict(first, second) if first and second else None
+
+    def _clashing(self, rows: Rows) -> Iterator[tuple[int, int, int, int]]:
+        """State by state two robots and labels of theirs, each possible, that may not meet."""
         options = self.choices(rows)
         robots = range(len(self._robots))
         for state, (i, j) in product(range(len(rows)), combinations(robots, 2)):
@@ -159,10 +174,7 @@ class ComposingStepper:
                 for first, labels in (options[i], options[j])
             )
             for a, b in np.argwhere(~self.tables[i, j][np.ix_(mine, theirs)]).tolist():
-                first_one, second_one = self._choices[i][mine[a]], self._choices[j][theirs[b]]
-                if first_one and second_one and (why := conflict(first_one, second_one)):
-                    return why
-        return None
+                yield i, j, int(mine[a]), int(theirs[b])
 
     def _options(self, robot: _Subactions, number: int, rows: Rows) -> tuple[Ints, Ints]:
         """CSR of each state's labels for one robot: (first index, labels)."""

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.grounding import GroundAction
-from planners.pddl.formula_tree import Leaf, forbidden_steps, label, literals
-from planners.pddl.lifted import Atom, StepAtom
+from planners.pddl.formula_tree import Leaf, forbidden_steps, label, literals, substituted
+from planners.pddl.lifted import FALSE, Atom, Formula, StepAtom, Truth
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,8 +19,9 @@ class Footprint:
     """What an action touches, as the interference rule reads it.
 
     Every literal left after grounding counts as required, also inside disjunctions and effect
-    conditions; conditional effects count as if they fired; an atom both deleted and added counts as
-    added.  ``partners`` are the actions that a positive literal of a precondition or effect
+    conditions; conditional effects count as if they fired, but those whose condition the pair of
+    actions itself makes false are none; an atom both deleted and added counts as added.
+    ``partners`` are the actions that a positive literal of a precondition or effect
     condition or a network names, ``excluded`` those that its precondition as a whole forbids.
     """
 
@@ -32,22 +33,47 @@ class Footprint:
     excluded: frozenset[StepAtom]
 
 
-def footprint(action: GroundAction) -> Footprint:
-    """The `Footprint` of a ground action."""
+def footprint(action: GroundAction, step: frozenset[StepAtom] | None = None) -> Footprint:
+    """The `Footprint` of a ground action.
+
+    ``step`` are the subactions of the pair: effects whose condition needs others, or none of these,
+    are left out.  None: every effect counts.
+    """
     conditions = (action.precondition, *(effect.condition for effect in action.effects))
+    partners = {
+        leaf
+        for condition in conditions
+        for leaf, positive in literals(condition)
+        if positive and isinstance(leaf, StepAtom)
+    }
+    effects = [e for e in action.effects if step is None or _can_fire(e.condition, step)]
     signs: dict[bool, set[Leaf]] = {True: set(), False: set()}
-    for condition in conditions:
+    for condition in (action.precondition, *(effect.condition for effect in effects)):
         for leaf, positive in literals(condition):
             signs[positive].add(leaf)
-    adds = frozenset(e.atom for e in action.effects if e.adds)
+    adds = frozenset(e.atom for e in effects if e.adds)
     return Footprint(
         requires_true=frozenset(a for a in signs[True] if isinstance(a, Atom)),
         requires_false=frozenset(a for a in signs[False] if isinstance(a, Atom)),
         adds=adds,
-        deletes=frozenset(e.atom for e in action.effects if not e.adds) - adds,
-        partners=action.links | {a for a in signs[True] if isinstance(a, StepAtom)},
+        deletes=frozenset(e.atom for e in effects if not e.adds) - adds,
+        partners=action.links | partners,
         excluded=frozenset(forbidden_steps(action.precondition)),
     )
+
+
+def _can_fire(condition: Formula, step: frozenset[StepAtom]) -> bool:
+    """Whether a condition is true in some state, with exactly these subactions in the step."""
+
+    def value(leaf: Atom | StepAtom) -> Formula:
+        return Truth(leaf in step) if isinstance(leaf, StepAtom) else leaf
+
+    return substituted(condition, value) != FALSE
+
+
+def _name(action: GroundAction) -> StepAtom:
+    """What formulas call an action."""
+    return StepAtom(action.schema, action.args)
 
 
 def conflict(a: GroundAction, b: GroundAction) -> str | None:
@@ -55,9 +81,10 @@ def conflict(a: GroundAction, b: GroundAction) -> str | None:
 
     The rule of docs/pddl.md, read literally; `compatible` is the same for whole tables.
     """
-    first, second = footprint(a), footprint(b)
+    pair = frozenset((_name(a), _name(b)))
+    first, second = footprint(a, pair), footprint(b, pair)
     for one, other, x, y in ((a, b, first, second), (b, a, second, first)):
-        if StepAtom(other.schema, other.args) in x.excluded:
+        if _name(other) in x.excluded:
             return f"{one.label} forbids {other.label} in the same step"
         if x.deletes & y.adds:
             return f"{one.label} deletes {_show(x.deletes & y.adds)}, which {other.label} adds"
@@ -79,10 +106,7 @@ def conflict(a: GroundAction, b: GroundAction) -> str | None:
 
 def _linked(a: GroundAction, b: GroundAction, first: Footprint, second: Footprint) -> bool:
     """Two actions meant to be done together: one names the other in a positive literal."""
-    return (
-        StepAtom(b.schema, b.args) in first.partners
-        or StepAtom(a.schema, a.args) in second.partners
-    )
+    return _name(b) in first.partners or _name(a) in second.partners
 
 
 def _show(atoms: frozenset[Atom]) -> str:
@@ -98,13 +122,20 @@ def compatible(
     A shared subaction of both goes only with itself; one that only names other robots goes with
     idling too. O(pairs that touch one atom) beside the table itself.
     """
-    mine, theirs = ([footprint(a) if a else None for a in side] for side in (left, right))
+    # Where no condition of an effect names the other, its own action alone decides what can fire.
+    mine, theirs = (
+        [footprint(a, frozenset((_name(a),))) if a else None for a in side]
+        for side in (left, right)
+    )
     table = ~_meeting(mine, theirs, [("requires_true", "deletes"), ("requires_false", "adds")])
     for row, column in _naming("partners", left, right, mine, theirs):  # meant to be done together
         table[row, column] = True
     table &= ~_meeting(mine, theirs, [("adds", "deletes")])
     for row, column in _naming("excluded", left, right, mine, theirs):
         table[row, column] = False
+    for row, column in _conditional_on_each_other(left, right):
+        a, b = left[row], right[column]
+        table[row, column] = not (a and b and conflict(a, b))
     _share(table, left, right, i, j)
     return table
 
@@ -128,8 +159,37 @@ def _naming(
                 yield rows[named], column
 
 
+def _conditional_on_each_other(
+    left: Sequence[GroundAction | None], right: Sequence[GroundAction | None]
+) -> set[tuple[int, int]]:
+    """Pairs of which the condition of an effect of one names the other."""
+    columns, rows = _numbers(right), _numbers(left)
+    found = {
+        (row, columns[name])
+        for row, one in enumerate(left)
+        for name in _named_by_effects(one)
+        if name in columns
+    }
+    return found | {
+        (rows[name], column)
+        for column, one in enumerate(right)
+        for name in _named_by_effects(one)
+        if name in rows
+    }
+
+
+def _named_by_effects(action: GroundAction | None) -> set[StepAtom]:
+    """The subactions that the conditions of an action's effects name."""
+    return {
+        leaf
+        for effect in (action.effects if action else ())
+        for leaf, _ in literals(effect.condition)
+        if isinstance(leaf, StepAtom)
+    }
+
+
 def _numbers(side: Sequence[GroundAction | None]) -> dict[StepAtom, int]:
-    return {StepAtom(a.schema, a.args): number for number, a in enumerate(side) if a}
+    return {_name(a): number for number, a in enumerate(side) if a}
 
 
 def _meeting(

@@ -122,6 +122,10 @@ class JointActionStepper:
         """None: a joint action is written as a whole."""
         return None
 
+    def frequent_conflict(self, rows: Rows) -> tuple[str, int] | None:
+        """None: a joint action is written as a whole."""
+        return None
+
 
 def _cost_of(action: GroundAction, cost: Cost) -> int:
     """The second component of a joint action's cost: under ``makespan+actions`` its parts."""

@@ -101,6 +101,9 @@ class Stepper(Protocol):
     def conflict_in(self, rows: Rows) -> str | None:
         """Why two subactions that are both possible in one of these states interfere, in words."""
 
+    def frequent_conflict(self, rows: Rows) -> tuple[str, int] | None:
+        """The `conflict_in` that is met in most of these states, and in how many."""
+
 
 @dataclass(frozen=True, slots=True)
 class JointModel:

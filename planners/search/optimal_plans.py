@@ -25,6 +25,8 @@ _FEW = 8
 
 _FAR = np.iinfo(np.int64).max // 4
 
+#: States in which the reason why actions cannot share a step is looked for.
+_LOOK_AT = 1_000
 #: The steps of a layer in pieces: (number of the first state, steps).
 Stored = list[tuple[int, Steps]]
 
@@ -81,18 +83,28 @@ def _forward(
             raise ProvedImpossible(
                 f"task {task.name}: the goal cannot be reached",
                 position=task.position,
-                remedy=_searched(len(seen)),
+                remedy=_searched(model, seen),
             )
         seen, _ = unique_rows(np.concatenate((seen, layer)))
         layers.append(layer)
         kept.append(steps_here)
 
 
-def _searched(states: int) -> str:
-    return (
-        f"All {states:,} reachable states were searched."
-        if states > 1
+def _searched(model: JointModel, seen: Rows) -> str:
+    """What was searched without reaching the goal, and what kept robots from acting together."""
+    said = (
+        f"All {len(seen):,} reachable states were searched."
+        if len(seen) > 1
         else "No other state can be reached."
+    )
+    looked_at = model.codec.facts_part(seen[:: len(seen) // _LOOK_AT + 1])
+    found = model.stepper.frequent_conflict(looked_at)
+    if found is None:
+        return said
+    why, states = found
+    return (
+        f"{said}\n  Of pairs of actions that cannot share a step, the one met most often "
+        f"({states:,} of {len(looked_at):,} states looked at): {why}."
     )
 
 
@@ -253,7 +265,7 @@ def _batch(space: Space, tasks: Sequence[tuple[Goal, Rows | None]]) -> PlanSpace
         if len(bad):
             raise ProvedImpossible(
                 f"the goal cannot be reached from {space.model.state_text(inits[bad[0]])}",
-                remedy=_searched(len(space)),
+                remedy=_searched(space.model, space.rows),
             )
         states.append(found)
     second, graph = _second_costs(space, distance)

@@ -171,6 +171,9 @@ class Stopping:
     def conflict_in(self, rows: Rows) -> str | None:
         return self.stepper.conflict_in(rows)
 
+    def frequent_conflict(self, rows: Rows) -> tuple[str, int] | None:
+        return self.stepper.frequent_conflict(rows)
+
 
 def corners(problem: str = "corners-3x3") -> PlanningInstance:
     return load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / f"{problem}.pddl"])

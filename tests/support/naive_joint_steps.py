@@ -107,13 +107,10 @@ class Twin:
         return sum(not self.does_nothing(label) for label in {*labels} if label is not None)
 
     def does_nothing(self, label: str) -> bool:
-        """No effect, whatever the state and the step, and no formula of the domain names the
-        action.
-        """
+        """No effect as written, and no formula of the domain names the action."""
         found = self.rules.instance(label)
         assert not isinstance(found, str), found
-        touched = self.rules.touched(found)
-        if touched.adds or touched.deletes:
+        if found.schema.effects:
             return False
         schemas = self.rules.domain.schemas
         bound = {name for c in self.rules.domain.constraints for name, _ in c.actions}
