@@ -121,6 +121,35 @@ class Choices:
             self._failing[key] = known
         return known
 
+    def fails_each(self, nodes: Ints) -> Bools:
+        """Of nodes ``(x_1 .. x_n, y)`` whether some mixture of plans from the x_i fails from y.
+
+        Parameters
+        ----------
+        nodes
+            (k, robots + 1), of one layer in each row.
+        """
+        mixed = nodes[:, self._robots]
+        fails = np.zeros(len(nodes), np.bool_)
+        equal = np.ones(len(nodes), np.bool_)
+        for robot in range(self._robots):
+            mine = self.of_node[robot, nodes[:, robot]]
+            theirs = self.of_node[robot, mixed]
+            equal &= mine == theirs
+            asked = np.flatnonzero((mine != theirs) & ~fails)
+            fails[asked] = ~self.sets.within_each(mine[asked], theirs[asked])
+        left = np.flatnonzero(~fails & self.requires[mixed])
+        fails[left[equal[left]]] = True
+        left = left[~equal[left]]
+        chosen = self.of_node[np.arange(self._robots)[:, None], nodes[left, :-1].T]
+        table, number = unique_tuples(
+            np.column_stack((*chosen, mixed[left])),
+            [len(self.sets)] * self._robots + [len(self.space)],
+        )
+        answers = [self.fails(tuple(row[:-1]), row[-1]) for row in table.tolist()]
+        fails[left] = np.array(answers, np.bool_)[number]
+        return fails
+
     def moves_fail(self, moves: Sequence[Moves], node: int) -> bool:
         """`fails` for sets given by their moves: each first label with the set of what follows."""
         edges = self.edges_of(node)

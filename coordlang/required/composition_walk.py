@@ -6,7 +6,8 @@ of ``pi_i``, step by step - is not an optimal plan (the paper, section 3; for tw
 the two recombinations is not).  The walk goes through n plans in step and carries the state that
 the mixture has reached: nodes ``(x_1 .. x_n, y)``.  An edge of it *fails* when the mixed joint
 action is not an edge of the plan space in ``y``.  All starts and goals walk at once, layer by
-layer, in numpy.  Proposition 2 of docs/concepts.md says why this decides RC.
+layer, in numpy, and only as far as some mixture can fail, which the robots' choices say.
+Propositions 2 and 14 of docs/concepts.md say why this decides what it decides.
 """
 
 from __future__ import annotations
@@ -17,11 +18,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from coordlang.required.choices import Choices
 from planners.errors import OutOfMemory
 from planners.limits import memory_left
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints, spans
+from planners.tables import Bools, Ints, spans
 
 #: What else may help.
 INSTEAD = "fewer robots, smaller tasks or --cost makespan+actions"
@@ -100,6 +102,18 @@ def moves(
             else prefix
         )
         yield Moves(source, np.stack(edges, axis=1), mixed)
+
+
+def can_fail(choices: Choices, targets: Ints, mixed: Ints) -> Bools:
+    """Whether mixtures can fail that have come to ``targets`` (k, robots) and ``mixed`` (k).
+
+    A failed mixture has; what cannot need not be walked further, whatever the words are.
+    """
+    open_rows = np.flatnonzero(mixed != FAILED)
+    possible = np.ones(len(mixed), np.bool_)
+    nodes = np.column_stack((targets[open_rows], mixed[open_rows]))
+    possible[open_rows] = choices.fails_each(nodes)
+    return possible
 
 
 def edges_out_of(space: PlanSpace, nodes: Ints) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ docs/concepts.md).
 
 The relation of all alphas with all betas is listed only where it is small
 (`DifferenceWalk.every`).  Else the composition walk is kept, and asked for pairs that a partition
-leaves unseparated.
+leaves unseparated.  It goes only where some mixture fails (Proposition 14).
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from coordlang.required.composition_walk import FAILED, moves
+from coordlang.required.choices import Choices
+from coordlang.required.composition_walk import FAILED, can_fail, moves
 from planners.errors import OutOfMemory
 from planners.joint.states import bits
 from planners.limits import memory_left
@@ -61,8 +62,8 @@ class _Layer:
 class DifferenceWalk:
     """The composition walk of one plan space, kept whole, from every node of the plan space.
 
-    Memory is that of the walk's links, of which only those are kept that lead to a failure.  Raises
-    `OutOfMemory` before the memory budget is used up.
+    Only nodes from which some mixture fails are walked; memory is that of the links between them.
+    Raises `OutOfMemory` before the memory budget is used up.
     """
 
     def __init__(self, space: PlanSpace) -> None:
@@ -202,18 +203,17 @@ def _separated(word: Ints, shared: Ints, others: Ints) -> Bools:
 
 
 def _walk(space: PlanSpace) -> list[_Layer]:
-    """All layers, goals first, without what cannot fail."""
+    """All layers, goals first, of nodes from which some mixture fails."""
     robots = space.robots
     failed = len(space)
-    index = EdgeIndex.of(space)
+    choices, index = Choices(space), EdgeIndex.of(space)
+    requiring = np.flatnonzero(choices.requires)
     tables: list[Ints] = []
     links: list[tuple[Ints, Ints]] = []
     arriving = np.zeros((0, robots + 1), np.int64)
-    spans = space.layers
-    for number in range(len(spans) - 1, -1, -1):
-        starting = np.repeat(
-            np.arange(spans[number].start, spans[number].stop)[:, None], robots + 1, axis=1
-        )
+    for number in range(len(space.layers) - 1, -1, -1):
+        here = requiring[space.layer[requiring] == number]
+        starting = np.repeat(here[:, None], robots + 1, axis=1)
         table, place = unique_tuples(
             np.concatenate((starting, arriving)), [failed + 1] * (robots + 1)
         )
@@ -221,7 +221,7 @@ def _walk(space: PlanSpace) -> list[_Layer]:
             links[-1] = (links[-1][0], place[len(starting) :][links[-1][1]])
         tables.append(table)
         if number:
-            source, arriving, child = _links(space, index, table)
+            source, arriving, child = _links(choices, index, table)
             links.append((source, child))
         if 4 * sum(a.nbytes + b.nbytes for a, b in links) > memory_left():
             raise OutOfMemory(
@@ -229,15 +229,16 @@ def _walk(space: PlanSpace) -> list[_Layer]:
                 "large to keep",
                 remedy="Use --method greedy or minimal, fewer tasks, or a larger --memory-limit.",
             )
-    return _pruned(space, tables[::-1], links[::-1])
+    return _layers(tables[::-1], links[::-1])
 
 
-def _links(space: PlanSpace, index: EdgeIndex, table: Ints) -> tuple[Ints, Ints, Ints]:
+def _links(choices: Choices, index: EdgeIndex, table: Ints) -> tuple[Ints, Ints, Ints]:
     """Links out of a table of nodes.
 
     (source, different children, number of each link's child among them).
     """
-    robots = table.shape[1] - 1
+    space = choices.space
+    robots = space.robots
     failed = len(space)
     bounds = [failed + 1] * (robots + 1)
     y = table[:, robots]
@@ -247,9 +248,13 @@ def _links(space: PlanSpace, index: EdgeIndex, table: Ints) -> tuple[Ints, Ints,
     numbers: list[Ints] = [np.zeros(0, np.int64)]
     count = 0
     for move in moves(space, index, walking):
-        mixed = np.where(move.mixed == FAILED, failed, move.mixed)
-        fresh, number = unique_tuples(np.column_stack((space.targets(move.edges), mixed)), bounds)
-        pairs, _ = unique_tuples(np.column_stack((move.source, number)), [len(table), len(fresh)])
+        target = space.targets(move.edges)
+        fails = can_fail(choices, target, move.mixed)
+        mixed = np.where(move.mixed == FAILED, failed, move.mixed)[fails]
+        fresh, number = unique_tuples(np.column_stack((target[fails], mixed)), bounds)
+        pairs, _ = unique_tuples(
+            np.column_stack((move.source[fails], number)), [len(table), len(fresh)]
+        )
         sources.append(pairs[:, 0])
         numbers.append(pairs[:, 1] + count)
         children.append(fresh)
@@ -258,31 +263,19 @@ def _links(space: PlanSpace, index: EdgeIndex, table: Ints) -> tuple[Ints, Ints,
     return np.concatenate(sources), merged, place[np.concatenate(numbers)]
 
 
-def _pruned(
-    space: PlanSpace, tables: Sequence[Ints], links: Sequence[tuple[Ints, Ints]]
-) -> list[_Layer]:
-    """Only what can end in a failed mixture."""
-    robots = tables[0].shape[1] - 1
-    failed = len(space)
+def _layers(tables: Sequence[Ints], links: Sequence[tuple[Ints, Ints]]) -> list[_Layer]:
+    """The layers with what their links are, goals first."""
     none = np.zeros(0, np.int64)
     nothing = np.zeros(0, np.bool_)
-    kept = tables[0][:, robots] == failed
-    x = tables[0][kept, :robots]
+    x = tables[0][:, :-1]
     layers = [_Layer(x, none, none, nothing, nothing, (x == x[:, :1]).all(axis=1))]
     for table, (source, child) in zip(tables[1:], links, strict=True):
-        number = np.cumsum(kept) - 1
-        alive = kept[child]
-        source, child = source[alive], number[child[alive]]
-        kept = np.zeros(len(table), np.bool_)
-        kept[source] = True
-        source = (np.cumsum(kept) - 1)[source]
-        table = table[kept]
-        x, below = table[:, :robots], layers[-1]
+        x, below = table[:, :-1], layers[-1]
         together = (x == x[:, :1]).all(axis=1)
         joined = (below.x == below.x[:, :1]).all(axis=1)
         tail = np.zeros(len(x), np.bool_)
         tail[source[together[source] & joined[child] & below.tail[child]]] = True
-        diagonal = together & (table[:, robots] == x[:, 0])
+        diagonal = together & (table[:, -1] == x[:, 0])
         parts = diagonal[source] & ~joined[child]
         meets = ~together[source] & joined[child]
         layers.append(_Layer(x, source, child, parts, meets, tail))

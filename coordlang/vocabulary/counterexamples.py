@@ -3,7 +3,8 @@
 
 The same walk as verification makes, written for the builders: it keeps, for every node, the way to
 a violation with the fewest steps at which the plans are in different states.  Such pairs give short
-clauses.
+clauses.  It is cut off where no mixture can fail, whatever the words are, and where the sentences
+that the plans can still have do not meet.
 """
 
 from __future__ import annotations
@@ -15,8 +16,10 @@ from random import Random
 
 import numpy as np
 
-from coordlang.required.composition_walk import FAILED, moves
+from coordlang.required.choices import Choices
+from coordlang.required.composition_walk import FAILED, Moves, can_fail, moves
 from coordlang.vocabulary.leads import NO_LEAD, NO_WORD, PARTED, Leads
+from coordlang.vocabulary.sentence_sets import SentenceSets
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 from planners.tables import Ints, unique_tuples
@@ -66,7 +69,7 @@ class _Layer:
 
 
 def counterexamples(
-    space: PlanSpace, index: EdgeIndex, word: Ints, most: int, starts: Ints | None = None
+    choices: Choices, index: EdgeIndex, word: Ints, most: int
 ) -> Iterator[Counterexample]:
     """Failing tuples of plans with one sentence, those that differ least first.
 
@@ -75,87 +78,98 @@ def counterexamples(
 
     Parameters
     ----------
-    space, index
-        The plan space, and what finds its edges.
+    choices, index
+        Of the plan space: the robots' choices, and what finds its edges.
     word
         (nodes) the word of each node of the plan space.
     most
         About how many are wanted.  If there is none at all, ``word`` is a language for the tasks.
-    starts
-        The nodes where the tasks start, sorted; None: all of them.
     """
-    layers = _forward(space, index, word, np.unique(space.starts) if starts is None else starts)
-    _backward(space, layers)
-    yield from _retrace(space, layers, most)
+    if not len(choices.space):
+        return
+    layers = _Walk(choices, index, word).layers()
+    _backward(choices.space, layers)
+    yield from _retrace(choices.space, layers, most)
 
 
-def _forward(space: PlanSpace, index: EdgeIndex, word: Ints, starts: Ints) -> list[_Layer]:
-    """The nodes of the walk: ``layers[k]`` has k joint steps to go."""
-    robots = space.robots
-    leads = Leads()
-    layers: list[_Layer] = []
-    arriving = np.zeros((0, 2 * robots), np.int64)
-    for number in reversed(range(len(space.layers))):
-        here = starts[space.layer[starts] == number]
-        fresh = np.zeros((len(here), 2 * robots), np.int64)
-        fresh[:, : robots + 1] = here[:, None]
-        both = np.concatenate((fresh, arriving))
-        bounds = (
-            [len(space)] * robots
-            + [len(space) + 1]
-            + [int(both[:, k].max(initial=0)) + 1 for k in range(robots + 1, 2 * robots)]
-        )
-        nodes, place = unique_tuples(both, bounds)
-        if layers:
-            layers[-1].child = place[len(fresh) :]
-        if number == 0:
-            none = np.zeros(0, np.int64)
-            layers.append(_Layer(nodes, none, np.zeros((0, robots), np.int64), none, none, none))
-            break
-        layer, arriving = _expand(space, index, word, leads, nodes)
-        layers.append(layer)
-    layers.reverse()
-    return layers
+class _Walk:
+    """The nodes from which some mixture can fail and the plans' sentences can agree."""
 
+    def __init__(self, choices: Choices, index: EdgeIndex, word: Ints) -> None:
+        self._choices, self._index, self._word = choices, index, word
+        self._space = choices.space
+        self._leads = Leads()
+        self._sentences = SentenceSets(self._space, word)
 
-def _expand(
-    space: PlanSpace, index: EdgeIndex, word: Ints, leads: Leads, nodes: Ints
-) -> tuple[_Layer, Ints]:
-    """A layer with the moves out of its nodes, and the nodes that they lead to."""
-    robots = space.robots
-    failed = len(space)
-    sources: list[Ints] = []
-    edges: list[Ints] = []
-    children: list[Ints] = []
-    # A failed mixture has no edges: -1 as prefix finds none.
-    y = nodes[:, robots]
-    walking = np.column_stack((nodes[:, :robots], np.where(y == failed, FAILED, y)))
-    for move in moves(space, index, walking):
-        target = space.targets(move.edges)
+    def layers(self) -> list[_Layer]:
+        """The nodes: ``layers[k]`` has k joint steps to go."""
+        space, robots = self._space, self._space.robots
+        starts = np.unique(space.starts)
+        starts = starts[self._choices.requires[starts]]
+        layers: list[_Layer] = []
+        arriving = np.zeros((0, 2 * robots), np.int64)
+        for number in reversed(range(len(space.layers))):
+            here = starts[space.layer[starts] == number]
+            fresh = np.zeros((len(here), 2 * robots), np.int64)
+            fresh[:, : robots + 1] = here[:, None]
+            both = np.concatenate((fresh, arriving))
+            bounds = (
+                [len(space)] * robots
+                + [len(space) + 1]
+                + [int(both[:, k].max(initial=0)) + 1 for k in range(robots + 1, 2 * robots)]
+            )
+            nodes, place = unique_tuples(both, bounds)
+            if layers:
+                layers[-1].child = place[len(fresh) :]
+            if number == 0:
+                layers.append(_layer(nodes, np.zeros(0, np.int64), np.zeros((0, robots), np.int64)))
+                break
+            layer, arriving = self._expand(nodes)
+            layers.append(layer)
+        layers.reverse()
+        return layers
+
+    def _expand(self, nodes: Ints) -> tuple[_Layer, Ints]:
+        """A layer with the moves out of its nodes, and the nodes that they lead to."""
+        robots, failed = self._space.robots, len(self._space)
+        sources: list[Ints] = [np.zeros(0, np.int64)]
+        edges: list[Ints] = [np.zeros((0, robots), np.int64)]
+        children: list[Ints] = [np.zeros((0, 2 * robots), np.int64)]
+        # A failed mixture has no edges: -1 as prefix finds none.
+        y = nodes[:, robots]
+        walking = np.column_stack((nodes[:, :robots], np.where(y == failed, FAILED, y)))
+        for move in moves(self._space, self._index, walking):
+            kept, target, lead = self._in_agreement(nodes, move)
+            mixed = move.mixed[kept]
+            fails = can_fail(self._choices, target, mixed)
+            kept, mixed = kept[fails], np.where(mixed == FAILED, failed, mixed)[fails]
+            sources.append(move.source[kept])
+            edges.append(move.edges[kept])
+            children.append(np.column_stack((target[fails], mixed, lead[fails])))
+        layer = _layer(nodes, np.concatenate(sources), np.concatenate(edges))
+        return layer, np.concatenate(children)
+
+    def _in_agreement(self, nodes: Ints, move: Moves) -> tuple[Ints, Ints, Ints]:
+        """The moves after which the sentences can agree, with the nodes reached and the leads."""
+        robots, word = self._space.robots, self._word
+        kept = np.arange(len(move.source))
+        target = self._space.targets(move.edges)
+        lead = nodes[move.source, robots + 1 :]
         same_word = word[target] == word[nodes[move.source, :robots]]
         entered = np.where(same_word, NO_WORD, word[target])
-        lead = nodes[move.source, robots + 1 :].copy()
-        keep = np.ones(len(lead), np.bool_)
         for other in range(1, robots):
-            lead[keep, other - 1] = leads.after(
-                lead[keep, other - 1], entered[keep, 0], entered[keep, other]
-            )
-            keep &= lead[:, other - 1] != PARTED
-        mixed = np.where(move.mixed == FAILED, failed, move.mixed)
-        sources.append(move.source[keep])
-        edges.append(move.edges[keep])
-        children.append(np.column_stack((target[keep], mixed[keep], lead[keep])))
+            after = self._leads.after(lead[kept, other - 1], entered[kept, 0], entered[kept, other])
+            lead[kept, other - 1] = after
+            kept = kept[after != PARTED]
+        agree = self._sentences.can_agree(target[kept], lead[kept], self._leads)
+        kept = kept[agree]
+        return kept, target[kept], lead[kept]
+
+
+def _layer(nodes: Ints, source: Ints, edges: Ints) -> _Layer:
+    """A layer of which only the nodes and the moves out of them are known."""
     none = np.zeros(0, np.int64)
-    layer = _Layer(
-        nodes,
-        np.concatenate(sources) if sources else none,
-        np.concatenate(edges) if edges else np.zeros((0, robots), np.int64),
-        none,
-        none,
-        none,
-    )
-    arriving = np.concatenate(children) if children else np.zeros((0, 2 * robots), np.int64)
-    return layer, arriving
+    return _Layer(nodes, source, edges, none, none, none)
 
 
 def _backward(space: PlanSpace, layers: list[_Layer]) -> None:

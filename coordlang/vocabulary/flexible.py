@@ -23,7 +23,6 @@ from coordlang.vocabulary.necessary_clauses import TaskPart
 from coordlang.vocabulary.symmetry import symmetry_group
 from planners.errors import OutOfMemory
 from planners.limits import run_until_stopped
-from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 from planners.tables import Bools, Ints
 
@@ -149,12 +148,12 @@ def _parts(spaces: Sequence[PlanSpace], requires: Sequence[Bools], tasks: int) -
     """The tasks that require coordination, in parts of about so many tasks."""
     parts = []
     for space, required in zip(spaces, requires, strict=True):
-        index = EdgeIndex.of(space)
-        starts = np.unique(space.starts[required[space.starts]])
-        count = 1 + len(starts) // tasks
+        wanted = required[space.starts]
+        goals = space.goal[space.starts]
+        count = 1 + len(np.unique(space.starts[wanted])) // tasks
         parts += [
-            TaskPart(space, index, mine)
+            TaskPart.of(space, mine)
             for number in range(count)
-            if len(mine := starts[space.goal[starts] % count == number])
+            if (mine := wanted & (goals % count == number)).any()
         ]
     return parts

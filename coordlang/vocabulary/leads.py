@@ -26,6 +26,10 @@ class Leads:
         self._number = {self._leads[NO_LEAD]: NO_LEAD}
         self._after: dict[tuple[int, int, int], int] = {}
 
+    def words(self, lead: int) -> tuple[int, tuple[int, ...]]:
+        """Which of the two plans is ahead, 1 or 2 (0: neither), and by which words."""
+        return self._leads[lead]
+
     def after(self, lead: Ints, first: Ints, second: Ints) -> Ints:
         """The leads when the plans enter words ``first`` and ``second``, or `NO_WORD`.
 

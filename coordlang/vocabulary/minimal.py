@@ -33,7 +33,6 @@ from coordlang.vocabulary.separating import short_separating_search
 from coordlang.vocabulary.symmetry import SymmetryGroup, symmetry_group
 from planners.errors import OutOfMemory
 from planners.limits import run_until_stopped
-from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 
 #: Tasks are searched for counterexamples in parts, one after another: at least so many parts ..
@@ -245,12 +244,11 @@ def _parts(spaces: Sequence[PlanSpace], random: Random) -> list[TaskPart]:
     """The tasks in parts, each with a random choice of the goals."""
     parts = []
     for space in spaces:
-        index = EdgeIndex.of(space)
         goals = list(range(len(space.goals)))
         random.shuffle(goals)
         goal_of_start = space.goal[space.starts]
         count = min(len(goals), max(_LEAST_PARTS, len(space.starts) // _TASKS_OF_A_PART))
         for number in range(count):
             mine = np.isin(goal_of_start, goals[number::count])
-            parts.append(TaskPart(space, index, np.unique(space.starts[mine])))
+            parts.append(TaskPart.of(space, mine))
     return parts

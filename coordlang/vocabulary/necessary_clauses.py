@@ -7,13 +7,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from coordlang.language.warping import Clause, separation_clause
+from coordlang.required.choices import Choices
 from coordlang.vocabulary.clauses import without_implied
 from coordlang.vocabulary.counterexamples import Counterexample, counterexamples
 from coordlang.vocabulary.job import Evidence
 from coordlang.vocabulary.symmetry import SymmetryGroup
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints
+from planners.tables import Bools, Ints
 
 #: Counterexamples taken at a time.
 _AT_A_TIME = 200
@@ -25,15 +26,25 @@ class TaskPart:
 
     Attributes
     ----------
-    space
-        The plan space; ``index`` finds its edges.
-    starts
-        The nodes where the tasks start, sorted.
+    choices
+        The robots' choices in the plan space of just these tasks.
+    index
+        Finds its edges.
     """
 
-    space: PlanSpace
+    choices: Choices
     index: EdgeIndex
-    starts: Ints
+
+    @classmethod
+    def of(cls, space: PlanSpace, tasks: Bools) -> TaskPart:
+        """These tasks of a plan space."""
+        part = space.with_tasks(space.starts[tasks], space.second[tasks])
+        return cls(Choices(part), EdgeIndex.of(part))
+
+    @property
+    def space(self) -> PlanSpace:
+        """The plan space of the tasks."""
+        return self.choices.space
 
     def violated(self, word: Ints) -> dict[Clause, Counterexample]:
         """Clauses that a partition violates, each with the plans that it comes from.
@@ -51,7 +62,7 @@ class TaskPart:
         words = word.tolist()
         found: dict[Clause, Counterexample] = {}
         nodes = word[self.space.state]
-        for example in counterexamples(self.space, self.index, nodes, _AT_A_TIME, self.starts):
+        for example in counterexamples(self.choices, self.index, nodes, _AT_A_TIME):
             clause = separation_clause(example.states, words)
             assert clause, "the plans have one sentence, and none of them is the other"
             found.setdefault(clause, example)

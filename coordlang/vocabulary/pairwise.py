@@ -21,6 +21,7 @@ from itertools import combinations
 import numpy as np
 
 from coordlang.language.warping import Clause
+from coordlang.required.choices import Choices
 from coordlang.required.divergences import required_nodes
 from coordlang.required.miscoordination import Inseparable, inseparable, separable
 from coordlang.vocabulary.clauses import most_constrained_first, without_implied
@@ -106,9 +107,9 @@ def language_for(spaces: Sequence[PlanSpace], pairs: Sequence[tuple[int, int]]) 
     views = [view for space in spaces for view in _separable_views(space, pairs)]
     parts = []
     for view in views:
-        starts = view.starts[required_nodes(view)[view.starts]]
-        if len(starts):
-            parts.append(TaskPart(view, EdgeIndex.of(view), np.unique(starts)))
+        required = required_nodes(view)[view.starts]
+        if required.any():
+            parts.append(TaskPart.of(view, required))
     states = np.unique(np.concatenate([space.state for space in spaces])).tolist()
     clauses: list[Clause] = []
     size = 2 if parts else 1
@@ -181,7 +182,7 @@ def unsafe_pair(spaces: Sequence[PlanSpace], words: Sequence[int]) -> tuple[int,
         for side in sides_between(robots, i, j):
             for space in spaces:
                 view = divided(space, side)
-                found = counterexamples(view, EdgeIndex.of(view), word[view.state], 1)
+                found = counterexamples(Choices(view), EdgeIndex.of(view), word[view.state], 1)
                 if next(found, None) is not None:
                     return i, j
     return None
