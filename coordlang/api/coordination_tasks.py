@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Unpack
 
 from coordlang.api.inputs import DomainSource, File, ProblemSource, read_planning
+from coordlang.api.layout import WIDTH
 from coordlang.api.options import GivenOptions, ModelKeywords
 from coordlang.api.presenting import Presented
 from coordlang.api.witness import witness_data, witness_text
@@ -58,12 +59,16 @@ class TaskCoordination(Presented):
         }
 
     def __str__(self) -> str:
+        return self.text()
+
+    def text(self, width: int = WIDTH) -> str:
+        """Return the answer in lines of at most ``width`` characters, as far as atoms allow."""
         answer = "is required" if self.required else "is not required"
         if not self.required and self.plans > 1:
             answer += ": any mixture of them is optimal"
         plans = f"{counted(self.plans, 'optimal plan')} of {counted(self.makespan, 'step')}"
         line = f"{self.problem}: {plans}; coordination {answer}"
-        return f"{line}\n\n{witness_text(self.witness)}" if self.witness else line
+        return f"{line}\n\n{witness_text(self.witness, width)}" if self.witness else line
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -105,7 +110,11 @@ class Coordination(Presented):
         return {"tasks": [task.data() for task in self.tasks]}
 
     def __str__(self) -> str:
-        return "\n".join(map(str, self.tasks))
+        return self.text()
+
+    def text(self, width: int = WIDTH) -> str:
+        """Return the answers in lines of at most ``width`` characters, as far as atoms allow."""
+        return "\n".join(task.text(width) for task in self.tasks)
 
     def _repr_html_(self) -> str:
         head = ("problem", "makespan", "plans", "coordination")

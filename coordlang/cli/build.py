@@ -24,7 +24,7 @@ from coordlang.cli.echo import echo
 from coordlang.cli.exit_codes import INTERRUPTED, UNPROVED, interrupted_by
 from coordlang.cli.files import PlanningFiles, check_outputs, never_stdout, planning_files
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
-from coordlang.cli.terminal import note_single_robot, working
+from coordlang.cli.terminal import line_width, note_single_robot, working
 from planners.messages import visible
 from planners.notebook import counted
 from planners.signals import Interrupted
@@ -150,7 +150,7 @@ def _build(pddl: PlanningFiles, **keywords: Any) -> BuiltLanguage:
                 *pddl.files, factored=pddl.factored, progress=progress, **keywords
             )
     except coordlang.Inseparable as error:
-        echo(witness_text(error.witness), err=True)
+        echo(witness_text(error.witness, line_width(err=True)), err=True)
         raise
     for name in built.skipped:
         echo(f"coordlang: left out, it has no plan: {name}", err=True)

@@ -4,6 +4,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -21,7 +24,7 @@ from coordlang.cli.files import (
 from coordlang.cli.group import RenamedOptions
 from coordlang.cli.listing import form_of
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
-from coordlang.cli.terminal import covered_code, working
+from coordlang.cli.terminal import covered_code, line_width, working
 from planners.notebook import counted
 
 if TYPE_CHECKING:
@@ -31,6 +34,9 @@ if TYPE_CHECKING:
 
 #: States of an automaton beyond which a table is cut.
 STATES_SHOWN = 40
+_MAY_DO = "may do"
+#: Characters that what is known has at least beside what may be done.
+_LEAST_ROOM = 30
 
 
 @click.command(name="choices", cls=RenamedOptions, renamed={"--did": "--history"})
@@ -138,7 +144,7 @@ def _guarantee_code(found: RobotsChoices, check: bool) -> int:
         if found.covered:
             why = "the file holds no coordination language"
         echo(f"coordlang: refuted: choices of this task miscoordinate; {why}", err=True)
-        echo(witness_text(found.witness), err=True)
+        echo(witness_text(found.witness, line_width(err=True)), err=True)
         return REFUTED
     if check and not found.covered:
         echo(
@@ -150,42 +156,82 @@ def _guarantee_code(found: RobotsChoices, check: bool) -> int:
 
 
 def _text(found: RobotsChoices, check: bool) -> str:
+    from coordlang.api.layout import alike, named, wrapped
     from coordlang.tasks.candidates import describe
 
+    width = line_width()
     used, mixtures = found.found.task_language, found.found.mixtures
     lines = [
-        f"The task {describe(used.space, used.task)}",
+        *wrapped(f"The task {describe(used.space, used.task)}", width, "", "  "),
         f'"{found.sentence}" leaves {counted(found.plans, "plan")} open.',
     ]
     if check and mixtures is not None and mixtures.holds:
         number = counted(found.combinations, "combination")
         nodes = counted(mixtures.nodes, "node")
         lines.append(f"checked: {number} of own subplans, all optimal plans ({nodes} walked)")
-    for robot in found.chosen:
-        lines += ["", *_table(found, found.found.robots[robot])]
+    tables = [_table(found, found.found.robots[robot], width) for robot in found.chosen]
+    for group in alike(tables):
+        robots = named([used.model.robots[found.chosen[number]] for number in group])
+        may, table = "may" if len(group) == 1 else "may each", tables[group[0]]
+        lines += ["", *wrapped(f"{robots} {may} {table[0]}", width, "", "  "), *table[1:]]
     return "\n".join(lines) + "\n"
 
 
-def _table(found: RobotsChoices, own: RobotChoices) -> list[str]:
+def _table(found: RobotsChoices, own: RobotChoices, width: int) -> list[str]:
     """The automaton state by state: what may be done there, where it leads, what is known there."""
-    model, automaton = found.found.task_language.model, own.automaton
+    automaton = own.automaton
     subplans = counted(automaton.count, "subplan")
     states = counted(len(automaton), "state")
-    lines = [f"{model.robots[own.robot]} may follow {subplans} ({states}):"]
     rows = _rows(found, own)[:STATES_SHOWN]
-    if rows:
-        rows.insert(0, ("step", "state", "left", "may do", "knows"))
-        widths = [max(len(row[k]) for row in rows) for k in range(4)]
-        for *numbers, may_do, knows in rows:
-            cells = [cell.rjust(width) for cell, width in zip(numbers, widths, strict=False)]
-            lines.append("  ".join(["", *cells, may_do.ljust(widths[3]), knows]).rstrip())
-    rest = automaton.layers[-1].start - max(0, len(rows) - 1)
+    lines = [f"follow {subplans} ({states}):", *(_row_lines(rows, width) if rows else ())]
+    rest = automaton.layers[-1].start - len(rows)
     if rest > 0:
         lines.append(f"  .. and {counted(rest, 'state')} more; --format json has all of them")
     return lines
 
 
-def _rows(found: RobotsChoices, own: RobotChoices) -> list[tuple[str, str, str, str, str]]:
+def _row_lines(rows: Sequence[_Row], width: int) -> Iterator[str]:
+    """Columns as wide as they need be; broken into lines where they do not fit.
+
+    Then each alternative has a line of its own, and so many atoms as fit stand beside it.
+    """
+    from coordlang.api.layout import packed
+
+    head = ("step", "state", "left")
+    numbers = [
+        max(map(len, column)) for column in zip(head, *(row.numbers for row in rows), strict=True)
+    ]
+    indent = sum(numbers) + 2 * len(numbers) + 2
+    whole = [(" | ".join(row.moves), " ".join(row.knows)) for row in rows]
+    broken = indent + max(len(m) for m, _ in whole) + 2 + max(len(k) for _, k in whole) > width
+    shown = [
+        (row.moves[:1] + tuple(f"| {move}" for move in row.moves[1:]) if broken else (moves,), row)
+        for row, (moves, _) in zip(rows, whole, strict=True)
+    ]
+    may_do = max(len(_MAY_DO), *(len(line) for lines, _ in shown for line in lines))
+    room = max(_LEAST_ROOM, width - indent - may_do - 2) if broken else width
+
+    def line(left: Sequence[str], move: str, atoms: str) -> str:
+        cells = [cell.rjust(size) for cell, size in zip(left, numbers, strict=True)]
+        return "  ".join(["", *cells, move.ljust(may_do), atoms]).rstrip()
+
+    yield line(head, _MAY_DO, "knows")
+    for moves, row in shown:
+        atoms = packed(row.knows, room, "", "") if broken else [" ".join(row.knows)]
+        for number, (move, known) in enumerate(zip_longest(moves, atoms, fillvalue="")):
+            yield line(row.numbers if number == 0 else ("",) * len(head), move, known)
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """One state of an automaton: its step, number and subplans left, moves, and what is known."""
+
+    numbers: tuple[str, str, str]
+    moves: tuple[str, ...]
+    knows: tuple[str, ...]
+
+
+def _rows(found: RobotsChoices, own: RobotChoices) -> list[_Row]:
     """A row for each state in which something may be done, of the first steps."""
     from coordlang.use.choices.dot import distinguishing
 
@@ -195,12 +241,12 @@ def _rows(found: RobotsChoices, own: RobotChoices) -> list[tuple[str, str, str, 
         if states.start >= STATES_SHOWN:
             break
         for state, atoms in zip(states, distinguishing(found.found, own, states), strict=True):
-            moves = " | ".join(
+            moves = tuple(
                 f"{model.label_text(own.robot, label) or 'idle'} -> {to}"
                 for label, to in automaton.moves(state)
             )
-            left = f"{automaton.left[state]:,}"
-            rows.append((str(step), str(state), left, moves, " ".join(atoms)))
+            numbers = str(step), str(state), f"{automaton.left[state]:,}"
+            rows.append(_Row(numbers, moves, tuple(atoms)))
     return rows
 
 

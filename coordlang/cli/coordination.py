@@ -11,7 +11,7 @@ import coordlang
 from coordlang.cli.echo import echo
 from coordlang.cli.files import PlanningFiles, planning_files
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
-from coordlang.cli.terminal import note_single_robot, working
+from coordlang.cli.terminal import line_width, note_single_robot, working
 
 
 @click.command(name="coordination")
@@ -24,7 +24,7 @@ def command(pddl: PlanningFiles, as_json: bool, model: ModelKeywords) -> None:
 
     Show how robots that follow different optimal plans miscoordinate.
     """
-    with working("walking pairs of plans"):
+    with working("finding all optimal plans"):
         found = coordlang.coordination(*pddl.files, factored=pddl.factored, **model)
     note_single_robot(found.robots)
-    echo(json.dumps(found.data()) if as_json else str(found))
+    echo(json.dumps(found.data()) if as_json else found.text(line_width()))

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -19,6 +20,18 @@ if TYPE_CHECKING:
 
 #: Seconds of work before progress is shown: short commands neither flicker nor load rich.
 _DELAY = 0.4
+#: Narrower terminals break lines themselves.
+_LEAST_WIDTH = 60
+
+
+def line_width(*, err: bool = False) -> int:
+    """The width of the terminal that stdout or stderr is, `WIDTH` where it is none."""
+    from coordlang.api.layout import WIDTH
+
+    stream = sys.stderr if err else sys.stdout
+    if stream is None or not stream.isatty():
+        return WIDTH
+    return max(_LEAST_WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns)
 
 
 @contextmanager

@@ -20,7 +20,7 @@ from coordlang.cli.files import (
 )
 from coordlang.cli.group import RenamedOptions
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
-from coordlang.cli.terminal import working
+from coordlang.cli.terminal import line_width, working
 from planners.notebook import counted
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def _text(found: Verification) -> str:
     if found.witness:
         sentence = " ".join(found.witness.sentence or ())
         head = f'refuted: plans with the sentence "{sentence} .." miscoordinate'
-        return f"{head}\n{witness_text(found.witness)}"
+        return f"{head}\n{witness_text(found.witness, line_width())}"
     mixing = "all optimal plans of one sentence mix freely"
     if found.overlapping:
         mixing = "words overlap, every optimal plan has a sentence whose plans mix freely"

@@ -17,6 +17,8 @@ from planners.joint.model import PlanningTask
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
 
+#: Characters of a state or goal that a message shows in full.
+_LONGEST = 100
 #: One joint step as text: each robot's subaction, None for idling.
 Step = tuple[str | None, ...]
 
@@ -59,13 +61,20 @@ class Inseparable(ProvedImpossible):
 
     def __init__(self, witness: Miscoordination) -> None:
         super().__init__(
-            f"two optimal plans of task {witness.task} introduce required coordination but pass "
-            "through the "
-            "same states: no language over states can tell them apart",
+            f"two optimal plans of task {_short(witness.task)} introduce required coordination "
+            "but pass through the same states: no language over states can tell them apart",
             remedy="Build with --remember-actions: the state then also holds each robot's last "
             "subaction.",
         )
         self.witness = witness
+
+
+def _short(task: str) -> str:
+    """A long task's beginnings; the witness has all of it."""
+    parts = task.split(" -> ")
+    return " -> ".join(
+        part if len(part) <= _LONGEST else f"{part[: part.index(')') + 1]} .." for part in parts
+    )
 
 
 def inseparable(space: PlanSpace) -> Miscoordination | None:

@@ -108,10 +108,11 @@ def test_a_drawn_state_without_facts(
 
 def test_a_miscoordination_through_states_without_facts() -> None:
     plan = (("(a r1)", None), (None, "(a r2)"))
+    plans = (plan, plan[::-1])
     states = ("", "(q)", "")
     text = witness_text(
         Miscoordination(
-            "t", ("r1", "r2"), (plan, plan), (states, states), plan, ("", "(q)"), 1, "so it is"
+            "t", ("r1", "r2"), plans, (states, states), plan, ("", "(q)"), 1, "so it is"
         )
     )
     assert text.count("reaches (no fact holds)\n") == 2
