@@ -13,16 +13,12 @@ from coordlang.language.partition import Partition
 from coordlang.language.provenance import Guarantee, provenance_of
 from coordlang.language.warping import Clause
 from coordlang.language.words import Language
-from coordlang.required.divergences import (
-    FirstDifferences,
-    first_differences,
-    required_nodes,
-    states_on_plans,
-)
-from coordlang.required.miscoordination import require_separable
+from coordlang.required.divergences import FirstDifferences, required_nodes
+from coordlang.required.pieces import differences
 from coordlang.tasks.candidates import Candidates, require_solvable
-from coordlang.verification.by_definition import Verdict, verify
+from coordlang.verification.by_definition import Verdict
 from coordlang.verification.overlapping import verify_overlapping
+from coordlang.verification.pieces import verify_candidates
 from coordlang.vocabulary import EXACT, METHODS, Job, Outcome, greedy
 from coordlang.vocabulary.enlarging import enlarge
 from coordlang.vocabulary.flexible import flexible
@@ -31,6 +27,8 @@ from coordlang.vocabulary.minimal import refuting_clauses
 from planners.errors import UsageError
 from planners.limits import run_until_stopped
 from planners.messages import echoed
+from planners.pieces.processes import Processes
+from planners.pieces.work import Runner
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +112,7 @@ def build_language(
     prefer: Literal["flexible"] | None = None,
     overlap: bool = False,
     progress: Callable[[str], None] = lambda _: None,
+    runner: Runner | None = None,
 ) -> Built:
     """Build a coordination language for candidate tasks and verify it by definition.
 
@@ -125,6 +124,8 @@ def build_language(
         See `BuildOptions`.
     progress
         Called with a line of text now and then.
+    runner
+        Who does pieces of the work; None: this process.  The language does not depend on it.
 
     Raises
     ------
@@ -139,22 +140,22 @@ def build_language(
     """
     options = BuildOptions(method, seed, alpha_only, prefer, overlap)
     require_solvable(candidates)
+    runner = runner or Processes(jobs=1)
     clock = _Clock()
-    progress("looking for inseparable plans")
-    require_separable(candidates.spaces)
-    progress("walking pairs of plans")
-    differences = first_differences(candidates.spaces)
+    found = differences(candidates, runner, progress)
     clock.note("coordination")
-    states = tuple(states_on_plans(candidates.spaces).tolist())
+    states = tuple(found.states.tolist())
     verified: list[_Verified] = []
     job = Job(
         candidates,
         states,
-        differences,
+        found.first,
         seed=seed,
         alpha_only=alpha_only,
         progress=progress,
-        check=lambda assignment: verified.append(_verified(candidates, assignment)),
+        check=lambda assignment: verified.append(
+            _verified(candidates, assignment, runner, progress)
+        ),
     )
     if method != "greedy":
         job = _with_incumbent(job)
@@ -173,7 +174,7 @@ def build_language(
     provenance = provenance_of(candidates, guarantee, {"program": "coordlang"})
     return Built(
         language=Language.of(partition, candidates.model, provenance),
-        first_differences=differences,
+        first_differences=found.first,
         states=len(states),
         verdict=best.verdict,
         figures=outcome.figures,
@@ -274,9 +275,14 @@ class _Verified:
     verdict: Verdict
 
 
-def _verified(candidates: Candidates, assignment: Assignment) -> _Verified:
+def _verified(
+    candidates: Candidates,
+    assignment: Assignment,
+    runner: Runner,
+    progress: Callable[[str], None],
+) -> _Verified:
     partition = Partition.of_states(candidates.rows, assignment)
-    verdict = verify(partition, candidates.spaces)
+    verdict = verify_candidates(partition, candidates, runner, progress)
     if not verdict.holds:
         raise AssertionError(
             f"a method returned what is no coordination language: {verdict.witness}"

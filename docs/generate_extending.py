@@ -21,6 +21,7 @@ END = "<!-- end of the files -->\n"
 #: The rooms in the order in which data flows, from PDDL text to the command line.
 ROOMS = (
     "planners",
+    "planners/pieces",
     "planners/pddl",
     "planners/grounding",
     "planners/joint",

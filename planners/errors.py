@@ -8,6 +8,7 @@ or a failure.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from planners.messages import sentence
 
@@ -55,11 +56,24 @@ class CoordlangError(Exception):
         self.remedy = remedy
         self.reached: str | None = None
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Errors of pieces of work are sent from one process to another, whatever they need."""
+        return _rebuilt, (type(self), self.args, self.__dict__)
+
     def __str__(self) -> str:
         what = sentence(self.what)
         lines = [f"{self.position}: {what}" if self.position else what]
         lines += [sentence(line, keep="\n") for line in (self.reached, self.remedy) if line]
         return "\n  ".join(lines)
+
+
+def _rebuilt(
+    kind: type[CoordlangError], args: tuple[Any, ...], fields: dict[str, Any]
+) -> CoordlangError:
+    """An error as it was pickled."""
+    error = kind.__new__(kind, *args)
+    error.__dict__.update(fields)
+    return error
 
 
 class Refuted(CoordlangError):

@@ -18,7 +18,8 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from types import FrameType
 
 from planners.errors import OutOfMemory, OutOfTime
@@ -42,6 +43,11 @@ _NO_MEMORY = (
     "std::bad_alloc",
 )
 _LONGER = "Use a larger --time-limit."
+#: Of the memory that is free, what a process takes that is given no limit.
+_SHARE = 0.8
+#: Where control groups are, and which of their memory is files that can be read again.
+_GROUPS = Path("/sys/fs/cgroup")
+_GIVEN_UP = ("inactive_file", "total_inactive_file")
 
 
 @contextmanager
@@ -145,6 +151,30 @@ def limit_memory(size: int | None) -> None:
         resource.setrlimit(resource.RLIMIT_AS, (min(size, most), hard))
 
 
+@contextmanager
+def limited_memory(size: int | None) -> Iterator[None]:
+    """`limit_memory` for the block; after it the limit is what it was."""
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    limit_memory(size)
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, before)
+
+
+def has_memory_limit() -> bool:
+    """Whether the address space of this process is limited."""
+    return resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
+
+
+def default_memory_limit() -> int:
+    """What a process may have that is given no limit: 80 % of what is free, besides what it has.
+
+    What is free is that of the machine or of the process's control group, whichever is less.
+    """
+    return address_space() + int(_SHARE * _available())
+
+
 def require_memory(size: int) -> None:
     """Raise `OutOfMemory` if the program alone already has more than ``size`` bytes.
 
@@ -156,9 +186,9 @@ def require_memory(size: int) -> None:
     import numpy as np
 
     np.zeros((8, 8)) @ np.zeros((8, 8))
-    if size < _used():
+    if size < address_space():
         raise OutOfMemory(
-            f"the program alone needs {_used() / 2**20:.0f} MiB of address space",
+            f"the program alone needs {address_space() / 2**20:.0f} MiB of address space",
             remedy="Use a larger --memory-limit.",
         )
 
@@ -211,17 +241,63 @@ def memory_left() -> int:
     soft, _ = resource.getrlimit(resource.RLIMIT_AS)
     if soft == resource.RLIM_INFINITY:
         return free
-    return max(0, min(free, soft - _used()))
+    return max(0, min(free, soft - address_space()))
 
 
 def _available() -> int:
-    """Bytes that the machine has free or can free at once."""
+    """Bytes that the machine, or the process's control group, has free or can free at once."""
     import psutil  # some milliseconds, and only long work asks
 
-    return int(psutil.virtual_memory().available)
+    return min(int(psutil.virtual_memory().available), _group_memory_left())
 
 
-def _used() -> int:
+def _group_memory_left() -> int:
+    """Bytes that the control groups of this process leave it (jobs of a scheduler, containers)."""
+    left = sys.maxsize
+    for folder in _memory_groups():
+        most = _number(folder / "memory.max", folder / "memory.limit_in_bytes")
+        used = _number(folder / "memory.current", folder / "memory.usage_in_bytes")
+        if most is not None and used is not None:
+            left = min(left, max(0, most - used + _cached(folder)))
+    return left
+
+
+def _memory_groups() -> Iterator[Path]:
+    """The folders of the control groups that count this process's memory, versions 1 and 2."""
+    try:
+        lines = Path("/proc/self/cgroup").read_text().splitlines()
+    except OSError:
+        return
+    for line in lines:
+        _, controllers, path = line.split(":", 2)
+        if controllers not in ("", "memory"):
+            continue
+        root = _GROUPS / controllers
+        own = root / path.lstrip("/")
+        # In a container the path may be that of the machine, and the root is the own group.
+        for folder in (own, *own.parents):
+            if folder.is_relative_to(root):
+                yield folder
+
+
+def _cached(folder: Path) -> int:
+    """Bytes of a group that are files in memory, which are given up where memory is short."""
+    try:
+        lines = (folder / "memory.stat").read_text().splitlines()
+    except OSError:
+        return 0
+    return sum(int(line.split()[1]) for line in lines if line.split()[0] in _GIVEN_UP)
+
+
+def _number(*paths: Path) -> int | None:
+    """The number that the first of these files holds, None where there is none."""
+    for path in paths:
+        with suppress(OSError, ValueError):
+            return int(path.read_text())
+    return None
+
+
+def address_space() -> int:
     """Bytes of address space that this process has."""
     import psutil
 

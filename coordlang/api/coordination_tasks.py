@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Unpack
 
@@ -12,11 +12,11 @@ from coordlang.api.layout import WIDTH
 from coordlang.api.options import GivenOptions, ModelKeywords
 from coordlang.api.presenting import Presented
 from coordlang.api.witness import witness_data, witness_text
-from coordlang.required.miscoordination import Miscoordination, miscoordination
-from coordlang.tasks.candidates import from_problems
+from coordlang.api.workers import opened_runner
+from coordlang.required.miscoordination import Miscoordination
+from coordlang.required.pieces import answers
 from planners.notebook import counted, html_table
 from planners.search.plan_file import json_count
-from planners.search.plans import counts
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -129,6 +129,10 @@ def coordination(
     domain: DomainSource | None = None,
     *problems: ProblemSource,
     factored: File | None = None,
+    jobs: int | None = None,
+    scheduler: File | None = None,
+    resume: File | None = None,
+    note: Callable[[str], None] | None = None,
     **model: Unpack[ModelKeywords],
 ) -> Coordination:
     """Decide which tasks require coordination, and show how robots then miscoordinate.
@@ -139,6 +143,8 @@ def coordination(
     ----------
     domain, problems, factored, **model
         As in `load`.
+    jobs, scheduler, resume, note
+        As in `build`; a problem is a piece of the work.
 
     Raises
     ------
@@ -146,16 +152,11 @@ def coordination(
         For a task without a plan.
     """
     files = read_planning(domain, problems, factored, GivenOptions.of(**model))
-    candidates = from_problems(files.domain, files.problems, files.given.options())
-    space = candidates.spaces[0]
-    numbers = counts(space)
+    loaded = files.instance()
+    with opened_runner(jobs, scheduler, resume, note) as runner:
+        found = answers(loaded, runner)
     tasks = tuple(
-        TaskCoordination(
-            problem.source.name,
-            space.cost_of(task)[0],
-            numbers[int(space.starts[task])],
-            miscoordination(space, task),
-        )
-        for task, problem in enumerate(files.problems)
+        TaskCoordination(problem.source.name, answer.makespan, answer.plans, answer.witness)
+        for problem, answer in zip(files.problems, found, strict=True)
     )
-    return Coordination(candidates.model.robots, tasks)
+    return Coordination(loaded.model.robots, tasks)

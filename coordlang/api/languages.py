@@ -31,6 +31,7 @@ from coordlang.api.options import (
 )
 from coordlang.api.presenting import Presented
 from coordlang.api.witness import witness_data
+from coordlang.api.workers import opened_runner
 from coordlang.building import BuildOptions, Built, build_language, certificate_of
 from coordlang.certificate import Certificate, Checked, read_certificate
 from coordlang.certificate import check as check_certificate
@@ -40,9 +41,7 @@ from coordlang.language.recorded import check_source, recorded_candidates
 from coordlang.language.words import Language
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.tasks.candidates import Candidates
-from coordlang.verification.by_definition import Verdict
-from coordlang.verification.by_definition import verify as verify_partition
-from coordlang.verification.overlapping import verify_overlapping
+from coordlang.verification.pieces import verify_candidates
 from planners.errors import ProvedImpossible
 
 #: Called with what is being done, now and then.
@@ -144,6 +143,10 @@ def build(
     unsolvable: Unsolvable = "fail",
     seed: int = 0,
     progress: Progress | None = None,
+    jobs: int | None = None,
+    scheduler: File | None = None,
+    resume: File | None = None,
+    note: Progress | None = None,
     **model: Unpack[ModelKeywords],
 ) -> BuiltLanguage:
     """Build a coordination language for candidate tasks, and verify it by definition.
@@ -170,6 +173,11 @@ def build(
         Of the methods' random choices: same input, same seed, same language.
     progress
         Called with a line of text when a phase begins.
+    jobs, scheduler, resume, note
+        Who does the pieces of large work (docs/cli.md, cores and machines): how many processes, by
+        default one for each core; a running Dask cluster; a folder that keeps finished pieces.
+        ``note`` is called with what a person should read, by default a warning.  The language
+        does not depend on them.
 
     Raises
     ------
@@ -187,7 +195,10 @@ def build(
     files = read_planning(domain, problems, factored, GivenOptions.of(**model))
     candidates = _candidates(files, tasks, unsolvable)
     seconds = {"space": perf_counter() - begin}
-    built = build_language(candidates, **asdict(options), progress=progress or _silent)
+    with opened_runner(jobs, scheduler, resume, note) as runner:
+        built = build_language(
+            candidates, **asdict(options), progress=progress or _silent, runner=runner
+        )
     seconds |= built.seconds
     producer = {
         "program": "coordlang",
@@ -264,6 +275,10 @@ def verify(
     tasks: TasksSource | None = None,
     certificate: File | Certificate | None = None,
     progress: Progress | None = None,
+    jobs: int | None = None,
+    scheduler: File | None = None,
+    resume: File | None = None,
+    note: Progress | None = None,
     **model: Unpack[ModelKeywords],
 ) -> Verification:
     """Check by definition that a language is a coordination language.
@@ -282,6 +297,8 @@ def verify(
         Why fewer words do not suffice: a file of ``coordlang build --certificate``, checked too.
     progress
         Called with a line of text when a phase begins.
+    jobs, scheduler, resume, note
+        As in `build`.
 
     Raises
     ------
@@ -299,7 +316,9 @@ def verify(
         candidates = recorded_candidates(read, files.domain, files.problems, options, position)
     else:
         candidates = files.candidates(tasks, options)
-    verdict = _verdict(read, candidates)
+    partition = read.partition(candidates.model)
+    with opened_runner(jobs, scheduler, resume, note) as runner:
+        verdict = verify_candidates(partition, candidates, runner, progress or _silent)
     checked = None
     if proof and verdict.holds:
         checked = check_certificate(proof, candidates, progress or _silent)
@@ -313,14 +332,6 @@ def verify(
         checked,
         read.guarantee.lower_bound,
     )
-
-
-def _verdict(language: Language, candidates: Candidates) -> Verdict:
-    partition = language.partition(candidates.model)
-    verdict = verify_partition(partition, candidates.spaces)
-    if not (language.also and verdict.holds):
-        return verdict
-    return verify_overlapping(partition, candidates.spaces)
 
 
 def _certificate(certificate: File | Certificate | None) -> Certificate | None:

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from typing import TYPE_CHECKING, Literal, TypedDict, get_args
 
 if TYPE_CHECKING:
@@ -26,6 +27,20 @@ BUILD_PREFERENCES: tuple[str, ...] = get_args(BuildPreference)
 UNSOLVABLE: tuple[str, ...] = get_args(Unsolvable)
 HEURISTICS: tuple[str, ...] = get_args(HeuristicName)
 TARGETS: tuple[str, ...] = get_args(Target)
+
+
+class PiecesKeywords(TypedDict, total=False):
+    """Who does the pieces of the work (docs/cli.md, cores and machines).
+
+    ``jobs``: processes, one for each core by default; ``scheduler``: a running Dask cluster in
+    their place; ``resume``: a folder that keeps finished pieces; ``note`` is called with what a
+    person should read, which is a Python warning otherwise.
+    """
+
+    jobs: int | None
+    scheduler: str | PathLike[str] | None
+    resume: str | PathLike[str] | None
+    note: Callable[[str], None] | None
 
 
 class ModelKeywords(TypedDict, total=False):

@@ -23,7 +23,13 @@ from coordlang.api.options import (
 from coordlang.cli.echo import echo
 from coordlang.cli.exit_codes import INTERRUPTED, UNPROVED, interrupted_by
 from coordlang.cli.files import PlanningFiles, check_outputs, never_stdout, planning_files
-from coordlang.cli.shared_options import ModelKeywords, limits, model_options
+from coordlang.cli.shared_options import (
+    ModelKeywords,
+    PiecesKeywords,
+    limits,
+    model_options,
+    pieces_options,
+)
 from coordlang.cli.terminal import line_width, note_single_robot, working
 from planners.messages import visible
 from planners.notebook import counted
@@ -87,6 +93,7 @@ if TYPE_CHECKING:
 )
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as one JSON object.")
+@pieces_options
 @model_options
 @limits
 def command(
@@ -101,6 +108,7 @@ def command(
     output: str,
     seed: int,
     as_json: bool,
+    pieces: PiecesKeywords,
     model: ModelKeywords,
 ) -> int:
     """Build a coordination language and verify it before it is written.
@@ -122,6 +130,7 @@ def command(
         overlap=overlap,
         unsolvable=unsolvable,
         seed=seed,
+        **pieces,
         **model,
     )
     left = time_left()

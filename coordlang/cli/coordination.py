@@ -10,21 +10,30 @@ import click
 import coordlang
 from coordlang.cli.echo import echo
 from coordlang.cli.files import PlanningFiles, planning_files
-from coordlang.cli.shared_options import ModelKeywords, limits, model_options
+from coordlang.cli.shared_options import (
+    ModelKeywords,
+    PiecesKeywords,
+    limits,
+    model_options,
+    pieces_options,
+)
 from coordlang.cli.terminal import line_width, note_single_robot, working
 
 
 @click.command(name="coordination")
 @planning_files("DOMAIN PROBLEMS...")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
+@pieces_options
 @model_options
 @limits
-def command(pddl: PlanningFiles, as_json: bool, model: ModelKeywords) -> None:
+def command(
+    pddl: PlanningFiles, as_json: bool, pieces: PiecesKeywords, model: ModelKeywords
+) -> None:
     """Decide which tasks require coordination.
 
     Show how robots that follow different optimal plans miscoordinate.
     """
     with working("finding all optimal plans"):
-        found = coordlang.coordination(*pddl.files, factored=pddl.factored, **model)
+        found = coordlang.coordination(*pddl.files, factored=pddl.factored, **pieces, **model)
     note_single_robot(found.robots)
     echo(json.dumps(found.data()) if as_json else found.text(line_width()))

@@ -15,7 +15,7 @@ from coordlang.cli.echo import echo
 from coordlang.cli.exit_codes import UNPROVED
 from coordlang.cli.files import check_outputs
 from coordlang.cli.group import RenamedOptions
-from coordlang.cli.shared_options import limits, was_given
+from coordlang.cli.shared_options import limits, note, was_given
 from coordlang.cli.terminal import bar
 from planners.messages import echoed
 from planners.notebook import counted
@@ -36,7 +36,17 @@ if TYPE_CHECKING:
     "--page", metavar="FILE", help="The page that shows them (default: evaluation.md in DIR)."
 )
 @click.option("--seed", type=int, default=0, show_default=True)
-@click.option("--jobs", type=click.IntRange(min=1), help="Processes (default: one for each core).")
+@click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Processes (default: one for each core).",
+)
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS|FILE",
+    help="Do the work on this running Dask cluster instead.",
+)
 @click.option(
     "--samples",
     type=click.IntRange(min=1),
@@ -66,6 +76,7 @@ def command(
     page: str | None,
     seed: int,
     jobs: int | None,
+    scheduler: str | None,
     samples: int,
     quick: bool,
     unit_time_limit: float,
@@ -98,7 +109,7 @@ def command(
     settings = Settings(find_domains(domains), cache, seed, samples, quick, unit_time_limit)
     kept = Results(folder)
     begin = perf_counter()
-    found = _run(chosen, settings, kept, jobs)
+    found = _run(chosen, settings, kept, jobs, scheduler)
     written = write_page(RECIPES, kept, Path(page) if page else folder / "evaluation.md")
     seconds = perf_counter() - begin
     if as_json:
@@ -139,20 +150,25 @@ def _exit_code(found: dict[str, list[Record]]) -> int:
 
 
 def _run(
-    recipes: list[Recipe], settings: Settings, kept: Results, jobs: int | None
+    recipes: list[Recipe],
+    settings: Settings,
+    kept: Results,
+    jobs: int | None,
+    scheduler: str | None,
 ) -> dict[str, list[Record]]:
     """Run experiments with progress shown; what is done is kept when they are stopped."""
+    from coordlang.api.workers import opened_runner
     from coordlang.evaluation.lab.runner import Progress, run
     from planners.errors import OutOfTime
 
     try:
-        with bar() as show:
+        with opened_runner(jobs, scheduler, note=note) as runner, bar() as show:
 
             def report(progress: Progress) -> None:
                 running = ", ".join(f"{unit.experiment}/{unit.key}" for unit in progress.running)
                 show(progress.done, progress.all, f"({progress.known} known) {running}")
 
-            return run(recipes, settings, kept, jobs or len(os.sched_getaffinity(0)), report)
+            return run(recipes, settings, kept, runner, report)
     except (KeyboardInterrupt, OutOfTime):
         echo("coordlang: what is done is kept; the same command goes on from there", err=True)
         raise

@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import functools
 import math
+import os
 import re
 from collections.abc import Callable
 
 import click
 
-from coordlang.api.options import COSTS, UNOWNED, ModelKeywords
+from coordlang.api.options import COSTS, UNOWNED, ModelKeywords, PiecesKeywords
+from coordlang.cli.echo import echo
 
 #: A command's function; it returns the exit code, None for 0.
 CommandFunction = Callable[..., int | None]
@@ -29,23 +31,23 @@ def limits(function: CommandFunction) -> CommandFunction:
         "--memory-limit",
         callback=_size,
         metavar="SIZE",
-        help="Stop before using more, e.g. 4G (exit 22).",
+        help="Stop before using more, e.g. 4G (exit 22); none: no limit.  Default: 80 % of what is "
+        "free.",
     )
     @click.option("--debug", is_flag=True, help="Show tracebacks.")
     @functools.wraps(function)
     def wrapped(
-        time_limit: float | None, memory_limit: int | None, debug: bool, **arguments: object
+        time_limit: float | None, memory_limit: int | str | None, debug: bool, **arguments: object
     ) -> int | None:
-        from planners.limits import limit_memory, require_libraries, require_memory
+        from planners.limits import limited_memory, require_libraries, require_memory
         from planners.limits import time_limit as limit_time
 
         if time_limit is not None and math.isnan(time_limit):
             raise click.UsageError("--time-limit: expected a number of seconds")
         require_libraries()
-        if memory_limit is not None:
+        if isinstance(memory_limit, int):
             require_memory(memory_limit)
-            limit_memory(memory_limit)
-        with limit_time(time_limit):
+        with limited_memory(_bytes(memory_limit)), limit_time(time_limit):
             return function(**arguments)
 
     return wrapped
@@ -88,6 +90,48 @@ def model_options(function: CommandFunction) -> CommandFunction:
     return wrapped
 
 
+def pieces_options(function: CommandFunction) -> CommandFunction:
+    """``--jobs``, ``--scheduler`` and ``--resume``; the command gets them as ``pieces``."""
+
+    @click.option(
+        "--jobs",
+        type=click.IntRange(min=1),
+        metavar="N",
+        help="Processes for large work (default: one for each core).",
+    )
+    @click.option(
+        "--scheduler",
+        metavar="ADDRESS|FILE",
+        help="Do the work on this running Dask cluster instead.",
+    )
+    @click.option(
+        "--resume",
+        metavar="DIR",
+        help="Keep finished pieces here, and go on with those that are kept.",
+    )
+    @functools.wraps(function)
+    def wrapped(
+        jobs: int | None, scheduler: str | None, resume: str | None, **arguments: object
+    ) -> int | None:
+        from coordlang.cli.files import check_outputs  # which imports this module
+
+        if resume is not None:
+            check_outputs(
+                [("--resume", os.path.join(resume, ".piece") if resume else "")],
+                [],
+                makes_folder=True,
+            )
+        pieces = {"jobs": jobs, "scheduler": scheduler, "resume": resume, "note": note}
+        return function(pieces=pieces, **arguments)
+
+    return wrapped
+
+
+def note(text: str) -> None:
+    """Write what a person should read to stderr."""
+    echo(f"coordlang: note: {text}", err=True)
+
+
 def was_given(name: str) -> bool:
     """Whether this parameter of the command stands on the command line."""
     return (
@@ -96,13 +140,33 @@ def was_given(name: str) -> bool:
     )
 
 
-def _size(_context: click.Context, _parameter: click.Parameter, value: str | None) -> int | None:
-    if value is None:
-        return None
+def _bytes(memory_limit: int | str | None) -> int | None:
+    """Return the limit on the address space; None for "none"."""
+    from planners.limits import default_memory_limit
+
+    if memory_limit is None:
+        return default_memory_limit()
+    return memory_limit if isinstance(memory_limit, int) else None
+
+
+def _size(
+    _context: click.Context, _parameter: click.Parameter, value: str | None
+) -> int | str | None:
+    if value is None or value.strip().lower() == "none":
+        return value and "none"
     match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([kmgt]?)i?b?", value.strip().lower())
     if not match:
-        raise click.BadParameter("expected a size such as 500M or 4G")
+        raise click.BadParameter("expected a size such as 500M or 4G, or none")
     return int(float(match[1]) * 1024 ** " kmgt".index(match[2] or " "))
 
 
-__all__ = ["CommandFunction", "ModelKeywords", "limits", "model_options", "was_given"]
+__all__ = [
+    "CommandFunction",
+    "ModelKeywords",
+    "PiecesKeywords",
+    "limits",
+    "model_options",
+    "note",
+    "pieces_options",
+    "was_given",
+]

@@ -19,7 +19,13 @@ from coordlang.cli.files import (
     planning_files,
 )
 from coordlang.cli.group import RenamedOptions
-from coordlang.cli.shared_options import ModelKeywords, limits, model_options
+from coordlang.cli.shared_options import (
+    ModelKeywords,
+    PiecesKeywords,
+    limits,
+    model_options,
+    pieces_options,
+)
 from coordlang.cli.terminal import line_width, working
 from planners.notebook import counted
 
@@ -47,6 +53,7 @@ if TYPE_CHECKING:
     help="With --certificate: write the formula that was refuted, for any SAT solver.",
 )
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
+@pieces_options
 @model_options
 @limits
 def command(
@@ -56,6 +63,7 @@ def command(
     certificate: str | None,
     dimacs: str | None,
     as_json: bool,
+    pieces: PiecesKeywords,
     model: ModelKeywords,
 ) -> int:
     """Check by definition that LANGUAGE is a coordination language.

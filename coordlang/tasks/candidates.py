@@ -23,6 +23,7 @@ from planners.search.optimal_plans import (
     solvable,
 )
 from planners.search.plan_space import PlanSpace
+from planners.search.portions import Explored, PlanSpaces, Searched, Source
 from planners.search.reachable import explore
 from planners.tables import Rows, find_rows, unique_rows
 
@@ -37,13 +38,15 @@ class Candidates:
     states; "file": ``listed``.  ``spaces`` are their optimal plans, in batches over one common
     table of states; ``count`` is the number of tasks.  ``states`` is the number of reachable states
     where the whole space was explored, else None. ``skipped`` names tasks that were left out
-    because they have no plan.
+    because they have no plan.  ``source`` makes the plan spaces of any portion of the goals, where
+    that is done in pieces.
     """
 
     kind: Kind
     loaded: PlanningInstance
     listed: tuple[ListedTask, ...]
-    spaces: tuple[PlanSpace, ...]
+    spaces: Sequence[PlanSpace]
+    source: Source
     states: int | None
     skipped: tuple[str, ...] = ()
 
@@ -55,12 +58,12 @@ class Candidates:
     @property
     def count(self) -> int:
         """How many tasks there are."""
-        return sum(len(space.starts) for space in self.spaces)
+        return self.source.tasks
 
     @property
     def rows(self) -> Rows:
         """The table of states that every plan space's state numbers refer to."""
-        return self.spaces[0].rows
+        return self.source.rows
 
 
 def from_problems(
@@ -88,7 +91,10 @@ def from_problems(
             skipped.append(problem.source.name)
             continue
         listed.append(listed_task(domain, problem, task))
-    return Candidates("problems", loaded, tuple(listed), (joined(spaces),), None, tuple(skipped))
+    plans = joined(spaces)
+    return Candidates(
+        "problems", loaded, tuple(listed), (plans,), Searched(plans), None, tuple(skipped)
+    )
 
 
 def all_pairs(
@@ -103,8 +109,8 @@ def all_pairs(
     if loaded.model.remembers:
         return _all_pairs_remembering(loaded, inits)
     space = explore(loaded.model, inits)
-    spaces = tuple(plan_spaces(space, _to_each_state(loaded.model, space.rows)))
-    return Candidates("all", loaded, (), spaces, len(space))
+    source = Explored(space, _to_each_state(loaded.model, space.rows))
+    return Candidates("all", loaded, (), PlanSpaces(source), source, len(space))
 
 
 def _all_pairs_remembering(loaded: PlanningInstance, inits: Rows) -> Candidates:
@@ -125,7 +131,8 @@ def _all_pairs_remembering(loaded: PlanningInstance, inits: Rows) -> Candidates:
             if len(mine):
                 groups.append((goal, starts[mine]))
     extended = explore(model, starts)
-    return Candidates("all", loaded, (), tuple(plan_spaces(extended, groups)), len(base))
+    source = Explored(extended, groups)
+    return Candidates("all", loaded, (), PlanSpaces(source), source, len(base))
 
 
 def _to_each_state(model: JointModel, rows: Rows) -> list[tuple[Goal, None]]:
@@ -184,7 +191,8 @@ def from_listed(
             position=position,
             remedy=error.remedy,
         ) from None
-    return Candidates("file", loaded, tuple(listed), spaces, len(reached), skipped)
+    source = Explored(space, kept or by_goal)
+    return Candidates("file", loaded, tuple(listed), spaces, source, len(reached), skipped)
 
 
 def _require_reached(
@@ -241,7 +249,8 @@ def from_recorded(
     They are searched one by one, without the rest of the space.
     """
     loaded, tasks = model_of_listed(domain, problems, listed, options, position)
-    return Candidates("problems", loaded, tuple(listed), (search_each(loaded.model, tasks),), None)
+    plans = search_each(loaded.model, tasks)
+    return Candidates("problems", loaded, tuple(listed), (plans,), Searched(plans), None)
 
 
 def describe(space: PlanSpace, task: int) -> str:

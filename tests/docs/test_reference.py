@@ -23,7 +23,11 @@ from tests.support.domains import ROOT
 from tests.support.pages import DOCS, PAGES, anchor, blocks, code, links, prose, rows, sections
 
 CLI = DOCS / "cli.md"
-SHARED = {"model options": "Model options", "limits": "Limits"}
+SHARED = {
+    "model options": "Model options",
+    "cores and machines": "Cores and machines",
+    "limits": "Limits",
+}
 
 
 @cache

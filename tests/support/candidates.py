@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
 from itertools import product
 from random import Random
@@ -57,7 +57,7 @@ def requiring(candidates: Candidates) -> bool:
     return any(walk(space).requires[space.starts].any() for space in candidates.spaces)
 
 
-def states_of(spaces: tuple[PlanSpace, ...]) -> int:
+def states_of(spaces: Sequence[PlanSpace]) -> int:
     return len({int(s) for space in spaces for s in space.state})
 
 

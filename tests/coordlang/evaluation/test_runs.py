@@ -20,6 +20,7 @@ from coordlang.evaluation.lab.recipe import Settings
 from coordlang.evaluation.lab.results import Results
 from coordlang.evaluation.lab.runner import Progress, UnitFailed, run
 from planners.errors import BadInput, UsageError
+from planners.pieces.processes import Processes
 from tests.support.command import Command, own_process
 from tests.support.domains import DOMAINS
 
@@ -61,7 +62,7 @@ def test_a_line_says_what_it_was_made_with(finished: Path) -> None:
 
 
 def test_processes_do_not_matter(finished: Path, tmp_path: Path) -> None:
-    run([GAME], settings(tmp_path), Results(tmp_path), jobs=3)
+    run([GAME], settings(tmp_path), Results(tmp_path), Processes(jobs=3))
     assert lines(tmp_path, "game") == lines(finished, "game")
 
 

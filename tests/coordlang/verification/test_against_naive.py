@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from random import Random
 from typing import Any
 
@@ -52,7 +53,7 @@ def listable(candidates: Candidates, most: int) -> None:
 
 
 def naive_divergences(
-    spaces: tuple[PlanSpace, ...], most: int
+    spaces: Sequence[PlanSpace], most: int
 ) -> tuple[set[tuple[int, frozenset[int]]], list[bool], bool]:
     """alpha* of all failing mixtures, which tasks require coordination, and whether some plans are
     inseparable.

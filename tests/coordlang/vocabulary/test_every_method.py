@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from typing import Any
 
 import pytest
 
@@ -92,11 +93,11 @@ def test_stopped_while_it_checks(
     verified = coordlang.building._verified
     checked: list[Assignment] = []
 
-    def late(given: Candidates, partition: Assignment) -> object:
+    def late(given: Candidates, partition: Assignment, *others: Any) -> object:
         if checked:
             raise error
         checked.append(partition)
-        return verified(given, partition)
+        return verified(given, partition, *others)
 
     monkeypatch.setattr(coordlang.building, "_verified", late)
     built = build_language(candidates, method)

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Who does the pieces of the work: the options of a call, and a runner of pieces."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from os import PathLike, fspath
+
+from planners.errors import UsageError
+from planners.pieces.runners import Where, runner
+from planners.pieces.work import Runner
+
+#: The packages whose code does pieces.
+PACKAGES = ("planners", "coordlang")
+
+
+def opened_runner(
+    jobs: int | None = None,
+    scheduler: str | PathLike[str] | None = None,
+    resume: str | PathLike[str] | None = None,
+    note: Callable[[str], None] | None = None,
+) -> AbstractContextManager[Runner]:
+    """Return a runner of pieces, for a block.
+
+    Raises
+    ------
+    UsageError
+        For fewer than one job, and for jobs together with a scheduler.
+    """
+    if jobs is not None and jobs < 1:
+        raise UsageError(f"--jobs {jobs}: at least one process does the work")
+    if jobs is not None and scheduler is not None:
+        raise UsageError(
+            "--jobs counts processes of this machine, and --scheduler sends the work elsewhere",
+            remedy="Give one of them.",
+        )
+    where = Where(jobs, None if scheduler is None else fspath(scheduler), resume)
+    return runner(where, PACKAGES, note or _warn)
+
+
+def _warn(text: str) -> None:
+    warnings.warn(text, RuntimeWarning, stacklevel=2)

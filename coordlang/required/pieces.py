@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Required coordination of many tasks in pieces: by goals, and by problems.
+
+Divergences at a node depend on its goal only, so the goals are cut into portions, and each is a
+piece of work (`planners.pieces`).  Few or small ones are one portion, and done here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from itertools import combinations
+
+import msgspec
+import numpy as np
+
+from coordlang.required.divergences import (
+    Divergences,
+    FirstDifferences,
+    first_differences,
+    states_on_plans,
+)
+from coordlang.required.miscoordination import (
+    Inseparable,
+    Miscoordination,
+    inseparable,
+    miscoordination,
+    require_separable,
+    separable,
+)
+from coordlang.tasks.candidates import Candidates
+from planners.joint.model import JointModel, PlanningTask
+from planners.limits import reaching
+from planners.loading import PlanningInstance
+from planners.pieces.work import Runner, Table, Work, digest, tables
+from planners.search.optimal_plans import search
+from planners.search.plans import counts
+from planners.search.portions import PORTION, Source, cut
+from planners.tables import Bools, Ints
+
+
+@dataclass(frozen=True, slots=True)
+class Differences:
+    """The first differences of candidate tasks, and the numbers of the states on their plans."""
+
+    first: FirstDifferences
+    states: Ints
+
+
+def differences(
+    candidates: Candidates,
+    runner: Runner,
+    progress: Callable[[str], None] = lambda _: None,
+    portion: float = PORTION,
+) -> Differences:
+    """Find both, for tasks without inseparable plans, in pieces of about ``portion`` effort.
+
+    Raises
+    ------
+    Inseparable
+        With the plans of the first portion that has some.
+    """
+    source = candidates.source
+    portions = cut(source.efforts, portion)
+    if len(portions) == 1:
+        progress("looking for inseparable plans")
+        require_separable(candidates.spaces)
+        progress("looking where coordination is required")
+        return Differences(first_differences(candidates.spaces), states_on_plans(candidates.spaces))
+    efforts = [float(source.efforts[goals.start : goals.stop].sum()) for goals in portions]
+    work = Work("first differences", _differences, source, portions, source.identity, efforts)
+    found: list[Table] = []
+
+    def so_far() -> str:
+        return f"{len(found):,} of {len(portions):,} portions of the goals"
+
+    with (
+        reaching(so_far, "fewer candidate tasks (a task file)"),
+        closing(tables(runner.run(work))) as pieces,
+    ):
+        for table in pieces:
+            if table["inseparable"]:
+                witness = inseparable(source.portion(portions[len(found)]))
+                assert witness is not None
+                raise Inseparable(witness)
+            found.append(table)
+            progress(f"looking where coordination is required: {so_far()}")
+    return _together(found)
+
+
+@dataclass(frozen=True, slots=True)
+class TaskAnswer:
+    """One task: its optimal makespan and plans, and plans that miscoordinate, if there are any."""
+
+    makespan: int
+    plans: int
+    witness: Miscoordination | None
+
+
+def answers(loaded: PlanningInstance, runner: Runner) -> list[TaskAnswer]:
+    """Search the task of each problem and decide whether it requires coordination, in pieces.
+
+    Raises
+    ------
+    ProvedImpossible
+        For the first task without a plan.
+    """
+    model, tasks = loaded.model, loaded.tasks
+    effort = float(len(model.codec.facts) * sum(map(len, model.labels)))  # a guess: no search yet
+    numbers = range(len(tasks))
+    hashes = (loaded.domain.source.sha256, *(p.source.sha256 for p in loaded.problems))
+    identity = digest(*hashes, repr(loaded.options))
+    shared = (model, tasks)
+    work = Work("coordination", _answer, shared, numbers, identity, [effort for _ in numbers])
+    return [_read_answer(table) for table in tables(runner.run(work))]
+
+
+def _answer(shared: tuple[JointModel, Sequence[PlanningTask]], number: int) -> Table:
+    """One piece: a task."""
+    model, tasks = shared
+    space = search(model, tasks[number])
+    witness = miscoordination(space, 0)
+    return {
+        "makespan": np.array(space.cost_of(0)[0]),
+        "plans": np.array(str(counts(space)[int(space.starts[0])])),
+        "witness": np.frombuffer(msgspec.json.encode(witness), np.uint8),
+    }
+
+
+def _read_answer(table: Table) -> TaskAnswer:
+    witness = msgspec.json.decode(table["witness"].tobytes(), type=Miscoordination | None)
+    return TaskAnswer(int(table["makespan"]), int(str(table["plans"])), witness)
+
+
+def _differences(source: Source, goals: range) -> Table:
+    """One piece: the tasks of some goals."""
+    space = source.portion(goals)
+    if not len(space):  # nothing leads to these goals
+        return _table(None, np.zeros((0, 1 + space.robots), np.int64), space.state)
+    if not separable(space):
+        return {"inseparable": np.array(True)}
+    found = first_differences([space])
+    rows = np.column_stack((found.divergences.last, found.divergences.following))
+    return _table(found, rows, states_on_plans([space]))
+
+
+def _table(found: FirstDifferences | None, rows: Ints, states: Ints) -> Table:
+    figures = np.zeros(5, np.int64)
+    if found is not None:
+        figures[:] = found.requiring, found.nodes, found.edges, found.sets, found.evaluations
+    return {
+        "inseparable": np.array(False),
+        "divergences": rows,
+        "figures": figures,
+        "states": states,
+    }
+
+
+def _together(found: Sequence[Table]) -> Differences:
+    """What pieces found as one: sets and mixtures are counted anew in each."""
+    rows = np.unique(np.concatenate([table["divergences"] for table in found]), axis=0)
+    rows = rows[~_implied(rows)]
+    figures = np.stack([table["figures"] for table in found]).sum(axis=0)
+    requiring, nodes, edges, sets, evaluations = figures.tolist()
+    return Differences(
+        FirstDifferences(
+            Divergences(rows[:, 0], rows[:, 1:]), requiring, nodes, edges, sets, evaluations
+        ),
+        np.unique(np.concatenate([table["states"] for table in found])),
+    )
+
+
+def _implied(rows: Ints) -> Bools:
+    """Which divergences hold all states of a smaller one at the same last shared state."""
+    large = np.flatnonzero((rows[:, 1:] >= 0).sum(axis=1) > 2)
+    implied = np.zeros(len(rows), np.bool_)
+    if not len(large):
+        return implied
+    known = {tuple(state for state in row if state >= 0) for row in rows.tolist()}
+    for number in large.tolist():
+        last, *states = (state for state in rows[number].tolist() if state >= 0)
+        implied[number] = any(
+            (last, *some) in known
+            for size in range(2, len(states))
+            for some in combinations(states, size)
+        )
+    return implied

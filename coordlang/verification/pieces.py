@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Verification of many tasks in pieces: the goals are cut into portions, each verified by itself.
+
+Every walk of the verifiers is that of one goal, so the verdict is that of all portions together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+
+import numpy as np
+
+from coordlang.language.partition import Partition
+from coordlang.tasks.candidates import Candidates
+from coordlang.verification.by_definition import Verdict, verify
+from coordlang.verification.overlapping import verify_overlapping
+from planners.limits import reaching
+from planners.pieces.work import Runner, Table, Work, digest, tables
+from planners.search.plan_space import PlanSpace
+from planners.search.portions import PORTION, Source, cut
+
+
+@dataclass(frozen=True, slots=True)
+class _Check:
+    """What all pieces share: words, and where the plans come from."""
+
+    source: Source
+    partition: Partition
+
+    def verdict(self, space: PlanSpace) -> Verdict:
+        """By definition; words that overlap are checked as a partition first."""
+        if not len(space):  # nothing leads to these goals
+            return Verdict(True, 0, 0, None)
+        verdict = verify(self.partition, [space])
+        if verdict.holds and self.partition.further:
+            return verify_overlapping(self.partition, [space])
+        return verdict
+
+
+def verify_candidates(
+    partition: Partition,
+    candidates: Candidates,
+    runner: Runner,
+    progress: Callable[[str], None] = lambda _: None,
+    portion: float = PORTION,
+) -> Verdict:
+    """Check words against the definition, in pieces of about ``portion`` effort.
+
+    The witness of a violation is that of the first portion that has one.
+    """
+    source = candidates.source
+    portions = cut(source.efforts, portion)
+    if len(portions) == 1:
+        return _all_at_once(partition, candidates)
+    efforts = [float(source.efforts[goals.start : goals.stop].sum()) for goals in portions]
+    check = _Check(source, partition)
+    identity = digest(source.identity, *_of_words(partition))
+    work = Work("verification", _verdict, check, portions, identity, efforts)
+    done = nodes = 0
+
+    def so_far() -> str:
+        return f"{done:,} of {len(portions):,} portions of the goals, {nodes:,} nodes of the walk"
+
+    with (
+        reaching(so_far, "fewer candidate tasks (a task file)"),
+        closing(tables(runner.run(work))) as pieces,
+    ):
+        for table in pieces:
+            nodes += int(table["nodes"])
+            if not table["holds"]:
+                witness = check.verdict(source.portion(portions[done])).witness
+                return Verdict(False, candidates.count, nodes, witness)
+            done += 1
+            progress(f"verifying by definition: {so_far()}")
+    return Verdict(True, candidates.count, nodes, None)
+
+
+def _verdict(check: _Check, goals: range) -> Table:
+    """One piece: the tasks of some goals."""
+    verdict = check.verdict(check.source.portion(goals))
+    return {"holds": np.array(verdict.holds), "nodes": np.array(verdict.nodes)}
+
+
+def _all_at_once(partition: Partition, candidates: Candidates) -> Verdict:
+    verdict = verify(partition, candidates.spaces)
+    if verdict.holds and partition.further:
+        return verify_overlapping(partition, candidates.spaces)
+    return verdict
+
+
+def _of_words(partition: Partition) -> tuple[object, ...]:
+    further = tuple((state, *sorted(more)) for state, more in sorted(partition.further.items()))
+    return partition.words, partition.rows, partition.word, partition.default, further

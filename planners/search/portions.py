@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The plan spaces of many goals, a portion of the goals at a time: tasks are cut between goals.
+
+What is asked of a plan space goal by goal is asked of portions, which other processes make
+themselves: they are sent where the plans come from, not the plans.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Protocol, overload
+
+import numpy as np
+
+from planners.joint.model import FullState, Goal, JointModel
+from planners.pieces.work import digest
+from planners.search.optimal_plans import distances, plan_spaces
+from planners.search.plan_space import PlanSpace
+from planners.search.reachable import PIECES, PieceSizes, Space
+from planners.tables import Bools, Ints, Rows
+
+#: Estimated nodes times robots in one portion.  Smaller ones find the same label sets again and
+#: again, larger ones leave cores without work.
+PORTION = 40_000.0
+#: Goals whose distances are worked out together.
+_GOALS = 512
+
+
+class Source(Protocol):
+    """Where plan spaces come from; it is sent to other processes."""
+
+    def portion(self, goals: range) -> PlanSpace:
+        """The plan space of the tasks of some goals; states have the same numbers in all."""
+        ...
+
+    @property
+    def rows(self) -> Rows:
+        """The table of all states."""
+        ...
+
+    @property
+    def efforts(self) -> Ints:
+        """For each goal the estimated nodes of its plan space, times robots."""
+        ...
+
+    @property
+    def tasks(self) -> int:
+        """How many tasks there are."""
+        ...
+
+    @property
+    def identity(self) -> str:
+        """A hash of all that portions say, the same in every process."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Explored:
+    """Tasks over one explored space, by goal, with their initial states; None: all others."""
+
+    space: Space
+    goals: Sequence[tuple[Goal, Rows | None]]
+
+    def portion(self, goals: range) -> PlanSpace:
+        """See `Source.portion`; O(goals x joint steps)."""
+        tasks = self.goals[goals.start : goals.stop]
+        pieces = PieceSizes(pairs=max(1, len(tasks) * len(self.space)))
+        (space,) = plan_spaces(self.space, tasks, pieces)
+        return space
+
+    @property
+    def rows(self) -> Rows:
+        """See `Source.rows`."""
+        return self.space.rows
+
+    @property
+    def efforts(self) -> Ints:
+        """As many nodes as there are states: a goal's plan space can have no more."""
+        return np.full(len(self.goals), len(self.space) * len(self.space.model.robots))
+
+    @property
+    def tasks(self) -> int:
+        """How many there are: pairs of a goal and another state that reaches it, for None."""
+        listed = sum(len(inits) for _, inits in self.goals if inits is not None)
+        free = [goal for goal, inits in self.goals if inits is None]
+        return listed + _pairs(self.space, free)
+
+    @property
+    def identity(self) -> str:
+        """See `Source.identity`."""
+        space = self.space
+        goals = tuple(
+            (
+                goal.facts if isinstance(goal, FullState) else space.model.holds(goal, space.rows),
+                inits,
+            )
+            for goal, inits in self.goals
+        )
+        return digest(
+            *_of_model(space.model),
+            *(space.rows, space.first, space.target, space.labels, space.cost),
+            goals,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Searched:
+    """Tasks of a plan space that is there already, cut by its goals."""
+
+    plans: PlanSpace
+
+    def portion(self, goals: range) -> PlanSpace:
+        """See `Source.portion`; O(edges)."""
+        plans = self.plans
+        goal = plans.goal[plans.starts]
+        mine = (goal >= goals.start) & (goal < goals.stop)
+        return plans.with_tasks(plans.starts[mine], plans.second[mine])
+
+    @property
+    def rows(self) -> Rows:
+        """See `Source.rows`."""
+        return self.plans.rows
+
+    @property
+    def efforts(self) -> Ints:
+        """Nodes times robots, as they are."""
+        plans = self.plans
+        found: Ints = np.bincount(plans.goal, minlength=len(plans.goals)) * plans.robots
+        return found
+
+    @property
+    def tasks(self) -> int:
+        """How many there are."""
+        return len(self.plans.starts)
+
+    @property
+    def identity(self) -> str:
+        """See `Source.identity`."""
+        plans = self.plans
+        return digest(
+            *_of_model(plans.model),
+            *(plans.rows, plans.state, plans.goal, plans.layer, plans.first, plans.target),
+            *(plans.labels, plans.cost, plans.starts, plans.second),
+        )
+
+
+class PlanSpaces(Sequence[PlanSpace]):
+    """All plan spaces of a source in batches, each made when it is asked for, and then kept."""
+
+    def __init__(self, source: Explored) -> None:
+        self._source = source
+        size = max(1, PIECES.pairs // max(1, len(source.space)))
+        count = len(source.goals)
+        self._batches = [range(low, min(low + size, count)) for low in range(0, count, size)]
+        self._made: dict[int, PlanSpace] = {}
+
+    def __len__(self) -> int:
+        return len(self._batches)
+
+    @overload
+    def __getitem__(self, number: int) -> PlanSpace: ...
+    @overload
+    def __getitem__(self, number: slice) -> Sequence[PlanSpace]: ...
+    def __getitem__(self, number: int | slice) -> PlanSpace | Sequence[PlanSpace]:
+        if isinstance(number, slice):
+            return [self[k] for k in range(*number.indices(len(self)))]
+        at = range(len(self))[number]
+        if at not in self._made:
+            self._made[at] = self._source.portion(self._batches[at])
+        return self._made[at]
+
+
+def cut(efforts: Ints, portion: float = PORTION) -> list[range]:
+    """Goals in a row whose efforts sum to one portion, as near as that goes.
+
+    It depends on nothing else, so that results do not depend on who does the work.
+    """
+    total = float(efforts.sum())
+    parts = max(1, min(len(efforts), round(total / portion)))
+    ends = np.searchsorted(np.cumsum(efforts), total * np.arange(1, parts) / parts) + 1
+    bounds = np.unique(np.concatenate(([0], np.minimum(ends, len(efforts)), [len(efforts)])))
+    return [range(int(low), int(high)) for low, high in pairwise(bounds)]
+
+
+def _pairs(space: Space, goals: Sequence[Goal]) -> int:
+    """How many pairs there are of a goal and a state that reaches it in one step or more."""
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    if not goals:
+        return 0
+    reached = _holding(space, goals[:1])
+    size = len(space)
+    if all(isinstance(goal, FullState) for goal in goals) and reached.sum() == 1:
+        graph = csr_matrix(
+            (np.ones(len(space.target)), (space.sources, space.target)), (size, size)
+        )
+        parts, _ = connected_components(graph, connection="strong")
+        if parts == 1:
+            return len(goals) * (size - 1)
+    return sum(
+        int((distances(space, _holding(space, goals[low : low + _GOALS])) > 0).sum())
+        for low in range(0, len(goals), _GOALS)
+    )
+
+
+def _holding(space: Space, goals: Sequence[Goal]) -> Bools:
+    return np.stack([space.model.holds(goal, space.rows) for goal in goals])
+
+
+def _of_model(model: JointModel) -> Iterator[object]:
+    """What the numbers of states and labels mean, for a hash."""
+    yield model.robots
+    yield model.labels
+    yield model.cost
+    yield tuple(model.codec.facts.texts)
