@@ -7,6 +7,7 @@ or a failure.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -74,6 +75,19 @@ def _rebuilt(
     error = kind.__new__(kind, *args)
     error.__dict__.update(fields)
     return error
+
+
+class Note(UserWarning):
+    """What was read in a way that its writer may not have meant; no error.
+
+    A Python warning: the command line writes it to stderr, a program may filter or raise it.
+    """
+
+
+def note(what: str, *, position: Position | None = None, remedy: str | None = None) -> None:
+    """Give a `Note`, written as errors are."""
+    text = str(CoordlangError(what, position=position, remedy=remedy))
+    warnings.warn(Note(text), stacklevel=3)
 
 
 class Refuted(CoordlangError):

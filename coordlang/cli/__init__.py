@@ -11,15 +11,18 @@ import os
 import signal
 import sys
 import traceback
-from contextlib import suppress
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from io import StringIO
+from typing import TextIO
 
 import click
 
 from coordlang.cli.exit_codes import BROKEN_PIPE, INTERRUPTED, interrupted_by
 from coordlang.cli.group import cli
 from coordlang.cli.standard_error import drop_stdout
-from planners.errors import CoordlangError, OutOfMemory
+from planners.errors import CoordlangError, Note, OutOfMemory
 from planners.limits import lacks_memory
 from planners.messages import sentence, visible
 from planners.signals import Interruptions
@@ -49,7 +52,8 @@ def run(arguments: list[str], interruptions: Interruptions | None = None) -> int
 def _run(arguments: list[str]) -> int:
     """Run one command through click; the exit code."""
     try:
-        result = cli.main(args=arguments, prog_name="coordlang", standalone_mode=False)
+        with _notes_on_stderr():
+            result = cli.main(args=arguments, prog_name="coordlang", standalone_mode=False)
         if sys.stdout is not None:
             sys.stdout.flush()
         return result if isinstance(result, int) else 0
@@ -66,6 +70,31 @@ def _run(arguments: list[str]) -> int:
         return BROKEN_PIPE
     except SystemExit:
         return BROKEN_PIPE  # so ends click a command whose reader has gone
+
+
+@contextmanager
+def _notes_on_stderr() -> Iterator[None]:
+    """Write each note once, as a line of the command; other warnings as Python does."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", Note)
+        python_shows, written = warnings.showwarning, set[str]()
+
+        def show(
+            message: Warning | str,
+            category: type[Warning],
+            filename: str,
+            lineno: int,
+            file: TextIO | None = None,
+            line: str | None = None,
+        ) -> None:
+            if not issubclass(category, Note):
+                python_shows(message, category, filename, lineno, file, line)
+            elif str(message) not in written:
+                written.add(str(message))
+                _show(f"coordlang: note: {message}\n")
+
+        warnings.showwarning = show
+        yield
 
 
 def _interrupted(interruptions: Interruptions | None) -> int:

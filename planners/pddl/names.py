@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 
-from planners.errors import BadInput, Unsupported
+from planners.errors import BadInput, Unsupported, note
 from planners.messages import echoed
 from planners.pddl.lifted import Variable
 from planners.pddl.sexpr import Document, Expression, Group, Token
@@ -58,7 +58,8 @@ class Typed:
 def typed_list(document: Document, items: Sequence[Expression], what: str) -> list[Typed]:
     """Read ``a b - t c - (either u v) d``; entries without a type get ``object``.
 
-    Raises `BadInput` where a dash has no names before or no type behind it.
+    A dash with no names before it is noted and stands for none, as Fast Downward reads it.  Raises
+    `BadInput` where it has no type behind it.
     """
     entries: list[Typed] = []
     waiting: list[Token] = []
@@ -71,9 +72,13 @@ def typed_list(document: Document, items: Sequence[Expression], what: str) -> li
             continue
         if at + 1 == len(items):
             raise document.fail("expected a type after '-'", item)
-        if not waiting:
-            raise document.fail(f"expected {what} before '-'", item)
         types = _types(document, items[at + 1])
+        if not waiting:
+            noun = what.partition(" ")[2]
+            note(
+                f"no {noun} stands before '- {' '.join(types)}': nothing is declared",
+                position=document.source.position(item.offset),
+            )
         entries += [Typed(name, types) for name in waiting]
         waiting = []
         at += 2

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from planners.errors import BadInput, UsageError
+from planners.errors import BadInput, UsageError, note
 from planners.messages import echoed
 from planners.pddl.lifted import And, Atom, Domain, Problem, Schema
 
@@ -18,6 +18,10 @@ Unowned = Literal["error", "environment", "shared"]
 ENVIRONMENT = "environment"
 
 
+#: More objects than this are not taken to be robots unless the user says so.
+_MOST_GUESSED = 12
+#: Objects of a type that messages list.
+_SHOWN = 6
 _DIGITS = frozenset("0123456789")
 
 
@@ -223,14 +227,51 @@ def _detect(domain: Domain, problem: Problem) -> tuple[tuple[str, ...], str]:
         return robots, f"type {kind}"
     candidates = sorted(named) or _candidates(domain, problem)
     if len(candidates) == 1:
-        return _of_kind(domain, problem, candidates[0]), f"type {candidates[0]}"
-    raise BadInput(
-        "which objects are the robots? "
-        + ("Several types could be" if candidates else "No type could be"),
+        return _guessed(domain, problem, candidates[0])
+    why = "Several types could be" if candidates else "No type is taken by every action"
+    raise _unclear(domain, problem, why, candidates or _kinds(domain, problem))
+
+
+def _guessed(domain: Domain, problem: Problem, kind: str) -> tuple[tuple[str, ...], str]:
+    """The objects of the one type that every action takes, with a note.
+
+    Raises `BadInput` where they are unlikely to be robots.
+    """
+    robots = _of_kind(domain, problem, kind)
+    first = [schema.parameters[0].types for schema in domain.schemas if schema.parameters]
+    doubt = None
+    if len(robots) == len(problem.objects) > 1:
+        doubt = "are all its objects"
+    elif len(robots) > _MOST_GUESSED:
+        doubt = f"are {len(robots):,}"
+    elif not any(kind in domain.supertypes(t) for types in first for t in types):
+        doubt = "are never the first argument of an action"
+    if doubt:
+        what = f"Every action takes objects of type {echoed(kind)}, but they {doubt}"
+        raise _unclear(domain, problem, what, _taken(domain, problem))
+    note(
+        f"the robots are taken to be {_some(robots)}: every action takes an object of type "
+        f"{echoed(kind)}",
+        position=domain.source.section(":types"),
+        remedy=f"Say --robot-type {kind} if that is so; --robots NAME,NAME names others.",
+    )
+    return robots, f"type {kind}"
+
+
+def _unclear(domain: Domain, problem: Problem, why: str, candidates: Sequence[str]) -> BadInput:
+    """The error for robots that cannot be told, with the candidates and their objects."""
+    listed = "; ".join(f"{kind} ({_some(_of_kind(domain, problem, kind))})" for kind in candidates)
+    return BadInput(
+        f"which objects are the robots? {why}",
         position=domain.source.section(":types"),
         remedy="Say --robot-type TYPE or --robots NAME,NAME."
-        + (f" Candidates: {', '.join(candidates)}." if candidates else ""),
+        + (f" Candidates: {listed}." if listed else ""),
     )
+
+
+def _some(names: Sequence[str]) -> str:
+    shown = ", ".join(names[:_SHOWN])
+    return f"{shown} and {len(names) - _SHOWN:,} more" if len(names) > _SHOWN else shown
 
 
 def _kinds(domain: Domain, problem: Problem) -> list[str]:
@@ -238,18 +279,22 @@ def _kinds(domain: Domain, problem: Problem) -> list[str]:
 
     The likely types, else all that some action takes, else unary predicates.
     """
+    unary = sorted(
+        {atom.predicate for atom in static_atoms(domain, problem) if len(atom.args) == 1}
+    )
+    likely = [kind for kind in ("agent", "robot") if _of_kind(domain, problem, kind)]
+    return likely or _candidates(domain, problem) or _taken(domain, problem) or unary
+
+
+def _taken(domain: Domain, problem: Problem) -> list[str]:
+    """The types of which some action takes an object."""
     taken = [p.types for schema in domain.schemas for p in schema.parameters]
-    every = [
+    return [
         kind
         for kind in sorted(domain.types)
         if objects_of(domain, problem, (kind,))
         and any(kind in domain.supertypes(t) for own in taken for t in own)
     ]
-    unary = sorted(
-        {atom.predicate for atom in static_atoms(domain, problem) if len(atom.args) == 1}
-    )
-    likely = [kind for kind in ("agent", "robot") if _of_kind(domain, problem, kind)]
-    return likely or _candidates(domain, problem) or every or unary
 
 
 def _candidates(domain: Domain, problem: Problem) -> list[str]:

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Robots that nobody declared, and typed lists without names: said to the user, never silent."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import pytest
+
+from planners.errors import BadInput, Note
+from planners.loading import PlanningInstance, build
+from planners.pddl import parse_domain, parse_problem
+from planners.pddl.sexpr import Source
+from tests.support.command import Command
+
+HIKERS = """(define (domain hike) (:types hiker place - object)
+ (:predicates (at ?h - hiker ?p - place) (way ?a ?b - place))
+ (:action walk :parameters (?h - hiker ?a ?b - place)
+  :precondition (and (at ?h ?a) (way ?a ?b)) :effect (and (at ?h ?b) (not (at ?h ?a))))
+ (:action rest :parameters (?h - hiker) :precondition (at ?h a) :effect (at ?h a)))"""
+HIKE = """(define (problem p) (:domain hike) (:objects h1 h2 - hiker a b - place)
+ (:init (at h1 a) (at h2 b) (way a b) (way b a)) (:goal (and (at h1 b) (at h2 a))))"""
+
+
+def domain(actions: str, types: str = "(:types lift floor cell)") -> str:
+    return f"(define (domain d) {types} (:predicates (on ?x)) {actions})"
+
+
+def action(name: str, parameters: str) -> str:
+    first = parameters.split()[0]
+    return f"(:action {name} :parameters ({parameters}) :effect (on {first}))"
+
+
+def read(domain_text: str, objects: str) -> PlanningInstance:
+    lifted = parse_domain(Source("domain.pddl", domain_text))
+    text = (
+        f"(define (problem p) (:domain {lifted.name}) (:objects {objects}) (:init) (:goal (on x)))"
+    )
+    return build(lifted, [parse_problem(Source("problem.pddl", text), lifted)])
+
+
+def test_a_guess_is_said_once_with_the_type_and_the_objects(
+    coordlang: Command, tmp_path: Path
+) -> None:
+    files = tmp_path / "domain.pddl", tmp_path / "problem.pddl"
+    files[0].write_text(HIKERS.replace(" (:predicates", " (:constants a - place) (:predicates"))
+    files[1].write_text(HIKE.replace(" a b - place", " b - place"))
+    outcome = coordlang("plans", *files, "--count")
+    assert (outcome.code, outcome.out) == (0, "1\n")
+    assert outcome.err == (
+        f"coordlang: note: {files[0]}:1:24: the robots are taken to be h1, h2: every action takes an "
+        "object of type 'hiker'\n"
+        "  Say --robot-type hiker if that is so; --robots NAME,NAME names others.\n"
+    )
+    assert coordlang("plans", *files, "--count", "--robot-type", "hiker").err == ""
+
+
+@pytest.mark.parametrize(
+    ("actions", "objects", "why"),
+    [
+        (action("go", "?a ?b - cell"), "x y - cell", "they are all its objects"),
+        (
+            action("go", "?a ?b - cell"),
+            " ".join(f"c{n}" for n in range(80)) + " - cell x - lift",
+            "they are 80",
+        ),
+        (
+            action("up", "?p - lift ?f - floor") + action("board", "?c - cell ?f - floor"),
+            "x - lift f1 f2 - floor c - cell",
+            "they are never the first argument of an action",
+        ),
+    ],
+    ids=["every object", "80 cells", "never first"],
+)
+def test_an_implausible_guess_is_an_error_with_candidates(
+    actions: str, objects: str, why: str
+) -> None:
+    with pytest.raises(BadInput) as caught:
+        read(domain(actions), objects)
+    text = str(caught.value)
+    assert text.startswith("domain.pddl:1:21: which objects are the robots? Every action takes")
+    assert why in text
+    assert "Say --robot-type TYPE or --robots NAME,NAME. Candidates: " in text
+
+
+def test_all_of_ferry_are_objects() -> None:
+    """Without types no guess is made, and what may be robots is listed with its objects."""
+    text = domain(action("sail", "?a ?b"), types="")
+    lifted = parse_domain(Source("domain.pddl", text))
+    problem = parse_problem(
+        Source(
+            "problem.pddl",
+            "(define (problem p) (:domain d) (:objects x l1 l2) (:init (port l1) (port l2)) (:goal (on x)))".replace(
+                "(port l1) (port l2)", ""
+            ),
+        ),
+        lifted,
+    )
+    with pytest.raises(BadInput, match=r"No type is taken by every action\n  Say --robot-type"):
+        build(lifted, [problem])
+
+
+@pytest.mark.parametrize("kind", ["robot", "agent"])
+def test_a_type_of_that_name_is_no_guess(kind: str) -> None:
+    text = domain(action("go", f"?a - {kind}"), types=f"(:types {kind} cell)")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", Note)
+        assert read(text, f"x y - {kind} z - cell").team.robots == ("x", "y")
+
+
+def test_typed_lists_without_names_are_read_with_a_note() -> None:
+    text = domain(action("go", "?a - robot"), types="(:types robot board)")
+    with pytest.warns(
+        Note, match="problem.pddl:1:43: no object stands before '- board': nothing is declared"
+    ):
+        loaded = read(text, "- board x y - robot - board")
+    assert loaded.team.robots == ("x", "y")
+    assert "board" not in {kind for own in loaded.problems[0].objects.values() for kind in own}
