@@ -30,6 +30,7 @@ ROOMS = (
     "planners/classical",
     "coordlang",
     "coordlang/tasks",
+    "coordlang/symmetry",
     "coordlang/required",
     "coordlang/vocabulary",
     "coordlang/language",

@@ -11,11 +11,11 @@ import numpy as np
 from coordlang.certificate.encoding import core
 from coordlang.certificate.file import Certificate, PlanTexts, Reason, WarpingPath
 from coordlang.language.warping import Clause, pair, warping_path
+from coordlang.symmetry.group import Symmetry
 from coordlang.tasks.candidates import Candidates
 from coordlang.tasks.listed import goal_text
 from coordlang.vocabulary.counterexamples import Counterexample
 from coordlang.vocabulary.job import Evidence
-from coordlang.vocabulary.symmetry import Symmetry
 from planners.joint.model import JointModel
 from planners.joint.states import split_atoms
 from planners.search.plan_space import PlanSpace

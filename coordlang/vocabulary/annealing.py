@@ -17,11 +17,11 @@ import numpy as np
 
 from coordlang.language.flexibility import Floats
 from coordlang.language.warping import Clause
+from coordlang.symmetry.group import SymmetryGroup
 from coordlang.vocabulary.clauses import without_implied
 from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.necessary_clauses import TaskPart
 from coordlang.vocabulary.objective import Objective
-from coordlang.vocabulary.symmetry import SymmetryGroup
 from planners.tables import Ints
 
 

@@ -16,11 +16,11 @@ import numpy as np
 
 from coordlang.language.flexibility import Flexibility, Floats, flexibility
 from coordlang.required.divergences import required_nodes
+from coordlang.symmetry.group import symmetry_group
 from coordlang.vocabulary.annealing import Annealing, AnnealingSettings, Violations
 from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from coordlang.vocabulary.job import Assignment, Job, Outcome
 from coordlang.vocabulary.necessary_clauses import TaskPart
-from coordlang.vocabulary.symmetry import symmetry_group
 from planners.errors import OutOfMemory
 from planners.limits import run_until_stopped
 from planners.search.plan_space import PlanSpace

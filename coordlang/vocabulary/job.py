@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 
 from coordlang.language.warping import Clause
 from coordlang.required.divergences import FirstDifferences
+from coordlang.symmetry.group import Symmetry
 from coordlang.tasks.candidates import Candidates
 from coordlang.vocabulary.counterexamples import Counterexample
-from coordlang.vocabulary.symmetry import Symmetry
 from planners.search.plan_space import PlanSpace
 
 #: A partition while it is looked for: state number -> word number.

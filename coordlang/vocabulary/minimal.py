@@ -20,6 +20,7 @@ from random import Random
 import numpy as np
 
 from coordlang.language.warping import Clause
+from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.vocabulary.clauses import (
     most_constrained_first,
     most_frequent_pairs,
@@ -30,7 +31,6 @@ from coordlang.vocabulary.necessary_clauses import NecessaryClauses, TaskPart
 from coordlang.vocabulary.problems_by_size import ProblemsBySize, SolverBudget, close_bounds
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from coordlang.vocabulary.separating import short_separating_search
-from coordlang.vocabulary.symmetry import SymmetryGroup, symmetry_group
 from planners.errors import OutOfMemory
 from planners.limits import run_until_stopped
 from planners.search.plan_space import PlanSpace

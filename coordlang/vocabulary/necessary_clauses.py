@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 from coordlang.language.warping import Clause, separation_clause
 from coordlang.required.choices import Choices
+from coordlang.symmetry.group import SymmetryGroup
 from coordlang.vocabulary.clauses import without_implied
 from coordlang.vocabulary.counterexamples import Counterexample, counterexamples
 from coordlang.vocabulary.job import Evidence
-from coordlang.vocabulary.symmetry import SymmetryGroup
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 from planners.tables import Bools, Ints

@@ -16,6 +16,7 @@ import numpy as np
 
 from coordlang.language.warping import Pair, pair
 from coordlang.required.last_differences import DifferenceWalk
+from coordlang.symmetry.group import symmetry_group
 from coordlang.vocabulary.clauses import most_constrained_first
 from coordlang.vocabulary.greedy import greedy_partition
 from coordlang.vocabulary.job import Assignment, Job, Outcome
@@ -28,7 +29,6 @@ from coordlang.vocabulary.separations import (
     ordered,
     separations,
 )
-from coordlang.vocabulary.symmetry import symmetry_group
 from planners.errors import OutOfMemory
 from planners.limits import run_until_stopped
 

@@ -11,9 +11,9 @@ import pytest
 from coordlang.building import build_language
 from coordlang.language.file import read_language, to_bytes
 from coordlang.language.partition import Partition
+from coordlang.symmetry.group import symmetry_group
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.verification.by_definition import verify
-from coordlang.vocabulary.symmetry import symmetry_group
 from planners.errors import BadInput
 from planners.pddl import parse_domain, parse_problem, read_domain
 from planners.pddl.sexpr import Source

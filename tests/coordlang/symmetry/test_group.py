@@ -9,11 +9,11 @@ from random import Random
 import numpy as np
 import pytest
 
+from coordlang.symmetry.check import SymmetryCheck
+from coordlang.symmetry.graph import automorphism_generators
+from coordlang.symmetry.group import Symmetry, SymmetryGroup, generated, symmetry_group
 from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
 from coordlang.tasks.listed import ListedTask
-from coordlang.vocabulary.symmetry import Symmetry, SymmetryGroup, generated, symmetry_group
-from coordlang.vocabulary.symmetry_check import SymmetryCheck
-from coordlang.vocabulary.symmetry_graph import automorphism_generators
 from planners.errors import ProvedImpossible
 from planners.joint.states import split_atoms
 from planners.pddl import parse_domain, parse_problem, read_domain

@@ -2,9 +2,9 @@
 """Symmetries of a joint model: permutations of its states that map plans to plans.
 
 They map candidate tasks to candidate tasks, too, and are renamings of the PDDL objects.  Generators
-come from the automorphisms of a graph of the model (`coordlang.vocabulary.symmetry_graph`); each is
+come from the automorphisms of a graph of the model (`coordlang.symmetry.graph`); each is
 checked on the ground actions, the states and the candidate tasks
-(`coordlang.vocabulary.symmetry_check`) before use, and their products are listed.  The image of a
+(`coordlang.symmetry.check`) before use, and their products are listed.  The image of a
 failing tuple of plans fails too, so the image of a necessary clause is necessary.
 """
 
@@ -18,14 +18,14 @@ from functools import cached_property
 import numpy as np
 
 from coordlang.language.warping import Clause, pair
-from coordlang.tasks.candidates import Candidates
-from coordlang.vocabulary.symmetry_check import SymmetryCheck
-from coordlang.vocabulary.symmetry_graph import (
+from coordlang.symmetry.check import SymmetryCheck
+from coordlang.symmetry.graph import (
     LARGEST_GRAPH,
     Renaming,
     automorphism_generators,
     joined_order,
 )
+from coordlang.tasks.candidates import Candidates
 from planners.pddl.robots import natural
 from planners.tables import Ints
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from coordlang.symmetry.graph import Renaming
 from coordlang.tasks.candidates import Candidates
-from coordlang.vocabulary.symmetry_graph import Renaming
 from planners.grounding import GroundAction
 from planners.joint.model import FullState, Goal
 from planners.pddl.formula_tree import Compound, Leaf, fold
