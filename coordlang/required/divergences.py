@@ -51,26 +51,40 @@ class FirstDifferences:
     evaluations: int
 
 
-def first_differences(spaces: Sequence[PlanSpace]) -> FirstDifferences:
+def first_differences(
+    spaces: Sequence[PlanSpace], spoken_for: Sequence[Ints] | None = None
+) -> FirstDifferences:
     """Find them from the robots' choices, one look at each node (`coordlang.required.choices`).
 
     Where no plans are inseparable, the divergences at a node depend on that node only, whatever was
     done before: Proposition 2 of docs/concepts.md.
+
+    Parameters
+    ----------
+    spaces
+        The plan spaces, over one table of states.
+    spoken_for
+        For each plan space, for how many goals each of its goals counts (default: for itself):
+        tasks, nodes and edges are counted so often.
     """
     sets = LabelSets()
     partings = Partings(spaces[0].robots)
-    requiring = evaluations = 0
-    for space in spaces:
+    requiring = nodes = edges = evaluations = 0
+    for number, space in enumerate(spaces):
         choices = Choices(space, sets)
-        requiring += int(choices.requires[space.starts].sum())
+        times = np.ones(len(space.goals), np.int64) if spoken_for is None else spoken_for[number]
+        counts = times[space.goal]
+        requiring += int(counts[space.starts][choices.requires[space.starts]].sum())
+        nodes += int(counts.sum())
+        edges += int((counts * space.out_degrees).sum())
         partings.add(choices)
         evaluations += choices.evaluations
     table = partings.table()
     return FirstDifferences(
         Divergences(table[:, 0], table[:, 1:]),
         requiring,
-        sum(map(len, spaces)),
-        sum(len(space.target) for space in spaces),
+        nodes,
+        edges,
         len(sets),
         evaluations,
     )

@@ -81,18 +81,32 @@ class Partings:
 
         Filled up with -1; only those that no other one implies.
         """
-        found = np.zeros((0, 1 + self._robots), np.int64)
-        for size, known in sorted(self._known.items()):
-            rows = known.rows
-            implied = np.zeros(len(rows), np.bool_)
-            for smaller in range(2, size):
-                for some in combinations(range(1, 1 + size), smaller):
-                    implied |= self._known[smaller].has(rows[:, [0, *some]])
-            filled = np.full((int((~implied).sum()), 1 + self._robots), -1)
-            filled[:, : 1 + size] = rows[~implied]
-            found = np.concatenate((found, filled))
-        # As lists of states are sorted, a shorter one before those that it begins.
-        return found[np.lexsort(found.T[::-1])]
+        filled = [np.zeros((0, 1 + self._robots), np.int64)]
+        for size, known in self._known.items():
+            filled.append(np.full((len(known.rows), 1 + self._robots), -1))
+            filled[-1][:, : 1 + size] = known.rows
+        return minimal(np.concatenate(filled))
+
+
+def minimal(rows: Ints) -> Ints:
+    """The different divergences (as in `Partings.table`) that no other one implies, sorted."""
+    states = int(rows.max(initial=0)) + 1
+    sizes = (rows[:, 1:] >= 0).sum(axis=1)
+    known: dict[int, _KnownSets] = {}
+    kept = [rows[:0]]
+    for size in np.unique(sizes).tolist():
+        known[size] = _KnownSets(size, states)
+        known[size].enter(rows[sizes == size][:, : 1 + size])
+        own = known[size].rows
+        implied = np.zeros(len(own), np.bool_)
+        for smaller in sorted(known)[:-1]:
+            for some in combinations(range(1, 1 + size), smaller):
+                implied |= known[smaller].has(own[:, [0, *some]])
+        filled = np.full((int((~implied).sum()), rows.shape[1]), -1)
+        filled[:, : 1 + size] = own[~implied]
+        kept.append(filled)
+    found = np.concatenate(kept)
+    return found[np.lexsort(found.T[::-1])]
 
 
 class _KnownSets:

@@ -2,15 +2,15 @@
 """Required coordination of many tasks in pieces: by goals, and by problems.
 
 Divergences at a node depend on its goal only, so the goals are cut into portions, and each is a
-piece of work (`planners.pieces`).  Few or small ones are one portion, and done here.
+piece of work (`planners.pieces`).  Of goals that are images of each other under a symmetry one is
+looked at (`coordlang.symmetry.goals`).  Few or small ones are one portion, and done here.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass
-from itertools import combinations
+from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
@@ -29,6 +29,8 @@ from coordlang.required.miscoordination import (
     require_separable,
     separable,
 )
+from coordlang.required.partings import minimal
+from coordlang.symmetry.goals import SymmetricGoals, symmetric_goals
 from coordlang.tasks.candidates import Candidates
 from planners.joint.model import JointModel, PlanningTask
 from planners.limits import reaching
@@ -36,8 +38,8 @@ from planners.loading import PlanningInstance
 from planners.pieces.work import Runner, Table, Work, digest, tables
 from planners.search.optimal_plans import search
 from planners.search.plans import counts
-from planners.search.portions import PORTION, Source, cut
-from planners.tables import Bools, Ints
+from planners.search.portions import PORTION, Explored, Source, cut
+from planners.tables import Ints
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,14 +64,45 @@ def differences(
         With the plans of the first portion that has some.
     """
     source = candidates.source
-    portions = cut(source.efforts, portion)
-    if len(portions) == 1:
+    goals = symmetric_goals(candidates)
+    if goals is not None and isinstance(source, Explored):
+        progress(f"looking at {len(goals.chosen):,} of {len(source.goals):,} goals, by symmetry")
+        some = _Goals(source.only(goals.chosen), goals.spoken_for[goals.chosen])
+        tables_of_some = _tables(some, runner, progress, portion)
+        if not _inseparable(tables_of_some):
+            return _spread(_together(tables_of_some), goals)
+    if len(cut(source.efforts, portion)) == 1:
         progress("looking for inseparable plans")
         require_separable(candidates.spaces)
         progress("looking where coordination is required")
         return Differences(first_differences(candidates.spaces), states_on_plans(candidates.spaces))
-    efforts = [float(source.efforts[goals.start : goals.stop].sum()) for goals in portions]
-    work = Work("first differences", _differences, source, portions, source.identity, efforts)
+    found = _tables(_Goals(source, None), runner, progress, portion)
+    if _inseparable(found):
+        witness = inseparable(source.portion(cut(source.efforts, portion)[len(found) - 1]))
+        assert witness is not None
+        raise Inseparable(witness)
+    return _together(found)
+
+
+@dataclass(frozen=True, slots=True)
+class _Goals:
+    """Goals that are looked at, and for how many goals each counts (None: for itself)."""
+
+    source: Source
+    spoken_for: Ints | None
+
+
+def _tables(
+    goals: _Goals, runner: Runner, progress: Callable[[str], None], portion: float
+) -> list[Table]:
+    """What the portions of the goals say, up to the first with inseparable plans."""
+    source = goals.source
+    portions = cut(source.efforts, portion)
+    if len(portions) == 1:
+        return [_differences(goals, portions[0])]
+    efforts = [float(source.efforts[own.start : own.stop].sum()) for own in portions]
+    identity = digest(source.identity, goals.spoken_for)
+    work = Work("first differences", _differences, goals, portions, identity, efforts)
     found: list[Table] = []
 
     def so_far() -> str:
@@ -80,13 +113,27 @@ def differences(
         closing(tables(runner.run(work))) as pieces,
     ):
         for table in pieces:
-            if table["inseparable"]:
-                witness = inseparable(source.portion(portions[len(found)]))
-                assert witness is not None
-                raise Inseparable(witness)
             found.append(table)
+            if table["inseparable"]:
+                break
             progress(f"looking where coordination is required: {so_far()}")
-    return _together(found)
+    return found
+
+
+def _inseparable(found: Sequence[Table]) -> bool:
+    return bool(found[-1]["inseparable"])
+
+
+def _spread(found: Differences, goals: SymmetricGoals) -> Differences:
+    """What the chosen goals say, for all goals (Proposition 14 of docs/concepts.md).
+
+    The numbers of tasks, nodes and edges are those of all goals already.
+    """
+    divergences = found.first.divergences
+    rows = np.column_stack((divergences.last, divergences.following))
+    rows = minimal(goals.images_of_rows(rows))
+    first = replace(found.first, divergences=Divergences(rows[:, 0], rows[:, 1:]))
+    return Differences(first, goals.images_of_states(found.states))
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,14 +180,15 @@ def _read_answer(table: Table) -> TaskAnswer:
     return TaskAnswer(int(table["makespan"]), int(str(table["plans"])), witness)
 
 
-def _differences(source: Source, goals: range) -> Table:
+def _differences(shared: _Goals, goals: range) -> Table:
     """One piece: the tasks of some goals."""
-    space = source.portion(goals)
+    space = shared.source.portion(goals)
     if not len(space):  # nothing leads to these goals
         return _table(None, np.zeros((0, 1 + space.robots), np.int64), space.state)
     if not separable(space):
         return {"inseparable": np.array(True)}
-    found = first_differences([space])
+    times = None if shared.spoken_for is None else [shared.spoken_for[goals.start : goals.stop]]
+    found = first_differences([space], times)
     rows = np.column_stack((found.divergences.last, found.divergences.following))
     return _table(found, rows, states_on_plans([space]))
 
@@ -159,8 +207,7 @@ def _table(found: FirstDifferences | None, rows: Ints, states: Ints) -> Table:
 
 def _together(found: Sequence[Table]) -> Differences:
     """What pieces found as one: sets and mixtures are counted anew in each."""
-    rows = np.unique(np.concatenate([table["divergences"] for table in found]), axis=0)
-    rows = rows[~_implied(rows)]
+    rows = minimal(np.concatenate([table["divergences"] for table in found]))
     figures = np.stack([table["figures"] for table in found]).sum(axis=0)
     requiring, nodes, edges, sets, evaluations = figures.tolist()
     return Differences(
@@ -169,20 +216,3 @@ def _together(found: Sequence[Table]) -> Differences:
         ),
         np.unique(np.concatenate([table["states"] for table in found])),
     )
-
-
-def _implied(rows: Ints) -> Bools:
-    """Which divergences hold all states of a smaller one at the same last shared state."""
-    large = np.flatnonzero((rows[:, 1:] >= 0).sum(axis=1) > 2)
-    implied = np.zeros(len(rows), np.bool_)
-    if not len(large):
-        return implied
-    known = {tuple(state for state in row if state >= 0) for row in rows.tolist()}
-    for number in large.tolist():
-        last, *states = (state for state in rows[number].tolist() if state >= 0)
-        implied[number] = any(
-            (last, *some) in known
-            for size in range(2, len(states))
-            for some in combinations(states, size)
-        )
-    return implied

@@ -32,7 +32,9 @@ class SymmetryCheck:
         self._actions = {
             (action.schema, action.args): self._does(action) for action in self._model.actions
         }
-        self._tasks = _Tasks(candidates.spaces, self._atoms)
+        # All pairs of states, the second to be reached from the first, go to such pairs.
+        all_pairs = candidates.kind == "all" and not self._model.remembers
+        self._tasks = None if all_pairs else _Tasks(candidates.spaces, self._atoms)
 
     def states_under(self, renaming: Renaming) -> Ints | None:
         """Where the renaming takes each state number; None if it is no symmetry."""
@@ -42,7 +44,7 @@ class SymmetryCheck:
         if not self._keeps_actions(renaming, images):
             return None
         states = self._states_under(images)
-        if states is None or not self._tasks.kept(images, states):
+        if states is None or (self._tasks is not None and not self._tasks.kept(images, states)):
             return None
         return states
 

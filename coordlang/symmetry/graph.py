@@ -31,7 +31,9 @@ Renaming = Mapping[str, str]
 LARGEST_GRAPH = 4_000
 
 
-def automorphism_generators(candidates: Candidates, largest: int = LARGEST_GRAPH) -> list[Renaming]:
+def automorphism_generators(
+    candidates: Candidates, largest: int = LARGEST_GRAPH, *, with_tasks: bool = True
+) -> list[Renaming]:
     """Generators of the automorphisms of the model's graph, as renamings of objects.
 
     Parameters
@@ -39,14 +41,17 @@ def automorphism_generators(candidates: Candidates, largest: int = LARGEST_GRAPH
     largest
         Vertices of the largest graph.  The tasks, or the actions, are left out of one that would
         have more; some of the generators may then be no symmetries of the model.
+    with_tasks
+        Whether the tasks are part of the graph where they fit.
     """
     model = candidates.model
     graph = _ModelGraph(candidates.loaded.domain, candidates.loaded.problems[0], model)
     if len(graph) > largest:
         return []
-    tasks = sum(len(np.unique(s.state[s.starts])) + len(s.goals) for s in candidates.spaces)
-    if len(graph) + tasks <= largest:
-        graph.add_tasks(candidates.spaces)
+    if with_tasks:
+        tasks = sum(len(np.unique(s.state[s.starts])) + len(s.goals) for s in candidates.spaces)
+        if len(graph) + tasks <= largest:
+            graph.add_tasks(candidates.spaces)
     if len(graph) + len(model.actions) <= largest:
         graph.add_actions()
     return graph.renamings()

@@ -70,6 +70,10 @@ class Explored:
         (space,) = plan_spaces(self.space, tasks, pieces)
         return space
 
+    def only(self, goals: Ints) -> Explored:
+        """The tasks of some of the goals, given by number."""
+        return Explored(self.space, [self.goals[number] for number in goals.tolist()])
+
     @property
     def rows(self) -> Rows:
         """See `Source.rows`."""

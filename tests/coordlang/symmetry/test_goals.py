@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Goals up to symmetry: the same first differences and states as from all goals."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from random import Random
+
+import numpy as np
+import pytest
+
+from coordlang.building import build_language
+from coordlang.required import pieces
+from coordlang.required.miscoordination import Inseparable, separable
+from coordlang.required.pieces import Differences, differences
+from coordlang.symmetry.goals import SymmetricGoals, symmetric_goals
+from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
+from planners.loading import ModelOptions
+from planners.pddl import parse_problem, read_domain, read_problem
+from planners.pddl.sexpr import Source
+from planners.pieces.processes import Processes
+from planners.search.portions import PORTION
+from tests.coordlang.symmetry.test_group import GRID, world
+from tests.support.domains import DOMAINS, all_tasks
+from tests.support.random_models import random_model
+
+
+def agree(candidates: Candidates, portion: float = PORTION) -> bool:
+    """Compare; whether a symmetry was found and coordination is required."""
+    if symmetric_goals(candidates, 0, 0) is None:
+        return False
+    found = answer(candidates, portion, True)
+    every = answer(candidates, portion, False)
+    if found is None or every is None:
+        assert found is every
+        return False
+    assert found.states.tolist() == every.states.tolist()
+    one, other = found.first, every.first
+    assert one.divergences.last.tolist() == other.divergences.last.tolist()
+    assert one.divergences.following.tolist() == other.divergences.following.tolist()
+    assert (one.requiring, one.nodes, one.edges) == (other.requiring, other.nodes, other.edges)
+    return bool(one.requiring)
+
+
+def answer(candidates: Candidates, portion: float, by_symmetry: bool) -> Differences | None:
+    """First differences with or without symmetries; None if some plans are inseparable."""
+    with pytest.MonkeyPatch.context() as patch:
+        for_action = 0 if by_symmetry else 10**9
+        patch.setattr(pieces, "symmetric_goals", lambda c: symmetric_goals(c, 0, for_action))
+        try:
+            return differences(candidates, Processes(jobs=1), portion=portion)
+        except Inseparable:
+            return None
+
+
+def random_worlds(seeds: range) -> int:
+    found = 0
+    for seed in seeds:
+        random = Random(seed)
+        robots = random.choice([2, 2, 3])
+        cells = random.randint(robots + 1, 5 if robots == 2 else 4)
+        edges = [edge for edge in combinations(range(cells), 2) if random.random() < 0.7]
+        problem = parse_problem(Source("p", world(cells, edges, robots)), GRID)
+        options = random.choice([ModelOptions(), ModelOptions(cost="makespan+actions")])
+        candidates = all_pairs(GRID, [problem], options)
+        found += bool(candidates.count) and agree(candidates, random.choice([PORTION, 40.0, 300.0]))
+    return found
+
+
+def test_random_worlds() -> None:
+    assert random_worlds(range(15)) >= 5
+
+
+def test_random_models() -> None:
+    """Mostly without a symmetry."""
+    found = 0
+    for seed in range(30):
+        domain, problem, options = random_model(seed, 2 + seed % 2)
+        candidates = all_pairs(domain, [problem], options)
+        if 0 < candidates.count <= 2_000:
+            agree(candidates)
+            found += symmetric_goals(candidates, 0, 0) is not None
+    assert found >= 1
+
+
+@pytest.mark.slow
+def test_many_random_worlds() -> None:
+    found = random_worlds(range(1_000, 1_300))
+    print(f"{found} worlds with symmetric goals that require coordination")
+    assert found >= 100
+
+
+@pytest.mark.parametrize(
+    ("folder", "stem"),
+    [("grid", "gw2-2x3"), ("grid", "gw4-3x3"), ("three-cells", "problem"), ("t-map", "problem")],
+)
+def test_shipped_maps(folder: str, stem: str) -> None:
+    assert agree(all_tasks(folder, stem))
+
+
+@pytest.mark.parametrize(
+    ("folder", "stem"), [("handover", "two-doors"), ("push-box", "next-door"), ("tray", "serve")]
+)
+def test_other_domains(folder: str, stem: str) -> None:
+    agree(all_tasks(folder, stem))
+
+
+def test_the_orbits_of_goals() -> None:
+    turn, swap = np.array([1, 2, 0, 3, 4, 5]), np.array([0, 1, 2, 4, 3, 5])
+    goals = SymmetricGoals.of([turn, swap], 6)
+    assert goals.representative.tolist() == [0, 0, 0, 3, 3, 5]
+    assert goals.chosen.tolist() == [0, 3, 5]
+    assert goals.spoken_for.tolist() == [3, 0, 0, 2, 0, 1]
+    assert goals.images_of_states(np.array([1, 5])).tolist() == [0, 1, 2, 5]
+    rows = np.array([[0, 1, 3], [5, 3, -1]])
+    assert goals.images_of_rows(rows).tolist() == [
+        *([0, 1, 3], [0, 1, 4], [1, 2, 3], [1, 2, 4], [2, 0, 3], [2, 0, 4]),
+        *([5, 3, -1], [5, 4, -1]),
+    ]
+
+
+def test_where_symmetries_are_not_looked_for() -> None:
+    grid = read_domain(DOMAINS / "grid" / "domain.pddl")
+    problem = read_problem(DOMAINS / "grid" / "gw2-2x3.pddl", grid)
+    small = all_pairs(grid, [problem])
+    assert symmetric_goals(small) is None  # less work than symmetries take
+    assert symmetric_goals(small, 0, 0) is not None
+    assert symmetric_goals(small, least=0, for_action=10**6) is None
+    assert symmetric_goals(from_problems(grid, [problem]), 0, 0) is None
+    remembering = all_pairs(grid, [problem], ModelOptions(remember_actions=True))
+    assert symmetric_goals(remembering, 0, 0) is None
+
+
+def test_a_language_is_the_same_and_inseparable_plans_are_shown(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    grid = all_tasks("grid", "gw4-3x3")
+    without = build_language(grid)
+    monkeypatch.setattr(
+        "coordlang.required.pieces.symmetric_goals", lambda c: symmetric_goals(c, 0, 0)
+    )
+    assert build_language(grid).language.states == without.language.states
+    shown = 0
+    for seed in range(30):
+        domain, problem, options = random_model(seed, 2)
+        candidates = all_pairs(domain, [problem], options)
+        if not candidates.count or all(map(separable, candidates.spaces)):
+            continue
+        with pytest.raises(Inseparable):
+            build_language(candidates)
+        shown += 1
+    assert shown
