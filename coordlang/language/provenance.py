@@ -12,7 +12,7 @@ from coordlang.tasks.candidates import Candidates
 from coordlang.tasks.task_file import task_data
 from planners.joint.model import show
 from planners.pddl.lifted import Domain, Problem
-from planners.pddl.robots import static_atoms
+from planners.pddl.robots import fluent_predicates, static_atoms
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,11 @@ def provenance_of(
     return Provenance(
         robots=loaded.model.robots,
         guarantee=guarantee,
-        domain={"name": loaded.domain.name, "sha256": loaded.domain.source.sha256},
+        domain={
+            "name": loaded.domain.name,
+            "sha256": loaded.domain.source.sha256,
+            "fluents": key_predicates(loaded.domain, loaded.options.remember_actions),
+        },
         model={
             "cost": loaded.options.cost,
             "unowned": loaded.options.robots.unowned,
@@ -83,6 +87,11 @@ def provenance_of(
         tasks=tasks,
         producer=producer,
     )
+
+
+def key_predicates(domain: Domain, remember_actions: bool) -> list[str]:
+    """The predicates of the atoms that a state key may hold, sorted."""
+    return sorted(fluent_predicates(domain) | ({"last"} if remember_actions else set()))
 
 
 def world_sha256(domain: Domain, problem: Problem) -> str:

@@ -27,8 +27,16 @@ class DomainRecord(msgspec.Struct):
     sha256: Annotated[
         str | None,
         Meta(
-            description="The SHA-256 of the text of the domain file; a file without it is not "
-            "held to one text."
+            description="The SHA-256 of the tokens of the domain file in lower case, each on a "
+            "line (comments, line ends and spacing do not matter), or of its text; a file without "
+            "it is not held to one domain."
+        ),
+    ] = None
+    fluents: Annotated[
+        list[str] | None,
+        Meta(
+            description="The predicates of atoms in state keys: those of some action's effect, "
+            "and 'last' where last subactions are remembered. Other atoms are static."
         ),
     ] = None
 
@@ -50,7 +58,7 @@ class ModelRecord(msgspec.Struct):
     ] = None
     problem_sha256: Annotated[
         str | None,
-        Meta(description="The SHA-256 of the text of the (first) problem file; for information."),
+        Meta(description="The SHA-256 of the (first) problem file, made alike; for information."),
     ] = None
     world_sha256: Annotated[
         str | None,

@@ -74,13 +74,16 @@ def _contradiction(flag: str, given: str | bool, recorded: str | bool) -> UsageE
 def check_source(
     language: Language, domain: Domain, problems: list[Problem], position: Position
 ) -> None:
-    """Raise `BadInput` when domain or problem are not those that the language was built for."""
+    """Raise `BadInput` when domain or problem are not those that the language was built for.
+
+    The recorded hash is that of what the domain says, or, in older files, of its text.
+    """
     wanted = language.provenance.domain.get("sha256")
-    if wanted is not None and wanted != domain.source.sha256:
+    if wanted not in (None, domain.source.sha256, domain.source.text_sha256):
         raise BadInput(
             "this language belongs to another domain "
-            f"({echoed(language.provenance.domain.get('name'))}): the text of "
-            f"{domain.source.name} has another hash",
+            f"({echoed(language.provenance.domain.get('name'))}): what "
+            f"{domain.source.name} says has another hash",
             position=position,
             remedy="Give the domain file that the language was built from.",
         )

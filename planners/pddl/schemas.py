@@ -10,7 +10,7 @@ from planners.messages import echoed
 from planners.pddl.formulas import read_effects, read_formula
 from planners.pddl.lifted import TRUE, Formula, Part, Schema
 from planners.pddl.names import Names, group, is_token, token, typed_list
-from planners.pddl.sexpr import Comment, Document, Expression, Group, Token
+from planners.pddl.sexpr import SUBACTION, Comment, Document, Expression, Group, Token
 
 _PART = re.compile(
     r"subaction\b\s*(?P<robot>[^\s()]+)(?:\s+idle|\s*\(\s*(?P<subaction>[^()]+?)\s*\))\s*$"
@@ -136,7 +136,7 @@ def _read_parts(names: Names, item: Group) -> tuple[Part, ...]:
     """The ``; subaction ROBOT (name args)`` comments inside an action."""
     parts: dict[str, Part] = {}
     for comment in names.document.comments:
-        if item.offset < comment.offset < item.end and comment.text.split()[:1] == ["subaction"]:
+        if item.offset < comment.offset < item.end and comment.text.split()[:1] == [SUBACTION]:
             part = _read_part(names, comment)
             if part.robot in parts:
                 raise names.document.fail(

@@ -21,6 +21,9 @@ from planners.messages import UNSEEN, echoed
 #: Deeper nesting than this is refused: no domain needs it, and the passes behind recurse.
 MAX_DEPTH = 200
 
+#: What begins the comments that are read: they say a robot's part of a joint action.
+SUBACTION = "subaction"
+
 #: A byte that is not UTF-8, as Python's ``surrogateescape`` decodes it.
 _NOT_DECODED = re.compile("[\udc80-\udcff]")
 
@@ -28,6 +31,16 @@ _NOT_DECODED = re.compile("[\udc80-\udcff]")
 _UNSEEN_IN_NAME = re.compile(rf"(?!\s){UNSEEN.pattern}")
 
 _TOKEN = re.compile(r";[^\n\r]*|[()]|[^\s();]+")
+
+
+def _read_tokens(text: str) -> Iterator[str]:
+    """The tokens of a text and its comments about subactions, in lower case."""
+    for match in _TOKEN.finditer(text):
+        token = match[0].lower()
+        if token[0] != ";":
+            yield token
+        elif (said := _TOKEN.findall(token.lstrip(";")))[:1] == [SUBACTION]:
+            yield f"; {' '.join(said)}"
 
 
 class Source:
@@ -55,7 +68,15 @@ class Source:
 
     @property
     def sha256(self) -> str:
-        """The hash of the text."""
+        """The hash of what is read: comments, line ends, spacing and case do not matter.
+
+        Of the tokens in lower case, each on a line, comments that are `SUBACTION` ones included.
+        """
+        return sha256("\n".join(_read_tokens(self.text)).encode()).hexdigest()
+
+    @property
+    def text_sha256(self) -> str:
+        """The hash of the text, byte by byte, as language files had it up to version 0.1."""
         return sha256(self.text.encode()).hexdigest()
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -226,3 +227,71 @@ def test_every_single_corruption_that_matters_is_caught(
             verdicts[expected] += 1
     # A language with words to spare may survive any one change; a smallest one does not.
     assert method == "greedy" or verdicts[False] > 0
+
+
+GRID_JOINT = DOMAINS / "grid-joint" / "domain.pddl", DOMAINS / "grid-joint" / "three-cells.pddl"
+
+
+@pytest.mark.parametrize(
+    "files",
+    [(DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"), GRID_JOINT],
+    ids=["t-map", "grid-joint"],
+)
+def test_a_language_belongs_to_what_the_domain_says(
+    files: tuple[Path, Path], coordlang: Command, tmp_path: Path
+) -> None:
+    """Not to its line ends, comments, spacing and case."""
+    domain, problem = files
+    path, copy = tmp_path / "l.json", tmp_path / "copy.pddl"
+    assert coordlang("build", *files, "-o", path).code == 0
+    text = domain.read_text()
+    said = {
+        "line ends": text.replace("\n", "\r\n"),
+        "comments": "; a new first line\n" + text + "\n; the end ; subactions\n",
+        "spacing": text.replace("\n", "\n\n ").replace("(", "  ( "),
+        "case": "\n".join(line.upper() if ";" not in line else line for line in text.split("\n")),
+        "byte order mark": "\ufeff" + text,
+    }
+    for what, other in said.items():
+        copy.write_bytes(other.encode())
+        assert coordlang("verify", path, copy, problem).code == 0, what
+    renamed = text.replace("?to", "?where") if "?to" in text else text.replace("?a", "?where")
+    assert renamed != text
+    copy.write_text(renamed)
+    outcome = coordlang("verify", path, copy, problem)
+    assert (outcome.code, "belongs to another domain" in outcome.err) == (31, True)
+
+
+def test_comments_that_are_read_belong_to_the_domain(coordlang: Command, tmp_path: Path) -> None:
+    domain, problem = GRID_JOINT
+    path, copy = tmp_path / "l.json", tmp_path / "copy.pddl"
+    assert coordlang("build", *GRID_JOINT, "-o", path).code == 0
+    text = domain.read_text()
+    other = text.replace("subaction r1 (move", "subaction r1 (drive")
+    assert other != text
+    copy.write_text(other)
+    assert coordlang("verify", path, copy, problem).code == 31
+
+
+def test_a_file_with_the_hash_of_the_text_is_read(coordlang: Command, tmp_path: Path) -> None:
+    """As language files had it before."""
+    domain, problem = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
+    path, copy = tmp_path / "l.json", tmp_path / "copy.pddl"
+    assert coordlang("build", domain, problem, "-o", path).code == 0
+    old = {"name": "t-map", "sha256": sha256(domain.read_bytes()).hexdigest()}
+    edit(path, domain=old)
+    assert coordlang("verify", path, domain, problem).code == 0
+    copy.write_text(domain.read_text() + "; one comment more\n")
+    assert coordlang("verify", path, copy, problem).code == 31
+
+
+@pytest.mark.parametrize("flags", [[], ["--remember-actions"]], ids=["states", "actions"])
+def test_the_file_says_which_predicates_keys_hold(
+    flags: list[str], coordlang: Command, tmp_path: Path
+) -> None:
+    domain, problem = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
+    path = tmp_path / "l.json"
+    assert coordlang("build", domain, problem, "--tasks", "all", *flags, "-o", path).code == 0
+    data = json.loads(path.read_text())
+    held = {atom.split("(")[1].split()[0] for key in data["states"] for atom in key.split(") ")}
+    assert set(data["domain"]["fluents"]) == held
