@@ -3,8 +3,8 @@
 
 The same walk as verification makes, written for the builders: it keeps, for every node, the way to
 a violation with the fewest steps at which the plans are in different states.  Such pairs give short
-clauses.  It is cut off where no mixture can fail, whatever the words are, and where the sentences
-that the plans can still have do not meet.
+clauses.  It is cut off where no mixture can fail, whatever the words are, and where what the plans
+can say next does not meet (Proposition 14 of docs/concepts.md).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 from coordlang.required.choices import Choices
 from coordlang.required.composition_walk import FAILED, Moves, can_fail, moves
 from coordlang.vocabulary.leads import NO_LEAD, NO_WORD, PARTED, Leads
-from coordlang.vocabulary.sentence_sets import SentenceSets
+from coordlang.vocabulary.next_words import NextWords
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 from planners.tables import Ints, unique_tuples
@@ -85,7 +85,7 @@ def counterexamples(
     most
         About how many are wanted.  If there is none at all, ``word`` is a language for the tasks.
     """
-    if not len(choices.space):
+    if not choices.requires[choices.space.starts].any():
         return
     layers = _Walk(choices, index, word).layers()
     _backward(choices.space, layers)
@@ -96,10 +96,13 @@ class _Walk:
     """The nodes from which some mixture can fail and the plans' sentences can agree."""
 
     def __init__(self, choices: Choices, index: EdgeIndex, word: Ints) -> None:
-        self._choices, self._index, self._word = choices, index, word
+        self._choices, self._index = choices, index
         self._space = choices.space
+        before, after = word[self._space.sources], word[self._space.targets()]
+        #: (edges): the word that a plan enters, `NO_WORD` where it goes on in its word.
+        self._entered = np.where(before == after, NO_WORD, after)
         self._leads = Leads()
-        self._sentences = SentenceSets(self._space, word)
+        self._next = NextWords(self._space, word)
 
     def layers(self) -> list[_Layer]:
         """The nodes: ``layers[k]`` has k joint steps to go."""
@@ -151,19 +154,20 @@ class _Walk:
 
     def _in_agreement(self, nodes: Ints, move: Moves) -> tuple[Ints, Ints, Ints]:
         """The moves after which the sentences can agree, with the nodes reached and the leads."""
-        robots, word = self._space.robots, self._word
+        robots = self._space.robots
         kept = np.arange(len(move.source))
-        target = self._space.targets(move.edges)
-        lead = nodes[move.source, robots + 1 :]
-        same_word = word[target] == word[nodes[move.source, :robots]]
-        entered = np.where(same_word, NO_WORD, word[target])
+        first = self._entered[move.edges[:, 0]]
+        leads: list[Ints] = []
         for other in range(1, robots):
-            after = self._leads.after(lead[kept, other - 1], entered[kept, 0], entered[kept, other])
-            lead[kept, other - 1] = after
-            kept = kept[after != PARTED]
-        agree = self._sentences.can_agree(target[kept], lead[kept], self._leads)
-        kept = kept[agree]
-        return kept, target[kept], lead[kept]
+            before = nodes[move.source[kept], robots + other]
+            lead = self._leads.after(before, first, self._entered[move.edges[kept, other]])
+            agree = lead != PARTED
+            kept, first = kept[agree], first[agree]
+            leads = [known[agree] for known in (*leads, lead)]
+        target = self._space.targets(move.edges[kept])
+        lead = np.column_stack(leads)
+        agree = self._next.can_agree(target, lead, self._leads)
+        return kept[agree], target[agree], lead[agree]
 
 
 def _layer(nodes: Ints, source: Ints, edges: Ints) -> _Layer:

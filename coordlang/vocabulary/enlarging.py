@@ -75,7 +75,7 @@ def enlarge(
         The plan spaces.
     requires
         For each space, of which nodes coordination is required
-        (`coordlang.required.composition_walk.walk`).
+        (`coordlang.required.divergences.required_nodes`).
     partition
         State number -> word number.
     most_plans

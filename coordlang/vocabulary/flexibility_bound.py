@@ -48,7 +48,7 @@ def flexibility_bounds(
         The plan spaces of the tasks.
     requires
         For each space, of which nodes coordination is required
-        (`coordlang.required.composition_walk.walk`).
+        (`coordlang.required.divergences.required_nodes`).
     most_plans
         A task with more plans is bounded by their number.
     most_boxes

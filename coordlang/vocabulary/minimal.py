@@ -39,8 +39,8 @@ from planners.search.plan_space import PlanSpace
 _LEAST_PARTS = 8
 #: .. of about so many tasks at most.
 _TASKS_OF_A_PART = 1_500
-#: Edges of the composition walk up to which separating words are looked for first.
-_SEPARATING_EDGES = 500_000
+#: Combinations of plans' next steps up to which separating words are looked for first.
+_SEPARATING_COMBINATIONS = 4_000_000
 #: Conflicts within which most partitions are found; after so many the solver is likely on the way
 #: to a proof.
 _EASY = 5_000
@@ -138,7 +138,8 @@ class _Search:
 
     def _look_for_separating_words(self) -> None:
         """Take a separating partition with fewer words, if a short search finds one."""
-        if self._job.first_differences.edges > _SEPARATING_EDGES:
+        spaces = self._job.candidates.spaces
+        if sum(map(_combinations, spaces)) > _SEPARATING_COMBINATIONS:
             return
         found = short_separating_search(replace(self._job, incumbent=self.best))
         self.best = found.partition
@@ -238,6 +239,12 @@ class _Partitions:
         pairs = most_frequent_pairs(known, _COMPARED_PAIRS)
         problem.add_lex_leaders(self._known.group.permutations, pairs)
         return problem
+
+
+def _combinations(space: PlanSpace) -> float:
+    """At most so many links has the walk to last differences: one edge for each plan, in step."""
+    of_goals = (np.bincount(space.goal[layer.source]) for layer in space.edges_by_layer())
+    return sum(float((edges.astype(np.float64) ** space.robots).sum()) for edges in of_goals)
 
 
 def _parts(spaces: Sequence[PlanSpace], random: Random) -> list[TaskPart]:

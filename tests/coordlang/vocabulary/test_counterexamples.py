@@ -11,8 +11,8 @@ import pytest
 
 from coordlang.required.choices import Choices
 from coordlang.vocabulary.counterexamples import counterexamples
-from coordlang.vocabulary.leads import Leads
-from coordlang.vocabulary.sentence_sets import SentenceSets
+from coordlang.vocabulary.leads import NO_LEAD, NO_WORD, PARTED, Leads
+from coordlang.vocabulary.next_words import NextWords
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 from tests.coordlang.required.test_choices import separable_spaces
@@ -57,23 +57,56 @@ def sentences(space: PlanSpace, word: list[int], node: int) -> set[tuple[int, ..
     return found
 
 
-def test_sentences_that_can_agree() -> None:
-    """Against lists of sentences, where one plan is ahead of the other by one of its words."""
+def beginning(sentence: tuple[int, ...]) -> tuple[int, ...]:
+    """Its first two words; -1 where it ends."""
+    return (*sentence, -1)[:2]
+
+
+def test_plans_that_can_go_on_with_the_same_words() -> None:
+    """Against lists of sentences, where one plan is ahead of the other by none to two words."""
     random = Random(1)
     answers: Counter[bool] = Counter()
     for space in separable_spaces(range(40), 2):
         word = np.array([random.randrange(2) for _ in space.rows], np.int64)[space.state]
-        sets = SentenceSets(space, word)
+        words = NextWords(space, word)
         listed = {node: sentences(space, word.tolist(), node) for node in range(len(space))}
         for _ in range(20):
             span = random.choice(space.layers)
             nodes = [random.randrange(span.start, span.stop) for _ in range(2)]
-            leads, ahead = Leads(), random.choice([-1, 0, 1])
-            none, said = np.array([-1]), np.array([ahead])
-            (lead,) = leads.after(np.zeros(1, np.int64), said, none) if ahead >= 0 else [0]
-            mine = {((ahead,) if ahead >= 0 else ()) + rest for rest in listed[nodes[0]]}
-            expected = bool(mine & listed[nodes[1]])
-            agree = sets.can_agree(np.array([nodes]), np.array([[lead]]), leads)
+            leads, lead = Leads(), np.zeros(1, np.int64)
+            ahead = tuple(random.randrange(2) for _ in range(random.randrange(3)))
+            none, behind = np.array([NO_WORD]), random.random() < 0.5
+            for said in ahead:
+                entered = [none, np.array([said])]
+                lead = leads.after(lead, entered[not behind], entered[behind])
+            first, second = nodes if not behind else nodes[::-1]
+            mine = {beginning((*ahead, *rest)) for rest in listed[first]}
+            expected = bool(mine & {beginning(rest) for rest in listed[second]})
+            agree = words.can_agree(np.array([nodes]), lead[:, None], leads)
             assert agree.tolist() == [expected]
             answers[expected] += 1
     assert min(answers[True], answers[False]) >= 20
+
+
+@pytest.mark.parametrize("largest", [0, 4_000_000])
+def test_leads_are_those_of_sentences(largest: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By tables and by sorting: what one sentence has said in addition."""
+    monkeypatch.setattr("coordlang.vocabulary.leads._LARGEST_TABLE", largest)
+    random = Random(2)
+    leads, kept = Leads(), 0
+    for _ in range(300):
+        number = np.zeros(1, np.int64)
+        said: list[list[int]] = [[], []]
+        for _ in range(4):
+            step = [random.randrange(-1, 2) for _ in range(2)]
+            number = leads.after(number, np.array(step[:1]), np.array(step[1:]))
+            for mine, word in zip(said, step, strict=True):
+                mine += [word] * (word != NO_WORD)
+            shared = min(map(len, said))
+            parted = said[0][:shared] != said[1][:shared]
+            assert (number[0] == PARTED) == parted
+            if parted:
+                break
+            assert (number[0] == NO_LEAD) == (said[0] == said[1])
+            kept += 1
+    assert kept > 100
