@@ -16,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -134,12 +134,16 @@ def _solve(
 ) -> int | None:
     """The cost of an optimal plan of a classical task, None if there is no plan."""
     task = as_json(classical, memory_limit)
-    with (
-        postponed_signals() as signals,
-        tempfile.TemporaryDirectory(prefix="coordlang-") as name,
-    ):
-        directory = Path(name)
-        (directory / "task.json").write_text(task)
+    with ExitStack() as stack:
+        signals = stack.enter_context(postponed_signals())
+        try:
+            directory = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="coordlang-")))
+            (directory / "task.json").write_text(task)
+        except OSError as error:
+            raise FastDownwardFailed(
+                f"the task for Fast Downward cannot be written: {error.strerror}",
+                remedy="Set TMPDIR to a folder with free space that you may write to.",
+            ) from None
         try:
             code = _run(directory, left, signals)
         except subprocess.TimeoutExpired:
@@ -153,21 +157,40 @@ def _solve(
             if code == -signal.SIGKILL:  # not by us: by the system, which is out of memory
                 raise _out_of_memory()
             raise _crash(f"the process that runs Fast Downward ended with exit code {code}", errors)
-        answer: dict[str, Any] = json.loads(result.read_text())
+        answer = _read_answer(result)
     match answer["status"]:
         case "solved":
-            total = int(answer["total"])
-            if total + classical.step_cost > _GREATEST:
-                raise FastDownwardFailed(
-                    f"a cost of {total} is too large for Fast Downward's 32-bit integers",
-                    remedy="Check with --cost makespan.",
-                )
-            return total
+            return _checked_cost(classical, answer["plan"])
         case "unsolvable":
             return None
         case "memory":
             raise _out_of_memory()
     raise _crash(f"Fast Downward {answer['status']}", answer["log"])
+
+
+def _read_answer(result: Path) -> dict[str, Any]:
+    """What the worker wrote: its JSON ends with a bracket, so that no part of it is JSON."""
+    try:
+        answer: dict[str, Any] = json.loads(result.read_bytes())
+    except ValueError as error:
+        raise FastDownwardFailed(f"the answer of Fast Downward is not complete: {error}") from None
+    return answer
+
+
+def _checked_cost(classical: ClassicalTask, plan: list[int]) -> int:
+    """The cost of Fast Downward's plan, which is executed: it writes part of one to a full disk."""
+    total = classical.cost_of_plan(plan)
+    if total is None:
+        raise FastDownwardFailed(
+            f"Fast Downward wrote {len(plan)} actions that are no plan of its task",
+            remedy="See whether the disk of the temporary directory (TMPDIR) is full.",
+        )
+    if total + classical.step_cost > _GREATEST:
+        raise FastDownwardFailed(
+            f"a cost of {total} is too large for Fast Downward's 32-bit integers",
+            remedy="Check with --cost makespan.",
+        )
+    return total
 
 
 def _run(directory: Path, left: float | None, signals: Postponed) -> int:

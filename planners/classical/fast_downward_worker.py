@@ -67,7 +67,7 @@ def solve(task: dict[str, Any]) -> dict[str, Any]:
     get_environment().credits_stream = None
     _FastDownward.memory_limit = task["memory_limit"]
     subprocess.Popen = _FastDownward  # type: ignore[assignment, misc]
-    problem, costs = build(task)
+    problem = build(task)
     with OneshotPlanner(name="fast-downward-opt") as planner:
         # A search for invariants among facts without arguments takes seconds and gains nothing:
         # 0.05 s without it where it took 7 s.  The engine that promises optimality has no parameter
@@ -82,12 +82,10 @@ def solve(task: dict[str, Any]) -> dict[str, Any]:
         outcome = "unsolvable"
     else:
         outcome = "memory" if answer.status == Status.MEMOUT else f"ended with exit code {code}"
-    total = (
-        sum(costs[step.action.name] for step in answer.plan.actions)
-        if outcome == "solved"
-        else None
+    plan = (
+        [int(step.action.name[1:]) for step in answer.plan.actions] if outcome == "solved" else None
     )
-    return {"status": outcome, "total": total, "log": log[-2000:]}
+    return {"status": outcome, "plan": plan, "log": log[-2000:]}
 
 
 def _config_space() -> ModuleType:
@@ -100,8 +98,8 @@ def _config_space() -> ModuleType:
     return module
 
 
-def build(task: dict[str, Any]) -> tuple[Any, dict[str, int]]:
-    """The task as a unified-planning problem, and the cost of each action by name.
+def build(task: dict[str, Any]) -> Any:
+    """The task as a unified-planning problem.
 
     Facts have no arguments and are called ``f0``, ``f1``, ..; actions ``a0``, ``a1``, ..
     """
@@ -123,7 +121,7 @@ def build(task: dict[str, Any]) -> tuple[Any, dict[str, int]]:
         problem.add_fluent(fluent, default_initial_value=False)
     for n in task["init"]:
         problem.set_initial_value(true[n], True)
-    prices, costs = {}, {}
+    prices = {}
     for number, (conditions, adds, deletes, cost) in enumerate(task["actions"]):
         if not adds and not deletes:
             continue  # of no use in a plan, and its PDDL could not be read by Fast Downward
@@ -135,12 +133,12 @@ def build(task: dict[str, Any]) -> tuple[Any, dict[str, int]]:
         for n in deletes:
             action.add_effect(true[n], False)
         problem.add_action(action)
-        prices[action], costs[action.name] = Int(cost), cost
+        prices[action] = Int(cost)
     for n, positive in task["goal"]:
         problem.add_goal(true[n] if positive else false[n])
     # Without a metric the engine calls its answer "satisficing".
     problem.add_quality_metric(MinimizeActionCosts(prices))
-    return problem, costs
+    return problem
 
 
 if __name__ == "__main__":

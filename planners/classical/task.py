@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from typing import Literal
 
@@ -61,3 +61,21 @@ class ClassicalTask:
         """
         makespan, second = divmod(total, self.step_cost)
         return (makespan, second) if self.step_cost > self.highest_cost * makespan else None
+
+    def cost_of_plan(self, plan: Sequence[int]) -> int | None:
+        """The total cost of the actions of these numbers in turn, None if they are no plan."""
+        state = set(self.init)
+        for number in plan:
+            if not 0 <= number < len(self.actions) or not _holds(
+                self.actions[number].preconditions, state
+            ):
+                return None
+            state.difference_update(self.actions[number].deletes)
+            state.update(self.actions[number].adds)
+        if not _holds(self.goal, state):
+            return None
+        return sum(self.actions[number].cost for number in plan)
+
+
+def _holds(conditions: Sequence[Condition], state: Set[int]) -> bool:
+    return all((fact in state) == wanted for fact, wanted in conditions)

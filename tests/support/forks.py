@@ -55,7 +55,8 @@ def fork(work: Callable[[], object]) -> Fork:
     try:
         os.dup2(out[1], 1)
         os.dup2(err[1], 2)
-        sys.stdout, sys.stderr = os.fdopen(1, "w"), os.fdopen(2, "w")
+        sys.stdout = os.fdopen(1, "w", closefd=False)
+        sys.stderr = os.fdopen(2, "w", closefd=False)
         for number in ENDING:
             signal.signal(number, signal.SIG_DFL)
         signal.signal(signal.SIGINT, signal.default_int_handler)
