@@ -11,6 +11,9 @@ from typing import NoReturn
 
 from planners.signals import Interruptions
 
+#: Digits of a number of plans: more than there are plans of any space that fits into memory.
+_DIGITS = 100_000
+
 
 def main() -> NoReturn:
     """Run the command line and end the process with its exit code.
@@ -19,6 +22,8 @@ def main() -> NoReturn:
     done is removed, and the exit code is 128 and the number of the signal.
     """
     interruptions = Interruptions()
+    if 0 < sys.get_int_max_str_digits() < _DIGITS:  # 0: there is no limit
+        sys.set_int_max_str_digits(_DIGITS)
     code = 0
     try:
         try:

@@ -19,7 +19,7 @@ import time
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from planners.classical import LONGEST, ClassicalTask, Form, compile_classical
 from planners.errors import CoordlangError, OutOfMemory, OutOfTime
@@ -139,13 +139,14 @@ def _solve(
         try:
             directory = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="coordlang-")))
             (directory / "task.json").write_text(task)
+            errors = stack.enter_context((directory / "stderr").open("wb"))
         except OSError as error:
             raise FastDownwardFailed(
                 f"the task for Fast Downward cannot be written: {error.strerror}",
                 remedy="Set TMPDIR to a folder with free space that you may write to.",
             ) from None
         try:
-            code = _run(directory, left, signals)
+            code = _run(directory, errors, left, signals)
         except subprocess.TimeoutExpired:
             raise OutOfTime(
                 f"Fast Downward found no answer in {time_limit:g} s",
@@ -153,10 +154,10 @@ def _solve(
             ) from None
         result = directory / "result.json"
         if not result.exists():
-            errors = (directory / "stderr").read_text(errors="replace")
+            said = (directory / "stderr").read_text(errors="replace")
             if code == -signal.SIGKILL:  # not by us: by the system, which is out of memory
                 raise _out_of_memory()
-            raise _crash(f"the process that runs Fast Downward ended with exit code {code}", errors)
+            raise _crash(f"the process that runs Fast Downward ended with exit code {code}", said)
         answer = _read_answer(result)
     match answer["status"]:
         case "solved":
@@ -193,38 +194,37 @@ def _checked_cost(classical: ClassicalTask, plan: list[int]) -> int:
     return total
 
 
-def _run(directory: Path, left: float | None, signals: Postponed) -> int:
-    """Run the worker in a directory; its exit code.
+def _run(directory: Path, errors: BinaryIO, left: float | None, signals: Postponed) -> int:
+    """Run the worker in a directory; its exit code.  It writes what is wrong to ``errors``.
 
     However this ends, the worker and its children are gone.  Signals are heard while it runs.
     """
     home = str(Path(__file__).resolve().parents[2])
     path = os.pathsep.join(p for p in (home, os.environ.get("PYTHONPATH")) if p)
     process = None
-    with (directory / "stderr").open("wb") as errors:
-        try:
-            process = subprocess.Popen(
-                [
-                    sys.executable,
-                    "-P",  # by its path: the package around it loads numpy, which it does not need
-                    str(Path(__file__).with_name("fast_downward_worker.py")),
-                    "task.json",
-                    "result.json",
-                ],
-                cwd=directory,
-                # What the worker's libraries put into a temporary directory goes away with this
-                # one.
-                env={**os.environ, **_ENVIRONMENT, "PYTHONPATH": path, "TMPDIR": str(directory)},
-                stdin=subprocess.PIPE,  # ends when we do; then the worker ends its group
-                stdout=subprocess.DEVNULL,
-                stderr=errors,
-                start_new_session=True,
-            )
-            with signals.heard():
-                return process.wait(None if left is None else max(left, 0.0))
-        finally:
-            if process is not None:
-                _end(process)
+    try:
+        process = subprocess.Popen(
+            [
+                sys.executable,
+                "-P",  # by its path: the package around it loads numpy, which it does not need
+                str(Path(__file__).with_name("fast_downward_worker.py")),
+                "task.json",
+                "result.json",
+            ],
+            cwd=directory,
+            # What the worker's libraries put into a temporary directory goes away with this
+            # one.
+            env={**os.environ, **_ENVIRONMENT, "PYTHONPATH": path, "TMPDIR": str(directory)},
+            stdin=subprocess.PIPE,  # ends when we do; then the worker ends its group
+            stdout=subprocess.DEVNULL,
+            stderr=errors,
+            start_new_session=True,
+        )
+        with signals.heard():
+            return process.wait(None if left is None else max(left, 0.0))
+    finally:
+        if process is not None:
+            _end(process)
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

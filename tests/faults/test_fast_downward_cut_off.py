@@ -25,7 +25,8 @@ CELLS = [DOMAINS / "three-cells" / name for name in ("domain.pddl", "problem.pdd
 
 @pytest.fixture(scope="module")
 def task() -> ClassicalTask:
-    loaded = read_instance(*CELLS, None, GivenOptions.of())
+    domain, problem = CELLS
+    loaded = read_instance(domain, problem, None, GivenOptions.of())
     return compile_classical(loaded.model, loaded.tasks[0], 2000, LONGEST)
 
 
@@ -129,18 +130,18 @@ def test_its_translated_task_is_cut_off_at_every_length(
     writer.write_domain(str(tmp_path / "domain.pddl"))
     writer.write_problem(str(tmp_path / "problem.pddl"))
     home = Path(up_fast_downward.__file__).parent / "downward"
-    translate = [sys.executable, home / "fast-downward.py", "--translate"]
+    translate = [sys.executable, str(home / "fast-downward.py"), "--translate"]
     subprocess.run(
         [*translate, "domain.pddl", "problem.pddl"], cwd=tmp_path, check=True, capture_output=True
     )
     sas = (tmp_path / "output.sas").read_bytes()
     plan = tmp_path / "plan"
-    search = [home / "builds/release/bin/downward", "--search", "astar(lmcut())"]
+    search = [str(home / "builds/release/bin/downward"), "--search", "astar(lmcut())"]
     answers = set()
     for size in range(len(sas) + 1):
         plan.unlink(missing_ok=True)
         ended = subprocess.run(
-            [*search, "--internal-plan-file", plan], input=sas[:size], capture_output=True
+            [*search, "--internal-plan-file", str(plan)], input=sas[:size], capture_output=True
         )
         text = plan.read_text() if plan.exists() else None
         answers.add((ended.returncode, text if ended.returncode else "; cost = 3" in str(text)))

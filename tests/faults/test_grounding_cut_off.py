@@ -150,9 +150,12 @@ def cut_off(place: str, monkeypatch: pytest.MonkeyPatch, every: int) -> tuple[di
     init = sorted(problem.init, key=str)
     given: list[Any] = []
     least = reachability._least_model
-    monkeypatch.setattr(
-        reachability, "_least_model", lambda rules: given.append(least(rules)) or given[0]
-    )
+
+    def noted(rules: Any) -> Any:
+        given.append(least(rules))
+        return given[0]
+
+    monkeypatch.setattr(reachability, "_least_model", noted)
     whole = reachable_arguments(domain, problem.objects, init)
     answer = [(predicate, args) for predicate, found in given[0].items() for args in found]
     outcomes = {"error": 0, "the same": 0}

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A disk that gets full at any write of any command: the documented exit code, the old files as
+they were, and nothing else left behind.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import resource
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import coordlang
+from tests.faults.test_kills import OLD, WRITING, Writing, normal
+from tests.support.command import Outcome
+from tests.support.domains import DOMAINS
+from tests.support.forks import fork_command
+
+GW1 = [str(DOMAINS / "grid" / name) for name in ("domain.pddl", "gw1-2x2.pddl")]
+QUICK = ("certificate", "tasks", "export")
+#: What an evaluation keeps besides its outputs: each of these is whole, or not there.
+KEPT = re.compile(r"cache|cache/[0-9a-f]{24}\.json\.gz(\.lock)?|png|png/\w+\.png|\w+\.svg|\.lock")
+
+
+@pytest.fixture(scope="module")
+def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """A language and a sentence of it; what commands use is loaded then."""
+    path = tmp_path_factory.mktemp("given") / "language.json"
+    built = coordlang.build(*GW1, tasks="all", method="minimal")
+    built.language.save(path)
+    plan = coordlang.plan(built.language, *GW1, prefer=["shortest"])
+    return {"LANGUAGE": str(path), "SENTENCE": plan.sentence}
+
+
+class FullDisk:
+    """The ``number``-th change of a folder fails, and all later ones that need space.
+
+    A change is a file that is opened for writing, written to the disk, or renamed, or a new folder.
+    """
+
+    def __init__(self, number: int, folder: Path) -> None:
+        self.left, self.folder = number, str(folder)
+
+    def begin(self) -> None:
+        real = os.fsync
+
+        def fsync(handle: Any) -> None:
+            self.change()
+            real(handle)
+
+        os.fsync = fsync  # type: ignore[assignment]
+        sys.addaudithook(self.hear)  # in a fork: nothing takes it away again
+
+    def hear(self, event: str, arguments: tuple[object, ...]) -> None:
+        if event == "open":
+            flags = arguments[2]
+            if not isinstance(flags, int) or not flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT):
+                return
+        elif event not in ("os.rename", "os.mkdir", "os.link", "os.symlink"):
+            return
+        path = arguments[0]
+        if isinstance(path, (str, bytes)) and os.path.abspath(os.fsdecode(path)).startswith(
+            self.folder
+        ):
+            self.change(needs_space=event != "os.rename")
+
+    def change(self, *, needs_space: bool = True) -> None:
+        self.left -= 1
+        if self.left == 0 or (self.left < 0 and needs_space):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def run(
+    writing: Writing, said: dict[str, str], folder: Path, limit: Callable[[], object]
+) -> tuple[Outcome, dict[str, bytes], set[str]]:
+    """Run a command on old outputs: how it ended, its outputs, and the names of other files."""
+    work, other = folder / "work", folder / "tmp"
+    work.mkdir(parents=True)
+    other.mkdir()
+    for name in writing.outputs:
+        if not name.endswith(".jsonl"):
+            (work / name).write_bytes(OLD)
+
+    def before() -> None:
+        os.chdir(work)
+        os.environ["TMPDIR"] = str(other)
+        tempfile.tempdir = str(other)  # by itself Python looks for another one with space
+        limit()
+
+    arguments = [said.get(argument, argument) for argument in writing.arguments]
+    ended = fork_command(*arguments, before=before).join(300)
+    found = {str(p.relative_to(root)) for root in (work, other) for p in root.rglob("*")}
+    outputs = {name: (work / name).read_bytes() for name in writing.outputs if name in found}
+    return ended, outputs, {name for name in found - {*outputs} if not KEPT.fullmatch(name)}
+
+
+def check(
+    name: str, said: dict[str, str], folder: Path, limit: Callable[[], object], whole: Outputs
+) -> int:
+    """Run it under a limit; its exit code."""
+    ended, outputs, others = run(WRITING[name], said, folder, limit)
+    if ended.code == 0:
+        assert {at: normal(at, held) for at, held in outputs.items()} == whole
+    else:
+        assert ended.code == (3 if name == "check" else 2), ended
+        assert ended.err.startswith("coordlang: ")
+        assert re.search("No space left on device|File too large|is full", ended.err), ended
+        assert "Traceback" not in ended.err
+        for at, held in outputs.items():
+            if at.endswith(".jsonl"):  # a line is added when its work is done
+                lines = normal(at, held[: held.rfind(b"\n") + 1])
+                assert {*lines.split(b"\n")} <= {*whole[at].split(b"\n"), b""}
+            else:
+                assert held == OLD or normal(at, held) == whole[at]
+        replaced = {at for at in WRITING[name].outputs if not at.endswith(".jsonl")}
+        if name == "certificate":  # the old one never stands beside a new language
+            assert {at for at, held in outputs.items() if held == OLD} in (replaced, set())
+            assert replaced - {*outputs} <= {"c.json.gz"}
+        else:
+            assert replaced <= {*outputs}
+            assert OLD in outputs.values() or not replaced
+    assert others == set()
+    return ended.code
+
+
+Outputs = dict[str, bytes]
+
+
+def fill_at_every_change(name: str, said: dict[str, str], folder: Path) -> int:
+    """The number of runs that met the full disk."""
+    ended, outputs, _ = run(WRITING[name], said, folder / "whole", lambda: None)
+    assert ended.code == 0, ended
+    whole = {at: normal(at, held) for at, held in outputs.items()}
+    for number in range(1, 1000):
+        disk = FullDisk(number, folder)
+        if check(name, said, folder / str(number), disk.begin, whole) == 0:
+            return number - 1
+    raise AssertionError("more than 1,000 changes")
+
+
+def fill_at_every_length(name: str, said: dict[str, str], folder: Path, steps: int) -> int:
+    """The number of runs that met the limit on the size of a file."""
+    ended, outputs, _ = run(WRITING[name], said, folder / "whole", lambda: None)
+    assert ended.code == 0, ended
+    whole = {at: normal(at, held) for at, held in outputs.items()}
+    most = max(map(len, outputs.values()))
+    met = 0
+    for number in range(steps):
+        size = most * number // steps
+
+        def limit(size: int = size) -> None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+        met += check(name, said, folder / str(number), limit, whole) != 0
+    return met
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_the_disk_is_full_at_a_change(name: str, said: dict[str, str], tmp_path: Path) -> None:
+    assert fill_at_every_change(name, said, tmp_path) >= 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", WRITING)
+def test_the_disk_is_full_at_every_change_of_every_command(
+    name: str, said: dict[str, str], tmp_path: Path
+) -> None:
+    met = fill_at_every_change(name, said, tmp_path)
+    print(f"{name}: {met} changes")
+    assert met >= 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in WRITING if WRITING[name].outputs])
+def test_the_disk_is_full_at_fifty_lengths_of_every_output(
+    name: str, said: dict[str, str], tmp_path: Path
+) -> None:
+    met = fill_at_every_length(name, said, tmp_path, 10 if name == "evaluate" else 50)
+    print(f"{name}: {met} lengths")
+    assert met >= 5
