@@ -37,6 +37,8 @@ _ENVIRONMENT = {"PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THR
 _NO_MEMORY = re.compile(
     "MemoryError|out of memory|allocat|failed to map|start new thread", re.IGNORECASE
 )
+#: How Python and the translator say that a file cannot be written.
+_NO_SPACE = re.compile("No space left on device|File too large|Disk quota exceeded")
 
 
 class FastDownwardFailed(CoordlangError):
@@ -241,7 +243,7 @@ def _crash(what: str, said: str) -> CoordlangError:
     # A limit of this process holds for all below it, and libraries crash in many ways when they
     # meet it.
     limited = resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
-    if limited or _NO_MEMORY.search(said):
+    if not _NO_SPACE.search(said) and (limited or _NO_MEMORY.search(said)):
         return _out_of_memory()
     return FastDownwardFailed(what, remedy=said[-_TAIL:].strip() or None)
 
