@@ -8,7 +8,7 @@ import gzip
 import os
 import stat
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -100,6 +100,25 @@ def write_compressed(
     if str(path).endswith(".gz"):
         data = gzip.compress(data, compresslevel=level, mtime=0)
     write_atomically(path, data, outdated=outdated)
+
+
+def write_texts(folder: str | Path, texts: Mapping[str, str]) -> None:
+    """Write text files, by their names, into a folder, which is made if it is missing.
+
+    Raises
+    ------
+    UsageError
+        A folder that cannot be made, or a file that cannot be written.
+    """
+    try:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(
+            f"the folder {folder} cannot be made: {error.strerror}",
+            remedy="Name a folder in one that you may write to.",
+        ) from None
+    for name, text in texts.items():
+        write_atomically(Path(folder) / name, text.encode())
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Unpack
 
-from coordlang.api.inputs import DomainSource, ProblemSource
+from coordlang.api.inputs import DomainSource, File, ProblemSource
 from coordlang.api.language_inputs import LanguageSource, read_task_language
 from coordlang.api.options import GivenOptions, ModelKeywords
 from coordlang.api.presenting import Presented
@@ -223,9 +223,10 @@ class Explanation(Presented):
 
 def explain(
     language: LanguageSource,
-    domain: DomainSource,
+    domain: DomainSource | None = None,
     problem: ProblemSource | None = None,
     *,
+    factored: File | None = None,
     task: bool = False,
     sentence: SentenceSource | None = None,
     formula_per_word: bool = False,
@@ -235,7 +236,7 @@ def explain(
 
     Parameters
     ----------
-    language, domain, problem, **model
+    language, domain, problem, factored, **model
         As in `verify`, with one problem.
     task
         Whether it is found out what the sentences of the problem's task ask of each robot.
@@ -253,7 +254,7 @@ def explain(
     """
     if sentence is not None and not task:
         raise UsageError("--sentence: only with --task", remedy="Add --task.")
-    used = read_task_language(language, domain, problem, GivenOptions.of(**model))
+    used = read_task_language(language, domain, problem, factored, GivenOptions.of(**model))
     only = None if sentence is None else used.words_of(sentence)
     if only is not None:
         used.plans_with(only)

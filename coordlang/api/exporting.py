@@ -3,11 +3,9 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import fspath
-from pathlib import Path
 from typing import Any, Literal, Unpack, overload
 
 from coordlang.api.inputs import DomainSource, File, ProblemSource
@@ -21,14 +19,14 @@ from coordlang.api.options import (
     require_one_of,
 )
 from coordlang.api.presenting import Presented
-from coordlang.api.speaking import SentencePlans, SentenceSource
+from coordlang.api.speaking import SentencePlans, SentenceSource, given_sentence
 from coordlang.use.export.ltlf import SentenceFormula, export_ltlf
 from coordlang.use.export.pddl import PddlExport, export_pddl, plan_names
 from coordlang.use.sentence.open_plans import OpenPlans
-from planners.errors import BadInput, Position, Refuted, UsageError
+from planners.errors import BadInput, Position, Refuted
 from planners.joint.model import JointModel
 from planners.search.plan_file import only_one_plan
-from planners.writing import write_atomically
+from planners.writing import write_texts
 
 #: Beyond this many joint actions robots choose one after another in the exported PDDL.
 MAX_ACTIONS = 2000
@@ -92,13 +90,7 @@ class ExportedTask(Presented):
         UsageError
             If it cannot be written to.
         """
-        path = fspath(folder)
-        try:
-            Path(path).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise UsageError(f"the folder {path} cannot be made: {error.strerror}") from None
-        for name, text in (("domain.pddl", self.domain), ("problem.pddl", self.problem)):
-            write_atomically(os.path.join(path, name), text.encode())
+        write_texts(fspath(folder), {"domain.pddl": self.domain, "problem.pddl": self.problem})
 
     def translate_plan(self, actions: Sequence[str]) -> PlanSteps:
         """Translate a plan of the exported problem, the names of its actions, into joint steps.
@@ -185,10 +177,11 @@ class ExportedFormula(Presented):
 @overload
 def export(
     language: LanguageSource,
-    domain: DomainSource,
-    problem: ProblemSource | None,
-    sentence: SentenceSource,
+    domain: DomainSource | None = None,
+    problem: ProblemSource | None = None,
+    sentence: SentenceSource | None = None,
     *,
+    factored: File | None = None,
     to: Literal["pddl"] = "pddl",
     max_actions: int = MAX_ACTIONS,
     **model: Unpack[ModelKeywords],
@@ -198,10 +191,11 @@ def export(
 @overload
 def export(
     language: LanguageSource,
-    domain: DomainSource,
-    problem: ProblemSource | None,
-    sentence: SentenceSource,
+    domain: DomainSource | None = None,
+    problem: ProblemSource | None = None,
+    sentence: SentenceSource | None = None,
     *,
+    factored: File | None = None,
     to: Literal["ltlf"],
     max_actions: int = MAX_ACTIONS,
     **model: Unpack[ModelKeywords],
@@ -210,10 +204,11 @@ def export(
 
 def export(
     language: LanguageSource,
-    domain: DomainSource,
-    problem: ProblemSource | None,
-    sentence: SentenceSource,
+    domain: DomainSource | None = None,
+    problem: ProblemSource | None = None,
+    sentence: SentenceSource | None = None,
     *,
+    factored: File | None = None,
     to: Target = "pddl",
     max_actions: int = MAX_ACTIONS,
     **model: Unpack[ModelKeywords],
@@ -222,7 +217,7 @@ def export(
 
     Parameters
     ----------
-    language, domain, problem, **model
+    language, domain, problem, factored, **model
         As in `verify`, with one problem.
     sentence
         ``"w1 w0"`` or ``("w1", "w0")``.
@@ -238,8 +233,9 @@ def export(
         If no optimal plan has the sentence.
     """
     require_one_of("--to", to, TARGETS)
-    used = read_task_language(language, domain, problem, GivenOptions.of(**model))
-    words = used.words_of(sentence)
+    said = given_sentence(sentence)
+    used = read_task_language(language, domain, problem, factored, GivenOptions.of(**model))
+    words = used.words_of(said)
     if to == "pddl":
         return ExportedTask(OpenPlans.of(used, words), export_pddl(used, words, max_actions))
     found: SentenceFormula = export_ltlf(used, words)

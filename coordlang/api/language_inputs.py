@@ -24,11 +24,12 @@ def read_language_source(language: LanguageSource) -> tuple[Language, Position]:
 
 def read_task_language(
     language: LanguageSource,
-    domain: DomainSource,
+    domain: DomainSource | None,
     problem: ProblemSource | None,
+    factored: File | None,
     given: GivenOptions,
 ) -> TaskLanguage:
     """Read a language and put it into the task of a problem."""
     read, position = read_language_source(language)
-    files = read_planning(domain, [problem], None, given, most=1)
+    files = read_planning(domain, [problem], factored, given, most=1)
     return language_in_task(read, files.domain, files.problems[0], files.options_of(read), position)

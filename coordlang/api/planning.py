@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from os import fspath
 from typing import Any, Unpack
 
 from coordlang.api.inputs import (
@@ -21,9 +22,11 @@ from planners.inspection import Inspection
 from planners.inspection import inspect as inspect_instance
 from planners.loading import PlanningInstance
 from planners.notebook import counted, html_table
+from planners.pddl.pddl_text import domain_text, problem_text
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from planners.search.reachable import count as count_reachable
+from planners.writing import write_texts
 
 
 def load(
@@ -148,6 +151,7 @@ def inspect(
     *,
     factored: File | None = None,
     states: bool = False,
+    write: File | None = None,
     **model: Unpack[ModelKeywords],
 ) -> Inspected:
     """Show what was understood of a domain and problem.
@@ -158,12 +162,20 @@ def inspect(
         As in `load`.
     states
         Whether the reachable joint states and steps are counted as well.
+    write
+        A folder for what was read, as ``domain.pddl`` and ``problem.pddl``: of factored files, one
+        domain and one problem in place of them all.
     """
     loaded = read_instance(domain, problem, factored, GivenOptions.of(**model))
     size = None
     if states:
         size = ReachableSize(*count_reachable(loaded.model, loaded.tasks[0].init[None, :]))
-    return Inspected(inspect_instance(loaded), size)
+    found = Inspected(inspect_instance(loaded), size)
+    if write is not None:
+        problem_pddl = problem_text(loaded.problems[0], loaded.domain)
+        texts = {"domain.pddl": domain_text(loaded.domain), "problem.pddl": problem_pddl}
+        write_texts(fspath(write), texts)
+    return found
 
 
 def plans(

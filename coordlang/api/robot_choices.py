@@ -13,7 +13,7 @@ from coordlang.api.inputs import DomainSource, File, ProblemSource
 from coordlang.api.language_inputs import LanguageSource, read_task_language
 from coordlang.api.options import GivenOptions, ModelKeywords
 from coordlang.api.presenting import Presented
-from coordlang.api.speaking import SentenceSource
+from coordlang.api.speaking import SentenceSource, given_sentence
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.use.choices.choices import MOST, Choices
 from coordlang.use.choices.choices import choices as choices_under
@@ -126,10 +126,11 @@ class RobotsChoices(Presented):
 
 def choices(
     language: LanguageSource,
-    domain: DomainSource,
-    problem: ProblemSource | None,
-    sentence: SentenceSource,
+    domain: DomainSource | None = None,
+    problem: ProblemSource | None = None,
+    sentence: SentenceSource | None = None,
     *,
+    factored: File | None = None,
     robot: str | Sequence[str] = (),
     check: bool = False,
     **model: Unpack[ModelKeywords],
@@ -138,7 +139,7 @@ def choices(
 
     Parameters
     ----------
-    language, domain, problem, **model
+    language, domain, problem, factored, **model
         As in `verify`, with one problem.
     sentence
         ``"w1 w0"`` or ``("w1", "w0")``.
@@ -156,9 +157,10 @@ def choices(
     OutOfMemory
         If the automata, or with ``check`` the combinations, do not fit into the memory.
     """
-    used = read_task_language(language, domain, problem, GivenOptions.of(**model))
+    said = given_sentence(sentence)
+    used = read_task_language(language, domain, problem, factored, GivenOptions.of(**model))
     chosen = _numbers(used.model.robots, robot) or tuple(range(len(used.model.robots)))
-    found = choices_under(used, used.words_of(sentence), most=None if check else MOST)
+    found = choices_under(used, used.words_of(said), most=None if check else MOST)
     return RobotsChoices(found, chosen)
 
 

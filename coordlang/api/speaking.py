@@ -69,18 +69,27 @@ class Said(Presented):
         return {"sentences": list(self.sentences), "covered": self.covered}
 
 
+def given_sentence(sentence: SentenceSource | None) -> SentenceSource:
+    """Return the sentence; `UsageError` where none is given."""
+    if sentence is None:
+        raise UsageError("expected a sentence", remedy='Give its words, as in "w1 w0".')
+    return sentence
+
+
 def say(
     language: LanguageSource,
-    domain: DomainSource,
-    problem: ProblemSource | None,
-    plan: PlanSource,
+    domain: DomainSource | None = None,
+    problem: ProblemSource | None = None,
+    plan: PlanSource | None = None,
+    *,
+    factored: File | None = None,
     **model: Unpack[ModelKeywords],
 ) -> Said:
     """Say optimal plans: the sentence of a plan is the sequence of words that it passes through.
 
     Parameters
     ----------
-    language, domain, problem, **model
+    language, domain, problem, factored, **model
         As in `verify`, with one problem.
     plan
         A plan file (which may hold several plans), or the steps of one plan.
@@ -90,7 +99,9 @@ def say(
     NotAPlan, NotOptimal
         With the first step that breaks: only optimal plans have a sentence.
     """
-    used = read_task_language(language, domain, problem, GivenOptions.of(**model))
+    if plan is None:
+        raise UsageError("expected a plan", remedy="Give a plan file or the steps of one plan.")
+    used = read_task_language(language, domain, problem, factored, GivenOptions.of(**model))
     plans = _plans(plan, used)
     sentences = []
     for number, steps in enumerate(plans, 1):
@@ -152,16 +163,18 @@ class SentencePlans(OptimalPlans):
 
 def understand(
     language: LanguageSource,
-    domain: DomainSource,
-    problem: ProblemSource | None,
-    sentence: SentenceSource,
+    domain: DomainSource | None = None,
+    problem: ProblemSource | None = None,
+    sentence: SentenceSource | None = None,
+    *,
+    factored: File | None = None,
     **model: Unpack[ModelKeywords],
 ) -> SentencePlans:
     """Understand a sentence: the optimal plans of the task that have it.
 
     Parameters
     ----------
-    language, domain, problem, **model
+    language, domain, problem, factored, **model
         As in `verify`, with one problem.
     sentence
         ``"w1 w0"`` or ``("w1", "w0")``.
@@ -173,8 +186,9 @@ def understand(
     BadInput
         For a word that the language does not have, or one said twice in a row.
     """
-    used = read_task_language(language, domain, problem, GivenOptions.of(**model))
-    return SentencePlans(OpenPlans.of(used, used.words_of(sentence)))
+    words = given_sentence(sentence)
+    used = read_task_language(language, domain, problem, factored, GivenOptions.of(**model))
+    return SentencePlans(OpenPlans.of(used, used.words_of(words)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -266,10 +280,11 @@ class PlanUnderSentence(Presented):
 
 def plan(
     language: LanguageSource,
-    domain: DomainSource,
-    problem: ProblemSource | None,
+    domain: DomainSource | None = None,
+    problem: ProblemSource | None = None,
     sentence: SentenceSource | None = None,
     *,
+    factored: File | None = None,
     prefer: str | Sequence[str] = (),
     heuristic: HeuristicName = "relaxed",
     **model: Unpack[ModelKeywords],
@@ -278,7 +293,7 @@ def plan(
 
     Parameters
     ----------
-    language, domain, problem, **model
+    language, domain, problem, factored, **model
         As in `verify`, with one problem.
     sentence
         ``"w1 w0"`` or ``("w1", "w0")``; None with ``prefer``.
@@ -298,8 +313,11 @@ def plan(
     require_one_of("--heuristic", heuristic, HEURISTICS)
     preferences = [prefer] if isinstance(prefer, str) else list(prefer)
     if (sentence is None) == (not preferences):
-        raise UsageError("expected a SENTENCE or --prefer, one of the two")
-    used = read_task_language(language, domain, problem, GivenOptions.of(**model))
+        raise UsageError(
+            "expected a SENTENCE or --prefer, one of the two",
+            remedy="--prefer shortest finds the sentence with the fewest words.",
+        )
+    used = read_task_language(language, domain, problem, factored, GivenOptions.of(**model))
     read = [read_preference(used, text) for text in preferences]
     best = best_sentence(used, read) if read else None
     words = best.words if best else used.words_of(sentence or ())

@@ -15,10 +15,10 @@ import coordlang
 from coordlang.cli.echo import echo
 from coordlang.cli.exit_codes import REFUTED
 from coordlang.cli.files import (
+    PlanningFiles,
     check_outputs,
-    domain_argument,
     language_argument,
-    problem_argument,
+    planning_files,
     write,
 )
 from coordlang.cli.group import RenamedOptions
@@ -41,9 +41,7 @@ _LEAST_ROOM = 30
 
 @click.command(name="choices", cls=RenamedOptions, renamed={"--did": "--history"})
 @language_argument
-@domain_argument
-@problem_argument
-@click.argument("sentence")
+@planning_files("DOMAIN PROBLEM SENTENCE", most=1, then="sentence")
 @click.option(
     "--robot",
     "whose",
@@ -88,8 +86,7 @@ _LEAST_ROOM = 30
 @limits
 def command(
     language: str,
-    domain: str,
-    problem: str,
+    pddl: PlanningFiles,
     sentence: str,
     whose: tuple[str, ...],
     check: bool,
@@ -111,10 +108,17 @@ def command(
     possible, all at once.
     """
     form = form_of(form, as_json)
-    check_outputs([("-o", output)], [language, domain, problem])
+    check_outputs([("-o", output)], [language, *pddl.paths])
     with working("finding the robots' choices"):
         found = coordlang.choices(
-            language, domain, problem, sentence, robot=whose, check=check, **model
+            language,
+            pddl.domain,
+            pddl.problem,
+            sentence,
+            factored=pddl.factored,
+            robot=whose,
+            check=check,
+            **model,
         )
     detours = {"visit": visit, "avoid": avoid, "do": do, "never": never}
     code = 0

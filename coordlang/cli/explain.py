@@ -9,7 +9,7 @@ import click
 
 import coordlang
 from coordlang.cli.echo import echo
-from coordlang.cli.files import domain_argument, language_argument, problem_argument
+from coordlang.cli.files import PlanningFiles, language_argument, planning_files
 from coordlang.cli.group import RenamedOptions
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import covered_code, working
@@ -17,8 +17,7 @@ from coordlang.cli.terminal import covered_code, working
 
 @click.command(name="explain", cls=RenamedOptions, renamed={"--each": "--formula-per-word"})
 @language_argument
-@domain_argument
-@problem_argument
+@planning_files("DOMAIN PROBLEM", most=1)
 @click.option(
     "--task", is_flag=True, help="What each sentence of PROBLEM's task asks of each robot."
 )
@@ -33,8 +32,7 @@ from coordlang.cli.terminal import covered_code, working
 @limits
 def command(
     language: str,
-    domain: str,
-    problem: str,
+    pddl: PlanningFiles,
     task: bool,
     sentence: str | None,
     formula_per_word: bool,
@@ -48,8 +46,8 @@ def command(
     with working("finding formulas of the words"):
         found = coordlang.explain(
             language,
-            domain,
-            problem,
+            *pddl.files,
+            factored=pddl.factored,
             task=task,
             sentence=sentence,
             formula_per_word=formula_per_word,

@@ -13,10 +13,10 @@ import coordlang
 from coordlang.api.options import TARGETS, Target
 from coordlang.cli.echo import echo
 from coordlang.cli.files import (
+    PlanningFiles,
     check_outputs,
-    domain_argument,
     language_argument,
-    problem_argument,
+    planning_files,
     write,
 )
 from coordlang.cli.group import RenamedOptions
@@ -33,9 +33,7 @@ _RENAMED = {"--limit": "--max-actions", "--back": "--translate-plan"}
 
 @click.command(name="export", cls=RenamedOptions, renamed=_RENAMED)
 @language_argument
-@domain_argument
-@problem_argument
-@click.argument("sentence")
+@planning_files("DOMAIN PROBLEM SENTENCE", most=1, then="sentence")
 @click.option(
     "--to",
     "target",
@@ -68,8 +66,7 @@ _RENAMED = {"--limit": "--max-actions", "--back": "--translate-plan"}
 @limits
 def command(
     language: str,
-    domain: str,
-    problem: str,
+    pddl: PlanningFiles,
     sentence: str,
     target: Target,
     output: str | None,
@@ -87,7 +84,7 @@ def command(
     """
     if target == "ltlf":
         _check_ltlf(translate_plan)
-    inputs = [language, domain, problem, translate_plan]
+    inputs = [language, *pddl.paths, translate_plan]
     writes_folder = target == "pddl" and translate_plan is None and not as_json
     if output is not None and output != "-" and writes_folder:
         names = ("domain.pddl", "problem.pddl")
@@ -95,14 +92,16 @@ def command(
         check_outputs(written, inputs, makes_folder=True)
     else:
         check_outputs([("-o", output)], inputs)
-    files = language, domain, problem, sentence
+    files = language, pddl.domain, pddl.problem, sentence
     if target == "ltlf":
         with working("finding formulas of the words"):
-            formula = coordlang.export(*files, to="ltlf", **model)
+            formula = coordlang.export(*files, factored=pddl.factored, to="ltlf", **model)
         _write_formula(formula, output, as_json)
         return covered_code(formula.covered)
     with working("compiling the task"):
-        exported = coordlang.export(*files, to="pddl", max_actions=max_actions, **model)
+        exported = coordlang.export(
+            *files, factored=pddl.factored, to="pddl", max_actions=max_actions, **model
+        )
     if translate_plan is not None:
         _write_plan(exported, translate_plan, output, as_json)
     else:

@@ -14,9 +14,6 @@ import click
 from coordlang.cli.echo import echo
 from coordlang.cli.shared_options import CommandFunction
 
-domain_argument = click.argument("domain", type=click.Path())
-problem_argument = click.argument("problem", type=click.Path())
-problems_argument = click.argument("problems", type=click.Path(), nargs=-1, required=True)
 language_argument = click.argument("language", type=click.Path())
 
 
@@ -28,19 +25,45 @@ class PlanningFiles:
     factored: str | None
 
     @property
+    def domain(self) -> str | None:
+        """The domain file; None under ``--factored``."""
+        return self.files[0] if self.files else None
+
+    @property
+    def problem(self) -> str | None:
+        """The only problem file; None under ``--factored``."""
+        return self.files[1] if self.files else None
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """The problem files; none under ``--factored``."""
+        return self.files[1:]
+
+    @property
     def paths(self) -> list[str]:
         """All files that are read."""
         if self.factored:
-            return [str(path) for path in Path(self.factored).glob("*-*.pddl")]
+            return [str(path) for path in Path(self.factored).glob("*.pddl")]
         return list(self.files)
 
 
 def planning_files(
-    metavar: str, most: int | None = None
+    metavar: str, most: int | None = None, *, then: str | None = None, optional: bool = False
 ) -> Callable[[CommandFunction], CommandFunction]:
     """DOMAIN and at most so many problems, or ``--factored DIR``.
 
     The command gets them as ``pddl``, a `PlanningFiles`.
+
+    Parameters
+    ----------
+    metavar
+        All that is named here, as the usage line shows it.
+    most
+        The greatest number of problems; None: any number.
+    then
+        An argument that comes last, by the name under which the command gets it.
+    optional
+        Whether that argument may be left out: then the command gets None.
     """
 
     def decorate(function: CommandFunction) -> CommandFunction:
@@ -48,20 +71,39 @@ def planning_files(
         @click.option(
             "--factored",
             metavar="DIR",
-            help="Read domain-ROBOT.pddl and problem-ROBOT.pddl of every robot here.",
+            help="In place of DOMAIN and PROBLEM: the folder of each robot's own domain and "
+            "problem file.",
         )
         @functools.wraps(function)
         def wrapped(
             files: tuple[str, ...], factored: str | None, **arguments: object
         ) -> int | None:
-            enough = not files if factored else 2 <= len(files) <= 1 + (most or len(files))
-            if not enough:
-                raise click.UsageError(f"expected {metavar}, or --factored DIR without them")
+            least = 0 if factored else 2
+            if then is not None:
+                files, arguments[then] = _without_last(files, least, is_optional=optional)
+            if _misses(files, least, most) or (then and not optional and arguments[then] is None):
+                without = "DOMAIN PROBLEM" if then else "them"
+                raise click.UsageError(f"expected {metavar}, or --factored DIR without {without}")
             return function(pddl=PlanningFiles(files, factored), **arguments)
 
         return wrapped
 
     return decorate
+
+
+def _misses(files: tuple[str, ...], least: int, most: int | None) -> bool:
+    """Whether these are too few files, or too many: none where none is needed."""
+    too_many = most is not None and len(files) > 1 + most
+    return len(files) < least or too_many or (bool(files) and not least)
+
+
+def _without_last(
+    files: tuple[str, ...], least: int, *, is_optional: bool
+) -> tuple[tuple[str, ...], str | None]:
+    """Split off the last argument; None where it is left out."""
+    if is_optional and len(files) <= least:
+        return files, None
+    return files[:-1], files[-1] if files else None
 
 
 def check_outputs(

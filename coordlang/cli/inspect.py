@@ -4,14 +4,18 @@
 from __future__ import annotations
 
 import json
+import os
 
 import click
 
 import coordlang
 from coordlang.cli.echo import echo
-from coordlang.cli.files import PlanningFiles, planning_files
+from coordlang.cli.files import PlanningFiles, check_outputs, planning_files
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import note_single_robot, working
+
+#: The files that --write makes.
+WRITTEN = "domain.pddl", "problem.pddl"
 
 
 @click.command(name="inspect")
@@ -21,13 +25,35 @@ from coordlang.cli.terminal import note_single_robot, working
     is_flag=True,
     help="Also count the reachable joint states and steps.",
 )
+@click.option(
+    "--write",
+    "folder",
+    metavar="DIR",
+    help="Also write what was read as domain.pddl and problem.pddl in this folder.",
+)
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
 @model_options
 @planning_files("DOMAIN PROBLEM", most=1)
 @limits
-def command(count_states: bool, as_json: bool, pddl: PlanningFiles, model: ModelKeywords) -> None:
-    """Show what was understood of DOMAIN and PROBLEM: a domain that was misread shows it here."""
+def command(
+    count_states: bool,
+    folder: str | None,
+    as_json: bool,
+    pddl: PlanningFiles,
+    model: ModelKeywords,
+) -> None:
+    """Show what was understood of DOMAIN and PROBLEM: a domain that was misread shows it here.
+
+    With --factored and --write: the files of all robots as one domain and one problem.
+    """
+    if folder is not None:
+        written = [("--write", os.path.join(folder, name)) for name in WRITTEN]
+        check_outputs(written, pddl.paths, makes_folder=True)
     with working("reading and grounding"):
-        found = coordlang.inspect(*pddl.files, factored=pddl.factored, states=count_states, **model)
+        found = coordlang.inspect(
+            *pddl.files, factored=pddl.factored, states=count_states, write=folder, **model
+        )
+    if folder is not None:
+        echo(f"coordlang: note: written to {folder}: {', '.join(WRITTEN)}", err=True)
     note_single_robot(found.robots)
     echo(json.dumps(found.data()) if as_json else str(found))

@@ -11,7 +11,7 @@ import click
 import coordlang
 from coordlang.api.options import HEURISTICS, HeuristicName
 from coordlang.cli.echo import echo
-from coordlang.cli.files import domain_argument, language_argument, problem_argument
+from coordlang.cli.files import PlanningFiles, language_argument, planning_files
 from coordlang.cli.group import RenamedOptions
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import covered_code, working
@@ -23,9 +23,7 @@ if TYPE_CHECKING:
 
 @click.command(name="plan", cls=RenamedOptions, renamed={"--wish": "--prefer"})
 @language_argument
-@domain_argument
-@problem_argument
-@click.argument("sentence", required=False)
+@planning_files("DOMAIN PROBLEM [SENTENCE]", most=1, then="sentence", optional=True)
 @click.option(
     "--prefer",
     multiple=True,
@@ -45,8 +43,7 @@ if TYPE_CHECKING:
 @limits
 def command(
     language: str,
-    domain: str,
-    problem: str,
+    pddl: PlanningFiles,
     sentence: str | None,
     prefer: tuple[str, ...],
     heuristic: HeuristicName,
@@ -60,7 +57,14 @@ def command(
     """
     with working("searching for a plan"):
         found = coordlang.plan(
-            language, domain, problem, sentence, prefer=prefer, heuristic=heuristic, **model
+            language,
+            pddl.domain,
+            pddl.problem,
+            sentence,
+            factored=pddl.factored,
+            prefer=prefer,
+            heuristic=heuristic,
+            **model,
         )
     if as_json:
         echo(json.dumps(found.data()))

@@ -10,10 +10,10 @@ import click
 
 from coordlang.cli.echo import echo
 from coordlang.cli.files import (
+    PlanningFiles,
     check_outputs,
-    domain_argument,
     language_argument,
-    problems_argument,
+    planning_files,
 )
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import working
@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 
 @click.command(name="report")
 @language_argument
-@domain_argument
-@problems_argument
+@planning_files("DOMAIN PROBLEMS...")
 @click.option("-o", "--output", required=True, metavar="PAGE", help="The HTML file; - for stdout.")
 @click.option(
     "--tasks-shown",
@@ -48,8 +47,7 @@ if TYPE_CHECKING:
 @limits
 def command(
     language: str,
-    domain: str,
-    problems: tuple[str, ...],
+    pddl: PlanningFiles,
     output: str,
     tasks_shown: int,
     coordinates: str | None,
@@ -68,10 +66,10 @@ def command(
     from coordlang.report.page import make_report
     from planners.writing import write_atomically
 
-    places = coordinates if coordinates is not None else str(_beside(problems[0]))
-    check_outputs([("-o", output)], [language, domain, *problems, places])
+    places = coordinates if coordinates is not None else str(_beside(pddl))
+    check_outputs([("-o", output)], [language, *pddl.paths, places])
     read, position = read_language_source(language)
-    files = read_planning(domain, problems, None, GivenOptions.of(**model))
+    files = read_planning(pddl.domain, pddl.problems, pddl.factored, GivenOptions.of(**model))
     check_source(read, files.domain, files.problems, position)
     with working("drawing the page"):
         report = make_report(
@@ -81,7 +79,7 @@ def command(
             tasks_shown=tasks_shown,
             seed=seed,
             options=files.options_of(read),
-            coordinates=_coordinates(coordinates, problems[0]),
+            coordinates=_coordinates(coordinates, pddl),
             position=position,
         )
     if output == "-":
@@ -93,14 +91,15 @@ def command(
     echo(f"{shown}, {len(report.html):,} bytes, written to {place}", err=output == "-")
 
 
-def _beside(problem: str) -> Path:
-    return Path(problem).parent / "coordinates.json"
+def _beside(pddl: PlanningFiles) -> Path:
+    folder = Path(pddl.factored) if pddl.factored else Path(pddl.files[1]).parent
+    return folder / "coordinates.json"
 
 
-def _coordinates(given: str | None, problem: str) -> dict[str, Point] | None:
+def _coordinates(given: str | None, pddl: PlanningFiles) -> dict[str, Point] | None:
     from coordlang.report.places import read_coordinates
 
     if given is not None:
         return read_coordinates(given)
-    beside = _beside(problem)
+    beside = _beside(pddl)
     return read_coordinates(beside) if beside.is_file() else None

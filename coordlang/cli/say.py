@@ -9,21 +9,19 @@ import click
 
 import coordlang
 from coordlang.cli.echo import echo
-from coordlang.cli.files import domain_argument, language_argument, problem_argument
+from coordlang.cli.files import PlanningFiles, language_argument, planning_files
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import covered_code, working
 
 
 @click.command(name="say")
 @language_argument
-@domain_argument
-@problem_argument
-@click.argument("plan", type=click.Path(allow_dash=True))
+@planning_files("DOMAIN PROBLEM PLAN", most=1, then="plan")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
 @model_options
 @limits
 def command(
-    language: str, domain: str, problem: str, plan: str, as_json: bool, model: ModelKeywords
+    language: str, pddl: PlanningFiles, plan: str, as_json: bool, model: ModelKeywords
 ) -> int:
     """Print the sentence of an optimal plan, the words on one line.
 
@@ -31,6 +29,8 @@ def command(
     sentence a line.
     """
     with working("finding all optimal plans"):
-        said = coordlang.say(language, domain, problem, plan, **model)
+        said = coordlang.say(
+            language, pddl.domain, pddl.problem, plan, factored=pddl.factored, **model
+        )
     echo(json.dumps(said.data()) if as_json else str(said))
     return covered_code(said.covered)

@@ -9,15 +9,14 @@ import click
 
 import coordlang
 from coordlang.cli.echo import echo
-from coordlang.cli.files import check_outputs, domain_argument, problem_argument, write
+from coordlang.cli.files import PlanningFiles, check_outputs, planning_files, write
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import working
 from planners.notebook import counted
 
 
 @click.command(name="tasks")
-@domain_argument
-@problem_argument
+@planning_files("DOMAIN PROBLEM", most=1)
 @click.option(
     "--start",
     "starts",
@@ -37,8 +36,7 @@ from planners.notebook import counted
 @model_options
 @limits
 def command(
-    domain: str,
-    problem: str,
+    pddl: PlanningFiles,
     starts: tuple[str, ...],
     goals: tuple[str, ...],
     output: str,
@@ -52,10 +50,11 @@ def command(
     from coordlang.tasks.patterns import varied_tasks
     from coordlang.tasks.task_file import tasks_text
 
-    check_outputs([("-o", output)], [domain, problem])
+    check_outputs([("-o", output)], pddl.paths)
     model["remember_actions"] = False  # tasks start with no action to remember
     with working("reading and grounding"):
-        tasks = varied_tasks(coordlang.load(domain, problem, **model), starts, goals)
+        loaded = coordlang.load(*pddl.files, factored=pddl.factored, **model)
+        tasks = varied_tasks(loaded, starts, goals)
     write(tasks_text(tasks), output)
     figures = {
         "tasks": len(tasks),

@@ -11,10 +11,10 @@ import click
 import coordlang
 from coordlang.cli.echo import echo
 from coordlang.cli.files import (
+    PlanningFiles,
     check_outputs,
-    domain_argument,
     language_argument,
-    problem_argument,
+    planning_files,
     write,
 )
 from coordlang.cli.listing import Listing, form_of, listing_options
@@ -30,9 +30,7 @@ _DRAWN = ("dot", "svg")
 
 @click.command(name="understand")
 @language_argument
-@domain_argument
-@problem_argument
-@click.argument("sentence")
+@planning_files("DOMAIN PROBLEM SENTENCE", most=1, then="sentence")
 @listing_options
 @click.option(
     "--format",
@@ -54,8 +52,7 @@ _DRAWN = ("dot", "svg")
 @limits
 def command(
     language: str,
-    domain: str,
-    problem: str,
+    pddl: PlanningFiles,
     sentence: str,
     only_count: bool,
     most: int | None,
@@ -77,9 +74,11 @@ def command(
     form = form_of(form, as_json)
     listing = Listing.of(only_count, most, sample, seed)
     _check_form(form, listing, nodes)
-    check_outputs([("-o", output)], [language, domain, problem])
+    check_outputs([("-o", output)], [language, *pddl.paths])
     with working("finding the plans with the sentence"):
-        plans = coordlang.understand(language, domain, problem, sentence, **model)
+        plans = coordlang.understand(
+            language, pddl.domain, pddl.problem, sentence, factored=pddl.factored, **model
+        )
         text = _text(plans, form, listing, nodes)
     write(text, output)
     if form in _DRAWN and (note := plans.cut_note(nodes or _DEFAULT_NODES)):

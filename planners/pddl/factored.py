@@ -8,22 +8,41 @@ the action's ``:agent``.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 from planners.errors import BadInput, Position
 from planners.messages import echoed
 from planners.pddl.domain import read_domain
-from planners.pddl.lifted import And, Atom, Domain, Formula, Problem, Schema
+from planners.pddl.formula_tree import Leaf, fold, with_parts
+from planners.pddl.lifted import (
+    And,
+    Atom,
+    Domain,
+    Equal,
+    Formula,
+    Problem,
+    Schema,
+    StepAtom,
+    Term,
+    Variable,
+)
 from planners.pddl.problem import read_problem
 from planners.pddl.sexpr import JoinedSource
 
+_AtomKind = TypeVar("_AtomKind", Atom, StepAtom)
+
 
 def read_factored(directory: str | Path) -> tuple[Domain, Problem]:
-    """Read ``domain-ROBOT.pddl`` and ``problem-ROBOT.pddl`` for every robot of a directory.
+    """Read the domain and the problem file of every robot of a directory.
 
-    Raises `BadInput` where a file has no partner, an action differs between files or has no
-    parameter for its robot.
+    They are called ``domain-ROBOT.pddl`` and ``problem-ROBOT.pddl``, as in CoDMAP, or
+    ``ROBOT_domain.pddl`` and ``ROBOT_problem.pddl``, as unified-planning writes them.
+
+    Raises `BadInput` where a file has no partner, an action differs between files in more than its
+    agent's name and type, or has no parameter for its robot.
     """
     folder = Path(directory)
     if not folder.is_dir():
@@ -31,17 +50,12 @@ def read_factored(directory: str | Path) -> tuple[Domain, Problem]:
         raise BadInput(
             what, position=Position(str(directory)), remedy="Name the folder of the robots' files."
         )
-    domains = {
-        path.stem.partition("-")[2].lower(): path for path in sorted(folder.glob("domain-*.pddl"))
-    }
-    problems = {
-        path.stem.partition("-")[2].lower(): path for path in sorted(folder.glob("problem-*.pddl"))
-    }
+    domains, problems = _files(folder, "domain"), _files(folder, "problem")
     if not domains or set(domains) != set(problems):
         odd = ", ".join(sorted(set(domains) ^ set(problems))) or "no such files"
         raise BadInput(
-            "expected domain-ROBOT.pddl and problem-ROBOT.pddl for every robot; without a "
-            f"partner: {odd}",
+            "expected domain-ROBOT.pddl and problem-ROBOT.pddl (or ROBOT_domain.pddl and "
+            f"ROBOT_problem.pddl) for every robot; without a partner: {odd}",
             position=Position(str(directory)),
             remedy="Unfactored files are given as DOMAIN PROBLEM, without --factored.",
         )
@@ -49,8 +63,26 @@ def read_factored(directory: str | Path) -> tuple[Domain, Problem]:
     for robot, path in domains.items():
         domain = read_domain(path)
         views.append(_of_robot(robot, domain, read_problem(problems[robot], domain)))
+    _require_owners(views, list(domains))
     domain = _join_domains([domain for domain, _ in views], str(directory))
     return domain, _join_problems([problem for _, problem in views], domain, str(directory))
+
+
+def _files(folder: Path, kind: str) -> dict[str, Path]:
+    """Robot -> its file of a kind; `BadInput` where both names are there for a robot."""
+    found: dict[str, Path] = {}
+    for path in sorted(folder.glob("*.pddl")):
+        robot = path.stem.removeprefix(f"{kind}-").removesuffix(f"_{kind}").lower()
+        if not robot or len(path.stem) - len(robot) != len(kind) + 1:
+            continue
+        if robot in found:
+            raise BadInput(
+                f"two {kind} files of robot {echoed(robot)}: {found[robot].name} and {path.name}",
+                position=Position(str(folder)),
+                remedy="Remove one of them.",
+            )
+        found[robot] = path
+    return found
 
 
 def _of_robot(robot: str, domain: Domain, problem: Problem) -> tuple[Domain, Problem]:
@@ -59,6 +91,7 @@ def _of_robot(robot: str, domain: Domain, problem: Problem) -> tuple[Domain, Pro
         raise BadInput(
             f"robot {echoed(robot)} of the file name is no object of its problem",
             position=problem.source.section(":objects"),
+            remedy="A robot's files have its name, and its problem declares it.",
         )
     schemas = tuple(replace(s, agent=_agent(robot, s, domain, problem)) for s in domain.schemas)
     return replace(domain, schemas=schemas), problem
@@ -90,16 +123,20 @@ def _join_domains(domains: list[Domain], name: str) -> Domain:
             raise BadInput(
                 f"domain {echoed(domain.name)}, expected {echoed(first.name)}",
                 position=domain.source.section("domain"),
+                remedy="All files of a folder belong to one domain.",
             )
         for schema in domain.schemas:
-            known = schemas.setdefault(
-                schema.name, replace(schema, offset=source.offset(domain.source, schema.offset))
-            )
-            if replace(known, offset=0) != replace(schema, offset=0):
+            own = replace(schema, offset=source.offset(domain.source, schema.offset))
+            known = schemas.setdefault(schema.name, own)
+            if _without_agent(known) != _without_agent(own):
                 raise BadInput(
-                    f"action {echoed(schema.name)} differs between the robots' files",
+                    f"action {echoed(schema.name)} differs between the robots' files in more than "
+                    "the agent's name and type",
                     position=domain.source.position(schema.offset),
+                    remedy=f"The other one is at {source.position(known.offset)}. Give different "
+                    "actions different names.",
                 )
+            schemas[schema.name] = _with_agent_of(known, own)
     return replace(
         first,
         source=source,
@@ -117,6 +154,91 @@ def _join_domains(domains: list[Domain], name: str) -> Domain:
         ),
         dependences=tuple(dict.fromkeys(d for domain in domains for d in domain.dependences)),
     )
+
+
+#: What an agent is called while actions are compared: no variable of a file has this name.
+_AGENT = "?"
+
+
+def _without_agent(schema: Schema) -> Schema:
+    """The action with neither the name nor the type of its agent, nor its position."""
+    assert schema.agent is not None
+    own = schema.parameters[schema.agent].name
+
+    def term(name: Term) -> Term:
+        return _AGENT if name == own else name
+
+    def in_formula(formula: Formula) -> Formula:
+        return fold(formula, _renamed_leaf(term), with_parts)
+
+    parameters = list(schema.parameters)
+    parameters[schema.agent] = Variable(_AGENT)
+    cost = schema.cost
+    return replace(
+        schema,
+        offset=0,
+        parameters=tuple(parameters),
+        precondition=in_formula(schema.precondition),
+        effects=tuple(
+            replace(
+                effect,
+                atom=_renamed(effect.atom, term),
+                condition=in_formula(effect.condition),
+            )
+            for effect in schema.effects
+        ),
+        cost=_renamed(cost, term) if isinstance(cost, Atom) else cost,
+    )
+
+
+def _renamed_leaf(term: Callable[[Term], Term]) -> Callable[[Leaf], Formula]:
+    def leaf(found: Leaf) -> Formula:
+        match found:
+            case Equal(left, right):
+                return Equal(term(left), term(right))
+            case Atom():
+                return _renamed(found, term)
+            case StepAtom():
+                return _renamed(found, term)
+        return found
+
+    return leaf
+
+
+def _renamed(atom: _AtomKind, term: Callable[[Term], Term]) -> _AtomKind:
+    return replace(atom, args=tuple(map(term, atom.args)))
+
+
+def _with_agent_of(known: Schema, other: Schema) -> Schema:
+    """The action for the agents of both."""
+    assert known.agent is not None
+    assert other.agent is not None
+    parameters = list(known.parameters)
+    agent = parameters[known.agent]
+    types = tuple(dict.fromkeys((*agent.types, *other.parameters[other.agent].types)))
+    parameters[known.agent] = replace(agent, types=types)
+    return replace(known, parameters=tuple(parameters))
+
+
+def _require_owners(views: list[tuple[Domain, Problem]], robots: list[str]) -> None:
+    """Raise `BadInput` where the union would give a robot an action that its own file lacks.
+
+    A robot does what its agent's type allows: two robots of one type have the same actions.
+    """
+    for domain, _ in views:
+        for schema in domain.schemas:
+            assert schema.agent is not None
+            wanted = set(schema.parameters[schema.agent].types)
+            for robot, (other, problem) in zip(robots, views, strict=True):
+                types = problem.objects[robot]
+                fits = any(other.supertypes(t) & wanted for t in types)
+                if fits and all(s.name != schema.name for s in other.schemas):
+                    raise BadInput(
+                        f"action {echoed(schema.name)} is for agents such as {echoed(robot)}, "
+                        f"whose own domain {other.source.name} does not have it",
+                        position=domain.source.position(schema.offset),
+                        remedy="Give robots with different actions different types.",
+                    )
 
 
 def _all_types(tables: list[dict[str, tuple[str, ...]]]) -> dict[str, tuple[str, ...]]:
@@ -149,12 +271,14 @@ def _join_problems(problems: list[Problem], domain: Domain, name: str) -> Proble
                 raise BadInput(
                     f"{function.predicate} {' '.join(function.args)} has another value elsewhere",
                     position=problem.source.section(":init"),
+                    remedy="Give it one value in all robots' problems.",
                 )
         for obj, types in problem.objects.items():
             if objects.setdefault(obj, types) != types:
                 raise BadInput(
                     f"object {echoed(obj)} has other types elsewhere",
                     position=problem.source.section(":objects"),
+                    remedy="Declare it with the same type in all robots' problems.",
                 )
         init |= problem.init
         goals[problem.goal] = None

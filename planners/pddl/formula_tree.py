@@ -55,6 +55,18 @@ def fold(
     return leaf(formula)
 
 
+def with_parts(compound: Compound, parts: Iterator[Formula]) -> Formula:
+    """The compound formula of the same kind with other parts: what `fold` keeps structure with."""
+    match compound:
+        case Not():
+            return Not(next(parts))
+        case Forall(variables, _):
+            return Forall(variables, next(parts))
+        case Exists(variables, _):
+            return Exists(variables, next(parts))
+    return type(compound)(tuple(parts))
+
+
 def literals(formula: Formula) -> tuple[tuple[Atom | StepAtom | Equal, bool], ...]:
     """List the literals of the formula's negation normal form, from left to right.
 
@@ -177,11 +189,12 @@ def _leaf_text(leaf: Leaf) -> str:
 def _compound_text(compound: Compound, parts: Iterator[str]) -> str:
     match compound:
         case Forall(variables, _) | Exists(variables, _):
-            declared = f"({' '.join(map(_declaration, variables))})"
+            declared = f"({' '.join(map(declaration, variables))})"
             return label(type(compound).__name__.lower(), (declared, *parts))
     return label(type(compound).__name__.lower(), parts)
 
 
-def _declaration(variable: Variable) -> str:
+def declaration(variable: Variable) -> str:
+    """A variable with its types, as in a list of parameters: ``?x - (either a b)``."""
     types = variable.types
     return f"{variable.name} - {types[0] if len(types) == 1 else label('either', types)}"

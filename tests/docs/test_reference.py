@@ -24,6 +24,7 @@ from tests.support.pages import DOCS, PAGES, anchor, blocks, code, links, prose,
 
 CLI = DOCS / "cli.md"
 SHARED = {
+    "factored files": "Factored files",
     "model options": "Model options",
     "cores and machines": "Cores and machines",
     "limits": "Limits",
