@@ -29,6 +29,7 @@ from planners.limits import run_until_stopped
 from planners.messages import echoed
 from planners.pieces.processes import Processes
 from planners.pieces.work import Runner
+from planners.search.portions import require_room
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,6 +159,7 @@ def build_language(
         ),
     )
     if method != "greedy":
+        require_room(candidates.source)
         job = _with_incumbent(job)
         clock.note("incumbent")
     progress(f"building words ({method})")

@@ -17,7 +17,7 @@ from typing import IO, Any, Generic, TypeVar
 import msgspec
 
 from planners.errors import BadInput, OutOfMemory, Position
-from planners.limits import memory_left
+from planners.limits import memory_left, more_memory
 from planners.messages import UNSEEN, echoed
 
 T = TypeVar("T")
@@ -252,7 +252,7 @@ def _require_size(size: int, most: int, position: Position) -> None:
             f"reading {size / 2**20:,.0f} MiB takes {size * _READING / 2**20:,.0f} MiB of memory "
             f"or more, {left / 2**20:,.0f} MiB are left",
             position=position,
-            remedy="Use a larger --memory-limit, or a smaller file.",
+            remedy=f"Use {more_memory()}, or a smaller file.",
         )
 
 

@@ -136,9 +136,7 @@ def reaching(so_far: Callable[[], str], instead: str) -> Iterator[None]:
         raise
     except MemoryError:
         pass  # what the frames below hold is free once this block is left
-    full = OutOfMemory(
-        "the memory is used up", remedy=f"Use a larger --memory-limit, or {instead}."
-    )
+    full = OutOfMemory("the memory is used up", remedy=f"Use {more_memory()}, or {instead}.")
     full.reached = f"Reached: {so_far()}."
     raise full
 
@@ -165,6 +163,11 @@ def limited_memory(size: int | None) -> Iterator[None]:
 def has_memory_limit() -> bool:
     """Whether the address space of this process is limited."""
     return resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
+
+
+def more_memory() -> str:
+    """What to use where the memory was too little, in words."""
+    return "a larger --memory-limit" if has_memory_limit() else "a machine with more memory"
 
 
 def default_memory_limit() -> int:

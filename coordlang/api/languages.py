@@ -31,7 +31,7 @@ from coordlang.api.options import (
 )
 from coordlang.api.presenting import Presented
 from coordlang.api.witness import witness_data
-from coordlang.api.workers import opened_runner
+from coordlang.api.workers import opened_runner, say_size
 from coordlang.building import BuildOptions, Built, build_language, certificate_of
 from coordlang.certificate import Certificate, Checked, read_certificate
 from coordlang.certificate import check as check_certificate
@@ -195,6 +195,7 @@ def build(
     files = read_planning(domain, problems, factored, GivenOptions.of(**model))
     candidates = _candidates(files, tasks, unsolvable)
     seconds = {"space": perf_counter() - begin}
+    say_size(candidates, note or progress)
     with opened_runner(jobs, scheduler, resume, note) as runner:
         built = build_language(
             candidates, **asdict(options), progress=progress or _silent, runner=runner
@@ -317,6 +318,7 @@ def verify(
     else:
         candidates = files.candidates(tasks, options)
     partition = read.partition(candidates.model)
+    say_size(candidates, note or progress)
     with opened_runner(jobs, scheduler, resume, note) as runner:
         verdict = verify_candidates(partition, candidates, runner, progress or _silent)
     checked = None

@@ -8,9 +8,11 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from os import PathLike, fspath
 
+from coordlang.tasks.candidates import Candidates
 from planners.errors import UsageError
 from planners.pieces.runners import Where, runner
 from planners.pieces.work import Runner
+from planners.search.portions import estimate
 
 #: The packages whose code does pieces.
 PACKAGES = ("planners", "coordlang")
@@ -38,6 +40,13 @@ def opened_runner(
         )
     where = Where(jobs, None if scheduler is None else fspath(scheduler), resume)
     return runner(where, PACKAGES, note or _warn)
+
+
+def say_size(candidates: Candidates, say: Callable[[str], None] | None) -> None:
+    """Say how much there is to do, where a person will wait for it."""
+    found = estimate(candidates.source)
+    if say is not None and found.is_large:
+        say(str(found))
 
 
 def _warn(text: str) -> None:

@@ -13,7 +13,7 @@ from coordlang.language.warping import Clause, Pair
 from coordlang.vocabulary.clauses import most_constrained_first, without_implied
 from coordlang.vocabulary.sat import PartitionProblem, Undecided, satisfiable
 from planners.errors import OutOfMemory
-from planners.limits import memory_left
+from planners.limits import memory_left, more_memory
 from planners.sat import sat_solver, solve_slice
 
 #: Conflicts after which the checking solver comes back.
@@ -134,7 +134,7 @@ def _require_memory(states: int, pairs: int, clauses: Sequence[Clause], size: in
         raise OutOfMemory(
             f"the formula about {size:,} words for {states:,} states has {count:,} clauses: they "
             f"take {needed / 2**20:,.0f} MiB, {left / 2**20:,.0f} MiB are left",
-            remedy="Use a larger --memory-limit, or a certificate about fewer words.",
+            remedy=f"Use {more_memory()}, or a certificate about fewer words.",
         )
 
 

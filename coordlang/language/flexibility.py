@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.errors import OutOfMemory
-from planners.limits import memory_left
+from planners.limits import memory_left, more_memory
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
 from planners.tables import Ints, ranges
@@ -206,5 +206,5 @@ def _check_memory(entries: int) -> None:
     if 100 * entries > memory_left():
         raise OutOfMemory(
             f"{entries:,} sentences at once are too many to measure a language by",
-            remedy="Measure fewer tasks at a time, or use a larger --memory-limit.",
+            remedy=f"Measure fewer tasks at a time, or use {more_memory()}.",
         )

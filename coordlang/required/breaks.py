@@ -66,7 +66,7 @@ def _earliest_labels(choices: Choices, start: int) -> list[Labels]:
             f"{len(layer):,} nodes"
         )
 
-    with reaching(so_far, "smaller tasks or --cost makespan+actions"):
+    with reaching(so_far, choices.space.model.smaller("smaller tasks")):
         while True:
             below, broken = _steps_of_choices(choices, layer)
             if broken is not None:
@@ -199,7 +199,7 @@ def break_in_same_states(space: PlanSpace) -> Trail | None:
             f"{len(history)} of {len(space.layers) - 1} steps along equal states, {nodes:,} nodes"
         )
 
-    with reaching(so_far, "smaller tasks or --cost makespan+actions"):
+    with reaching(so_far, space.model.smaller("smaller tasks")):
         return _walk_in_same_states(space, bundles, history)
 
 

@@ -64,7 +64,7 @@ class Choices:
                 "optimal plans"
             )
 
-        with reaching(so_far, "smaller tasks or --cost makespan+actions"):
+        with reaching(so_far, self.space.model.smaller("smaller tasks")):
             self._fill()
 
     def _fill(self) -> None:

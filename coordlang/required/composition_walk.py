@@ -20,13 +20,11 @@ from numpy.typing import NDArray
 
 from coordlang.required.choices import Choices
 from planners.errors import OutOfMemory
-from planners.limits import memory_left
+from planners.limits import memory_left, more_memory
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 from planners.tables import Bools, Ints, spans
 
-#: What else may help.
-INSTEAD = "fewer robots, smaller tasks or --cost makespan+actions"
 #: Mixtures that failed have no state: this in place of ``y``.
 FAILED = -1
 
@@ -81,7 +79,7 @@ def moves(
     robots = nodes.shape[1] - 1
     sizes = edges_out_of(space, nodes)
     if not together:
-        _check_size(sizes, robots, limits)
+        _check_size(sizes, space, limits)
     for span in spans(sizes, limits.piece):
         source = np.arange(span.start, span.stop)
         prefix = nodes[span, robots]
@@ -126,19 +124,20 @@ def edges_out_of(space: PlanSpace, nodes: Ints) -> NDArray[np.float64]:
     return product
 
 
-def _check_size(sizes: NDArray[np.float64], robots: int, limits: WalkLimits) -> None:
+def _check_size(sizes: NDArray[np.float64], space: PlanSpace, limits: WalkLimits) -> None:
     """Stop before one node needs too much at once, or a layer too much work."""
     largest, total = sizes.max(initial=0), sizes.sum()
+    robots, instead = space.robots, space.model.smaller("fewer robots", "smaller tasks")
     # One row of a chunk holds its source, a prefix and an edge for each robot, and copies of them.
     if 100 * largest > limits.memory_left():
         raise OutOfMemory(
             f"a state has {largest:,.0f} combinations of {robots} plans' next steps: about "
             f"{100 * largest / 2**30:,.1f} GiB at once",
-            remedy=f"Use {INSTEAD}, or a larger --memory-limit.",
+            remedy=f"Use {instead}, or {more_memory()}.",
         )
     if total > limits.most:
         raise OutOfMemory(
             f"the {len(sizes):,} nodes of one layer of the walk have {total:.1e} combinations "
             f"of {robots} plans' next steps",
-            remedy=f"Use {INSTEAD}.",
+            remedy=f"Use {instead}.",
         )

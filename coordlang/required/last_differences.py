@@ -27,7 +27,7 @@ from coordlang.required.choices import Choices
 from coordlang.required.composition_walk import FAILED, can_fail, moves
 from planners.errors import OutOfMemory
 from planners.joint.states import bits
-from planners.limits import memory_left
+from planners.limits import memory_left, more_memory
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 from planners.tables import Bools, Ints, unique_tuples
@@ -227,7 +227,7 @@ def _walk(space: PlanSpace) -> list[_Layer]:
             raise OutOfMemory(
                 f"the composition walk has more than {sum(len(t) for t in tables):,} nodes: too "
                 "large to keep",
-                remedy="Use --method greedy or minimal, fewer tasks, or a larger --memory-limit.",
+                remedy=f"Use --method greedy or minimal, fewer tasks, or {more_memory()}.",
             )
     return _layers(tables[::-1], links[::-1])
 

@@ -109,7 +109,7 @@ def _tables(
         return f"{len(found):,} of {len(portions):,} portions of the goals"
 
     with (
-        reaching(so_far, "fewer candidate tasks (a task file)"),
+        reaching(so_far, "fewer candidate tasks"),
         closing(tables(runner.run(work))) as pieces,
     ):
         for table in pieces:

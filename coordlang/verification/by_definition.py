@@ -23,7 +23,7 @@ from coordlang.verification.mixtures import FAILED, Mixtures
 from coordlang.verification.trace import trace
 from coordlang.verification.views import views_of_robot
 from planners.errors import OutOfMemory
-from planners.limits import memory_left, reaching
+from planners.limits import memory_left, more_memory, reaching
 from planners.search.plan_space import PlanSpace
 from planners.tables import Bools, Ints, ranges, spans, unique_tuples
 
@@ -73,7 +73,7 @@ def _explain(space: PlanSpace, partition: Partition, word: Ints, trail: Trail) -
 def _too_large(what: str) -> OutOfMemory:
     return OutOfMemory(
         f"verification needs more memory for {what}",
-        remedy="Check fewer tasks at a time, or use a larger --memory-limit.",
+        remedy=f"Check fewer tasks at a time, or use {more_memory()}.",
     )
 
 
@@ -122,6 +122,7 @@ class _Walk:
         walked = 0
         layers = self.space.layers
         number = len(layers)
+        smaller = self.space.model.smaller("fewer robots", "smaller or fewer tasks")
 
         def so_far() -> str:
             return (
@@ -129,7 +130,7 @@ class _Walk:
                 f"nodes of its walk; {len(table):,} in this layer"
             )
 
-        with reaching(so_far, "fewer robots, smaller or fewer tasks, or --cost makespan+actions"):
+        with reaching(so_far, smaller):
             for number in range(len(layers) - 1, 0, -1):
                 table = np.concatenate((self._diagonal_in(layers[number]), table))
                 walked += len(table)

@@ -64,7 +64,7 @@ def verify_candidates(
         return f"{done:,} of {len(portions):,} portions of the goals, {nodes:,} nodes of the walk"
 
     with (
-        reaching(so_far, "fewer candidate tasks (a task file)"),
+        reaching(so_far, "fewer candidate tasks"),
         closing(tables(runner.run(work))) as pieces,
     ):
         for table in pieces:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import resource
 import signal
 import subprocess
 import sys
@@ -24,6 +23,7 @@ from typing import Any, BinaryIO
 from planners.classical import LONGEST, ClassicalTask, Form, compile_classical
 from planners.errors import CoordlangError, OutOfMemory, OutOfTime
 from planners.joint.model import JointModel, PlanningTask
+from planners.limits import has_memory_limit, memory_left, more_memory
 from planners.signals import Postponed, postponed_signals
 
 #: Fast Downward adds up costs in 32-bit integers.
@@ -32,6 +32,8 @@ _GREATEST = 2**31 - 1
 _TAIL = 1500
 #: numpy, which unified-planning imports, would reserve memory for a thread per processor.
 _ENVIRONMENT = {"PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+#: Bytes that are more than what a crash may be blamed on.
+_MUCH = 2 << 30
 #: How Python, the loader and numpy say that a limit of the calling process leaves them too little
 #: memory.
 _NO_MEMORY = re.compile(
@@ -242,13 +244,13 @@ def _crash(what: str, said: str) -> CoordlangError:
     """The error for a process that gave no answer, with the end of what it said."""
     # A limit of this process holds for all below it, and libraries crash in many ways when they
     # meet it.
-    limited = resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
-    if not _NO_SPACE.search(said) and (limited or _NO_MEMORY.search(said)):
+    tight = has_memory_limit() and memory_left() < _MUCH
+    if not _NO_SPACE.search(said) and (tight or _NO_MEMORY.search(said)):
         return _out_of_memory()
     return FastDownwardFailed(what, remedy=said[-_TAIL:].strip() or None)
 
 
 def _out_of_memory() -> OutOfMemory:
     return OutOfMemory(
-        "Fast Downward needs more memory than it may use", remedy="Use a larger --memory-limit."
+        "Fast Downward needs more memory than it may use", remedy=f"Use {more_memory()}."
     )

@@ -16,7 +16,7 @@ from planners.joint.interference import compatible, conflict
 from planners.joint.model import Cost, Steps
 from planners.joint.operators import Operators
 from planners.joint.states import StateCodec
-from planners.limits import memory_left
+from planners.limits import memory_left, more_memory
 from planners.pddl.formula_tree import conjuncts, formula_text, signed
 from planners.pddl.lifted import Atom, Formula, StepAtom
 from planners.tables import Bools, Ints, Rows, ranges, spans
@@ -217,7 +217,7 @@ class ComposingStepper:
                 f"subactions in {states:,} "
                 f"state{'s' * (states != 1)}: about {needed / 2**30:,.1f} GiB, "
                 f"and {self.memory_left() / 2**30:.1f} GiB are left",
-                remedy="Use fewer robots, or a larger --memory-limit.",
+                remedy=f"Use fewer robots, or {more_memory()}.",
             )
 
     def _apply(self, rows: Rows, source: Ints, labels: Labels) -> tuple[Rows, Ints]:

@@ -131,6 +131,14 @@ class JointModel:
         """Whether states remember each robot's last subaction."""
         return self.codec.memory is not None
 
+    def smaller(self, *others: str) -> str:
+        """What makes work smaller: ``others``, and a cost with fewer plans where it is not used.
+
+        As the end of a sentence that begins with "Use".
+        """
+        ways = [*others, *(["--cost makespan+actions"] if self.cost == "makespan" else [])]
+        return " or ".join(filter(None, (", ".join(ways[:-1]), ways[-1])))
+
     def successors(self, rows: Rows) -> Steps:
         """All joint steps from a table of states (see `Steps`)."""
         if not self.remembers:

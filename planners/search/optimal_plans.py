@@ -247,7 +247,7 @@ def plan_spaces(
                 f"the optimal plans to {done:,} of {len(tasks):,} goals, over {len(space):,} states"
             )
 
-        with reaching(so_far, "fewer candidate tasks (a task file)"):
+        with reaching(so_far, "fewer candidate tasks"):
             batch = _batch(space, tasks[start : start + size])
         yield batch
 

@@ -14,7 +14,9 @@ from typing import Protocol, overload
 
 import numpy as np
 
+from planners.errors import OutOfMemory
 from planners.joint.model import FullState, Goal, JointModel
+from planners.limits import memory_left, more_memory
 from planners.pieces.work import digest
 from planners.search.optimal_plans import distances, plan_spaces
 from planners.search.plan_space import PlanSpace
@@ -24,6 +26,11 @@ from planners.tables import Bools, Ints, Rows
 #: Estimated nodes times robots in one portion.  Smaller ones find the same label sets again and
 #: again, larger ones leave cores without work.
 PORTION = 40_000.0
+#: Nodes times robots from which the estimate is said: some seconds of work.
+_LARGE = 1_000_000
+#: Bytes of a node and its edges in a plan space, and more of them while it is made (measured on grids
+#: for two robots).
+_NODE_BYTES, _MAKING_BYTES = 200, 600
 #: Goals whose distances are worked out together.
 _GOALS = 512
 
@@ -38,6 +45,11 @@ class Source(Protocol):
     @property
     def rows(self) -> Rows:
         """The table of all states."""
+        ...
+
+    @property
+    def robots(self) -> int:
+        """How many robots there are."""
         ...
 
     @property
@@ -80,9 +92,19 @@ class Explored:
         return self.space.rows
 
     @property
+    def robots(self) -> int:
+        """See `Source.robots`."""
+        return len(self.space.model.robots)
+
+    @property
     def efforts(self) -> Ints:
         """As many nodes as there are states: a goal's plan space can have no more."""
         return np.full(len(self.goals), len(self.space) * len(self.space.model.robots))
+
+    @property
+    def is_every_pair(self) -> bool:
+        """Whether all other states are initial states of each goal."""
+        return all(inits is None for _, inits in self.goals)
 
     @property
     def tasks(self) -> int:
@@ -126,6 +148,11 @@ class Searched:
     def rows(self) -> Rows:
         """See `Source.rows`."""
         return self.plans.rows
+
+    @property
+    def robots(self) -> int:
+        """See `Source.robots`."""
+        return self.plans.robots
 
     @property
     def efforts(self) -> Ints:
@@ -186,6 +213,61 @@ def cut(efforts: Ints, portion: float = PORTION) -> list[range]:
     ends = np.searchsorted(np.cumsum(efforts), total * np.arange(1, parts) / parts) + 1
     bounds = np.unique(np.concatenate(([0], np.minimum(ends, len(efforts)), [len(efforts)])))
     return [range(int(low), int(high)) for low, high in pairwise(bounds)]
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """How much there is to do for many tasks, before it is done.
+
+    ``nodes`` is a bound on the nodes of the plan graph, ``bytes`` what its plan spaces take if all
+    are kept.
+    """
+
+    goals: int
+    nodes: int
+    robots: int
+    pieces: int
+
+    @property
+    def bytes(self) -> int:
+        """About so much: a finished node and its edges, and what one batch takes while it is made."""
+        return _NODE_BYTES * self.nodes + _MAKING_BYTES * min(self.nodes, PIECES.pairs)
+
+    @property
+    def is_large(self) -> bool:
+        """Whether a person will wait for it."""
+        return self.nodes * self.robots >= _LARGE
+
+    def __str__(self) -> str:
+        return (
+            f"{self.goals:,} goals, up to {self.nodes:,} nodes of plans x {self.robots} robots, in "
+            f"{self.pieces:,} pieces"
+        )
+
+
+def estimate(source: Source) -> Estimate:
+    """The size of the work on a source, known before its plans are."""
+    efforts = source.efforts
+    nodes = int(efforts.sum()) // source.robots
+    if isinstance(source, Explored) and source.is_every_pair:
+        nodes = source.tasks + len(efforts)  # each start is a node, and each goal
+    return Estimate(len(efforts), nodes, source.robots, len(cut(efforts)))
+
+
+def require_room(source: Source) -> None:
+    """Raise `OutOfMemory` if the plan spaces of all tasks together will not fit.
+
+    For work that keeps them all.
+    """
+    if not isinstance(source, Explored) or not source.is_every_pair:
+        return  # they are there already
+    found, left = estimate(source), memory_left()
+    if found.is_large and found.bytes > left:
+        raise OutOfMemory(
+            f"all plans at once are {found}: about {found.bytes / 2**30:,.1f} GiB, and "
+            f"{left / 2**30:,.1f} GiB are left",
+            remedy=f"Use --method greedy, fewer candidate tasks, or {more_memory()}.",
+        )
 
 
 def _pairs(space: Space, goals: Sequence[Goal]) -> int:

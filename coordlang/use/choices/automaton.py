@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planners.errors import OutOfMemory
-from planners.limits import memory_left
+from planners.limits import memory_left, more_memory
 from planners.search.plan_space import PlanSpace
 from planners.tables import Ints, ranges, unique_tuples
 
@@ -326,11 +326,11 @@ def _check(
     # The rest at the rate at which they grew so far.
     growth = log10(max(members, 1)) / max(depth, 1)
     estimate = 10 ** min(18.0, log10(size / 2**30) + growth * max(steps - depth, 0))
+    smaller = space.model.smaller("another sentence", "a smaller task")
     raise OutOfMemory(
         f"the choices of {space.model.robots[robot]} have too many different histories: "
         f"after {depth + 1} of {steps} "
         f"steps their subsets have {members:,} members, at this rate about {estimate:,.1f} GiB in "
         "the end",
-        remedy="Use --cost makespan+actions, another sentence or a smaller task, or a larger "
-        "--memory-limit.",
+        remedy=f"Use {smaller}, or {more_memory()}.",
     )

@@ -19,7 +19,8 @@ from coordlang.use.choices.automaton import Automaton
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import OutOfMemory
 from planners.joint.conditions import Labels
-from planners.limits import memory_left
+from planners.joint.model import JointModel
+from planners.limits import memory_left, more_memory
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace, UnfoldingStep
 from planners.tables import Ints, spans, unique_tuples
@@ -102,7 +103,7 @@ def walk_mixtures(
     steps: list[_JointMoves] = []
     walked, held = 1, 0
     for step in range(automata[0].steps):
-        _check(automata, table, step, held, most)
+        _check(space.model, automata, table, step, held, most)
         source, labels, after = _moves(automata, table)
         edge = _edges(index, table[source, robots], labels)
         broken = np.flatnonzero(edge < 0)
@@ -185,7 +186,12 @@ def _with_beginning(fits: PlanSpace, robot: int, subplan: Sequence[int]) -> list
 
 
 def _check(
-    automata: Sequence[Automaton], table: Ints, step: int, held: int, most: int | None
+    model: JointModel,
+    automata: Sequence[Automaton],
+    table: Ints,
+    step: int,
+    held: int,
+    most: int | None,
 ) -> None:
     """Estimate a layer's joint moves before they are made."""
     size = np.ones(len(table))
@@ -196,11 +202,11 @@ def _check(
     if (most is not None and moves + held / 40 > most) or (
         needed > SMALL and needed > memory_left()
     ):
+        smaller = model.smaller("a smaller task")
         states = " x ".join(f"{len(own.layers[step]):,}" for own in automata)
         raise OutOfMemory(
             f"step {step + 1} has {moves:,.0f} combinations of what the robots may do ({states} "
             "states of their "
             f"automata): about {needed / 2**30:,.1f} GiB",
-            remedy="Leave out --check, use --cost makespan+actions or a smaller task, or a larger "
-            "--memory-limit.",
+            remedy=f"Leave out --check, use {smaller} or {more_memory()}.",
         )

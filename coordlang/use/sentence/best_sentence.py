@@ -10,7 +10,7 @@ from heapq import heapify, heappop, heappush
 from coordlang.use.sentence.preferences import Memory, PlanPreference, Preference
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import OutOfMemory
-from planners.limits import memory_left
+from planners.limits import memory_left, more_memory
 from planners.search.plan_space import PlanSpace
 
 #: Bytes of one entry of a prefix's counts.
@@ -90,8 +90,8 @@ def best_sentence(
             raise OutOfMemory(
                 f"{prefixes:,} beginnings of sentences were looked at, and the best sentence is "
                 "not decided yet",
-                remedy="Prefer the shortest sentence first, use a smaller task, or a larger "
-                "--memory-limit.",
+                remedy="Prefer the shortest sentence first, use a smaller task, or "
+                f"{more_memory()}.",
             )
     raise AssertionError("a task has at least one sentence")
 

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""docs/cluster.md is executed: a scheduler, workers and the client are processes of their own."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import signal
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.planners.pieces.test_processes import until
+from tests.support.cluster import ENVIRONMENT, needs_distributed, running_cluster
+from tests.support.domains import ROOT
+from tests.support.pages import DOCS
+
+PAGE = (DOCS / "cluster.md").read_text()
+
+
+def command(name: str) -> str:
+    """The one line of the block of this name."""
+    found = re.search(rf"<!-- {name} -->\n```sh\n(.*)\n```\n", PAGE)
+    assert found is not None, name
+    return found[1]
+
+
+def arguments(line: str) -> list[str]:
+    """A command of the page for this Python."""
+    program, *rest = shlex.split(line)
+    known = {"coordlang": ["-m", "coordlang"], "python": []}
+    return [sys.executable, *known[program], *rest]
+
+
+def client(line: str, folder: Path) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        arguments(line),
+        cwd=folder,
+        env=ENVIRONMENT,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def succeeds(line: str, folder: Path) -> str:
+    process = client(line, folder)
+    out, err = process.communicate(timeout=300)
+    assert process.returncode == 0, err
+    return out
+
+
+def language(path: Path) -> dict[str, Any]:
+    """A language file without what depends on the run: the rest must be equal byte for byte."""
+    data: dict[str, Any] = json.loads(path.read_text())
+    del data["producer"]
+    return data
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A working directory like that of the page."""
+    for name in ("domains", "docs"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    return tmp_path
+
+
+def test_one_machine(folder: Path) -> None:
+    line = command("resume")
+    succeeds(line.replace("--jobs 2 --resume pieces", "--jobs 1"), folder)
+    alone = language(folder / "4x4.json")
+    succeeds(line, folder)
+    kept = {path: path.stat().st_mtime_ns for path in (folder / "pieces").iterdir()}
+    assert len(kept) > 2
+    assert language(folder / "4x4.json") == alone
+    assert "producer" not in alone
+    succeeds(line, folder)
+    assert {path: path.stat().st_mtime_ns for path in (folder / "pieces").iterdir()} == kept
+    assert language(folder / "4x4.json") == alone
+
+
+@needs_distributed
+def test_two_terminals_with_a_worker_killed_in_the_middle(folder: Path) -> None:
+    succeeds(command("resume").replace("--jobs 2 --resume pieces", "--jobs 1"), folder)
+    alone = (folder / "4x4.json").rename(folder / "alone.json")
+    worker = command("workers").replace("--nworkers 2", "--nworkers 1")
+    assert worker != command("workers")  # two commands with one worker each: one is killed whole
+    with running_cluster(folder, 2, command("scheduler"), worker) as cluster:
+        process = client(command("build"), folder)
+        until(lambda: list(folder.glob("pieces/*.piece")) or process.poll() is not None, 120)
+        assert process.poll() is None, process.communicate()
+        cluster.workers[0].kill(signal.SIGKILL)
+        _, err = process.communicate(timeout=300)
+        assert process.returncode == 0, err
+        assert language(folder / "4x4.json") == language(alone)
+        assert succeeds(command("verify"), folder).startswith("verified: ")
+        cluster.add_worker()
+        assert "detour" in succeeds(command("evaluate"), folder)
+        assert (folder / "results" / "scenario.jsonl").exists()
+
+
+@needs_distributed
+def test_the_workers_of_the_page_are_two(folder: Path) -> None:
+    with running_cluster(folder, 1, command("scheduler"), command("workers")) as cluster:
+        log = cluster.workers[0].log
+        until(lambda: log.read_text().count("Registered to") >= 2, 60)
+
+
+@pytest.mark.skipif(
+    find_spec("dask_jobqueue") is None,
+    reason="dask-jobqueue is not installed (pip install dask-jobqueue)",
+)
+def test_the_script_of_a_slurm_job(folder: Path) -> None:
+    script = succeeds(command("slurm-print"), folder)
+    lines = script.splitlines()
+    assert lines[0].startswith("#!")
+    given = {line.removeprefix("#SBATCH ") for line in lines if line.startswith("#SBATCH")}
+    assert {
+        "-p normal",
+        "-n 1",
+        "--cpus-per-task=4",
+        "-t 02:00:00",
+        "--job-name=coordlang",
+    } <= given
+    assert any(line.startswith("--mem=") for line in given)
+    (started,) = (line for line in lines if "distributed.cli.dask_worker" in line)
+    words = shlex.split(started)
+    options = dict(zip(words, words[1:], strict=False))
+    assert (options["--nworkers"], options["--nthreads"]) == ("4", "1")
+    assert options["--memory-limit"] in ("3.73GiB", "4.00GB")
+    assert any("OMP_NUM_THREADS=1" in line for line in lines)
+    subprocess.run(["sh", "-n"], input=script, text=True, check=True)
