@@ -23,7 +23,7 @@ from planners.errors import OutOfMemory, OutOfTime
 from planners.grounding import instantiate
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import Stepper, Steps
-from planners.limits import reaching, time_left, time_limit
+from planners.limits import limited_memory, reaching, time_left, time_limit
 from planners.loading import PlanningInstance, load
 from planners.search.edge_index import EdgeIndex
 from planners.search.optimal_plans import plan_spaces, search
@@ -57,7 +57,11 @@ def test_the_innermost_block_speaks() -> None:
 
 
 def test_memory_that_is_used_up_is_an_error_with_a_code() -> None:
-    with pytest.raises(OutOfMemory) as caught, reaching(lambda: "half of it", "fewer parts"):
+    with (
+        limited_memory(900 << 30),
+        pytest.raises(OutOfMemory) as caught,
+        reaching(lambda: "half of it", "fewer parts"),
+    ):
         raise MemoryError
     assert caught.value.exit_code == 22
     assert "Reached: half of it." in str(caught.value)
