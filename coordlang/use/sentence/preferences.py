@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from coordlang.use.sentence.task_language import TaskLanguage
@@ -11,6 +11,7 @@ from planners.errors import BadInput, UsageError
 from planners.joint.model import JointModel
 from planners.joint.states import split_atoms
 from planners.messages import echoed
+from planners.pddl.lifted import Atom
 
 #: What a preference remembers of a plan's beginning.
 Memory = tuple[int, ...]
@@ -131,20 +132,27 @@ _LATE = (-1,)
 def avoids(task_language: TaskLanguage, atoms: str) -> PlanPreference:
     """The preference that no state of the plan, the first and last included, has all these atoms.
 
-    Grades: 0 if so, else 1.  Raises `UsageError` for text that is not a list of atoms of the model.
+    Grades: 0 if so, else 1; always 0 where one of the atoms can never be true.  Raises `UsageError`
+    for text that is not a list of atoms of the problem.
     """
-    codec = task_language.model.codec
     try:
         wanted = split_atoms(" ".join(atoms.lower().split()).replace("( ", "(").replace(" )", ")"))
-        mask = codec.facts_part(codec.encode(wanted))
     except BadInput as error:
         raise UsageError(f"--prefer avoid:{atoms}: {error.what}", remedy=error.remedy) from None
     if not wanted:
-        raise UsageError('--prefer avoid: expected atoms, as in avoid:"(at r1 c1-1)"')
+        raise UsageError(
+            "--prefer avoid: expected atoms", remedy='As in --prefer avoid:"(at r1 c1-1)".'
+        )
+    facts, never = _facts_of(task_language, wanted)
+    codec = task_language.model.codec
     states = codec.facts_part(task_language.space.rows)
+    mask = codec.mask(facts)
     hit: list[int] = ((states & mask) == mask).all(axis=1).astype(int).tolist()
+    if never:
+        hit = [0] * len(states)
     text = " ".join(wanted)
-    grades = (f"it keeps away from {text}", f"it passes through {text}")
+    why = f": {never[0]} can never be true" if never else ""
+    grades = (f"it keeps away from {text}{why}", f"it passes through {text}")
     return PlanPreference(
         f"avoid:{text}",
         lambda state: (hit[state],),
@@ -152,3 +160,27 @@ def avoids(task_language: TaskLanguage, atoms: str) -> PlanPreference:
         lambda memory: memory[0],
         grades,
     )
+
+
+def _facts_of(task_language: TaskLanguage, texts: Sequence[str]) -> tuple[list[int], list[str]]:
+    """The numbers of the atoms that can change, and those that can never be true.
+
+    Left out is what is always true.  Raises `UsageError` for what is no atom of the problem.
+    """
+    model, declared = task_language.model, task_language.declared
+    facts, never = [], []
+    for text in texts:
+        predicate, *args = text[1:-1].split(" ")
+        number = model.codec.facts.number_of(text)
+        if number is not None:
+            facts.append(number)
+        elif declared is not None and declared.has(predicate, args):
+            if Atom(predicate, tuple(args)) not in model.statics:
+                never.append(text)
+        else:
+            raise UsageError(
+                f"--prefer avoid:{text}: this is no atom of the problem",
+                remedy="Write a predicate of the domain with objects of the problem, as in "
+                f"{next(iter(model.codec.facts.texts), '(at r1 c1-1)')}.",
+            )
+    return facts, never

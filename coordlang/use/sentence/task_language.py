@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -27,6 +27,19 @@ from planners.tables import Ints
 
 
 @dataclass(frozen=True, slots=True)
+class Declared:
+    """What a domain and a problem declare: predicates, with their numbers of arguments, objects."""
+
+    predicates: Mapping[str, frozenset[int]]
+    objects: Collection[str]
+
+    def has(self, predicate: str, args: Sequence[str]) -> bool:
+        """Whether this is an atom over declared names, be it possible or not."""
+        known = len(args) in self.predicates.get(predicate, ())
+        return known and all(name in self.objects for name in args)
+
+
+@dataclass(frozen=True, slots=True)
 class TaskLanguage:
     """A language with the optimal plans of one task.
 
@@ -45,6 +58,8 @@ class TaskLanguage:
     covered
         Whether it is one of the candidate tasks that the language was built for.  For any other
         task nothing is guaranteed.
+    declared
+        The names of domain and problem; None where there is only a model.
     """
 
     language: Language
@@ -53,6 +68,7 @@ class TaskLanguage:
     task: int
     word: Ints
     covered: bool
+    declared: Declared | None = None
 
     @property
     def start(self) -> int:
@@ -139,9 +155,9 @@ def language_in_task(
     space = search(loaded.model, loaded.tasks[0])
     partition = language.partition(loaded.model)
     covered = _covers(language, space, recorded)
-    return TaskLanguage(
-        language, partition, space, 0, partition.word_of(space.rows)[space.state], covered
-    )
+    word = partition.word_of(space.rows)[space.state]
+    declared = Declared(domain.predicates, problem.objects)
+    return TaskLanguage(language, partition, space, 0, word, covered, declared)
 
 
 def languages_in_tasks(language: Language, candidates: Candidates) -> Iterator[TaskLanguage]:

@@ -7,6 +7,7 @@ import json
 from collections import Counter
 from collections.abc import Callable
 from itertools import accumulate
+from pathlib import Path
 from random import Random
 
 import numpy as np
@@ -18,6 +19,8 @@ from coordlang.use.sentence.best_sentence import best_sentence
 from coordlang.use.sentence.preferences import PlanPreference, read_preference
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import OutOfMemory, UsageError
+from planners.joint.model import show
+from planners.loading import load
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
 from tests.support.command import Command
@@ -295,6 +298,29 @@ def test_a_search_that_is_too_large_says_so() -> None:
 def test_wishes_that_are_none(text: str) -> None:
     with pytest.raises(UsageError):
         read_preference(shipped("t-map/problem")[1], text)
+
+
+def test_what_can_never_hold_is_avoided(coordlang: Command, tmp_path: Path) -> None:
+    """Robots are never in cells that they cannot reach, and never closed in; adjacent cells are."""
+    domain = tmp_path / "d.pddl"
+    text = (DOMAINS / "t-map" / "domain.pddl").read_text()
+    domain.write_text(text.replace("(:predicates", "(:predicates (closed ?x)"))
+    files, language = (domain, DOMAINS / "t-map" / "problem.pddl"), tmp_path / "l.json"
+    assert coordlang("build", *files, "-o", language).code == 0
+    shortest = coordlang("plan", language, *files, "--prefer", "shortest").out
+    loaded = load(domain, [files[1]])
+    always = min(show(atom) for atom in loaded.model.statics)
+    for atom in ("(closed r1)", "(at r1 r2)", f"(closed r1) {always}", "(at r1 r2) (at r1 c1-1)"):
+        outcome = coordlang("plan", language, *files, "--prefer", f"avoid:{atom}")
+        assert (outcome.code, outcome.out) == (0, shortest)
+        assert f"avoid:{atom}: in every plan it keeps away from {atom}: " in outcome.err
+        assert " can never be true\n" in outcome.err
+    outcome = coordlang("plan", language, *files, "--prefer", f"avoid:{always}")
+    assert f"in every plan it passes through {always}\n" in outcome.err
+    for atom in ("(at r1 c9-9)", "(ta r1 c1-1)", "(at r1)", "(last r1 none)"):
+        outcome = coordlang("plan", language, *files, "--prefer", f"avoid:{atom}")
+        assert (outcome.code, "this is no atom of the problem" in outcome.err) == (2, True)
+        assert "Write a predicate of the domain with objects of the problem" in outcome.err
 
 
 def test_spelling_of_wishes() -> None:
