@@ -90,13 +90,19 @@ class BuildOptions:
                 remedy=f"Methods are {', '.join(METHODS)}.",
             )
         if self.alpha_only and self.method != "separating":
-            raise UsageError("--alpha-only belongs to --method separating")
+            raise UsageError(
+                "--alpha-only belongs to --method separating",
+                remedy="Add --method separating, or leave out --alpha-only.",
+            )
         if self.prefer not in (None, "flexible"):
             raise UsageError(
                 f"there is no preference {echoed(self.prefer)}", remedy="--prefer takes flexible."
             )
         if self.prefer and not self.is_exact:
-            raise UsageError(f"--prefer {self.prefer} belongs to --method minimal or exhaustive")
+            raise UsageError(
+                f"--prefer {self.prefer} belongs to --method minimal or exhaustive",
+                remedy="Add --method minimal, or leave out --prefer.",
+            )
 
     @property
     def is_exact(self) -> bool:

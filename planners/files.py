@@ -88,7 +88,9 @@ class FileFormat(Generic[T]):
             raise self._refused(error, position) from None
         except (msgspec.DecodeError, RecursionError) as error:
             raise BadInput(
-                f"this is no JSON, or it is cut off: {error}", position=position
+                f"this is no JSON, or it is cut off: {error}",
+                position=position,
+                remedy="Write or copy the file again; an editor that checks JSON shows the place.",
             ) from None
 
     def convert(self, data: Any, position: Position) -> T:
@@ -107,13 +109,17 @@ class FileFormat(Generic[T]):
     def _check_format(self, head: _Head, position: Position) -> None:
         if head.format != self.format:
             raise BadInput(
-                f"format {echoed(head.format)}, expected {self.format!r}", position=position
+                f"format {echoed(head.format)}, expected {self.format!r}",
+                position=position,
+                remedy=f"`coordlang schema {self.name}` prints what a {self.title} holds.",
             )
         if head.version != self.version or isinstance(head.version, bool):
             raise BadInput(
                 f"{self.title} version {echoed(head.version)}; "
                 f"this program reads version {self.version}",
                 position=position,
+                remedy="Use the version of coordlang that wrote it, or write it again "
+                "with this one.",
             )
 
     def _refused(self, error: Exception, position: Position) -> BadInput:
@@ -161,7 +167,11 @@ def read_bytes(path: str | Path, *, most: int = MAX_TEXT) -> bytes:
         _require_size(size, most, position)
         return gzip.GzipFile(fileobj=BytesIO(data)).read(size)
     except (OSError, EOFError, zlib.error) as error:
-        raise BadInput(f"cannot be read: {error}", position=position) from None
+        raise BadInput(
+            f"cannot be read: {error}",
+            position=position,
+            remedy="Its compression (gzip) is damaged: copy or write the file again.",
+        ) from None
 
 
 def read_stored_bytes(path: str | Path, *, most: int = MAX_TEXT) -> bytes:
@@ -174,9 +184,17 @@ def read_stored_bytes(path: str | Path, *, most: int = MAX_TEXT) -> bytes:
             with open(path, "rb") as file:
                 data = b"".join(_pieces(file, most))
     except FileNotFoundError:
-        raise BadInput("there is no such file", position=position) from None
+        raise BadInput(
+            "there is no such file",
+            position=position,
+            remedy="Check the name and the folder; relative names start at the working directory.",
+        ) from None
     except OSError as error:
-        raise BadInput(f"cannot be read: {error.strerror or error}", position=position) from None
+        raise BadInput(
+            f"cannot be read: {error.strerror or error}",
+            position=position,
+            remedy="Name a file that you may read.",
+        ) from None
     _require_size(len(data), most, position)
     return data
 
@@ -275,4 +293,8 @@ def _require_shallow(data: bytes, position: Position) -> None:
             break
         marks = outer
     if len(marks) > MAX_DEPTH or b"[]" in marks:
-        raise BadInput(f"this JSON is nested more than {MAX_DEPTH} deep", position=position)
+        raise BadInput(
+            f"this JSON is nested more than {MAX_DEPTH} deep",
+            position=position,
+            remedy="No file of coordlang is nested as deep: is it the right one?",
+        )

@@ -94,7 +94,10 @@ def read_planning(
         return _from_instance(domain, found, given, most)
     if domain is None or not found or (most is not None and len(found) > most):
         wanted = "a problem" if most == 1 else "problems"
-        raise UsageError(f"expected a domain and {wanted}, or --factored without them")
+        raise UsageError(
+            f"expected a domain and {wanted}, or --factored without them",
+            remedy="Give both as files or parsed objects, or factored=DIR.",
+        )
     lifted = domain if isinstance(domain, Domain) else read_domain(fspath(domain))
     return PlanningInput(lifted, [_problem(p, lifted) for p in found], given)
 
@@ -147,7 +150,10 @@ def _from_instance(
         )
     read = [_problem(p, loaded.domain) for p in problems] or list(loaded.problems)
     if most is not None and len(read) > most:
-        raise UsageError(f"expected one problem, and {len(read)} are loaded")
+        raise UsageError(
+            f"expected one problem, and {len(read)} are loaded",
+            remedy="Give the problem that is meant as the second argument.",
+        )
     options = loaded.options
     chosen = options.robots
     kept = GivenOptions(

@@ -99,7 +99,8 @@ class GivenOptions:
             raise UsageError("--robots: expected names", remedy="As in --robots r1,r2.")
         if chosen and robot_type:
             raise UsageError(
-                "--robots and --robot-type both say who the robots are: give one of them"
+                "--robots and --robot-type both say who the robots are: give one of them",
+                remedy="--robots names them one by one.",
             )
         kind = robot_type.lower() if robot_type else None
         return cls(chosen, kind, unowned, cost, bool(remember_actions))

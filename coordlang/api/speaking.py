@@ -340,7 +340,10 @@ def _plans(plan: PlanSource, used: TaskLanguage) -> Sequence[Sequence[Texts]]:
     if isinstance(plan, str | PathLike):
         return read_plan_file(fspath(plan), used.model)
     if isinstance(plan, Mapping):
-        raise UsageError("expected a plan file or the steps of one plan")
+        raise UsageError(
+            "expected a plan file or the steps of one plan",
+            remedy="A step has one text for each robot, None where it idles.",
+        )
     return [plan]
 
 

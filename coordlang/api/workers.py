@@ -32,7 +32,10 @@ def opened_runner(
         For fewer than one job, and for jobs together with a scheduler.
     """
     if jobs is not None and jobs < 1:
-        raise UsageError(f"--jobs {jobs}: at least one process does the work")
+        raise UsageError(
+            f"--jobs {jobs}: at least one process does the work",
+            remedy="Use --jobs 1, or leave it out for all cores.",
+        )
     if jobs is not None and scheduler is not None:
         raise UsageError(
             "--jobs counts processes of this machine, and --scheduler sends the work elsewhere",

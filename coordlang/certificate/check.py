@@ -26,6 +26,10 @@ from planners.pddl.sexpr import Expression, Source, Token, parse
 from planners.search.plan_space import PlanSpace
 from planners.tables import find_rows
 
+#: What to do about a certificate that proves nothing.
+_REBUILD = "Write it again: `coordlang build .. --method minimal --certificate FILE`."
+_ITS_FILES = "Give the domain, the problems and the tasks for which the certificate was written."
+
 
 @dataclass(frozen=True, slots=True)
 class Checked:
@@ -59,14 +63,18 @@ def check(
     `OutOfMemory` before a formula is made that would not fit.
     """
     if tuple(certificate.robots) != candidates.model.robots:
-        raise Refuted(f"the certificate is about other robots: {', '.join(certificate.robots)}")
+        raise Refuted(
+            f"the certificate is about other robots: {', '.join(certificate.robots)}",
+            remedy=_ITS_FILES,
+        )
     domain = candidates.loaded.domain.name
     if certificate.domain != domain:
         raise Refuted(
-            f"the certificate is about the domain {echoed(certificate.domain)}, not {domain!r}"
+            f"the certificate is about the domain {echoed(certificate.domain)}, not {domain!r}",
+            remedy=_ITS_FILES,
         )
     if certificate.refuted < 0:
-        raise Refuted(f"the certificate speaks of {certificate.refuted} words")
+        raise Refuted(f"the certificate speaks of {certificate.refuted} words", remedy=_REBUILD)
     tasks = _Tasks(candidates)
     clauses: list[Clause] = []
     for number, reason in enumerate(certificate.reasons, 1):
@@ -74,7 +82,10 @@ def check(
         try:
             clauses.append(_clause(reason, tasks))
         except (Refuted, BadInput) as error:
-            raise Refuted(f"reason {number} of the certificate is wrong: {error.what}") from None
+            raise Refuted(
+                f"reason {number} of the certificate is wrong: {error.what}",
+                remedy=error.remedy or _REBUILD,
+            ) from None
     progress(f"refuting {certificate.refuted} words")
     # A word for each state of its own satisfies every reason: no solver is needed to see it, and
     # no formula, which a number of a million words would make large.
@@ -91,7 +102,8 @@ def check(
 def _leaves_languages(certificate: Certificate) -> Refuted:
     return Refuted(
         f"the certificate's {len(certificate.reasons):,} reasons leave languages "
-        f"with {certificate.refuted} words"
+        f"with {certificate.refuted} words",
+        remedy=_REBUILD,
     )
 
 
@@ -100,18 +112,20 @@ def _clause(reason: Reason, tasks: _Tasks) -> Clause:
     space, start = tasks.find(reason)
     robots = len(space.model.robots)
     if len(reason.plans) != robots:
-        raise Refuted(f"expected a plan for each of {robots} robots")
+        raise Refuted(f"expected a plan for each of {robots} robots", remedy=_REBUILD)
     states = [_states(space, start, plan, f"plan {n}") for n, plan in enumerate(reason.plans)]
     mixture = [
         [own[robot] for robot, own in enumerate(step)] for step in zip(*reason.plans, strict=True)
     ]
     if _follow(space, start, mixture) is not None:
-        raise Refuted("the mixture of its plans is an optimal plan: they need no separation")
+        raise Refuted(
+            "the mixture of its plans is an optimal plan: they need no separation", remedy=_REBUILD
+        )
     clause: set[Pair] = set()
     for path in reason.paths:
         clause |= _different_cells(path, states)
     if not _joins_all([path.plans for path in reason.paths], robots):
-        raise Refuted("its warping paths do not join all of its plans")
+        raise Refuted("its warping paths do not join all of its plans", remedy=_REBUILD)
     return frozenset(clause)
 
 
@@ -119,7 +133,7 @@ def _different_cells(path: WarpingPath, states: Sequence[Sequence[int]]) -> set[
     """The pairs of different states on the cells of a path; ``states`` by plan."""
     a, b = path.plans
     if not (0 <= a < len(states) and 0 <= b < len(states)):
-        raise Refuted(f"there are no plans {a} and {b}")
+        raise Refuted(f"there are no plans {a} and {b}", remedy=_REBUILD)
     one, other = states[a], states[b]
     _check_path(path.cells, len(one), len(other), f"the path of plans {a} and {b}")
     return {pair(one[i], other[j]) for i, j in path.cells if one[i] != other[j]}
@@ -136,7 +150,7 @@ def _joins_all(links: Sequence[tuple[int, int]], plans: int) -> bool:
 def _states(space: PlanSpace, start: int, plan: PlanTexts, name: str) -> list[int]:
     states = _follow(space, start, plan)
     if states is None:
-        raise Refuted(f"{name} is no optimal plan of the task")
+        raise Refuted(f"{name} is no optimal plan of the task", remedy=_REBUILD)
     return states
 
 
@@ -159,7 +173,7 @@ def _check_path(path: list[tuple[int, int]], rows: int, columns: int, name: str)
     ends = [(0, 0), (rows - 1, columns - 1)]
     steps = [(c - a, d - b) for (a, b), (c, d) in pairwise(path)]
     if not path or [path[0], path[-1]] != ends or not set(steps) <= {(0, 1), (1, 0), (1, 1)}:
-        raise Refuted(f"{name} is no warping path from {ends[0]} to {ends[1]}")
+        raise Refuted(f"{name} is no warping path from {ends[0]} to {ends[1]}", remedy=_REBUILD)
 
 
 class _Tasks:
@@ -180,7 +194,8 @@ class _Tasks:
         goal = _canonical(part for text in reason.goal for part in split_atoms(text))
         if (state, goal) not in self._tasks:
             raise Refuted(
-                f"{' '.join(reason.init)} -> {' '.join(reason.goal)} is no candidate task"
+                f"{' '.join(reason.init)} -> {' '.join(reason.goal)} is no candidate task",
+                remedy=_ITS_FILES,
             )
         return self._tasks[state, goal]
 

@@ -126,7 +126,8 @@ def _show_bound(
     if not found.proves_claim:
         raise coordlang.Refuted(
             f"{language} claims that {counted(found.claimed, 'word')} are needed; "
-            f"the certificate proves {checked.lower_bound} only"
+            f"the certificate proves {checked.lower_bound} only",
+            remedy="Give the certificate that was written with this language, or build both again.",
         )
     if as_json:
         return

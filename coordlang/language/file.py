@@ -20,6 +20,9 @@ from planners.files import read_bytes, require_seen
 from planners.messages import echoed
 from planners.writing import write_compressed
 
+#: What to do about a file that was changed or damaged.
+_BUILD_AGAIN = "Copy the file again, or build the language again: `coordlang build`."
+
 
 def to_bytes(language: Language) -> bytes:
     """The text of a language file: the same language gives the same bytes."""
@@ -69,7 +72,9 @@ def language_from_bytes(data: bytes, position: Position) -> Language:
     try:
         twice = duplicate_key(data, memoryview(large), len(record.states))
     except RecursionError as error:
-        raise BadInput(f"this is no JSON that can be read: {error}", position=position) from None
+        raise BadInput(
+            f"this is no JSON that can be read: {error}", position=position, remedy=_BUILD_AGAIN
+        ) from None
     if twice is not None:
         raise BadInput(
             f"the key {echoed(twice)} occurs twice",
@@ -80,7 +85,9 @@ def language_from_bytes(data: bytes, position: Position) -> Language:
     _check_seen(record, position)
     robots = [] if record.robots is UNSET else record.robots
     if len(set(robots)) < len(robots) or (not robots and record.robots is not UNSET):
-        raise BadInput("the robots must be different, and at least one", position=position)
+        raise BadInput(
+            "the robots must be different, and at least one", position=position, remedy=_BUILD_AGAIN
+        )
     return Language(
         words=tuple(record.words),
         states=record.states,
@@ -105,7 +112,9 @@ def _present(record: msgspec.Struct) -> dict[str, Any]:
 def _check_words(record: LanguageRecord, position: Position) -> None:
     words = set(record.words)
     if len(words) < len(record.words) or not words:
-        raise BadInput("the words must be different, and at least one", position=position)
+        raise BadInput(
+            "the words must be different, and at least one", position=position, remedy=_BUILD_AGAIN
+        )
     for word in record.words:
         if word.split() != [word]:
             raise BadInput(
@@ -117,7 +126,9 @@ def _check_words(record: LanguageRecord, position: Position) -> None:
         given = [*record.states.items(), ("default", record.default)]
         key, word = next((key, word) for key, word in given if word not in words)
         raise BadInput(
-            f"{echoed(word)} (of {echoed(key)}) is not among the words", position=position
+            f"{echoed(word)} (of {echoed(key)}) is not among the words",
+            position=position,
+            remedy="Add it to 'words', or give the state one of them.",
         )
     for key, further in record.also.items():
         others = words - {record.states.get(key)}
@@ -125,6 +136,7 @@ def _check_words(record: LanguageRecord, position: Position) -> None:
             raise BadInput(
                 f"'also' of {echoed(key)} must hold further words of a state that 'states' has",
                 position=position,
+                remedy="Name words that differ from the state's own.",
             )
 
 
@@ -155,9 +167,14 @@ def _guarantee(record: LanguageRecord, position: Position) -> Guarantee | None:
             f"the guarantee (size {g.size}, lower bound {g.lower_bound}) contradicts "
             f"the {size} words",
             position=position,
+            remedy="Correct 'guarantee', or build the language again.",
         )
     if g.proved_minimal != (g.lower_bound == g.size):
-        raise BadInput("'proved_minimal' contradicts the lower bound", position=position)
+        raise BadInput(
+            "'proved_minimal' contradicts the lower bound",
+            position=position,
+            remedy="It is true exactly where lower_bound is size: correct 'guarantee'.",
+        )
     return Guarantee(g.method, g.size, g.lower_bound, g.proved_minimal)
 
 

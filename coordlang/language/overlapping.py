@@ -33,6 +33,11 @@ _MOST_SENTENCES = 2_000
 class TooManySentences(OutOfMemory):
     """Words overlap so much that the sentences of a task are too many to hold."""
 
+    def __init__(self, what: str) -> None:
+        super().__init__(
+            what, remedy="Give states fewer further words, or build without --overlap."
+        )
+
 
 def readings(states: Sequence[int], words: Overlap) -> frozenset[Sentence]:
     """The sentences of a plan through these states."""

@@ -132,9 +132,15 @@ def _in_front(word: int, rest: Sentence) -> Sentence:
 
 def _check_limits(of_node: int, most_of_node: int | None, steps: int, most: int | None) -> None:
     if most_of_node is not None and of_node > most_of_node:
-        raise OutOfMemory(f"a task has more than {most_of_node:,} sentences: too many to list")
+        raise OutOfMemory(
+            f"a task has more than {most_of_node:,} sentences: too many to list",
+            remedy="`coordlang understand` and `plan --prefer` need no list of sentences.",
+        )
     if most is not None and steps > most:
-        raise OutOfMemory(f"the sentences of the tasks take more than {most:,} steps to count")
+        raise OutOfMemory(
+            f"the sentences of the tasks take more than {most:,} steps to count",
+            remedy="Give fewer tasks.",
+        )
 
 
 def _choices(

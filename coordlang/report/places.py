@@ -92,6 +92,7 @@ def read_coordinates(path: str | Path) -> dict[str, Point]:
             raise BadInput(
                 f"{echoed(name)}: the coordinates must be between {-_LARGEST:g} and {_LARGEST:g}",
                 position=position,
+                remedy="Scale the coordinates: only their proportions are drawn.",
             )
     points = {name.lower(): point for name, point in entries.items()}
     if len(points) < len(entries):
@@ -101,7 +102,11 @@ def read_coordinates(path: str | Path) -> dict[str, Point]:
             remedy="PDDL does not distinguish them: of two entries one would be lost.",
         )
     if len(set(points.values())) < len(points):
-        raise BadInput("two places have the same coordinates", position=position)
+        raise BadInput(
+            "two places have the same coordinates",
+            position=position,
+            remedy="Give each place coordinates of its own.",
+        )
     return points
 
 

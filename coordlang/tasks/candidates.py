@@ -266,5 +266,6 @@ def require_solvable(candidates: Candidates) -> None:
     """Raise `ProvedImpossible` when there is no task at all to build a language for."""
     if candidates.count == 0:
         raise ProvedImpossible(
-            "there is no candidate task: no reachable state leads to another one"
+            "there is no candidate task: no reachable state leads to another one",
+            remedy="`coordlang inspect` shows what robots can do at the start.",
         )

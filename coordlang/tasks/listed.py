@@ -119,10 +119,16 @@ def _read_init(
     for text in task.init:
         formula = _read_text(domain, problem, text, position)
         if not isinstance(formula, Atom):
-            raise BadInput(f"{text} is no atom: 'init' lists what is true", position=position)
+            raise BadInput(
+                f"{text} is no atom: 'init' lists what is true",
+                position=position,
+                remedy="Leave out what is false: all that 'init' does not list.",
+            )
         if formula.predicate not in fluents and formula not in problem.init:
             raise BadInput(
-                f"{text} is static and false in {problem.source.name}", position=position
+                f"{text} is static and false in {problem.source.name}",
+                position=position,
+                remedy="Tasks of one file share their static facts: leave it out.",
             )
         atoms.add(formula)
     return frozenset(atom for atom in atoms if atom.predicate in fluents)
@@ -132,7 +138,9 @@ def _read_text(domain: Domain, problem: Problem, text: str, position: Position |
     try:
         parts = split_atoms(text)
         if len(parts) != 1:
-            raise BadInput("expected one PDDL literal")
+            raise BadInput(
+                "expected one PDDL literal", remedy="As in (at r1 a) or (not (at r1 a))."
+            )
         names = _names(domain, problem, parts[0], position)
         return read_formula(names, names.document.root)
     except BadInput as error:

@@ -63,7 +63,8 @@ def varied_tasks(
     if not pairs:
         raise ProvedImpossible(
             f"there is no such task: none of {len(here):,} starts reaches one of {len(texts):,} "
-            "goals that it is not at"
+            "goals that it is not at",
+            remedy="Give patterns that match more atoms: ? stands for any one name.",
         )
     return tuple(
         sorted(

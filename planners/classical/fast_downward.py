@@ -43,6 +43,10 @@ _NO_MEMORY = re.compile(
 _NO_SPACE = re.compile("No space left on device|File too large|Disk quota exceeded")
 
 
+#: What to do where Fast Downward says nothing.
+_SILENT = "Run `pip install --force-reinstall up-fast-downward` and try again."
+
+
 class FastDownwardFailed(CoordlangError):
     """Fast Downward gave no answer.
 
@@ -178,7 +182,10 @@ def _read_answer(result: Path) -> dict[str, Any]:
     try:
         answer: dict[str, Any] = json.loads(result.read_bytes())
     except ValueError as error:
-        raise FastDownwardFailed(f"the answer of Fast Downward is not complete: {error}") from None
+        raise FastDownwardFailed(
+            f"the answer of Fast Downward is not complete: {error}",
+            remedy="See whether the disk of the temporary directory (TMPDIR) is full.",
+        ) from None
     return answer
 
 
@@ -247,7 +254,7 @@ def _crash(what: str, said: str) -> CoordlangError:
     tight = has_memory_limit() and memory_left() < _MUCH
     if not _NO_SPACE.search(said) and (tight or _NO_MEMORY.search(said)):
         return _out_of_memory()
-    return FastDownwardFailed(what, remedy=said[-_TAIL:].strip() or None)
+    return FastDownwardFailed(what, remedy=said[-_TAIL:].strip() or _SILENT)
 
 
 def _out_of_memory() -> OutOfMemory:

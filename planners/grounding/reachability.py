@@ -129,10 +129,16 @@ def _least_model(rules: Sequence[str]) -> dict[str, list[Arguments]]:
         _ground(control)
     except RuntimeError as error:
         said = " ".join((str(error), *messages))
-        raise CoordlangError(f"clingo does not ground the reachability program: {said}") from error
+        raise CoordlangError(
+            f"clingo does not ground the reachability program: {said}",
+            remedy="Install clingo again (`pip install --force-reinstall clingo`).",
+        ) from error
     atoms = control.symbolic_atoms
     if not any(atoms.by_signature("goal", 0)):
-        raise CoordlangError("clingo's grounding of the reachability program is not complete")
+        raise CoordlangError(
+            "clingo's grounding of the reachability program is not complete",
+            remedy="Install clingo again (`pip install --force-reinstall clingo`).",
+        )
     return {
         predicate: [
             tuple([argument.name for argument in atom.symbol.arguments])

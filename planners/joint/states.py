@@ -168,7 +168,10 @@ class StateCodec:
                 number = self.memory[position].index(name) + 1
                 row[self.fact_blocks + position] = np.uint64(number)
                 return
-        raise BadInput(f"{atom} names no robot's subaction of this model")
+        raise BadInput(
+            f"{atom} names no robot's subaction of this model",
+            remedy="As in (last r1 (move r1 a b)), or (last r1 none) at the start.",
+        )
 
 
 def split_atoms(text: str) -> list[str]:

@@ -43,7 +43,12 @@ def parse_domain(source: Source) -> Domain:
     if len(actions) < len(sections.get(":action", ())):
         _complain_about_double_action(document, sections)
     if not actions:
-        raise document.fail("this domain has no action", document.root)
+        raise document.fail(
+            "this domain has no action",
+            document.root,
+            remedy="Write at least one '(:action NAME :parameters (..) :precondition "
+            ".. :effect ..)'.",
+        )
     names = Names(
         document,
         names.types,
@@ -92,7 +97,9 @@ def _read_types(document: Document, sections: Sections) -> dict[str, tuple[str, 
     cycle = _cycle(types)
     if cycle:
         raise document.fail(
-            "the types form a cycle: " + " - ".join(cycle), offsets.get(cycle[0], document.root)
+            "the types form a cycle: " + " - ".join(cycle),
+            offsets.get(cycle[0], document.root),
+            remedy="Remove one of these supertypes.",
         )
     return types
 
@@ -129,7 +136,11 @@ def _read_predicates(document: Document, sections: Sections) -> dict[str, frozen
                 continue
             entry = group(document, item, "a predicate in parentheses")
             if len(entry) == 0:
-                raise document.fail("expected a predicate, found '()'", entry)
+                raise document.fail(
+                    "expected a predicate, found '()'",
+                    entry,
+                    remedy="As in (at ?r - robot ?x - place).",
+                )
             name = token(document, entry.items[0], "the name of a predicate").text
             if name == "=":  # some domains declare it; it stays the equality of objects
                 continue
@@ -160,5 +171,9 @@ def _complain_about_double_action(document: Document, sections: Sections) -> Non
     for item in sections.get(":action", ()):
         name = action_name(document, item)
         if name.text in seen:
-            raise document.fail(f"action {echoed(name.text)} is declared twice", name)
+            raise document.fail(
+                f"action {echoed(name.text)} is declared twice",
+                name,
+                remedy="Rename or remove one of them.",
+            )
         seen.add(name.text)

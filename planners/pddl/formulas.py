@@ -121,7 +121,11 @@ def read_effects(names: Names, item: Expression) -> tuple[tuple[Effect, ...], in
     reader = _EffectReader([], [])
     reader.read(_Scope(names), item)
     if len(reader.costs) > 1:
-        raise names.document.fail("total-cost is increased twice in one action", item)
+        raise names.document.fail(
+            "total-cost is increased twice in one action",
+            item,
+            remedy="Keep one '(increase (total-cost) N)'.",
+        )
     return tuple(reader.effects), reader.costs[0] if reader.costs else None
 
 
@@ -229,7 +233,12 @@ def _cost(names: Names, item: Group, *, conditional: bool) -> int | Atom:
 
 def _constant_cost(names: Names, item: Group, amount: Token) -> int:
     if not NUMBER.match(amount.text):
-        raise names.document.fail(f"expected a number, found {echoed(amount.text)}", amount)
+        raise names.document.fail(
+            f"expected a number, found {echoed(amount.text)}",
+            amount,
+            remedy="As in (increase (total-cost) 3), or with a function declared in "
+            "(:functions ..).",
+        )
     # Costs that are too large are refused where costs are used.
     value = min(float(amount.text), 2.0 * MAX_COST)
     if value < 0 or value % 1 != 0:
@@ -255,7 +264,9 @@ def _unknown(names: Names, what: str, item: Group, head: str) -> BadInput:
 def _expect(names: Names, item: Group, count: int) -> None:
     if len(item) != count + 1:
         raise names.document.fail(
-            f"'{item.head}' takes {count} argument{'s' * (count > 1)}, found {len(item) - 1}", item
+            f"'{item.head}' takes {count} argument{'s' * (count > 1)}, found {len(item) - 1}",
+            item,
+            remedy="As in (not (p a)), (= ?x ?y), (when (p a) (q a)), (forall (?x - t) (p ?x)).",
         )
 
 

@@ -14,6 +14,10 @@ from planners.pddl.lifted import Constraint, Schema
 from planners.pddl.names import Names, group, known, token
 from planners.pddl.sexpr import Expression, Group, Token
 
+#: What a constraint looks like.
+_FORM = (
+    "As in (:concurrency-constraint v :parameters (?b - boat) :bounds (2 inf) :actions ((row 1)))."
+)
 #: More robots than there ever are: larger numbers mean the same.
 _MANY = 1_000_000_000
 
@@ -37,7 +41,12 @@ def read_network(
             token(names.document, item, "the name of a constraint") for item in section.items[1:]
         ]
         if len(pair) != 2:
-            raise names.document.fail("expected '(:positive-dependence V W)'", section)
+            raise names.document.fail(
+                "expected '(:positive-dependence V W)'",
+                section,
+                remedy="Both are names of constraints: whoever matches W needs "
+                "somebody who matches V.",
+            )
         for item in pair:
             if item.text not in by_name:
                 raise names.document.fail(
@@ -48,7 +57,9 @@ def read_network(
         first, second = (by_name[item.text] for item in pair)
         if len(first.parameters) != len(second.parameters):
             raise names.document.fail(
-                "the two constraints have different numbers of parameters", section
+                "the two constraints have different numbers of parameters",
+                section,
+                remedy="They are bound to the same objects: give both as many :parameters.",
             )
         dependences.append((first.name, second.name))
     return tuple(constraints), tuple(dependences)
@@ -57,7 +68,7 @@ def read_network(
 def _constraint(names: Names, arities: dict[str, int], section: Group) -> Constraint:
     document = names.document
     if len(section) < 2:
-        raise document.fail("expected the name of the constraint", section)
+        raise document.fail("expected the name of the constraint", section, remedy=_FORM)
     name = token(document, section.items[1], "the name of the constraint").text
     fields: dict[str, Expression] = {}
     items = section.items[2:]
@@ -69,6 +80,7 @@ def _constraint(names: Names, arities: dict[str, int], section: Group) -> Constr
             "a constraint has :parameters, :bounds and :actions"
             + (f"; missing: {', '.join(sorted(missing))}" if missing else ""),
             section,
+            remedy=_FORM,
         )
     parameters = names.read_variables(
         group(document, fields[":parameters"], "a list of variables").items
@@ -87,6 +99,8 @@ def _constraint(names: Names, arities: dict[str, int], section: Group) -> Constr
                 f"expected {len(parameters)} argument positions below {arities[entry.head]} (the "
                 "agent is argument 0)",
                 entry,
+                remedy="Each number says which argument of the action a "
+                "parameter of the constraint is.",
             )
         actions.append((entry.head, positions))
         offsets.append(entry.offset)
@@ -95,7 +109,11 @@ def _constraint(names: Names, arities: dict[str, int], section: Group) -> Constr
 
 def _bounds(names: Names, item: Group) -> tuple[int, int | None]:
     if len(item) != 2:
-        raise names.document.fail("expected '(LOW HIGH)'", item)
+        raise names.document.fail(
+            "expected '(LOW HIGH)'",
+            item,
+            remedy="As in (2 inf): at least two robots do it together, or none.",
+        )
     low = _number(names, item.items[0])
     high = item.items[1]
     if isinstance(high, Token) and high.text in ("inf", "infinity"):
@@ -113,6 +131,10 @@ def _bounds(names: Names, item: Group) -> tuple[int, int | None]:
 def _number(names: Names, item: Expression) -> int:
     text = token(names.document, item, "a number").text
     if not re.fullmatch(r"[0-9]+", text):
-        raise names.document.fail(f"expected a number from 0, found {echoed(text)}", item)
+        raise names.document.fail(
+            f"expected a number from 0, found {echoed(text)}",
+            item,
+            remedy="Arguments of an action are counted from 0, bounds are numbers of robots.",
+        )
     digits = text.lstrip("0") or "0"
     return int(digits) if len(digits) <= len(str(_MANY)) else _MANY

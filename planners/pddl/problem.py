@@ -10,7 +10,7 @@ from planners.limits import reaching
 from planners.messages import echoed
 from planners.pddl.formulas import NUMBER, read_formula
 from planners.pddl.lifted import Atom, Domain, Formula, Problem
-from planners.pddl.names import Names, group, read_objects, token
+from planners.pddl.names import Names, group, known, read_objects, token
 from planners.pddl.sections import Sections, read_header
 from planners.pddl.sexpr import Document, Group, Source, Token, parse, read_source
 
@@ -84,7 +84,11 @@ def _read_init(names: Names, item: Group, init: set[Atom], values: dict[Atom, fl
         _refuse_other_states(document, item)
         atom = read_formula(names, item)
         if not isinstance(atom, Atom):
-            raise document.fail("expected an atom in the initial state", item)
+            raise document.fail(
+                "expected an atom in the initial state",
+                item,
+                remedy="As in (at r1 a): what is not listed is false.",
+            )
         init.add(atom)
 
 
@@ -101,6 +105,7 @@ def _refuse_other_states(document: Document, item: Group) -> None:
         raise Unsupported(
             f"an uncertain initial state '({item.head} ..)' is not supported",
             position=document.source.position(item.offset),
+            remedy="coordlang reads problems with one initial state, known to all robots.",
         )
 
 
@@ -109,11 +114,16 @@ def _read_value(names: Names, item: Group, values: dict[Atom, float]) -> None:
     function = group(document, item.items[1], "a function in parentheses")
     number = item.items[2]
     if function.head not in names.functions and function.head != "total-cost":
-        raise document.fail(f"unknown function {echoed(function.head)}", function)
+        raise document.fail(
+            f"unknown function {echoed(function.head)}",
+            function,
+            remedy=known(names.functions, function.head, "function"),
+        )
     if not isinstance(number, Token) or not NUMBER.match(number.text):
         raise Unsupported(
             "a function value that is no number is not supported",
             position=document.source.position(item.offset),
+            remedy="As in (= (distance a b) 3).",
         )
     if function.head in names.functions:
         error = names.arity(function, function.head, names.functions[function.head], "function")

@@ -12,6 +12,9 @@ from planners.pddl.lifted import TRUE, Formula, Part, Schema
 from planners.pddl.names import Names, group, is_token, token, typed_list
 from planners.pddl.sexpr import SUBACTION, Comment, Document, Expression, Group, Token
 
+#: What an action looks like.
+_FORM = "As in (:action move :parameters (?r - robot ?to - place) :precondition .. :effect ..)."
+_AGENT_FORM = "As in (:action move :agent ?r - robot :parameters (?to - place) ..)."
 _PART = re.compile(
     r"subaction\b\s*(?P<robot>[^\s()]+)(?:\s+idle|\s*\(\s*(?P<subaction>[^()]+?)\s*\))\s*$"
 )
@@ -20,7 +23,7 @@ _PART = re.compile(
 def action_name(document: Document, item: Group) -> Token:
     """The name of an action section; raises `BadInput` if it has none."""
     if len(item) < 2:
-        raise document.fail("expected the name of the action", item)
+        raise document.fail("expected the name of the action", item, remedy=_FORM)
     return token(document, item.items[1], "the name of the action")
 
 
@@ -41,16 +44,22 @@ def _fields(document: Document, item: Group) -> dict[str, tuple[Expression, ...]
                     "Known here: " + ", ".join(_FIELDS) + ".",
                 )
             if key in fields:
-                raise document.fail(f"{key} occurs twice in one action", part)
+                raise document.fail(
+                    f"{key} occurs twice in one action",
+                    part,
+                    remedy="Join the two by (and ..), or remove one.",
+                )
             fields[key] = ()
         elif not key:
-            raise document.fail("expected a keyword such as ':parameters'", part)
+            raise document.fail("expected a keyword such as ':parameters'", part, remedy=_FORM)
         else:
             fields[key] = (*fields[key], part)
     for key in (":parameters", ":precondition", ":effect"):
         if len(fields.get(key, ())) > 1:
             raise document.fail(
-                f"expected one expression after {key}, found {len(fields[key])}", fields[key][1]
+                f"expected one expression after {key}, found {len(fields[key])}",
+                fields[key][1],
+                remedy="Join several conditions or effects by (and ..).",
             )
     return fields
 
@@ -69,7 +78,7 @@ def _parameter_items(
         if is_token(item, ":agent"):
             before, behind = listed[:number], listed[number + 1 :]
             if not behind or not isinstance(behind[0], Token):
-                raise document.fail("expected a variable after ':agent'", item)
+                raise document.fail("expected a variable after ':agent'", item, remedy=_AGENT_FORM)
             return before + behind, behind[0].text
     if ":agent" not in fields:
         return listed, None
@@ -81,7 +90,9 @@ def _parameter_items(
         declaration = (Token("-", at), Token("object", at))
     if not is_token(declaration[0], "-"):
         raise document.fail(
-            "expected '- TYPE' or nothing after the agent's variable", declaration[0]
+            "expected '- TYPE' or nothing after the agent's variable",
+            declaration[0],
+            remedy=_AGENT_FORM,
         )
     return (variable, *declaration, *listed), variable.text
 
@@ -93,7 +104,7 @@ def _agent(
     if len(items) == 1 and isinstance(items[0], Group):  # ":agent (?a - robot)"
         items = items[0].items
     if not items or not isinstance(items[0], Token):
-        raise document.fail("expected a variable after ':agent'", document.root)
+        raise document.fail("expected a variable after ':agent'", document.root, remedy=_AGENT_FORM)
     return items[0], items[1:]
 
 
@@ -112,7 +123,11 @@ def read_schema(names: Names, item: Group) -> Schema:
     parameters = names.read_variables(items)
     agent = next((i for i, v in enumerate(parameters) if v.name == agent_name), None)
     if agent_name is not None and agent is None:
-        raise document.fail(f"expected a variable after ':agent', found {echoed(agent_name)}", item)
+        raise document.fail(
+            f"expected a variable after ':agent', found {echoed(agent_name)}",
+            item,
+            remedy=_AGENT_FORM,
+        )
     inner = names.with_variables(parameters)
     precondition: Formula = TRUE
     if fields.get(":precondition"):
@@ -140,7 +155,9 @@ def _read_parts(names: Names, item: Group) -> tuple[Part, ...]:
             part = _read_part(names, comment)
             if part.robot in parts:
                 raise names.document.fail(
-                    f"robot {echoed(part.robot)} has two subactions in one action", comment
+                    f"robot {echoed(part.robot)} has two subactions in one action",
+                    comment,
+                    remedy="Remove one of the two comments.",
                 )
             parts[part.robot] = part
     return tuple(parts.values())
@@ -178,5 +195,8 @@ def check_parts(document: Document, schemas: tuple[Schema, ...], actions: dict[s
             )
         if schema.agent is not None:
             raise document.fail(
-                f"action {echoed(schema.name)} has both ':agent' and subaction comments", item
+                f"action {echoed(schema.name)} has both ':agent' and subaction comments",
+                item,
+                remedy="Remove ':agent', or the comments: a joint action says "
+                "what every robot does.",
             )

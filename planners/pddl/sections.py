@@ -28,7 +28,12 @@ def read_header(document: Document, kind: str) -> tuple[str, Sections]:
     """
     root = document.root
     if root.head != "define":
-        raise document.fail(f"expected '(define ({kind} ..) ..)'", root)
+        raise document.fail(
+            f"expected '(define ({kind} ..) ..)'",
+            root,
+            remedy=f"A {kind} file is one '(define ({kind} NAME) ..)'; give "
+            f"DOMAIN first, then PROBLEM.",
+        )
     title = root.items[1] if len(root) > 1 else root
     if not isinstance(title, Group) or title.head != kind or len(title) != 2:
         other = title.head if isinstance(title, Group) else ""
@@ -37,7 +42,7 @@ def read_header(document: Document, kind: str) -> tuple[str, Sections]:
             title,
             f"This is a {other} file: the order is DOMAIN PROBLEM."
             if {kind, other} == {"domain", "problem"}
-            else None,
+            else f"As in (define ({kind} NAME) ..).",
         )
     sections: Sections = {}
     for item in root.items[2:]:

@@ -43,6 +43,10 @@ def _read_tokens(text: str) -> Iterator[str]:
             yield f"; {' '.join(said)}"
 
 
+#: What helps against an error of syntax that has no remedy of its own.
+_COMPARE = "`coordlang domains` lists domains that are read, to compare with."
+
+
 class Source:
     """A text with a name: turns offsets into positions for messages."""
 
@@ -150,7 +154,8 @@ class Document:
 
     def fail(self, what: str, at: Expression | Comment, remedy: str | None = None) -> BadInput:
         """An error that points at an expression (the caller raises it)."""
-        return BadInput(what, position=self.source.position(at.offset), remedy=remedy)
+        position = self.source.position(at.offset)
+        return BadInput(what, position=position, remedy=remedy or _COMPARE)
 
 
 def read_source(path: str | Path) -> Source:
@@ -172,7 +177,11 @@ def _with_old_comments(data: bytes, name: str) -> str:
     Bytes there that are not UTF-8 are read as Latin-1.  Raises `BadInput` for such bytes elsewhere.
     """
     if b"\0" in data:
-        raise BadInput("this is a binary file, not PDDL text", position=Position(name))
+        raise BadInput(
+            "this is a binary file, not PDDL text",
+            position=Position(name),
+            remedy="Give a PDDL file: DOMAIN first, then PROBLEM.",
+        )
     # Such a byte b is chr(0xdc00 + b) here, so that it comes back as it was.
     text = data.decode("utf-8-sig", "surrogateescape")
     for match in _TOKEN.finditer(text):
@@ -225,18 +234,30 @@ class _Reader:
             )
         elif text == "(":
             if len(self._open) >= MAX_DEPTH:
-                raise self._error(f"nested more than {MAX_DEPTH} deep", offset)
+                raise self._error(
+                    f"nested more than {MAX_DEPTH} deep",
+                    offset,
+                    remedy="Is a ')' missing? No domain needs such nesting.",
+                )
             self._open.append((offset, []))
         elif text == ")":
             self._close(offset)
         elif not self._open:
-            raise self._error(f"expected '(define ...', found {echoed(text[:40])}", offset)
+            raise self._error(
+                f"expected '(define ...', found {echoed(text[:40])}",
+                offset,
+                remedy="Give a PDDL file: DOMAIN first, then PROBLEM.",
+            )
         else:
             self._open[-1][1].append(Token(text.lower(), offset))
 
     def _close(self, offset: int) -> None:
         if not self._open:
-            raise self._error("')' without a '('", offset)
+            raise self._error(
+                "')' without a '('",
+                offset,
+                remedy="Remove it, or add the '(' that is missing before it.",
+            )
         start, items = self._open.pop()
         group = Group(tuple(items), start, offset)
         if self._open:

@@ -41,6 +41,10 @@ class WorkerLost(Exception):
         self.asked = asked
 
 
+#: What to do about a bug.
+_BUG = "This is a bug; --jobs 1 --debug shows where."
+
+
 class WorkFailed(CoordlangError):
     """A piece ended with an error that cannot be sent: a bug."""
 
@@ -167,7 +171,7 @@ def lost_for_good(work: Work) -> OutOfMemory:
 
 def _received(packed: bytes | None, text: str, where: str) -> BaseException:
     """An error as the worker sent it, with a note of where it was raised there."""
-    error: Any = WorkFailed(text) if packed is None else pickle.loads(packed)
+    error: Any = WorkFailed(text, remedy=_BUG) if packed is None else pickle.loads(packed)
     assert isinstance(error, BaseException)
     error.add_note(f"in a worker process:\n{where}")
     return error

@@ -76,7 +76,11 @@ class NoSuchAction(BadInput):
     """A plan names an action that the problem does not have; ``step`` is where, from 0."""
 
     def __init__(self, action: str, step: int, position: Position) -> None:
-        super().__init__(f"{action} is no action of this problem", position=position)
+        super().__init__(
+            f"{action} is no action of this problem",
+            position=position,
+            remedy="`coordlang inspect DOMAIN PROBLEM` shows what the robots can do.",
+        )
         self.step = step
 
 
@@ -193,6 +197,7 @@ def _from_json(text: str, model: JointModel, position: Position) -> list[tuple[T
                     f"step {number} must have one text or null for each "
                     f"of {', '.join(model.robots)}",
                     position=position,
+                    remedy='As in ["(move r1 a b)", null]: null is a robot that idles.',
                 )
     return found
 
@@ -209,12 +214,16 @@ def _from_ipc(text: str, model: JointModel, name: str) -> tuple[Texts, ...]:
             raise BadInput(
                 f"expected '0: (action args)', found {echoed(raw.strip())}",
                 position=Position(name, number, 1),
+                remedy="`coordlang plans DOMAIN PROBLEM` writes plans in this form.",
             )
         action = "(" + " ".join(match["action"][1:-1].split()) + ")"
         step = int(match["step"][-8:]) if match["step"] else len(steps)
         if match["step"] and (len(match["step"]) > 8 or step > _MOST_STEPS):
             raise BadInput(
-                f"step {match['step'][:20]} is too many steps", position=Position(name, number, 1)
+                f"step {match['step'][:20]} is too many steps",
+                position=Position(name, number, 1),
+                remedy="Steps are counted from 0, one number for all that "
+                "happens at the same time.",
             )
         own = steps.setdefault(step, [None] * len(model.robots))
         _put(own, step, action, model, Position(name, number, 1))
@@ -232,7 +241,9 @@ def _put(
             raise NoSuchAction(action, step, position)
         if any(own):
             raise BadInput(
-                f"two joint actions in one step: {action} is the second", position=position
+                f"two joint actions in one step: {action} is the second",
+                position=position,
+                remedy="Each line of a joint-action plan is a step of its own.",
             )
         own[:] = parts
         return
@@ -244,5 +255,6 @@ def _put(
             raise BadInput(
                 f"{model.robots[robot]} does two things in one step: {own[robot]} and {action}",
                 position=position,
+                remedy="Give one of them another step number.",
             )
         own[robot] = action

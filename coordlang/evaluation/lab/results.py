@@ -39,7 +39,10 @@ class Results:
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise UsageError(f"{folder} cannot be made: {error.strerror}") from None
+            raise UsageError(
+                f"{folder} cannot be made: {error.strerror}",
+                remedy="Name a folder in one that you may write to.",
+            ) from None
 
     def path(self, experiment: str) -> Path:
         """Return the file of an experiment."""
@@ -110,7 +113,10 @@ class Results:
             text = path.read_text("utf-8", errors="replace")
         except OSError as error:
             raise BadInput(
-                f"cannot be read: {error.strerror}", position=Position(str(path))
+                f"cannot be read: {error.strerror}",
+                position=Position(str(path)),
+                remedy="Name a folder of results that you may read, or remove the "
+                "file: it is made again.",
             ) from None
         for number, line in enumerate(text.splitlines(keepends=True), 1):
             try:

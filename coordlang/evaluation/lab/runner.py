@@ -135,7 +135,10 @@ def _record(unit: Unit, done: Done) -> Record:
         text = (
             str(error) if isinstance(error, CoordlangError) else f"{type(error).__name__}: {error}"
         )
-        raise UnitFailed(f"{name_of(unit)}: {text}")
+        raise UnitFailed(
+            f"{name_of(unit)}: {text}",
+            remedy="The results so far are kept: run it again when that is put right.",
+        )
     if done.table is None:
         lost: Status = "out of memory" if done.lost == "died" else "out of time"
         return Record(unit, lost, {}, done.seconds)

@@ -101,7 +101,8 @@ class PddlExport:
         for robot, name in enumerate(self.model.robots):
             if robot not in labels:
                 raise BadInput(
-                    f"in step {number} of the plan {name} chooses nothing: the plan is cut off"
+                    f"in step {number} of the plan {name} chooses nothing: the plan is cut off",
+                    remedy="Give the whole plan that the planner wrote.",
                 )
         return tuple(labels[robot] for robot in range(len(self.model.robots)))
 
@@ -175,7 +176,9 @@ def plan_names(text: str) -> list[str]:
             names.append(match[1] or match[2])
         elif line:
             raise BadInput(
-                f"line {number} of the plan: expected '(action)', found {echoed(raw.strip())}"
+                f"line {number} of the plan: expected '(action)', found {echoed(raw.strip())}",
+                remedy="Give a plan file as planners write it: one action a line, "
+                "comments behind ';'.",
             )
     return names
 

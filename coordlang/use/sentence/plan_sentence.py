@@ -55,7 +55,10 @@ class NotOptimal(Refuted):
     """
 
     def __init__(self, step: int, excess: tuple[int, int], reason: str) -> None:
-        super().__init__(f"this plan is not optimal: {reason}")
+        super().__init__(
+            f"this plan is not optimal: {reason}",
+            remedy="`coordlang plans DOMAIN PROBLEM` writes the optimal plans.",
+        )
         self.step = step
         self.excess = excess
 
@@ -132,7 +135,11 @@ def execute(task_language: TaskLanguage, plan: Sequence[Texts]) -> ExecutedPlan:
         numbers.append(labels)
     if not model.holds(_goal(task_language), rows[-1][None, :])[0]:
         unmet = _unmet_goal(task_language, rows[-1])
-        raise NotAPlan(len(plan), f"after {_steps(len(plan))} {unmet}")
+        raise NotAPlan(
+            len(plan),
+            f"after {_steps(len(plan))} {unmet}",
+            remedy="Give the whole plan: it ends where the goal holds.",
+        )
     return ExecutedPlan(tuple(numbers), rows, second)
 
 
@@ -146,10 +153,17 @@ def read_plan_file(path: str | Path, model: JointModel) -> list[tuple[Texts, ...
         plans = read_plans(path, model)
     except NoSuchAction as error:
         raise NotAPlan(
-            error.step, f"in step {error.step + 1}, {error.what}", position=error.position
+            error.step,
+            f"in step {error.step + 1}, {error.what}",
+            position=error.position,
+            remedy=error.remedy,
         ) from None
     if not plans:
-        raise BadInput("there is no plan in it", position=Position(str(path)))
+        raise BadInput(
+            "there is no plan in it",
+            position=Position(str(path)),
+            remedy="`coordlang plans DOMAIN PROBLEM` writes optimal plans.",
+        )
     return [tuple(tuple(map(_spelling, step)) for step in plan) for plan in plans]
 
 

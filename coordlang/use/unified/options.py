@@ -107,7 +107,8 @@ class EngineOptions:
             if set(team.robots) != set(options.robots.names):
                 raise UsageError(
                     f"robot_type {kind} contradicts the language: "
-                    f"its robots are {', '.join(options.robots.names)}"
+                    f"its robots are {', '.join(options.robots.names)}",
+                    remedy="Leave out robot_type.",
                 )
         return options
 

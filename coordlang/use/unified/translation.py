@@ -26,6 +26,10 @@ Subactions = Mapping[str, Mapping[str, str | None]]
 Schemas = dict[str, dict[str | None, Any]]
 
 _AGENT = "?agent"
+_COMPILE = (
+    "coordlang reads InstantaneousAction: states of true and false facts, steps without time."
+)
+_BOOLEAN = "coordlang reads Boolean fluents: True or False, no numbers and no objects as values."
 #: Kinds of unified-planning's expressions -> their PDDL operators.
 _QUANTIFIERS = {"exists": "exists", "forall": "forall"}
 _CONNECTIVES = {"and": "and", "or": "or", "not": "not", "implies": "imply"}
@@ -205,10 +209,15 @@ class _Writer:
         """Parameters, precondition and effect."""
         if type(action).__name__ != "InstantaneousAction":
             raise Unsupported(
-                f"{type(action).__name__} {action.name!r}: only instantaneous actions are supported"
+                f"{type(action).__name__} {action.name!r}: only instantaneous actions "
+                f"are supported",
+                remedy=_COMPILE,
             )
         if action.simulated_effect is not None:
-            raise Unsupported(f"action {action.name!r} has simulated effects")
+            raise Unsupported(
+                f"action {action.name!r} has simulated effects",
+                remedy="Write its effects as add_effect.",
+            )
         parameters = " ".join(
             f"{self.parameter(p)} - {self.type_name(p.type)}" for p in action.parameters
         )
@@ -224,7 +233,8 @@ class _Writer:
         """An assignment; of a value that is not constant both cases."""
         if not effect.is_assignment():
             raise Unsupported(
-                f"the effect {effect}: only assignments of truth values are supported"
+                f"the effect {effect}: only assignments of truth values are supported",
+                remedy=_BOOLEAN,
             )
         atom = self.text(effect.fluent, agent, inside=True)
         value, condition = effect.value, effect.condition
@@ -245,7 +255,8 @@ class _Writer:
         for fluent, value in self.problem.initial_values.items():
             if not value.is_bool_constant():
                 raise Unsupported(
-                    f"the initial value {fluent} := {value}: only truth values are supported"
+                    f"the initial value {fluent} := {value}: only truth values are supported",
+                    remedy=_BOOLEAN,
                 )
             if value.is_true():
                 found.append(self.text(fluent, None))
@@ -273,7 +284,11 @@ class _Writer:
         for kind, operator in _CONNECTIVES.items():
             if getattr(node, f"is_{kind}")():
                 return f"({' '.join((operator, *parts))})"
-        raise Unsupported(f"the expression {node}")
+        raise Unsupported(
+            f"the expression {node}",
+            remedy="coordlang reads Boolean fluents with and, or, not, implies, "
+            "equality and quantifiers.",
+        )
 
     def atom(self, node: Any, agent: Any, *, inside: bool) -> str:
         """A fluent with its arguments."""
@@ -324,7 +339,10 @@ class _Writer:
 
     def type_name(self, kind: Any) -> str:
         if not kind.is_user_type():
-            raise Unsupported(f"parameters of type {kind}: only user types are supported")
+            raise Unsupported(
+                f"parameters of type {kind}: only user types are supported",
+                remedy="Use objects of a user type.",
+            )
         return self.types.of(kind.name, kind.name)
 
     def agent_type(self) -> str:

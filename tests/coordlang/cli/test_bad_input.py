@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.command import Command
+from tests.support.command import Command, Outcome
 from tests.support.hall import DOMAIN, PROBLEM, factored
 
 
@@ -21,6 +21,23 @@ class Files:
         self.domain.write_text(domain)
         self.problem.write_text(problem)
         return self.domain, self.problem
+
+
+@pytest.fixture(name="coordlang")
+def with_remedies(coordlang: Command) -> Command:
+    """The command line, whose every error says on the line below what to do."""
+
+    def call(*arguments: object) -> Outcome:
+        outcome = coordlang(*arguments)
+        lines = outcome.err.splitlines()
+        if outcome.code in (1, 11, 22, 23, 31, 32, 34) and lines and ": warning:" not in lines[0]:
+            assert lines[0].startswith("coordlang: ")
+            assert lines[1].startswith("  "), outcome.err
+        if outcome.code == 2 and not lines[0].startswith("Usage: "):
+            assert lines[1].startswith("  "), outcome.err
+        return outcome
+
+    return call
 
 
 @pytest.fixture
