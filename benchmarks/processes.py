@@ -39,8 +39,8 @@ def coordlang(*arguments: str) -> Done:
     return run_python(("-c", "from coordlang.__main__ import main; main()", *arguments))
 
 
-def run_python(arguments: Sequence[str]) -> Done:
-    """Run Python with these arguments; what it prints is read as JSON."""
+def run_python(arguments: Sequence[str], most: float = MOST) -> Done:
+    """Run Python with these arguments, ``most`` seconds; what it prints is read as JSON."""
     start = perf_counter()
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         process = subprocess.Popen(
@@ -55,7 +55,7 @@ def run_python(arguments: Sequence[str]) -> Done:
             pid, status, usage = os.wait4(process.pid, os.WNOHANG)
             if pid == 0:
                 sleep(0.02)
-                if perf_counter() - start > MOST:
+                if perf_counter() - start > most:
                     os.killpg(process.pid, signal.SIGKILL)
         process.returncode = os.waitstatus_to_exitcode(status)
         seconds = perf_counter() - start

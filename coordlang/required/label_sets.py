@@ -16,6 +16,9 @@ from planners.tables import Bools, Ints, unique_tuples
 
 #: The set that holds only the empty sequence.
 END = 0
+#: Up to so many entries for each pair that is asked for, a table of all pairs of sets is filled in
+#: place of sorting.
+_TABLE = 32
 
 
 class LabelSets:
@@ -120,10 +123,22 @@ class LabelSets:
 
     def within_each(self, one: Ints, other: Ints) -> Bools:
         """For each pair whether ``one[k]`` is `within` ``other[k]``."""
-        pairs = np.column_stack((one, other))
-        different, inverse = unique_tuples(pairs, [len(self)] * 2)
-        answers = np.array([self.within(a, b) for a, b in different.tolist()], np.bool_)
-        return answers[inverse]
+        answers = one == other
+        left = np.flatnonzero(~answers)
+        if len(self) ** 2 <= _TABLE * len(left):
+            codes = one[left] * len(self) + other[left]
+            table = np.zeros(len(self) ** 2, np.bool_)
+            table[codes] = True
+            asked = np.flatnonzero(table)
+            rows = zip(*(part.tolist() for part in np.divmod(asked, len(self))), strict=True)
+            table[asked] = [self.within(a, b) for a, b in rows]
+            answers[left] = table[codes]
+        else:
+            pairs = np.column_stack((one[left], other[left]))
+            different, inverse = unique_tuples(pairs, [len(self)] * 2)
+            known = np.array([self.within(a, b) for a, b in different.tolist()], np.bool_)
+            answers[left] = known[inverse]
+        return answers
 
     def all_within(self, one: Sequence[int], other: Sequence[int]) -> bool:
         """Whether each set of ``one`` is `within` its partner."""

@@ -211,7 +211,7 @@ class _Mixing:
 
         Those that nothing is known of are looked at one by one at the end.
         """
-        fails = np.zeros(count, np.bool_)
+        fails, asked = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
         choices, size, robots = self._choices, sets.shape[1], self._space.robots
         given = [way for way in product(range(size), repeat=robots) if len(set(way)) == size]
         for assigned in given:
@@ -224,8 +224,9 @@ class _Mixing:
                 theirs = choices.of_node[robot, mixed.target[left]]
                 lost = ~choices.sets.within_each(mine, theirs)
                 fails[number[rows[mixed.row[left[lost]]]]] = True
+            asked[number[rows[mixed.row[choices.requires[mixed.target]]]]] = True
         for assigned in given:
-            rows = np.flatnonzero(~fails[number])
+            rows = np.flatnonzero(asked[number] & ~fails[number])
             mixed, _ = self._mixed(sets[rows][:, assigned])
             self._search(mixed, number[rows], fails)
         return fails
@@ -237,9 +238,11 @@ class _Mixing:
         missing = [row[:0]]
         for robot, (first, labels) in enumerate(self._labels):
             own = ways[row, robot]
-            counts = first[own + 1] - first[own]
-            label = labels[ranges(first[own], counts)]
-            row, prefix = np.repeat(row, counts), np.repeat(prefix, counts)
+            if len(labels) > len(self._node):  # more than one label on some way
+                counts = first[own + 1] - first[own]
+                own = ranges(first[own], counts)
+                row, prefix = np.repeat(row, counts), np.repeat(prefix, counts)
+            label = labels[own]
             prefix = self._index.follow(robot, prefix, label)
             missing.append(row[prefix < 0])
             row, prefix = row[prefix >= 0], prefix[prefix >= 0]

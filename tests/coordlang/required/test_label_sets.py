@@ -62,8 +62,10 @@ def test_sets_are_sets(seed: int) -> None:
     assert len(answers) > 1
 
 
+@pytest.mark.parametrize("table", [0, 10**6])
 @pytest.mark.parametrize("seed", range(10))
-def test_many_at_once(seed: int) -> None:
+def test_many_at_once(seed: int, table: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("coordlang.required.label_sets._TABLE", table)
     random = Random(seed)
     sets = LabelSets()
     groups = [[some_sequences(random, 2) for _ in range(random.randint(1, 4))] for _ in range(9)]

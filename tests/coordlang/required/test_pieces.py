@@ -42,7 +42,7 @@ def random_candidates(seeds: range, robots: int) -> Iterator[Candidates]:
             found = make(domain, goals, options)
         except (ProvedImpossible, BadInput):
             continue
-        if 0 < found.count and sum(map(len, found.spaces)) < 2_000:
+        if found.count > 0 and sum(map(len, found.spaces)) < 2_000:
             yield found
 
 
