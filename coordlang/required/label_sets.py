@@ -123,7 +123,7 @@ class LabelSets:
 
     def within_each(self, one: Ints, other: Ints) -> Bools:
         """For each pair whether ``one[k]`` is `within` ``other[k]``."""
-        answers = one == other
+        answers: Bools = one == other
         left = np.flatnonzero(~answers)
         if len(self) ** 2 <= _TABLE * len(left):
             codes = one[left] * len(self) + other[left]
