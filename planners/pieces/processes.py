@@ -19,8 +19,8 @@ from planners.pieces.worker_process import (
 )
 
 #: Estimated work, in nodes times robots, from which processes pay: each costs about half a second
-#: to start, in which one of them does some 20,000.
-WORTH_PROCESSES = 200_000.0
+#: to start, in which one of them does some 100,000.
+WORTH_PROCESSES = 500_000.0
 #: Bytes without which a process of its own is of no use.
 _LEAST_MEMORY = 256 << 20
 #: How often a piece is begun at most, whose processes die.

@@ -28,8 +28,8 @@ from planners.tables import Bools, Ints, Rows
 PORTION = 40_000.0
 #: Nodes times robots from which the estimate is said: some seconds of work.
 _LARGE = 1_000_000
-#: Bytes of a node and its edges in a plan space, and more of them while it is made (measured on grids
-#: for two robots).
+#: Bytes of a node and its edges in a plan space, and more of them while it is made (measured on
+#: grids with two robots).
 _NODE_BYTES, _MAKING_BYTES = 200, 600
 #: Goals whose distances are worked out together.
 _GOALS = 512
@@ -230,7 +230,7 @@ class Estimate:
 
     @property
     def bytes(self) -> int:
-        """About so much: a finished node and its edges, and what one batch takes while it is made."""
+        """About so much: finished nodes with their edges, and one batch while it is made."""
         return _NODE_BYTES * self.nodes + _MAKING_BYTES * min(self.nodes, PIECES.pairs)
 
     @property
