@@ -75,7 +75,10 @@ def build(name: str, output: Path, *options: str) -> tuple[dict[str, object], fl
     files = [str(ROOT / "domains" / folder / f"{file}.pddl") for file in ("domain", stem)]
     before, since = resource.getrusage(resource.RUSAGE_CHILDREN), perf_counter()
     command = [sys.executable, "-m", "coordlang", "build", *files, "--tasks", "all"]
-    subprocess.run([*command, "-o", str(output), *options], check=True, stdout=subprocess.DEVNULL)
+    command += ["-o", str(output), *options]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        sys.exit(done.stderr)
     wall, after = perf_counter() - since, resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     language = json.loads(output.read_text())
