@@ -25,6 +25,8 @@ from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 from planners.tables import Bools, Ints, spans
 
+#: Bytes for which it is not asked how much memory is left, which takes longer than small layers.
+_ALWAYS_THERE = 1 << 20
 #: Mixtures that failed have no state: this in place of ``y``.
 FAILED = -1
 
@@ -129,10 +131,11 @@ def _check_size(sizes: NDArray[np.float64], space: PlanSpace, limits: WalkLimits
     largest, total = sizes.max(initial=0), sizes.sum()
     robots, instead = space.robots, space.model.smaller("fewer robots", "smaller tasks")
     # One row of a chunk holds its source, a prefix and an edge for each robot, and copies of them.
-    if 100 * largest > limits.memory_left():
+    at_once = 100 * largest
+    if at_once > _ALWAYS_THERE and at_once > limits.memory_left():
         raise OutOfMemory(
             f"a state has {largest:,.0f} combinations of {robots} plans' next steps: about "
-            f"{100 * largest / 2**30:,.1f} GiB at once",
+            f"{at_once / 2**30:,.1f} GiB at once",
             remedy=f"Use {instead}, or {more_memory()}.",
         )
     if total > limits.most:

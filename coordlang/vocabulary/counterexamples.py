@@ -22,7 +22,7 @@ from coordlang.vocabulary.leads import NO_LEAD, NO_WORD, PARTED, Leads
 from coordlang.vocabulary.next_words import NextWords
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints, unique_tuples
+from planners.tables import Bools, Ints, unique_tuples
 
 #: Where no way leads to a violation; some steps may be added to it.
 _FAR = np.iinfo(np.int64).max // 4
@@ -49,6 +49,23 @@ class Counterexample:
     states: tuple[tuple[int, ...], ...]
 
 
+@dataclass(frozen=True, slots=True)
+class _OpenMoves:
+    """The moves of a layer that lead to a violation; ``first`` (nodes + 1) delimits each node's."""
+
+    moves: Ints
+    first: Ints
+
+    @classmethod
+    def of_layer(cls, layer: _Layer, leads: Bools) -> _OpenMoves:
+        moves = np.flatnonzero(leads)
+        return cls(moves, np.searchsorted(layer.source[moves], np.arange(len(layer.nodes) + 1)))
+
+    def of(self, row: int) -> tuple[int, int]:
+        """Where those of a node begin and end."""
+        return int(self.first[row]), int(self.first[row + 1])
+
+
 @dataclass(slots=True)
 class _Layer:
     """Nodes of the walk with equally many steps to go.
@@ -57,7 +74,7 @@ class _Layer:
     Each move has the row of its node in ``source``, the plans' ``edges``, and in ``child`` the row
     of the node that it leads to, one layer below.  Each node has in ``best`` the fewest steps at
     which the plans are in different states on a way to a violation, in ``choice`` the move that
-    begins it.
+    begins it, in ``open_moves`` all that do.
     """
 
     nodes: Ints
@@ -66,6 +83,7 @@ class _Layer:
     child: Ints
     best: Ints
     choice: Ints
+    open_moves: _OpenMoves
 
 
 def counterexamples(
@@ -173,7 +191,7 @@ class _Walk:
 def _layer(nodes: Ints, source: Ints, edges: Ints) -> _Layer:
     """A layer of which only the nodes and the moves out of them are known."""
     none = np.zeros(0, np.int64)
-    return _Layer(nodes, source, edges, none, none, none)
+    return _Layer(nodes, source, edges, none, none, none, _OpenMoves(none, none))
 
 
 def _backward(space: PlanSpace, layers: list[_Layer]) -> None:
@@ -194,6 +212,7 @@ def _backward(space: PlanSpace, layers: list[_Layer]) -> None:
         tight = np.flatnonzero((value == best[layer.source]) & (value < _FAR))
         choice[layer.source[tight][::-1]] = tight[::-1]
         layer.choice = choice
+        layer.open_moves = _OpenMoves.of_layer(layer, value < _FAR)
         layer.best = np.where(best < _FAR, best + differs, _FAR)
 
 
@@ -227,12 +246,11 @@ def _follow(
     robots = space.robots
     start = int(layers[number].nodes[row, 0])
     edges = []
-    for below, layer in zip(layers[number - 1 :: -1], layers[number:0:-1], strict=True):
+    for layer in layers[number:0:-1]:
         move = int(layer.choice[row])
         if random is not None:
-            low, high = np.searchsorted(layer.source, (row, row + 1))
-            open_moves = low + np.flatnonzero(below.best[layer.child[low:high]] < _FAR)
-            move = int(open_moves[random.randrange(len(open_moves))])
+            low, high = layer.open_moves.of(row)
+            move = int(layer.open_moves.moves[random.randrange(low, high)])
         edges.append(tuple(layer.edges[move].tolist()))
         row = int(layer.child[move])
     states = tuple(

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from coordlang.required.composition_walk import FAILED, moves
-from coordlang.vocabulary.counterexamples import Counterexample, _backward, _Layer, _retrace
+from coordlang.vocabulary.counterexamples import Counterexample, _backward, _Layer, _layer, _retrace
 from coordlang.vocabulary.leads import NO_WORD, PARTED, Leads
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
@@ -43,7 +43,7 @@ def _forward(space: PlanSpace, index: EdgeIndex, word: Ints, starts: Ints) -> li
             layers[-1].child = place[len(fresh) :]
         if number == 0:
             none = np.zeros(0, np.int64)
-            layers.append(_Layer(nodes, none, np.zeros((0, robots), np.int64), none, none, none))
+            layers.append(_layer(nodes, none, np.zeros((0, robots), np.int64)))
             break
         layer, arriving = _expand(space, index, word, leads, nodes)
         layers.append(layer)
@@ -79,13 +79,10 @@ def _expand(
         edges.append(move.edges[keep])
         children.append(np.column_stack((target[keep], mixed[keep], lead[keep])))
     none = np.zeros(0, np.int64)
-    layer = _Layer(
+    layer = _layer(
         nodes,
         np.concatenate(sources) if sources else none,
         np.concatenate(edges) if edges else np.zeros((0, robots), np.int64),
-        none,
-        none,
-        none,
     )
     arriving = np.concatenate(children) if children else np.zeros((0, 2 * robots), np.int64)
     return layer, arriving
