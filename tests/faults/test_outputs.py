@@ -17,6 +17,7 @@ from planners.errors import UsageError
 from planners.writing import write_atomically
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
+from tests.support.forks import fork_command
 
 CELLS = [DOMAINS / "three-cells" / name for name in ("domain.pddl", "problem.pddl")]
 BUILD = ("build", *CELLS, "--method", "minimal")
@@ -295,22 +296,21 @@ def test_every_rename_may_be_the_last_one(
 @pytest.mark.parametrize("at", range(1, 4))
 @pytest.mark.parametrize("after", [False, True])
 def test_killed_at_every_rename(at: int, after: bool, old_pair: Path) -> None:
-    program = f"""
-import os, sys
-from coordlang.cli import run
-replace, calls = os.replace, 0
-def ending(source, target):
-    global calls
-    calls += 1
-    if calls == {at} and not {after}: os.kill(os.getpid(), 9)
-    replace(source, target)
-    if calls == {at}: os.kill(os.getpid(), 9)
-os.replace = ending
-run(sys.argv[1:])
-"""
-    arguments = map(str, (*BUILD, *PAIR))
-    done = subprocess.run([sys.executable, "-c", program, *arguments], capture_output=True)
-    assert done.returncode == -signal.SIGKILL
+    replace, calls = os.replace, 0
+
+    def ending(source: str, target: str) -> None:
+        nonlocal calls
+        calls += 1
+        if calls == at and not after:
+            os.kill(os.getpid(), signal.SIGKILL)
+        replace(source, target)
+        if calls == at:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    def before() -> None:
+        os.replace = ending  # type: ignore[assignment]
+
+    assert fork_command(*BUILD, *PAIR, before=before).join().code == -signal.SIGKILL
     expected = {
         (1, False): "old",
         (1, True): "old, alone",

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import os
 import shutil
-import subprocess
+import tempfile
 from pathlib import Path
 
 import pytest
 
-from tests.support.command import own_process
 from tests.support.domains import DOMAINS
+from tests.support.forks import fork_command, fresh_command
 
 NAMES = ("two words", "two\nlines", "-o", "--help", "ünïcödé", "'\"$(x)`*")
 SURROUNDINGS: dict[str, dict[str, str | None]] = {
@@ -22,25 +22,31 @@ SURROUNDINGS: dict[str, dict[str, str | None]] = {
 }
 
 
-def run(folder: Path, changes: dict[str, str | None], *arguments: str) -> None:
-    environment = {**os.environ, **{k: v for k, v in changes.items() if v is not None}}
-    for name in (name for name, value in changes.items() if value is None):
-        environment.pop(name, None)
-    ended = subprocess.run(
-        own_process(*arguments), cwd=folder, env=environment, capture_output=True, text=True
-    )
-    assert ended.returncode == 0, ended.stderr
-    assert "Traceback" not in ended.stderr
+def run(folder: Path, changes: dict[str, str | None], *arguments: str, fresh: bool = False) -> None:
+    def before() -> None:
+        os.chdir(folder)
+        tempfile.tempdir = None
+        for name, value in changes.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+    ended = (fresh_command if fresh else fork_command)(*arguments, before=before).join()
+    assert ended.code == 0, ended
+    assert "Traceback" not in ended.err
 
 
-def build_verify_report(folder: Path, name: str, changes: dict[str, str | None]) -> None:
+def build_verify_report(
+    folder: Path, name: str, changes: dict[str, str | None], *, fresh: bool = False
+) -> None:
     """All files have names that begin with ``name``."""
     domain, problem, language, page = (f"{name}{end}" for end in (".d", ".p", ".json", ".html"))
     shutil.copy(DOMAINS / "grid" / "domain.pddl", folder / domain)
     shutil.copy(DOMAINS / "grid" / "gw1-2x2.pddl", folder / problem)
-    run(folder, changes, "build", f"--output={language}", "--", domain, problem)
-    run(folder, changes, "verify", "--", language, domain, problem)
-    run(folder, changes, "report", f"--output={page}", "--", language, domain, problem)
+    run(folder, changes, "build", f"--output={language}", "--", domain, problem, fresh=fresh)
+    run(folder, changes, "verify", "--", language, domain, problem, fresh=fresh)
+    run(folder, changes, "report", f"--output={page}", "--", language, domain, problem, fresh=fresh)
     assert sorted(path.name for path in folder.iterdir()) == sorted(
         [domain, problem, language, page]
     )
@@ -51,6 +57,11 @@ def test_names_of_files(name: str, tmp_path: Path) -> None:
     build_verify_report(tmp_path, name, {})
 
 
-@pytest.mark.parametrize("which", SURROUNDINGS)
-def test_surroundings(which: str, tmp_path: Path) -> None:
-    build_verify_report(tmp_path, "ünïcödé", SURROUNDINGS[which])
+def test_without_utf_8(tmp_path: Path) -> None:
+    build_verify_report(tmp_path, "ünïcödé", SURROUNDINGS["not UTF-8"], fresh=True)
+
+
+@pytest.mark.parametrize("which", ["no HOME", "HOME is missing", "TMPDIR is missing"])
+@pytest.mark.parametrize("fresh", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_surroundings(fresh: bool, which: str, tmp_path: Path) -> None:
+    build_verify_report(tmp_path, "ünïcödé", SURROUNDINGS[which], fresh=fresh)

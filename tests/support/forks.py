@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from planners.signals import ENDING
-from tests.support.command import Outcome
+from tests.support.command import Outcome, own_process
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,10 @@ class Fork:
 
     def send(self, number: int) -> None:
         os.kill(self.pid, number)
+
+    def ended(self) -> bool:
+        """Whether it has ended; it is not waited for."""
+        return os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
 
     def join(self, timeout: float = 120.0) -> Outcome:
         """Wait for its end; a negative code is the signal that ended it."""
@@ -55,11 +59,11 @@ def fork(work: Callable[[], object]) -> Fork:
     try:
         os.dup2(out[1], 1)
         os.dup2(err[1], 2)
+        os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
         sys.stdout = os.fdopen(1, "w", closefd=False)
         sys.stderr = os.fdopen(2, "w", closefd=False)
         for number in ENDING:
             signal.signal(number, signal.SIG_DFL)
-        signal.signal(signal.SIGINT, signal.default_int_handler)
         work()
         code = 0
     except SystemExit as error:
@@ -83,5 +87,16 @@ def fork_command(*arguments: object, before: Callable[[], object] = lambda: None
         before()
         sys.argv = ["coordlang", *map(str, arguments)]
         main()
+
+    return fork(work)
+
+
+def fresh_command(*arguments: object, before: Callable[[], object] = lambda: None) -> Fork:
+    """Run ``coordlang ..`` in a new interpreter, after ``before``."""
+
+    def work() -> None:
+        before()
+        command = own_process(*arguments)
+        os.execv(command[0], command)
 
     return fork(work)
