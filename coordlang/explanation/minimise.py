@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from coordlang.explanation.boxes import Bits, Points, conflicting, expand
 from coordlang.vocabulary.sat import Undecided, satisfiable
+from planners.errors import CoordlangError
 from planners.sat import sat_solver
 
 #: Array elements looked at in expansions; decides how many passes are made.
@@ -177,7 +178,16 @@ def _fewer(points: Points, number: int, needed: Sequence[int]) -> Bits | None:
         model = np.array(solver.get_model()[: number * (width + len(points.on))]) > 0
     holds = model[number * width :].reshape(number, len(points.on))
     seeds = [points.supercube(np.flatnonzero(row)) for row in holds if row.any()]
-    return _irredundant(points, np.array([expand(points, seed, points.on) for seed in seeds]))
+    boxes = np.array([expand(points, seed, points.on) for seed in seeds])
+    if (
+        points.inside(boxes, points.off).any()
+        or not points.inside(boxes, points.on).any(axis=0).all()
+    ):
+        raise CoordlangError(
+            "the boxes that Glucose found do not hold the points that they must hold",
+            remedy="This is a defect of the solver, not of the input: please report it.",
+        )
+    return _irredundant(points, boxes)
 
 
 def _box_clauses(points: Points, number: int, needed: Sequence[int]) -> Iterator[list[int]]:

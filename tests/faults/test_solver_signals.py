@@ -148,12 +148,12 @@ def test_many_interrupts_of_a_search_for_the_minimum(tmp_path: Path) -> None:
         folder.mkdir()
         arguments = ("build", *HANDOVER, "--tasks", "all", "--method", "minimal")
         process = fork_command(*arguments, "-o", folder / "l.json")
-        time.sleep(choice.uniform(0.2, 3.0))
+        time.sleep(choice.uniform(0.2, 2.0))
         process.send(signal.SIGINT)
         ended = process.join(60)
         assert ended.code == 130, ended
         # Nothing is said before the command line is there.
-        assert ended.err == "" or ended.err.startswith("coordlang: interrupted")
+        assert ended.err.lstrip()[:22] in ("", "coordlang: interrupted")
         assert "Traceback" not in ended.err
         files = [path.name for path in folder.iterdir()]
         assert files == (["l.json"] if "is written" in ended.err else [])
