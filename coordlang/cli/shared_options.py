@@ -13,6 +13,7 @@ import click
 
 from coordlang.api.options import COSTS, UNOWNED, ModelKeywords, PiecesKeywords
 from coordlang.cli.echo import echo
+from planners.errors import OutOfTime
 
 #: A command's function; it returns the exit code, None for 0.
 CommandFunction = Callable[..., int | None]
@@ -122,7 +123,12 @@ def pieces_options(function: CommandFunction) -> CommandFunction:
                 makes_folder=True,
             )
         pieces = {"jobs": jobs, "scheduler": scheduler, "resume": resume, "note": note}
-        return function(pieces=pieces, **arguments)
+        try:
+            return function(pieces=pieces, **arguments)
+        except (KeyboardInterrupt, OutOfTime):
+            if resume is not None:
+                note(f"finished pieces are kept in {resume}: the same command goes on from there")
+            raise
 
     return wrapped
 
