@@ -21,6 +21,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import os
+import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -125,10 +126,24 @@ __all__ = [
 ]
 
 
+def why_not_here() -> str | None:
+    """Return why coordlang does not run on this system, or None where it does."""
+    if sys.platform == "win32" or importlib.util.find_spec("resource") is None:
+        return (
+            f"coordlang runs on Linux and macOS, not on this system ({sys.platform}): its limits of "
+            "time and memory need POSIX signals\n"
+            "  On Windows use WSL (https://learn.microsoft.com/windows/wsl/install): "
+            "`wsl --install`, then `pip install coordlang` in it."
+        )
+    return None
+
+
 def __getattr__(name: str) -> object:
     module = _MODULE_OF.get(name)
     if module is None:
         raise AttributeError(f"module 'coordlang' has no attribute {name!r}")
+    if why_not := why_not_here():
+        raise OSError(why_not)
     value: object = getattr(importlib.import_module(module), name)
     globals()[name] = value
     return value

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """``python -m coordlang`` and the program ``coordlang``: the command line.
 
-Signals are looked after before anything else is imported.
+Signals are looked after before anything else of the packages is imported.
 """
 
 from __future__ import annotations
@@ -9,10 +9,13 @@ from __future__ import annotations
 import sys
 from typing import NoReturn
 
-from planners.signals import Interruptions
+import coordlang
 
 #: Digits of a number of plans: more than there are plans of any space that fits into memory.
 _DIGITS = 100_000
+
+#: The exit code on a system that coordlang does not run on: that of what it relies on.
+_NOT_HERE = 32
 
 
 def main() -> NoReturn:
@@ -21,6 +24,11 @@ def main() -> NoReturn:
     Ctrl-C (SIGINT), SIGTERM and SIGHUP end the work at any moment, imports included: what is half
     done is removed, and the exit code is 128 and the number of the signal.
     """
+    if why_not := coordlang.why_not_here():
+        print(f"coordlang: {why_not}", file=sys.stderr)
+        sys.exit(_NOT_HERE)
+    from planners.signals import Interruptions
+
     interruptions = Interruptions()
     if 0 < sys.get_int_max_str_digits() < _DIGITS:  # 0: there is no limit
         sys.set_int_max_str_digits(_DIGITS)

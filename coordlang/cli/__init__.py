@@ -68,7 +68,9 @@ def _run(arguments: list[str]) -> int:
         # The reader has gone (`| head`): no more output, and no complaint at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return BROKEN_PIPE
-    except SystemExit:
+    except SystemExit as end:
+        if "_COORDLANG_COMPLETE" in os.environ:  # so ends click what a shell asks it
+            return 2 if end.code else 0
         return BROKEN_PIPE  # so ends click a command whose reader has gone
 
 

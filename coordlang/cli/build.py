@@ -22,7 +22,7 @@ from coordlang.api.options import (
 )
 from coordlang.cli.echo import echo
 from coordlang.cli.exit_codes import INTERRUPTED, UNPROVED, interrupted_by
-from coordlang.cli.files import PlanningFiles, check_outputs, never_stdout, planning_files
+from coordlang.cli.files import FILE, PlanningFiles, check_outputs, never_stdout, planning_files
 from coordlang.cli.shared_options import (
     ModelKeywords,
     PiecesKeywords,
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 @planning_files("DOMAIN PROBLEMS...")
 @click.option(
     "--tasks",
+    type=FILE,
     metavar="all|FILE",
     help="Candidate tasks: every pair of reachable states, or a task file "
     "(default: the problems' own).",
@@ -73,6 +74,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--certificate",
+    type=FILE,
     metavar="FILE",
     help="Also write why fewer words do not suffice, for `verify --certificate`.",
 )
@@ -88,6 +90,7 @@ if TYPE_CHECKING:
     "-o",
     "--output",
     required=True,
+    type=FILE,
     metavar="LANGUAGE",
     help="The language file; .json or .json.gz, - for stdout.",
 )

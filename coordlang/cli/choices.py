@@ -15,6 +15,7 @@ import coordlang
 from coordlang.cli.echo import echo
 from coordlang.cli.exit_codes import REFUTED
 from coordlang.cli.files import (
+    FILE,
     PlanningFiles,
     check_outputs,
     language_argument,
@@ -81,7 +82,9 @@ _LEAST_ROOM = 30
     show_default=True,
 )
 @click.option("--json", "as_json", is_flag=True, help="Short for --format json.")
-@click.option("-o", "--output", metavar="FILE", help="Write to this file instead of stdout.")
+@click.option(
+    "-o", "--output", type=FILE, metavar="FILE", help="Write to this file instead of stdout."
+)
 @model_options
 @limits
 def command(

@@ -13,7 +13,7 @@ import click
 
 from coordlang.cli.echo import echo
 from coordlang.cli.exit_codes import UNPROVED
-from coordlang.cli.files import check_outputs
+from coordlang.cli.files import FOLDER, check_outputs
 from coordlang.cli.group import RenamedOptions
 from coordlang.cli.shared_options import limits, note, was_given
 from coordlang.cli.terminal import bar
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 @click.argument("names", nargs=-1, required=True, metavar="NAME...")
 @click.option(
     "--results",
+    type=FOLDER,
     metavar="DIR",
     help="Where results are kept (default: evaluation; with --quick evaluation/quick).",
 )
@@ -65,8 +66,9 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--domains",
+    type=FOLDER,
     metavar="DIR",
-    help="The shipped domains (default: domains here, or those of the checkout).",
+    help="The shipped domains (default: domains here, or those of the package).",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print all results as one JSON object.")
 @limits

@@ -13,6 +13,7 @@ import coordlang
 from coordlang.api.options import TARGETS, Target
 from coordlang.cli.echo import echo
 from coordlang.cli.files import (
+    FILE,
     PlanningFiles,
     check_outputs,
     language_argument,
@@ -45,6 +46,7 @@ _RENAMED = {"--limit": "--max-actions", "--back": "--translate-plan"}
 @click.option(
     "-o",
     "--output",
+    type=FILE,
     metavar="PATH",
     help="pddl: a folder for domain.pddl and problem.pddl; ltlf: a file.",
 )
@@ -58,6 +60,7 @@ _RENAMED = {"--limit": "--max-actions", "--back": "--translate-plan"}
 )
 @click.option(
     "--translate-plan",
+    type=FILE,
     metavar="PLAN",
     help="Do not export: translate a plan of the exported problem into a plan file.",
 )

@@ -10,11 +10,33 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import click
+from click.shell_completion import CompletionItem
 
 from coordlang.cli.echo import echo
 from coordlang.cli.shared_options import CommandFunction
 
-language_argument = click.argument("language", type=click.Path())
+
+class _Named(click.ParamType):  # type: ignore[type-arg]  # generic in newer versions only
+    """Text that names a file or a folder: shells complete it, and nothing is checked yet.
+
+    Parameters
+    ----------
+    kind
+        What click calls it: ``file`` or ``dir``.
+    """
+
+    def __init__(self, kind: str) -> None:
+        self.name = kind
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        return [CompletionItem(incomplete, type=self.name)]
+
+
+FILE, FOLDER = _Named("file"), _Named("dir")
+
+language_argument = click.argument("language", type=FILE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,9 +89,10 @@ def planning_files(
     """
 
     def decorate(function: CommandFunction) -> CommandFunction:
-        @click.argument("files", nargs=-1, metavar=metavar)
+        @click.argument("files", nargs=-1, type=FILE, metavar=metavar)
         @click.option(
             "--factored",
+            type=FOLDER,
             metavar="DIR",
             help="In place of DOMAIN and PROBLEM: the folder of each robot's own domain and "
             "problem file.",

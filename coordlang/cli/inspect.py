@@ -10,7 +10,7 @@ import click
 
 import coordlang
 from coordlang.cli.echo import echo
-from coordlang.cli.files import PlanningFiles, check_outputs, planning_files
+from coordlang.cli.files import FOLDER, PlanningFiles, check_outputs, planning_files
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import note_single_robot, working
 
@@ -28,6 +28,7 @@ WRITTEN = "domain.pddl", "problem.pddl"
 @click.option(
     "--write",
     "folder",
+    type=FOLDER,
     metavar="DIR",
     help="Also write what was read as domain.pddl and problem.pddl in this folder.",
 )

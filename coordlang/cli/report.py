@@ -10,6 +10,7 @@ import click
 
 from coordlang.cli.echo import echo
 from coordlang.cli.files import (
+    FILE,
     PlanningFiles,
     check_outputs,
     language_argument,
@@ -27,7 +28,9 @@ if TYPE_CHECKING:
 @click.command(name="report")
 @language_argument
 @planning_files("DOMAIN PROBLEMS...")
-@click.option("-o", "--output", required=True, metavar="PAGE", help="The HTML file; - for stdout.")
+@click.option(
+    "-o", "--output", required=True, type=FILE, metavar="PAGE", help="The HTML file; - for stdout."
+)
 @click.option(
     "--tasks-shown",
     type=click.IntRange(1, 500),
@@ -38,6 +41,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--coordinates",
+    type=FILE,
     metavar="FILE",
     help="Where the places are drawn (default: coordinates.json beside the "
     "first PROBLEM, else by their names, else laid out).",

@@ -9,7 +9,7 @@ import click
 
 import coordlang
 from coordlang.cli.echo import echo
-from coordlang.cli.files import PlanningFiles, check_outputs, planning_files, write
+from coordlang.cli.files import FILE, PlanningFiles, check_outputs, planning_files, write
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import working
 from planners.notebook import counted
@@ -31,7 +31,9 @@ from planners.notebook import counted
     metavar="PATTERN",
     help="Each goal has one atom of this pattern (default: the problem's goal).",
 )
-@click.option("-o", "--output", required=True, metavar="FILE", help="The task file, - for stdout.")
+@click.option(
+    "-o", "--output", required=True, type=FILE, metavar="FILE", help="The task file, - for stdout."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as one JSON object.")
 @model_options
 @limits

@@ -11,6 +11,7 @@ import click
 import coordlang
 from coordlang.cli.echo import echo
 from coordlang.cli.files import (
+    FILE,
     PlanningFiles,
     check_outputs,
     language_argument,
@@ -47,7 +48,9 @@ _DRAWN = ("dot", "svg")
     help=f"Cut the DAG to about N nodes (default: {_DEFAULT_NODES} for dot and svg; json: "
     "not cut).",
 )
-@click.option("-o", "--output", metavar="FILE", help="Write to this file instead of stdout.")
+@click.option(
+    "-o", "--output", type=FILE, metavar="FILE", help="Write to this file instead of stdout."
+)
 @model_options
 @limits
 def command(

@@ -12,6 +12,7 @@ import coordlang
 from coordlang.cli.echo import echo
 from coordlang.cli.exit_codes import REFUTED
 from coordlang.cli.files import (
+    FILE,
     PlanningFiles,
     check_outputs,
     language_argument,
@@ -39,16 +40,19 @@ if TYPE_CHECKING:
 @planning_files("DOMAIN PROBLEMS...")
 @click.option(
     "--tasks",
+    type=FILE,
     metavar="all|FILE",
     help="Check these tasks (default: those that the language file records).",
 )
 @click.option(
     "--certificate",
+    type=FILE,
     metavar="FILE",
     help="Also check why fewer words do not suffice (a file of `build --certificate`).",
 )
 @click.option(
     "--dimacs",
+    type=FILE,
     metavar="FILE",
     help="With --certificate: write the formula that was refuted, for any SAT solver.",
 )

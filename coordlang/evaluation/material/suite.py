@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from coordlang.shipped import shipped_domains
 from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
 from coordlang.tasks.listed import ListedTask
 from coordlang.tasks.task_file import read_task_file
@@ -91,19 +92,19 @@ WORLDS = {world.name: world for world in (*ROWS, *OTHERS)}
 
 
 def find_domains(given: str | None) -> Path:
-    """Return the folder of the shipped domains: ``given``, else that of here or of the checkout.
+    """Return the folder of the shipped domains: ``given``, else that of here or of the package.
 
     Raises
     ------
     UsageError
         If there is none.
     """
-    beside = Path(__file__).resolve().parents[3] / "domains"
-    places = [Path(given)] if given else [Path("domains"), beside]
-    for place in places:
-        if (place / "grid" / "domain.pddl").is_file():
-            return place.resolve()
+    place = Path(given or "domains")
+    if (place / "grid" / "domain.pddl").is_file():
+        return place.resolve()
+    if given is None:
+        return shipped_domains()
     raise UsageError(
-        f"there are no domains in {' or '.join(str(p) for p in places)}",
-        remedy="Say --domains DIR, the folder domains of a checkout of coordlang.",
+        f"there are no domains in {place}",
+        remedy="Leave out --domains: coordlang brings its own.",
     )
