@@ -233,8 +233,9 @@ def measured(name: str, limit: float, old: float | None) -> dict[str, Any]:
 def _why(code: int, errors: str) -> str:
     if code < 0:
         return "out of time"
-    last = errors.strip().splitlines()[-1] if errors.strip() else f"exit {code}"
-    return "out of memory" if "Memory" in last else last[:60]
+    if "Memory" in errors:
+        return "out of memory"
+    return (errors.strip().splitlines() or [f"exit {code}"])[-1][:60]
 
 
 def cells(figures: dict[str, Any]) -> Iterator[object]:
