@@ -14,12 +14,13 @@ import traceback
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from io import StringIO
 from typing import TextIO
 
 import click
 
+from coordlang.cli.echo import Output, echo
 from coordlang.cli.exit_codes import BROKEN_PIPE, INTERRUPTED, interrupted_by
+from coordlang.cli.failure import Failure, usage_failure, wants_json
 from coordlang.cli.group import cli
 from coordlang.cli.standard_error import drop_stdout
 from planners.errors import CoordlangError, Note, OutOfMemory
@@ -39,31 +40,37 @@ def run(arguments: list[str], interruptions: Interruptions | None = None) -> int
     interruptions
         What looks after the signals that end the process, None if nothing does.
     """
+    output = Output()
     try:
-        return _run(arguments)
+        return _run(arguments, output)
     except (KeyboardInterrupt, click.Abort):
-        return _interrupted(interruptions)
+        failure = _interrupted(interruptions)
     except Exception as error:
         if interruptions is not None and interruptions.first is not None:
-            return _interrupted(interruptions)  # that is what a library made of the interrupt
-        return _failed(error, "--debug" in arguments)
+            failure = _interrupted(interruptions)  # that is what a library made of the interrupt
+        else:
+            failure = _failed(error, "--debug" in arguments)
+    with suppress(OSError):  # the terminal may be gone
+        _show(failure.text)
+        if wants_json(arguments) and not output.written:
+            echo(failure.json())
+            if sys.stdout is not None:
+                sys.stdout.flush()
+    return failure.exit_code
 
 
-def _run(arguments: list[str]) -> int:
+def _run(arguments: list[str], output: Output) -> int:
     """Run one command through click; the exit code."""
     try:
         with _notes_on_stderr():
-            result = cli.main(args=arguments, prog_name="coordlang", standalone_mode=False)
+            result = cli.main(
+                args=arguments, prog_name="coordlang", standalone_mode=False, obj=output
+            )
         if sys.stdout is not None:
             sys.stdout.flush()
         return result if isinstance(result, int) else 0
     except click.exceptions.Exit as done:
         return int(done.exit_code)
-    except click.ClickException as error:
-        shown = StringIO()
-        error.show(file=shown)
-        _show(sentence(shown.getvalue(), keep="\n"))
-        return 2
     except BrokenPipeError:
         # The reader has gone (`| head`): no more output, and no complaint at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -99,47 +106,45 @@ def _notes_on_stderr() -> Iterator[None]:
         yield
 
 
-def _interrupted(interruptions: Interruptions | None) -> int:
-    """Say what has ended the work, if the terminal is still there; the exit code."""
+def _interrupted(interruptions: Interruptions | None) -> Failure:
+    """Say what has ended the work."""
     number = None if interruptions is None else interruptions.first
     by = "" if number in (None, signal.SIGINT) else f" by {signal.Signals(number).name}"
-    with suppress(OSError):
-        _fail(f"interrupted{by}", INTERRUPTED)
-    return INTERRUPTED if number is None else interrupted_by(number)
+    code = INTERRUPTED if number is None else interrupted_by(number)
+    return Failure.of(f"interrupted{by}", code, "Start it again.")
 
 
-def _failed(error: Exception, debug: bool) -> int:
-    """Say what is wrong and what to do; the exit code."""
+def _failed(error: Exception, debug: bool) -> Failure:
+    """Say what is wrong and what to do."""
     match error:
+        case click.ClickException():
+            return usage_failure(error)
         case OSError() if error.errno in _UNWRITABLE:
             drop_stdout()
-            return _fail(f"the output cannot be written: {error.strerror}", 2)
+            what = f"the output cannot be written: {error.strerror}"
+            return Failure.of(what, 2, "Make room, or name another file.")
         case CoordlangError():
             if debug:
                 _show("".join(traceback.format_exception(error)))
-            return _fail(str(error), error.exit_code)
+            return Failure.of_error(error)
     return _internal(error, debug)
 
 
-def _internal(error: Exception, debug: bool) -> int:
+def _internal(error: Exception, debug: bool) -> Failure:
     """A bug: reported as one, with an exit code of its own, and never hidden.
 
     Memory that is used up is none, whatever the error that a library makes of it.
     """
     if lacks_memory(error):
-        return _fail(
-            "out of memory\n  Use a smaller task, or a larger --memory-limit.",
+        return Failure.of(
+            "out of memory",
             OutOfMemory.exit_code,
+            "Use a smaller task, or a larger --memory-limit.",
         )
     if debug:
         _show("".join(traceback.format_exception(error)))
     what = f"internal error: {type(error).__name__}: {sentence(str(error))}"
-    return _fail(f"{what}\n  This is a bug; --debug shows where.", CoordlangError.exit_code)
-
-
-def _fail(message: str, code: int) -> int:
-    _show(f"coordlang: {message}\n")
-    return code
+    return Failure.of(what, CoordlangError.exit_code, "This is a bug; --debug shows where.")
 
 
 def _show(text: str) -> None:

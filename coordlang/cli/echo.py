@@ -3,9 +3,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import click
 
 from planners.messages import visible
+
+
+@dataclass(slots=True)
+class Output:
+    """What a command has done to stdout: whether something is written there already."""
+
+    written: bool = False
 
 
 def echo(text: object, *, err: bool = False, nl: bool = True) -> None:
@@ -13,4 +22,7 @@ def echo(text: object, *, err: bool = False, nl: bool = True) -> None:
 
     Names of files and arguments may hold any character, and escapes of a terminal among them.
     """
+    context = click.get_current_context(silent=True)
+    if not err and context is not None and isinstance(context.obj, Output):
+        context.obj.written = True
     click.echo(visible(str(text), keep="\n\t"), err=err, nl=nl)

@@ -18,6 +18,7 @@ SCHEMAS = {
     "choices": "coordlang.use.choices.record",
     "plans": "planners.search.plan_file",
     "coordinates": "coordlang.report.places",
+    "error": "coordlang.cli.error_object",
 }
 
 
