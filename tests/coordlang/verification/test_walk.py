@@ -14,6 +14,7 @@ from coordlang.tasks.candidates import all_pairs, from_problems
 from coordlang.verification import leads
 from coordlang.verification.by_definition import verify
 from planners.errors import BadInput, ProvedImpossible
+from tests.support.domains import all_tasks
 from tests.support.random_models import random_model
 from tests.support.verification_walk import violation
 
@@ -68,3 +69,12 @@ def test_the_walk_equals_its_twin_on_many_models(robots: int, number: int) -> No
     answers = compared(range(10_000, 10_000 + number), robots)
     print(f"{robots} robots: {answers[True]} partitions with a violation, {answers[False]} without")
     assert min(answers[True], answers[False]) >= 50
+
+
+@pytest.mark.parametrize(("size", "nodes"), [(1, 2031), (2, 5950), (3, 6145), (5, 4502)])
+def test_as_many_nodes_as_before(size: int, nodes: int) -> None:
+    """Diagonal or not: what the walk without a mask counted, the shown violation included."""
+    candidates = all_tasks("grid", "gw2-2x3")
+    word = np.arange(len(candidates.rows)) * 7 % size
+    table = Partition(tuple(f"w{n}" for n in range(size)), candidates.rows, word, 0)
+    assert verify(table, candidates.spaces).nodes == nodes
