@@ -12,9 +12,11 @@ from coordlang.api.inputs import DomainSource, File, ProblemSource
 from coordlang.api.language_inputs import LanguageSource, read_task_language
 from coordlang.api.optimal_plans import PlanSteps
 from coordlang.api.options import (
+    READERS,
     TARGETS,
     GivenOptions,
     ModelKeywords,
+    Reader,
     Target,
     require_one_of,
 )
@@ -23,6 +25,7 @@ from coordlang.api.speaking import SentencePlans, SentenceSource, given_sentence
 from coordlang.use.export.ltlf import SentenceFormula, export_ltlf
 from coordlang.use.export.pddl import PddlExport, export_pddl, plan_names
 from coordlang.use.sentence.open_plans import OpenPlans
+from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import BadInput, Position, Refuted
 from planners.joint.model import JointModel
 from planners.search.plan_file import only_one_plan
@@ -184,6 +187,7 @@ def export(
     factored: File | None = None,
     to: Literal["pddl"] = "pddl",
     max_actions: int = MAX_ACTIONS,
+    for_planner: Reader = "fd",
     **model: Unpack[ModelKeywords],
 ) -> ExportedTask: ...
 
@@ -198,6 +202,7 @@ def export(
     factored: File | None = None,
     to: Literal["ltlf"],
     max_actions: int = MAX_ACTIONS,
+    for_planner: Reader = "fd",
     **model: Unpack[ModelKeywords],
 ) -> ExportedFormula: ...
 
@@ -211,6 +216,7 @@ def export(
     factored: File | None = None,
     to: Target = "pddl",
     max_actions: int = MAX_ACTIONS,
+    for_planner: Reader = "fd",
     **model: Unpack[ModelKeywords],
 ) -> ExportedTask | ExportedFormula:
     """Write a task under a sentence for other programs.
@@ -226,22 +232,32 @@ def export(
         ``"ltlf"``: a temporal formula over plans.
     max_actions
         Beyond this many joint actions robots choose one after another in the PDDL.
+    for_planner
+        Who reads the PDDL: ``"fd"`` (Fast Downward) and ``"kstar"`` read the same, ``"pyperplan"``
+        needs STRIPS without negative conditions and costs.
 
     Raises
     ------
+    UsageError
+        For pyperplan, where STRIPS cannot say what is optimal.
     NoPlanFits
         If no optimal plan has the sentence.
     """
     require_one_of("--to", to, TARGETS)
+    require_one_of("--for", for_planner, READERS)
     said = given_sentence(sentence)
     used = read_task_language(language, domain, problem, factored, GivenOptions.of(**model))
     words = used.words_of(said)
     if to == "pddl":
-        return ExportedTask(OpenPlans.of(used, words), export_pddl(used, words, max_actions))
+        return ExportedTask(OpenPlans.of(used, words), _pddl(used, words, max_actions, for_planner))
     found: SentenceFormula = export_ltlf(used, words)
     return ExportedFormula(
         found.formula, found.over_words, found.words, found.symbols, used.covered
     )
+
+
+def _pddl(used: TaskLanguage, words: Sequence[int], max_actions: int, reader: Reader) -> PddlExport:
+    return export_pddl(used, words, max_actions, strips_only=reader == "pyperplan")
 
 
 def _label_text(model: JointModel, robot: int, label: int) -> str | None:

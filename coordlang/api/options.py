@@ -19,6 +19,8 @@ BuildPreference = Literal["flexible"]
 Unsolvable = Literal["fail", "skip"]
 HeuristicName = Literal["relaxed", "manhattan", "blind"]
 Target = Literal["pddl", "ltlf"]
+#: Planners whose PDDL differs: what Fast Downward and K* read, or STRIPS alone.
+Reader = Literal["fd", "kstar", "pyperplan"]
 
 COSTS: tuple[str, ...] = get_args(Cost)
 UNOWNED: tuple[str, ...] = get_args(Unowned)
@@ -27,6 +29,7 @@ BUILD_PREFERENCES: tuple[str, ...] = get_args(BuildPreference)
 UNSOLVABLE: tuple[str, ...] = get_args(Unsolvable)
 HEURISTICS: tuple[str, ...] = get_args(HeuristicName)
 TARGETS: tuple[str, ...] = get_args(Target)
+READERS: tuple[str, ...] = get_args(Reader)
 
 
 class PiecesKeywords(TypedDict, total=False):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 import coordlang
-from coordlang.api.options import TARGETS, Target
+from coordlang.api.options import READERS, TARGETS, Reader, Target
 from coordlang.cli.echo import echo
 from coordlang.cli.files import (
     FILE,
@@ -59,6 +59,14 @@ _RENAMED = {"--limit": "--max-actions", "--back": "--translate-plan"}
     help="Beyond N joint actions robots choose one after another in the PDDL.",
 )
 @click.option(
+    "--for",
+    "reader",
+    type=click.Choice(READERS),
+    default="fd",
+    show_default=True,
+    help="Who reads the PDDL: fd (Fast Downward) and kstar the same, pyperplan STRIPS only.",
+)
+@click.option(
     "--translate-plan",
     type=FILE,
     metavar="PLAN",
@@ -74,6 +82,7 @@ def command(
     target: Target,
     output: str | None,
     max_actions: int,
+    reader: Reader,
     translate_plan: str | None,
     as_json: bool,
     model: ModelKeywords,
@@ -103,7 +112,12 @@ def command(
         return covered_code(formula.covered)
     with working("compiling the task"):
         exported = coordlang.export(
-            *files, factored=pddl.factored, to="pddl", max_actions=max_actions, **model
+            *files,
+            factored=pddl.factored,
+            to="pddl",
+            max_actions=max_actions,
+            for_planner=reader,
+            **model,
         )
     if translate_plan is not None:
         _write_plan(exported, translate_plan, output, as_json)
@@ -120,6 +134,8 @@ def _check_ltlf(translate_plan: str | None) -> None:
         )
     if was_given("max_actions"):
         raise click.UsageError("--max-actions belongs to --to pddl")
+    if was_given("reader"):
+        raise click.UsageError("--for belongs to --to pddl")
 
 
 def _write_pddl(exported: ExportedTask, output: str | None, as_json: bool) -> None:

@@ -21,6 +21,7 @@ from contextlib import suppress
 
 from planners.classical.explicit import TooManyError, explicit
 from planners.classical.pddl import action_names, to_pddl
+from planners.classical.positive import with_positive_conditions, with_positive_goal
 from planners.classical.selection import select_then_apply
 from planners.classical.selectors import Selectors, selectors_of
 from planners.classical.task import LONGEST, ClassicalAction, ClassicalTask, Condition, Form
@@ -36,6 +37,8 @@ __all__ = [
     "action_names",
     "compile_classical",
     "to_pddl",
+    "with_positive_conditions",
+    "with_positive_goal",
 ]
 
 

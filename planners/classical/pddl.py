@@ -10,8 +10,8 @@ from collections.abc import Iterable, Sequence
 from planners.classical.task import ClassicalTask, Condition
 
 
-def to_pddl(classical: ClassicalTask) -> tuple[str, str]:
-    """Domain and problem text: STRIPS with negative preconditions and action costs.
+def to_pddl(classical: ClassicalTask, *, costs: bool = True) -> tuple[str, str]:
+    """Domain and problem text: STRIPS with negative preconditions and, if asked for, action costs.
 
     Facts become predicates without arguments; a comment keeps what each predicate and action stands
     for.
@@ -21,34 +21,43 @@ def to_pddl(classical: ClassicalTask) -> tuple[str, str]:
     domain = [
         f"; {classical.name}: {classical.form} form; one joint step costs {classical.step_cost}",
         "(define (domain plain)",
-        "  (:requirements :strips :negative-preconditions :action-costs)",
+        f"  (:requirements {_requirements(classical, costs)})",
         "  (:predicates",
         *(f"    ({safe}) ; {text}" for safe, text in zip(facts, classical.facts, strict=True)),
         "  )",
-        "  (:functions (total-cost) - number)",
+        *(["  (:functions (total-cost) - number)"] if costs else []),
     ]
     for safe, action in zip(actions, classical.actions, strict=True):
         changes = [f"({facts[n]})" for n in action.adds] + [
             f"(not ({facts[n]}))" for n in action.deletes
         ]
+        paid = [f"(increase (total-cost) {action.cost})"] if costs else []
         domain += [
             f"  ; {action.name}",
             f"  (:action {safe}",
             "    :parameters ()",
             f"    :precondition {_all_of(facts, action.preconditions)}",
-            f"    :effect (and {' '.join((*changes, f'(increase (total-cost) {action.cost})'))}))",
+            f"    :effect (and {' '.join((*changes, *paid))}))",
         ]
     problem = [
         "(define (problem plain-task)",
         "  (:domain plain)",
         "  (:init",
-        "    (= (total-cost) 0)",
+        *(["    (= (total-cost) 0)"] if costs else []),
         *(f"    ({facts[n]})" for n in sorted(classical.init)),
         "  )",
-        f"  (:goal {_all_of(facts, classical.goal)})",
-        "  (:metric minimize (total-cost)))",
+        f"  (:goal {_all_of(facts, classical.goal)}){'' if costs else ')'}",
+        *(["  (:metric minimize (total-cost)))"] if costs else []),
     ]
     return "\n".join((*domain, ")", "")), "\n".join((*problem, ""))
+
+
+def _requirements(classical: ClassicalTask, costs: bool) -> str:
+    conditions = (c for action in classical.actions for c in action.preconditions)
+    negative = any(not positive for _, positive in (*classical.goal, *conditions))
+    names = [":strips"]
+    names += [":negative-preconditions"] if negative or costs else []
+    return " ".join(names + ([":action-costs"] if costs else []))
 
 
 def action_names(classical: ClassicalTask) -> list[str]:

@@ -38,8 +38,10 @@ from planners.classical import (
     action_names,
     compile_classical,
     to_pddl,
+    with_positive_conditions,
+    with_positive_goal,
 )
-from planners.errors import BadInput
+from planners.errors import BadInput, UsageError
 from planners.joint.model import IDLE, JointModel, PlanningTask
 from planners.messages import echoed
 from planners.search.plans import Plan
@@ -117,7 +119,13 @@ class PddlExport:
         return labels
 
 
-def export_pddl(task_language: TaskLanguage, words: Sequence[int], limit: int = 2000) -> PddlExport:
+def export_pddl(
+    task_language: TaskLanguage,
+    words: Sequence[int],
+    limit: int = 2000,
+    *,
+    strips_only: bool = False,
+) -> PddlExport:
     """Write the task under a sentence as PDDL; its optimal plans are exactly those of the sentence.
 
     The cost of a plan is that of the joint plan: ``classical.cost`` of the total cost is (makespan,
@@ -132,9 +140,14 @@ def export_pddl(task_language: TaskLanguage, words: Sequence[int], limit: int = 
     limit
         Up to this many plain actions every joint action is written as one; beyond, robots choose
         one after another (see `planners.classical.compile_classical`).
+    strips_only
+        Neither negative conditions nor costs: then the plans with the fewest actions are those of
+        the sentence.
 
     Raises
     ------
+    UsageError
+        Under ``strips_only``, where actions without costs do not count joint steps.
     NoPlanFits
         If no optimal plan has the sentence.
     """
@@ -147,7 +160,12 @@ def export_pddl(task_language: TaskLanguage, words: Sequence[int], limit: int = 
     tests = membership(task_language)
     named = named_by_words(task_language, words, plain, labels, tests)
     labels += [()] * (len(named.actions) - len(labels))
-    domain, problem = to_pddl(named)
+    if strips_only:
+        _require_steps_counted(plain, model)
+        named = with_positive_conditions(named)
+    else:
+        named = with_positive_goal(named)
+    domain, problem = to_pddl(named, costs=not strips_only)
     return PddlExport(
         model=model,
         classical=named,
@@ -157,6 +175,24 @@ def export_pddl(task_language: TaskLanguage, words: Sequence[int], limit: int = 
         cost=plain.step_cost * makespan + second,
         terms=tests.size,
     )
+
+
+def _require_steps_counted(plain: ClassicalTask, model: JointModel) -> None:
+    """Raise `UsageError` where fewest actions are not least cost.
+
+    In the explicit form each joint step takes as many actions as any other: itself, the naming of
+    its state, and one that stays at the word or goes on.
+    """
+    if plain.form != "explicit":
+        raise UsageError(
+            "without costs every joint action must be one action, and there are too many",
+            remedy="Use a greater --max-actions, or leave out --for pyperplan.",
+        )
+    if model.cost != "makespan":
+        raise UsageError(
+            f"--for pyperplan writes no costs, and --cost {model.cost} needs them",
+            remedy="Leave out --for pyperplan, or build the language with --cost makespan.",
+        )
 
 
 def plan_names(text: str) -> list[str]:
