@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import pytest
 
 import coordlang as door
+from coordlang.api.exporting import ExportedTask
 from coordlang.building import build_language
 from coordlang.tasks.candidates import from_problems
 from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
@@ -41,7 +43,11 @@ def lift() -> tuple[Any, Any]:
     return domain, parse_problem(Source("p.pddl", BOTH), domain)
 
 
-TASKS = {"lift": lift, "grid": lambda: GRID, "charger": lambda: CHARGER}
+TASKS: dict[str, Callable[[], tuple[Any, Any]]] = {
+    "lift": lift,
+    "grid": lambda: GRID,
+    "charger": lambda: CHARGER,
+}
 EACH = pytest.mark.parametrize("name", TASKS)
 
 
@@ -54,9 +60,10 @@ def built(name: str) -> tuple[Any, Any, str, int]:
     return files, language, sentence, door.understand(language, *files, sentence).count
 
 
-def export(name: str, **options: Any) -> Any:
+def export(name: str, **options: Any) -> ExportedTask:
     files, language, sentence, _ = built(name)
-    return door.export(language, *files, sentence, **options)
+    exported: ExportedTask = door.export(language, files[0], files[1], sentence, **options)
+    return exported
 
 
 def test_no_negative_goal() -> None:
@@ -126,7 +133,7 @@ def test_pyperplan(name: str, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "pyperplan", "-s", "astar", "-H", "blind", *pddl]
     subprocess.run(command, check=True, capture_output=True)
     plan = exported.translate_text((tmp_path / "problem.pddl.soln").read_text(), "the plan")
-    assert door.say(language, *files, plan).sentence == sentence
+    assert door.say(language, files[0], files[1], plan).sentence == sentence
 
 
 @EACH
