@@ -5,6 +5,7 @@ each other.
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 from pathlib import Path
@@ -69,7 +70,9 @@ def test_no_input_file_is_overwritten(
 ) -> None:
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     outcome = coordlang(*arguments)
-    assert (outcome.code, outcome.out) == (2, "")
+    assert outcome.code == 2
+    assert outcome.out == "" or json.loads(outcome.out)["error"]["exit_code"] == 2
+    assert ("--json" in arguments) == (outcome.out != "")
     assert "would overwrite an input file\n  " in outcome.err
     assert before == {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
