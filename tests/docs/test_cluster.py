@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -131,7 +132,7 @@ def test_the_script_of_a_slurm_job(folder: Path) -> None:
     assert any(line.startswith("--mem=") for line in given)
     (started,) = (line for line in lines if "distributed.cli.dask_worker" in line)
     words = shlex.split(started)
-    options = dict(zip(words, words[1:], strict=False))
+    options = dict(pairwise(words))
     assert (options["--nworkers"], options["--nthreads"]) == ("4", "1")
     assert options["--memory-limit"] in ("3.73GiB", "4.00GB")
     assert any("OMP_NUM_THREADS=1" in line for line in lines)

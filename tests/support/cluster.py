@@ -56,10 +56,8 @@ class Started:
     def end(self) -> None:
         """End all of it."""
         self.kill(signal.SIGTERM)
-        try:
+        with suppress(subprocess.TimeoutExpired):
             self._process.wait(5)
-        except subprocess.TimeoutExpired:
-            pass
         self.kill()
         self._process.wait()
 
