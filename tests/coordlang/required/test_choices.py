@@ -15,7 +15,7 @@ from coordlang.required.choices import Choices
 from coordlang.required.divergences import first_differences
 from coordlang.required.label_sets import LabelSets
 from coordlang.required.miscoordination import inseparable
-from coordlang.required.partings import Partings, _KnownSets
+from coordlang.required.partings import Partings, _KnownSets, minimal
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from planners.errors import BadInput, ProvedImpossible
 from planners.loading import ModelOptions
@@ -184,4 +184,49 @@ def test_many_plan_spaces_share_their_sets(seed: int) -> None:
     sets = LabelSets()
     assert [Choices(space, sets).requires.tolist() for space in spaces] == [
         twin.requires.tolist() for twin in walks
+    ]
+
+
+TWO_WAYS = """(define (domain two-ways) (:types robot place)
+ (:predicates (at ?r - robot ?x - place) (way ?x ?y - place))
+ (:action walk :agent ?r - robot :parameters (?x ?y - place)
+  :precondition (and (at ?r ?x) (way ?x ?y) (forall (?o - robot) (not (at ?o ?y))))
+  :effect (and (at ?r ?y) (not (at ?r ?x))))
+ (:action run :agent ?r - robot :parameters (?x ?y - place)
+  :precondition (and (at ?r ?x) (way ?x ?y) (forall (?o - robot) (not (at ?o ?y))))
+  :effect (and (at ?r ?y) (not (at ?r ?x)))))"""
+
+
+def test_several_labels_lead_to_one_state() -> None:
+    """Every robot may walk or run: several edges join the same two nodes, and plans mix freely."""
+    domain = parse_domain(Source("domain", TWO_WAYS))
+    places = " ".join(f"c{n}" for n in range(5))
+    ways = " ".join(f"(way c{n} c{(n + k) % 5})" for n in range(5) for k in (1, 4))
+    problem = parse_problem(
+        Source(
+            "problem",
+            f"(define (problem p) (:domain two-ways) (:objects r1 r2 - robot {places} - place)"
+            f" (:init (at r1 c0) (at r2 c2) {ways}) (:goal (at r1 c1)))",
+        ),
+        domain,
+    )
+    (space,) = all_pairs(domain, [problem]).spaces
+    ends = np.column_stack((space.sources, space.targets()))
+    assert len(np.unique(ends, axis=0)) < len(ends)
+    assert inseparable(space) is None
+    choices = Choices(space)
+    partings = Partings(2)
+    partings.add(choices)
+    rows = [tuple(row) for row in partings.table().tolist()]
+    assert rows == naive_partings.divergences(choices)
+    assert rows
+
+
+def test_what_a_smaller_divergence_implies() -> None:
+    rows = np.array([[0, 3, 4, 5], [0, 1, 2, 3], [0, 1, 2, -1], [1, 1, 2, 3], [0, 2, 3, 4]])
+    assert minimal(np.concatenate((rows, rows))).tolist() == [
+        [0, 1, 2, -1],
+        [0, 2, 3, 4],
+        [0, 3, 4, 5],
+        [1, 1, 2, 3],
     ]
