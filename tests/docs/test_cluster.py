@@ -72,6 +72,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.thorough
 def test_one_machine(folder: Path) -> None:
     line = command("resume")
     succeeds(line.replace("--jobs 2 --resume pieces", "--jobs 1"), folder)
@@ -87,6 +88,7 @@ def test_one_machine(folder: Path) -> None:
 
 
 @needs_distributed
+@pytest.mark.thorough
 def test_two_terminals_with_a_worker_killed_in_the_middle(folder: Path) -> None:
     succeeds(command("resume").replace("--jobs 2 --resume pieces", "--jobs 1"), folder)
     alone = (folder / "4x4.json").rename(folder / "alone.json")

@@ -23,7 +23,18 @@ def test_matches() -> None:
     assert not matches([], ["a"])
 
 
-@pytest.mark.parametrize("page", [p for p in PAGES if blocks(p)], ids=lambda p: p.stem)
+#: Pages of many commands, which take a while.
+LONG = ("cli", "library")
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(p, id=p.stem, marks=[pytest.mark.thorough] if p.stem in LONG else [])
+        for p in PAGES
+        if blocks(p)
+    ],
+)
 def test_page_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "domains").symlink_to(ROOT / "domains")
     monkeypatch.chdir(tmp_path)

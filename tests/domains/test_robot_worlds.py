@@ -129,6 +129,7 @@ def test_there_is_a_problem_of_each_kind(folder: str) -> None:
 # Fast Downward
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("folder", "problem"),
     [
@@ -151,6 +152,7 @@ def test_fast_downward_agrees(folder: str, problem: str) -> None:
     assert optimal_cost(loaded.model, loaded.tasks[0], time_limit=60).cost == ours
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("problem", "fuel"), [("one-van", 5), ("two-each", 6)])
 def test_fast_downward_agrees_about_fuel(problem: str, fuel: int) -> None:
     loaded = load(*files("vans", problem), ModelOptions(cost="makespan+cost"))

@@ -203,6 +203,7 @@ def aside(plan: Plan) -> frozenset[int]:
     return frozenset(robot for robot, text in moves(plan) if text.endswith(" c0-4)"))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("folder", "problem", "tasks", "told", "leaves"),
     [

@@ -117,14 +117,16 @@ def build(sizes: Iterator[int], language: bytes, folder: Path) -> dict[int, int]
             assert content(path.read_bytes()) == content(language)
             path.unlink()
         else:
-            assert size < len(language) + 200  # its producer says how many seconds it took
+            assert (
+                size < len(language) + 500
+            )  # its producer names the file, and the seconds it took
             assert ended.err.startswith(f"coordlang: {path} cannot be written: File too large\n")
         assert list(folder.iterdir()) == []
     return codes
 
 
 def test_a_language_is_whole_or_none(language: bytes, tmp_path: Path) -> None:
-    codes = build(iter((*QUICK, len(language) - 200, len(language) + 200)), language, tmp_path)
+    codes = build(iter((*QUICK, len(language) - 200, len(language) + 500)), language, tmp_path)
     assert all(codes.values())
 
 

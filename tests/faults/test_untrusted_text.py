@@ -460,6 +460,7 @@ def test_other_files_and_arguments(coordlang: Command, corridor: World, bad: str
         refused(coordlang(*command), bad)
 
 
+@pytest.mark.thorough
 def test_names_of_files(coordlang: Command, tmp_path: Path) -> None:
     folder = tmp_path / "a\x1b[31m\nb\u202e"
     folder.mkdir()

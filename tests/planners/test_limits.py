@@ -293,7 +293,10 @@ def test_verification_and_the_search_for_a_break_say_how_far_they_got(
     assert "0 of 4 steps to the first break of a mixture, 1 nodes" in str(caught.value)
 
 
-@pytest.mark.parametrize("problem", ["corners-4x4", "three-robots-3x3"])
+@pytest.mark.thorough
+@pytest.mark.parametrize(
+    "problem", ["corners-4x4", pytest.param("three-robots-3x3", marks=pytest.mark.slow)]
+)
 def test_work_in_pieces_is_the_same_work(problem: str) -> None:
     loaded = corners(problem)
     init = loaded.tasks[0].init[None, :]

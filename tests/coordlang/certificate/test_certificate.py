@@ -217,6 +217,7 @@ def test_nothing_to_refute() -> None:
     assert not encode([frozenset({(0, 1)})], 2).refuted()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("folder", "remember"),
     [

@@ -6,6 +6,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
 
@@ -71,6 +73,7 @@ def test_prefer_belongs_to_the_exact_methods(tmp_path: Path, coordlang: Command)
     assert not (tmp_path / "l.json").exists()
 
 
+@pytest.mark.thorough
 def test_overlapping_words_are_written_and_verified(tmp_path: Path, coordlang: Command) -> None:
     path = tmp_path / "l.json"
     outcome = coordlang("build", *SQUARE, "--tasks", "all", "--overlap", "-o", path, "--json")

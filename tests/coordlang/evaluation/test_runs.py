@@ -61,11 +61,13 @@ def test_a_line_says_what_it_was_made_with(finished: Path) -> None:
     assert keys == [unit.key for unit in GAME.units(settings(finished))]
 
 
+@pytest.mark.thorough
 def test_processes_do_not_matter(finished: Path, tmp_path: Path) -> None:
     run([GAME], settings(tmp_path), Results(tmp_path), Processes(jobs=3))
     assert lines(tmp_path, "game") == lines(finished, "game")
 
 
+@pytest.mark.thorough
 def test_known_results_are_not_run_again(finished: Path, tmp_path: Path) -> None:
     whole = (finished / "game.jsonl").read_text()
     kept = whole.splitlines(keepends=True)
@@ -116,7 +118,9 @@ def wait_for_lines(path: Path, number: int, process: subprocess.Popen[bytes]) ->
         time.sleep(0.01)
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
+@pytest.mark.parametrize(
+    "how", [pytest.param(signal.SIGKILL, marks=pytest.mark.thorough), signal.SIGINT]
+)
 def test_a_killed_run_goes_on(finished: Path, tmp_path: Path, how: signal.Signals) -> None:
     process = start(tmp_path, "--jobs", "1")
     wait_for_lines(tmp_path / "game.jsonl", 2, process)

@@ -38,7 +38,10 @@ def at(key: str, predicate: str = "at") -> dict[str, str]:
     return {atom[1]: atom[2] for atom in atoms if atom[0] == predicate}
 
 
-@pytest.mark.parametrize(("domain", "problem", "tasks"), WORLDS)
+@pytest.mark.parametrize(
+    ("domain", "problem", "tasks"),
+    [WORLDS[0], *(pytest.param(*world, marks=pytest.mark.thorough) for world in WORLDS[1:])],
+)
 def test_every_page_plays(open_page: Opener, domain: str, problem: str, tasks: str | None) -> None:
     """Every task of the page, at its end and in each robot's place; in the end nothing was logged."""
     world = make_world(domain, problem, tasks)
@@ -65,6 +68,7 @@ def test_every_page_plays(open_page: Opener, domain: str, problem: str, tasks: s
         assert all("goal is reached" in end for end in ends)
 
 
+@pytest.mark.thorough
 def test_plans_are_those_of_the_planner(open_page: Opener) -> None:
     """Each sentence, each of its plans, each step: every robot is where the planner says."""
     world = make_world("grid", "three-robots-3x3", None)
@@ -89,6 +93,7 @@ def test_plans_are_those_of_the_planner(open_page: Opener) -> None:
     assert checked > 100
 
 
+@pytest.mark.thorough
 def test_all_plans_through_the_interface_of_the_page(open_page: Opener) -> None:
     """The page's own counting and ranking, over all sentences of all tasks: nothing is missing,
     nothing twice.
@@ -116,6 +121,7 @@ def test_all_plans_through_the_interface_of_the_page(open_page: Opener) -> None:
         assert set(found) == {True}
 
 
+@pytest.mark.thorough
 def test_a_robots_options_are_its_own_subplans(open_page: Opener) -> None:
     """What the page lets a robot do, step by step, is what its part is in some plan with the
     sentence; no more, no less.
@@ -142,6 +148,7 @@ def test_a_robots_options_are_its_own_subplans(open_page: Opener) -> None:
             assert sorted(map(tuple, found)) == sorted(expected)
 
 
+@pytest.mark.thorough
 def test_choosing_for_a_robot(open_page: Opener) -> None:
     world = make_world("grid", "three-robots-3x3", None)
     opened = open_page(world.report.html)
@@ -163,6 +170,7 @@ def test_choosing_for_a_robot(open_page: Opener) -> None:
         assert "on an optimal plan" in page.inner_text("#now")
 
 
+@pytest.mark.thorough
 def test_without_a_sentence_it_goes_wrong(open_page: Opener) -> None:
     """In the place of a robot, with all optimal plans open (a language of one word), some mixture
     breaks, and it is said.
@@ -183,6 +191,7 @@ def test_without_a_sentence_it_goes_wrong(open_page: Opener) -> None:
     assert any("on an optimal plan" in text for text in said)
 
 
+@pytest.mark.thorough
 def test_keys(open_page: Opener) -> None:
     world = make_world("grid", "three-robots-3x3", None)
     opened = open_page(world.report.html)
@@ -264,6 +273,7 @@ def remaining(world: World, number: int) -> set[int]:
     return found
 
 
+@pytest.mark.thorough
 def test_the_picture_of_the_words(open_page: Opener) -> None:
     """Every state of the language is there once, with its word; a word alone, on demand; and the
     map's tint agrees.
@@ -320,6 +330,7 @@ def test_the_miscoordination(
     assert "bad" in (opened.page.get_attribute("#verdict", "class") or "")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("width", "scheme"), [(320, "light"), (390, "dark"), (1280, "light")])
 def test_narrow_and_wide(open_page: Opener, width: int, scheme: str) -> None:
     for domain, problem, tasks in (WORLDS[0], WORLDS[3], WORLDS[6]):
@@ -352,6 +363,7 @@ def contrast(opened: Opened, text: str, ground: str) -> float:
     return ratio
 
 
+@pytest.mark.thorough
 def test_text_can_be_read(open_page: Opener) -> None:
     for scheme in ("light", "dark"):
         opened = open_page(make_world("t-map", "problem").report.html, color_scheme=scheme)
@@ -376,6 +388,7 @@ def test_odd_names_stay_text(open_page: Opener) -> None:
     assert "</script>" in opened.page.inner_text("#now-word")
 
 
+@pytest.mark.thorough
 def test_odd_languages_and_tasks(open_page: Opener) -> None:
     """No map; no state mapped; a task that is done before it begins."""
     language, domain, problem = make_language("t-map", "problem")

@@ -28,6 +28,7 @@ def test_a_page_is_written(coordlang: Command, language: Path, tmp_path: Path) -
     assert "written to stdout" in to_stdout.err
 
 
+@pytest.mark.thorough
 def test_the_same_input_gives_the_same_bytes_in_other_processes(
     language: Path, tmp_path: Path
 ) -> None:

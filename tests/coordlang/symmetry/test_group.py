@@ -74,6 +74,7 @@ def is_group(permutations: set[tuple[int, ...]]) -> bool:
     return all(tuple(a[s] for s in b) in known for a in permutations for b in permutations)
 
 
+@pytest.mark.thorough
 def test_the_group_that_the_slow_twin_finds() -> None:
     random = Random(5)
     sizes = []

@@ -407,6 +407,7 @@ def solve(folder: Path) -> list[str]:
     return [step.action.name for step in answer.plan.actions]
 
 
+@pytest.mark.thorough
 def test_out_to_fast_downward_and_back(
     coordlang: Command, t_map: tuple[Path, Path], minimal: Path, tmp_path: Path
 ) -> None:

@@ -58,6 +58,7 @@ def check(candidates: Candidates, task_language: TaskLanguage, names: tuple[str,
     return searches
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", SHIPPED)
 def test_shipped_domains(name: str) -> None:
     candidates, task_language = shipped(name)

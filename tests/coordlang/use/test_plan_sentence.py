@@ -159,10 +159,11 @@ def judged(
     return "longer" if worse.value.excess[0] else "dearer"
 
 
+@pytest.mark.thorough
 def test_wrong_plans_of_random_models() -> None:
     seen: Counter[str] = Counter()
 
-    @settings(max_examples=80, deadline=None, derandomize=True)
+    @settings(max_examples=40, deadline=None, derandomize=True)
     @given(seed=st.integers(0, 10**6), robots=st.sampled_from([2, 3]))
     def compare(seed: int, robots: int) -> None:
         candidates, task_language = random_task_language(seed, robots)
@@ -172,7 +173,7 @@ def test_wrong_plans_of_random_models() -> None:
             seen[judged(candidates, task_language, changed(task_language, random), optimal)] += 1
 
     compare()
-    assert min(seen[kind] for kind in ("goal", "no plan", "optimal", "longer", "dearer")) > 5, seen
+    assert min(seen[kind] for kind in ("goal", "no plan", "optimal", "longer", "dearer")) > 2, seen
 
 
 @pytest.mark.parametrize(

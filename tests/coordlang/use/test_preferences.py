@@ -206,6 +206,7 @@ def worst_state(grade_of: list[int]) -> PlanPreference:
 DECIDED_BY_COUNTS = (11772, 14101, 15357)
 
 
+@pytest.mark.thorough
 def test_random_graphs() -> None:
     """Larger ones than small models have; the counts decide between beginnings that come to the
     same nodes.

@@ -190,6 +190,7 @@ def test_different_ends_need_one_pair_only() -> None:
     assert [sorted(s.pairs) for s in alternatives(2, [5, 3])] == [[(2, 3), (2, 5), (3, 5)]]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("robots", "most", "number"),
     [

@@ -256,6 +256,7 @@ def plain_distances(plain: ClassicalTask) -> dict[frozenset[str], tuple[int, int
     return found
 
 
+@pytest.mark.thorough
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 100_000), kind=st.sampled_from(KINDS), cost=st.sampled_from(COSTS))
 def test_every_state_of_random_models_costs_the_same(seed: int, kind: Kind, cost: Cost) -> None:

@@ -203,6 +203,7 @@ def test_nothing_is_written_or_printed(
     assert processes(tmp_path) == set()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seconds", [0.5, 5.0])
 def test_the_time_limit_ends_everything(
     seconds: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -304,6 +305,7 @@ ROWS: list[tuple[str, str, str, RobotSelection, int]] = [
 ]
 
 
+@pytest.mark.thorough
 @pytest.mark.foreign
 @pytest.mark.skipif(not FOREIGN.exists(), reason=f"no folder {FOREIGN}")
 @pytest.mark.parametrize(("limit", "cost"), [(2000, "makespan"), (0, "makespan+actions")])

@@ -172,6 +172,7 @@ def random_network(random: Random, domain: Domain) -> str:
     return "\n".join(lines)
 
 
+@pytest.mark.thorough
 def test_random_networks() -> None:
     seen: dict[str, int] = {}
 

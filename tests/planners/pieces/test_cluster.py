@@ -73,6 +73,7 @@ def test_results_errors_and_losses(connected: Runner, tmp_path: Path) -> None:
     until(lambda: left_on(connected) == (0, []))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("how", ["interrupt", "time limit"])
 def test_work_that_is_stopped_leaves_nothing(how: str, connected: Runner, tmp_path: Path) -> None:
     def interrupt() -> None:
@@ -131,6 +132,7 @@ def test_a_worker_is_waited_for_and_said(tmp_path: Path) -> None:
     assert "no worker has connected" in note
 
 
+@pytest.mark.thorough
 def test_killed_workers_cost_their_pieces_only(tmp_path: Path) -> None:
     with (
         running_cluster(tmp_path, 2) as cluster,

@@ -78,6 +78,7 @@ def test_a_piece_whose_process_dies_is_done_again_once(tmp_path: Path) -> None:
     assert {done.number: done.lost for done in TWO.run(isolated)} == {0: "died", 1: None}
 
 
+@pytest.mark.thorough
 def test_memory_is_divided_among_processes() -> None:
     with limited_memory(address_space() + (1 << 30)):
         fits = work(pieces.takes_memory, None, [100, 100])

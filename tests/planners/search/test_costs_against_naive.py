@@ -97,6 +97,7 @@ def brute_force(twin: Twin, goal: Formula, price: Price) -> tuple[int, int, int]
     raise AssertionError("the goal is one of the reachable states")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kind", ["agent", "plain"])
 def test_the_same_cost_and_the_same_number_of_plans(kind: Kind) -> None:
     seen: Counter[str] = Counter()
