@@ -249,6 +249,7 @@ def test_every_problem_is_in_a_readme() -> None:
     assert told == there
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("folder", "problem", "told"),
     [

@@ -77,6 +77,7 @@ def plans_under(folder: str, problem: str, cost: Cost) -> int:
     return Plans.of(search(loaded.model, loaded.tasks[0])).count
 
 
+@pytest.mark.thorough
 @by_language
 def test_the_table_of_languages(folder: str, row: Row) -> None:
     tasks = candidates(folder, row)

@@ -57,6 +57,7 @@ def test_names_of_files(name: str, tmp_path: Path) -> None:
     build_verify_report(tmp_path, name, {})
 
 
+@pytest.mark.thorough
 def test_without_utf_8(tmp_path: Path) -> None:
     build_verify_report(tmp_path, "ünïcödé", SURROUNDINGS["not UTF-8"], fresh=True)
 

@@ -61,6 +61,7 @@ def test_progress_on_a_terminal() -> None:
     assert "piece" in shown
 
 
+@pytest.mark.thorough
 def test_no_colour() -> None:
     _, shown = on_a_terminal(CODE, NO_COLOR="1")
     assert "first thing .." in shown

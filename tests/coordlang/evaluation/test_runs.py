@@ -118,9 +118,8 @@ def wait_for_lines(path: Path, number: int, process: subprocess.Popen[bytes]) ->
         time.sleep(0.01)
 
 
-@pytest.mark.parametrize(
-    "how", [pytest.param(signal.SIGKILL, marks=pytest.mark.thorough), signal.SIGINT]
-)
+@pytest.mark.thorough
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
 def test_a_killed_run_goes_on(finished: Path, tmp_path: Path, how: signal.Signals) -> None:
     process = start(tmp_path, "--jobs", "1")
     wait_for_lines(tmp_path / "game.jsonl", 2, process)

@@ -126,6 +126,7 @@ def planned(exported: PddlExport) -> list[Plan]:
     ]
 
 
+@pytest.mark.thorough
 @BOTH
 def test_the_optimal_plans_are_the_plans_that_fit(lot: str) -> None:
     for task_language in tasks(lot):

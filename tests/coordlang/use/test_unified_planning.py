@@ -686,6 +686,7 @@ def test_unified_planning_is_imported_by_register_only() -> None:
     assert (done.stdout, done.stderr) == ("False True\n", "")
 
 
+@pytest.mark.thorough
 def test_the_example_script() -> None:
     script = ROOT / "docs" / "examples" / "unified_planning_example.py"
     done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False)

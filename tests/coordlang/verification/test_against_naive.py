@@ -168,6 +168,7 @@ def check_witness(candidates: Candidates, table: Partition, witness: Any) -> Non
     raise AssertionError("no task has these plans with one sentence and a failing mixture")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("robots", "most", "number"), SIZES)
 def test_greedy_is_a_language_and_merging_is_judged_right(
     robots: int, most: int, number: int

@@ -53,6 +53,7 @@ def small(robots: int, most: int, number: int) -> list[Candidates]:
     raise AssertionError("too few random models")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(("robots", "most"), [(2, 40), (3, 14)])
 def test_a_language_by_definition_with_a_true_bound(method: str, robots: int, most: int) -> None:

@@ -97,7 +97,7 @@ def small_models(robots: int, most: int, number: int) -> Iterator[tuple[int, Can
             return
 
 
-@pytest.mark.parametrize("written", [True, False])
+@pytest.mark.parametrize("written", [pytest.param(True, marks=pytest.mark.thorough), False])
 @pytest.mark.parametrize(
     ("robots", "most", "number"),
     [
