@@ -125,7 +125,7 @@ def _inseparable(found: Sequence[Table]) -> bool:
 
 
 def _spread(found: Differences, goals: SymmetricGoals) -> Differences:
-    """What the chosen goals say, for all goals (Proposition 14 of docs/concepts.md).
+    """What the chosen goals say, for all goals (Proposition 15 of docs/concepts.md).
 
     The numbers of tasks, nodes and edges are those of all goals already.
     """

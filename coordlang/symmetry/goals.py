@@ -2,7 +2,7 @@
 """Goals that are images of each other under a symmetry: one of them speaks for all.
 
 A symmetry takes the optimal plans to a goal to those to the goal's image, mixtures to mixtures and
-failing ones to failing ones (Proposition 14 of docs/concepts.md).
+failing ones to failing ones (Proposition 15 of docs/concepts.md).
 """
 
 from __future__ import annotations
