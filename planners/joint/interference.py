@@ -21,8 +21,9 @@ class Footprint:
     Every literal left after grounding counts as required, also inside disjunctions and effect
     conditions; conditional effects count as if they fired, but those whose condition the pair of
     actions itself makes false are none; an atom both deleted and added counts as added.
-    ``partners`` are the actions that a positive literal of a precondition or effect
-    condition or a network names, ``excluded`` those that its precondition as a whole forbids.
+    ``partners`` are the actions that a positive literal of a precondition or effect condition or a
+    network names, ``excluded`` those that its precondition as a whole forbids, ``conditional_on``
+    those that the condition of an effect names.
     """
 
     requires_true: frozenset[Atom]
@@ -31,6 +32,7 @@ class Footprint:
     deletes: frozenset[Atom]
     partners: frozenset[StepAtom]
     excluded: frozenset[StepAtom]
+    conditional_on: frozenset[StepAtom]
 
 
 def footprint(action: GroundAction, step: frozenset[StepAtom] | None = None) -> Footprint:
@@ -59,6 +61,12 @@ def footprint(action: GroundAction, step: frozenset[StepAtom] | None = None) -> 
         deletes=frozenset(e.atom for e in effects if not e.adds) - adds,
         partners=action.links | partners,
         excluded=frozenset(forbidden_steps(action.precondition)),
+        conditional_on=frozenset(
+            leaf
+            for effect in action.effects
+            for leaf, _ in literals(effect.condition)
+            if isinstance(leaf, StepAtom)
+        ),
     )
 
 
@@ -133,7 +141,8 @@ def compatible(
     table &= ~_meeting(mine, theirs, [("adds", "deletes")])
     for row, column in _naming("excluded", left, right, mine, theirs):
         table[row, column] = False
-    for row, column in _conditional_on_each_other(left, right):
+    # The condition of an effect of one names the other: what can fire depends on both.
+    for row, column in _naming("conditional_on", left, right, mine, theirs):
         a, b = left[row], right[column]
         table[row, column] = not (a and b and conflict(a, b))
     _share(table, left, right, i, j)
@@ -157,35 +166,6 @@ def _naming(
         for named in getattr(one, field) if one else ():
             if named in rows:
                 yield rows[named], column
-
-
-def _conditional_on_each_other(
-    left: Sequence[GroundAction | None], right: Sequence[GroundAction | None]
-) -> set[tuple[int, int]]:
-    """Pairs of which the condition of an effect of one names the other."""
-    columns, rows = _numbers(right), _numbers(left)
-    found = {
-        (row, columns[name])
-        for row, one in enumerate(left)
-        for name in _named_by_effects(one)
-        if name in columns
-    }
-    return found | {
-        (rows[name], column)
-        for column, one in enumerate(right)
-        for name in _named_by_effects(one)
-        if name in rows
-    }
-
-
-def _named_by_effects(action: GroundAction | None) -> set[StepAtom]:
-    """The subactions that the conditions of an action's effects name."""
-    return {
-        leaf
-        for effect in (action.effects if action else ())
-        for leaf, _ in literals(effect.condition)
-        if isinstance(leaf, StepAtom)
-    }
 
 
 def _numbers(side: Sequence[GroundAction | None]) -> dict[StepAtom, int]:

@@ -16,10 +16,10 @@ from typing import Any
 
 import pytest
 
-from tests.planners.pieces.test_processes import until
 from tests.support.cluster import ENVIRONMENT, needs_distributed, running_cluster
 from tests.support.domains import ROOT
 from tests.support.pages import DOCS
+from tests.support.processes import until
 
 PAGE = (DOCS / "cluster.md").read_text()
 

@@ -68,3 +68,11 @@ def test_tested_versions_of_python_are_supported() -> None:
 def test_every_file_names_its_licence(path: Path) -> None:
     with path.open(encoding="utf-8") as file:
         assert file.readline() == "# SPDX-License-Identifier: GPL-3.0-or-later\n"
+
+
+def test_no_test_file_imports_another() -> None:
+    """What several need is in tests/support."""
+    importing = re.compile(r"^(?:from|import) tests\.(?:\w+\.)*test_\w+", re.MULTILINE)
+    files = sorted((ROOT / "tests").rglob("*.py"))
+    assert len(files) > 100
+    assert [str(path) for path in files if importing.search(path.read_text("utf-8"))] == []

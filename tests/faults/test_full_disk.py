@@ -18,10 +18,10 @@ from typing import Any
 import pytest
 
 import coordlang
-from tests.faults.test_kills import OLD, WRITING, Writing, normal
 from tests.support.command import Outcome
 from tests.support.domains import DOMAINS
 from tests.support.forks import fork_command
+from tests.support.writing_commands import OLD, WRITING, Writing, normal
 
 GW1 = [str(DOMAINS / "grid" / name) for name in ("domain.pddl", "gw1-2x2.pddl")]
 QUICK = ("certificate", "tasks", "export")

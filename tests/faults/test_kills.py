@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import gzip
 import json
 import os
 import random
@@ -17,50 +16,13 @@ from pathlib import Path
 import pytest
 
 import coordlang
-from tests.support.domains import DOMAINS
 from tests.support.forks import Fork, fork_command, fresh_command
+from tests.support.writing_commands import FILES, OLD, WRITING, Writing, normal
 
-FILES = [str(DOMAINS / "grid" / name) for name in ("domain.pddl", "gw1-2x2.pddl")]
-ALL = [*FILES, "--tasks", "all", "--method", "minimal"]
 SIGNALS = (signal.SIGKILL, signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-OLD = b"the old file\n"
 #: What a kill that nobody can hear may leave, beside an output and in the temporary directory:
 #: there is also a file with which Python tries whether it can write to that directory.
 LEFT = re.compile(r"[a-z0-9_]{8}|\.[^/]{1,16}\.[a-z0-9_]{8}|coordlang-[a-z0-9_]{8}(/.*)?|\.lock")
-
-
-@dataclass(frozen=True)
-class Writing:
-    """A command that writes: its arguments, and its outputs in the working directory."""
-
-    arguments: tuple[str, ...]
-    outputs: tuple[str, ...] = ()
-
-
-SAID = ("LANGUAGE", *FILES, "SENTENCE")
-WRITING = {
-    "build": Writing(("build", *ALL, "-o", "l.json"), ("l.json",)),
-    "certificate": Writing(
-        ("build", *ALL, "-o", "l.json.gz", "--certificate", "c.json.gz"),
-        ("l.json.gz", "c.json.gz"),
-    ),
-    "tasks": Writing(
-        ("tasks", *FILES, "--start", "(at r1 ?)", "--goal", "(at r1 ?)", "-o", "t.json"),
-        ("t.json",),
-    ),
-    "understand": Writing(("understand", *SAID, "--max", "5", "-o", "p.txt"), ("p.txt",)),
-    "choices": Writing(("choices", *SAID, "--json", "-o", "c.json"), ("c.json",)),
-    "export": Writing(("export", *SAID, "-o", "."), ("domain.pddl", "problem.pddl")),
-    "report": Writing(("report", "LANGUAGE", *FILES, "-o", "page.html"), ("page.html",)),
-    "check": Writing(("check", *FILES)),
-    "evaluate": Writing(
-        (
-            *("evaluate", "scenario", "--quick", "--samples", "1", "--jobs", "2"),
-            *("--results", ".", "--domains", str(DOMAINS)),
-        ),
-        ("scenario.jsonl", "evaluation.md"),
-    ),
-}
 
 
 @pytest.fixture(scope="module")
@@ -149,18 +111,6 @@ class Kills:
                     assert json.loads(other)["guarantee"]["lower_bound"] <= 3
                 else:
                     assert other in (OLD, new), (name, other[:300], new[:300])
-
-
-def normal(name: str, data: bytes) -> bytes:
-    """The content, without the seconds that work took; the last line of results may be cut off."""
-    if data[:2] == b"\x1f\x8b":
-        data = gzip.decompress(data)
-    if name.endswith(".jsonl"):
-        lines = [json.loads(line) for line in data.split(b"\n")[:-1]]
-        for line in lines:
-            line.pop("seconds"), line.pop("cpu")
-        return b"\n".join(sorted(json.dumps(line).encode() for line in lines))
-    return re.sub(rb"\d+\.\d+( s)?(?=\D)", b"0.0", data)
 
 
 def killed(

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -14,34 +14,10 @@ from coordlang.required.choices import Choices
 from coordlang.required.miscoordination import Miscoordination, Step, inseparable, miscoordination
 from coordlang.tasks.candidates import Candidates
 from planners.check.validate import Verdict, validate
-from planners.errors import BadInput, ProvedImpossible
 from planners.joint.model import JointModel
 from planners.search.plan_space import PlanSpace
-from tests.coordlang.required.test_choices import MOST, candidates_of, candidates_of_kinds
 from tests.support.break_walk import walk_to_a_break
-
-#: (robots, random models): a few always, many with ``-m slow``.
-RUNS = [
-    (2, range(90)),
-    (3, range(40)),
-    (None, range(25)),
-    pytest.param(2, range(1_000, 1_700), marks=pytest.mark.slow),
-    pytest.param(3, range(2_000, 2_800), marks=pytest.mark.slow),
-    pytest.param(4, range(3_000, 3_300), marks=pytest.mark.slow),
-    pytest.param(None, range(4_000, 4_400), marks=pytest.mark.slow),
-]
-
-
-def spaces_of(seeds: range, robots: int | None) -> Iterator[tuple[Candidates, PlanSpace]]:
-    """Plan spaces of random candidate tasks small enough for the twin."""
-    for seed in seeds:
-        try:
-            found = candidates_of(seed, robots) if robots else candidates_of_kinds(seed)
-        except (ProvedImpossible, BadInput):
-            continue
-        for space in found.spaces:
-            if 0 < len(space) <= MOST.get(space.robots, 0):
-                yield found, space
+from tests.support.random_spaces import random_spaces, runs
 
 
 def breaks(candidates: Candidates, space: PlanSpace, found: Miscoordination) -> None:
@@ -90,10 +66,10 @@ def goes(space: PlanSpace, node: int, found: Miscoordination) -> bool:
     )
 
 
-@pytest.mark.parametrize(("robots", "seeds"), RUNS)
+@pytest.mark.parametrize(("robots", "seeds"), runs(90, 40, 25))
 def test_breaks_equal_the_walk(robots: int | None, seeds: range) -> None:
     answers: Counter[tuple[str, bool]] = Counter()
-    for candidates, space in spaces_of(seeds, robots):
+    for candidates, space in random_spaces(seeds, robots):
         starts = np.unique(space.starts)
         together = walk_to_a_break(space, starts, together=True)
         shown = inseparable(space)

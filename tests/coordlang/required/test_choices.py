@@ -4,9 +4,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import replace
-from random import Random
 
 import numpy as np
 import pytest
@@ -16,59 +13,14 @@ from coordlang.required.divergences import first_differences
 from coordlang.required.label_sets import LabelSets
 from coordlang.required.miscoordination import inseparable
 from coordlang.required.partings import Partings, _KnownSets, minimal
-from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
-from planners.errors import BadInput, ProvedImpossible
-from planners.loading import ModelOptions
+from coordlang.tasks.candidates import all_pairs
 from planners.pddl import parse_domain, parse_problem
-from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
 from planners.search.plan_space import PlanSpace
 from tests.support import naive_partings
 from tests.support.composition_walk import walk
 from tests.support.random_models import random_model
-from tests.support.random_pddl import random_model as random_pddl
-
-#: Nodes of a plan space up to which the walk is waited for, by the number of robots.
-MOST = {2: 3_000, 3: 250, 4: 60}
-
-
-def candidates_of(seed: int, robots: int) -> Candidates:
-    random = Random(seed)
-    domain, problem, options = random_model(seed, robots)
-    options = replace(options, remember_actions=random.random() < 0.3)
-    if random.random() < 0.5:
-        return from_problems(domain, [problem], options)
-    return all_pairs(domain, [problem], options)
-
-
-def candidates_of_kinds(seed: int) -> Candidates:
-    """MA-PDDL with formulas, plain PDDL with shared actions, joint-action PDDL with drift."""
-    random = Random(seed)
-    text = random_pddl(seed, random.choice(["agent", "plain", "joint"]))
-    domain = parse_domain(Source("domain", text.domain))
-    problem = parse_problem(Source("problem", text.problem), domain)
-    selection = RobotSelection(unowned=text.unowned)
-    options = ModelOptions(selection, remember_actions=random.random() < 0.3)
-    make = from_problems if random.random() < 0.3 else all_pairs
-    return make(domain, [problem], options)
-
-
-def separable_spaces(
-    seeds: range, robots: int | None, most: int | None = None
-) -> Iterator[PlanSpace]:
-    """Plan spaces of random candidate tasks without inseparable plans, small enough for the twin.
-
-    ``most`` nodes, or as many as the walk is waited for.
-    """
-    for seed in seeds:
-        try:
-            found = candidates_of(seed, robots) if robots else candidates_of_kinds(seed)
-        except (ProvedImpossible, BadInput):
-            continue
-        for space in found.spaces:
-            limit = MOST.get(space.robots, 0) if most is None else most
-            if 0 < len(space) <= limit and inseparable(space) is None:
-                yield space
+from tests.support.random_spaces import separable_spaces
 
 
 def agree(space: PlanSpace, chunk: int) -> bool:

@@ -10,22 +10,11 @@ import numpy as np
 import pytest
 
 from coordlang.required.last_differences import DifferenceWalk
-from tests.coordlang.required.test_choices import separable_spaces
 from tests.support.difference_walk import UncutWalk
-
-#: (robots, random models): a few always, many with ``-m slow``.
-RUNS = [
-    (2, range(60)),
-    (3, range(30)),
-    (None, range(20)),
-    pytest.param(2, range(1_000, 1_700), marks=pytest.mark.slow),
-    pytest.param(3, range(2_000, 2_800), marks=pytest.mark.slow),
-    pytest.param(4, range(3_000, 3_300), marks=pytest.mark.slow),
-    pytest.param(None, range(4_000, 4_400), marks=pytest.mark.slow),
-]
+from tests.support.random_spaces import runs, separable_spaces
 
 
-@pytest.mark.parametrize(("robots", "seeds"), RUNS)
+@pytest.mark.parametrize(("robots", "seeds"), runs(60, 30, 20))
 def test_the_same_demands(robots: int | None, seeds: range) -> None:
     """All demands, and those that random partitions break, in the same order."""
     random = Random(seeds.start)

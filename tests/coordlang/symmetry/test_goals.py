@@ -20,9 +20,9 @@ from planners.pddl import parse_problem, read_domain, read_problem
 from planners.pddl.sexpr import Source
 from planners.pieces.processes import Processes
 from planners.search.portions import PORTION
-from tests.coordlang.symmetry.test_group import GRID, world
 from tests.support.domains import DOMAINS, all_tasks
 from tests.support.random_models import random_model
+from tests.support.symmetric_worlds import GRID, world
 
 
 def agree(candidates: Candidates, portion: float = PORTION) -> bool:

@@ -16,25 +16,13 @@ from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_
 from coordlang.tasks.listed import ListedTask
 from planners.errors import ProvedImpossible
 from planners.joint.states import split_atoms
-from planners.pddl import parse_domain, parse_problem, read_domain
+from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
 from planners.search.plans import Plans, counts
 from tests.support import slow_symmetry
-from tests.support.domains import DOMAINS, all_tasks
+from tests.support.domains import all_tasks
 from tests.support.random_models import random_model
-
-GRID = read_domain(DOMAINS / "grid" / "domain.pddl")
-
-
-def world(cells: int, edges: list[tuple[int, int]], robots: int) -> str:
-    """Robots in the first cells of a graph, each wants to be in the cell of the next one."""
-    names = [f"r{n + 1}" for n in range(robots)]
-    adjacent = " ".join(f"(adjacent c{a} c{b}) (adjacent c{b} c{a})" for a, b in edges)
-    at = " ".join(f"(at {name} c{n})" for n, name in enumerate(names))
-    goal = " ".join(f"(at {name} c{(n + 1) % robots})" for n, name in enumerate(names))
-    return f"""(define (problem p) (:domain grid)
-      (:objects {" ".join(names)} - robot {" ".join(f"c{n}" for n in range(cells))} - cell)
-      (:init {at} {adjacent}) (:goal (and {goal})))"""
+from tests.support.symmetric_worlds import GRID, world
 
 
 def random_world(random: Random) -> Candidates | None:

@@ -15,22 +15,11 @@ from coordlang.vocabulary.leads import NO_LEAD, NO_WORD, PARTED, Leads
 from coordlang.vocabulary.next_words import NextWords
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from tests.coordlang.required.test_choices import separable_spaces
 from tests.support.counterexample_walk import walked
-
-#: (robots, random models): a few always, many with ``-m slow``.
-RUNS = [
-    (2, range(60)),
-    (3, range(30)),
-    (None, range(20)),
-    pytest.param(2, range(1_000, 1_700), marks=pytest.mark.slow),
-    pytest.param(3, range(2_000, 2_800), marks=pytest.mark.slow),
-    pytest.param(4, range(3_000, 3_300), marks=pytest.mark.slow),
-    pytest.param(None, range(4_000, 4_400), marks=pytest.mark.slow),
-]
+from tests.support.random_spaces import runs, separable_spaces
 
 
-@pytest.mark.parametrize(("robots", "seeds"), RUNS)
+@pytest.mark.parametrize(("robots", "seeds"), runs(60, 30, 20))
 def test_what_is_cut_off_refutes_nothing(robots: int | None, seeds: range) -> None:
     """The same counterexamples in the same order, for random words."""
     random = Random(seeds.start)

@@ -17,10 +17,10 @@ from planners.limits import time_limit
 from planners.pieces import cluster as cluster_module
 from planners.pieces.runners import Where, runner
 from planners.pieces.work import Runner, tables
-from tests.planners.pieces.test_processes import runs, until, workers
 from tests.support import pieces
 from tests.support.cluster import Cluster, needs_distributed, running_cluster
 from tests.support.pieces import work
+from tests.support.processes import runs, until, workers
 
 pytestmark = needs_distributed
 

@@ -7,8 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -19,29 +17,9 @@ from planners.pieces.processes import Processes
 from planners.pieces.work import tables
 from tests.support import pieces
 from tests.support.pieces import work
+from tests.support.processes import runs, until, workers
 
 TWO = Processes(jobs=2)
-
-
-def until(condition: Callable[[], object], seconds: float = 60) -> None:
-    """Wait for it."""
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
-
-
-def runs(pid: int) -> bool:
-    """Whether there is such a process, and it is no zombie."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
-
-
-def workers(folder: Path) -> list[int]:
-    """The processes that `pieces.waits` and `pieces.removes` have met."""
-    return [int(path.name.split("-")[1]) for path in folder.glob("pid-*")]
 
 
 def test_jobs_do_not_matter_and_small_work_stays_here() -> None:

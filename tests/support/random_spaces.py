@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Plan spaces of random candidate tasks, small enough for the walks that are twins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from random import Random
+from typing import Any
+
+import pytest
+
+from coordlang.required.miscoordination import inseparable
+from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
+from planners.errors import BadInput, ProvedImpossible
+from planners.loading import ModelOptions
+from planners.pddl import parse_domain, parse_problem
+from planners.pddl.robots import RobotSelection
+from planners.pddl.sexpr import Source
+from planners.search.plan_space import PlanSpace
+from tests.support.random_models import random_model
+from tests.support.random_pddl import random_model as random_pddl
+
+#: Nodes of a plan space up to which the walk is waited for, by the number of robots.
+MOST = {2: 3_000, 3: 250, 4: 60}
+
+
+def candidates_of(seed: int, robots: int) -> Candidates:
+    random = Random(seed)
+    domain, problem, options = random_model(seed, robots)
+    options = replace(options, remember_actions=random.random() < 0.3)
+    if random.random() < 0.5:
+        return from_problems(domain, [problem], options)
+    return all_pairs(domain, [problem], options)
+
+
+def candidates_of_kinds(seed: int) -> Candidates:
+    """MA-PDDL with formulas, plain PDDL with shared actions, joint-action PDDL with drift."""
+    random = Random(seed)
+    text = random_pddl(seed, random.choice(["agent", "plain", "joint"]))
+    domain = parse_domain(Source("domain", text.domain))
+    problem = parse_problem(Source("problem", text.problem), domain)
+    selection = RobotSelection(unowned=text.unowned)
+    options = ModelOptions(selection, remember_actions=random.random() < 0.3)
+    make = from_problems if random.random() < 0.3 else all_pairs
+    return make(domain, [problem], options)
+
+
+def random_spaces(
+    seeds: range, robots: int | None, most: int | None = None
+) -> Iterator[tuple[Candidates, PlanSpace]]:
+    """Plan spaces of random candidate tasks, of at most ``most`` nodes.
+
+    ``most`` None: as many as the walk is waited for; ``robots`` None: models of any kind.
+    """
+    for seed in seeds:
+        try:
+            found = candidates_of(seed, robots) if robots else candidates_of_kinds(seed)
+        except (ProvedImpossible, BadInput):
+            continue
+        for space in found.spaces:
+            if 0 < len(space) <= (MOST.get(space.robots, 0) if most is None else most):
+                yield found, space
+
+
+def separable_spaces(
+    seeds: range, robots: int | None, most: int | None = None
+) -> Iterator[PlanSpace]:
+    """The `random_spaces` without inseparable plans."""
+    return (space for _, space in random_spaces(seeds, robots, most) if inseparable(space) is None)
+
+
+def runs(two: int, three: int, any_kind: int) -> list[Any]:
+    """Pairs (robots, seeds): so many models always, and many with ``-m slow``."""
+    many = {2: range(1_000, 1_700), 3: range(2_000, 2_800), 4: range(3_000, 3_300)}
+    slow = (*many.items(), (None, range(4_000, 4_400)))
+    return [
+        (2, range(two)),
+        (3, range(three)),
+        (None, range(any_kind)),
+        *(pytest.param(*entry, marks=pytest.mark.slow) for entry in slow),
+    ]
