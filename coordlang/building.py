@@ -25,7 +25,7 @@ from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Assignment, Evidence
 from coordlang.vocabulary.minimal import refuting_clauses
 from planners.errors import UsageError
-from planners.limits import run_until_stopped
+from planners.limits import run_until_stopped, start_clock, time_left
 from planners.messages import echoed
 from planners.pieces.processes import Processes
 from planners.pieces.work import Runner
@@ -118,6 +118,7 @@ def build_language(
     alpha_only: bool = False,
     prefer: Literal["flexible"] | None = None,
     overlap: bool = False,
+    reserve: float = 0.0,
     progress: Callable[[str], None] = lambda _: None,
     runner: Runner | None = None,
 ) -> Built:
@@ -129,6 +130,9 @@ def build_language(
         The tasks that it must serve.
     method, seed, alpha_only, prefer, overlap
         See `BuildOptions`.
+    reserve
+        Share of a time limit's rest that a search, once there is a language, leaves for
+        `certificate_of`.
     progress
         Called with a line of text now and then.
     runner
@@ -168,6 +172,8 @@ def build_language(
         require_room(candidates.source)
         job = _with_incumbent(job)
         clock.note("incumbent")
+        if reserve:
+            start_clock((1 - reserve) * time_left())
     progress(f"building words ({method})")
     outcome = _outcome(job, options, verified, clock)
     best = next(known for known in verified if known.assignment is outcome.partition)
@@ -264,7 +270,7 @@ def _enlarged(
 def certificate_of(built: Built) -> Certificate:
     """Why no partition with fewer words than the proved lower bound is a language.
 
-    For others to check.
+    For others to check.  The bound is proved also where the search for fewer words was stopped.
 
     Uses what the method met on its way; for a method that meets nothing the search of `minimal`
     finds reasons.  As long as that takes: not anytime.

@@ -91,6 +91,12 @@ def stop_clock() -> None:
     signal.setitimer(signal.ITIMER_REAL, 0)
 
 
+def start_clock(seconds: float) -> None:
+    """Let the alarm of the `time_limit` around ring after so many seconds; infinite: as before."""
+    if seconds < math.inf:
+        signal.setitimer(signal.ITIMER_REAL, max(_SOON, seconds), _AGAIN)
+
+
 def run_until_stopped(
     work: Callable[[], object],
     *,

@@ -94,7 +94,10 @@ class BuiltLanguage(Presented):
         return self.built.stopped
 
     def certificate(self) -> Certificate:
-        """Return why fewer words do not suffice, for others to check; as long as that takes."""
+        """Return why fewer words than the proved lower bound do not suffice, for others to check.
+
+        Also where the search was ``stopped``; as long as that takes.
+        """
         return certificate_of(self.built)
 
     def data(self) -> dict[str, Any]:
@@ -142,6 +145,7 @@ def build(
     overlap: bool = False,
     unsolvable: Unsolvable = "fail",
     seed: int = 0,
+    reserve: float = 0.0,
     progress: Progress | None = None,
     jobs: int | None = None,
     scheduler: File | None = None,
@@ -171,6 +175,9 @@ def build(
         ``"fail"`` or ``"skip"``: what to do about candidate tasks without plans.
     seed
         Of the methods' random choices: same input, same seed, same language.
+    reserve
+        With `time_limit` around: the share of the time left that a search, once there is a
+        language, leaves for `BuiltLanguage.certificate`; 0.25 is a quarter.
     progress
         Called with a line of text when a phase begins.
     jobs, scheduler, resume, note
@@ -198,7 +205,11 @@ def build(
     say_size(candidates, note or progress)
     with opened_runner(jobs, scheduler, resume, note) as runner:
         built = build_language(
-            candidates, **asdict(options), progress=progress or _silent, runner=runner
+            candidates,
+            **asdict(options),
+            reserve=reserve,
+            progress=progress or _silent,
+            runner=runner,
         )
     seconds |= built.seconds
     producer = {
@@ -245,6 +256,11 @@ class Verification(Presented):
         """Whether the certificate, if any, proves the lower bound that the language claims."""
         return self.certificate is None or self.certificate.lower_bound >= self.claimed
 
+    @property
+    def proved_minimal(self) -> bool | None:
+        """Whether the certificate proves that fewer words do not suffice, None without one."""
+        return None if self.lower_bound is None else self.lower_bound == self.words
+
     def data(self) -> dict[str, Any]:
         """Return the answer as JSON data."""
         return {
@@ -255,6 +271,7 @@ class Verification(Presented):
             "miscoordination": witness_data(self.witness),
             "lower_bound": self.lower_bound,
             "reasons": self.certificate.reasons if self.certificate else None,
+            "proved_minimal": self.proved_minimal,
         }
 
     def facts(self) -> Mapping[str, object]:
@@ -324,6 +341,11 @@ def verify(
     checked = None
     if proof and verdict.holds:
         checked = check_certificate(proof, candidates, progress or _silent)
+        if checked.lower_bound > len(read.words):
+            raise AssertionError(
+                f"a language of {len(read.words)} words is verified, and a certificate that "
+                f"{checked.lower_bound} are needed: one of the two is wrong"
+            )
     return Verification(
         verdict.holds,
         len(read.words),

@@ -7,6 +7,7 @@ import json
 import os
 import sys
 from dataclasses import replace
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -37,6 +38,9 @@ from planners.signals import Interrupted
 
 if TYPE_CHECKING:
     from coordlang.api.languages import BuiltLanguage
+
+#: Share of the time that a search leaves for its certificate.
+_FOR_CERTIFICATE = 0.25
 
 
 @click.command(name="build")
@@ -121,6 +125,7 @@ def command(
     """
     from planners.limits import stop_clock, time_left
 
+    end = monotonic() + time_left()
     never_stdout("--certificate", certificate)
     listed = tasks if tasks != "all" else None
     check_outputs([("-o", output), ("--certificate", certificate)], [*pddl.paths, listed])
@@ -133,15 +138,15 @@ def command(
         overlap=overlap,
         unsolvable=unsolvable,
         seed=seed,
+        reserve=_FOR_CERTIFICATE if certificate else 0.0,
         **pieces,
         **model,
     )
-    left = time_left()
     stop_clock()  # the work is done; from here on it is saved
     stopped = _save(built, output, certificate)
     try:
         if certificate and stopped is None:
-            stopped = _certify(built, output, certificate, left)
+            stopped = _certify(built, output, certificate, end)
         figures = built.data()
         if as_json and output != "-":
             echo(json.dumps(figures))
@@ -197,21 +202,24 @@ def _save(built: BuiltLanguage, output: str, certificate: str | None) -> BaseExc
     return None
 
 
-def _certify(built: BuiltLanguage, output: str, path: str, seconds: float) -> BaseException | None:
-    """Write the certificate, within ``seconds``; the error that ended it early, or None."""
-    from coordlang.certificate import write_certificate
-    from planners.limits import run_until_stopped, stop_clock, time_limit
+def _certify(built: BuiltLanguage, output: str, path: str, end: float) -> BaseException | None:
+    """Write the certificate, until the time ``end``; the error that ended it early, or None.
 
-    if built.stopped is not None and not built.guarantee.proved_minimal:
-        echo("coordlang: no certificate is written: the search was stopped", err=True)
+    Of a search that was stopped it proves the lower bound that was reached; not after an interrupt,
+    which asks for an end.
+    """
+    from coordlang.certificate import write_certificate
+    from planners.limits import run_until_stopped, start_clock, stop_clock
+
+    if isinstance(built.stopped, KeyboardInterrupt):
         return None
 
     def write() -> None:
-        with time_limit(seconds):
-            with working("writing why fewer words do not suffice"):
-                proof = built.certificate()
-            stop_clock()
-            write_certificate(proof, path)
+        start_clock(end - monotonic())
+        with working("writing why fewer words do not suffice"):
+            proof = built.certificate()
+        stop_clock()
+        write_certificate(proof, path)
 
     try:
         stopped = run_until_stopped(write)
@@ -221,6 +229,13 @@ def _certify(built: BuiltLanguage, output: str, path: str, seconds: float) -> Ba
     if stopped is not None and not isinstance(stopped, KeyboardInterrupt):
         echo(
             "coordlang: no certificate is written: there was no time or memory left for it",
+            err=True,
+        )
+    elif stopped is None and not built.guarantee.proved_minimal:
+        echo(
+            "coordlang: the certificate proves a lower bound of "
+            f"{counted(built.guarantee.lower_bound, 'word')}, not that {built.guarantee.size:,} "
+            "are the fewest",
             err=True,
         )
     return stopped
@@ -240,6 +255,8 @@ def _exit_code(
         return interrupted_by(stopped.number) if isinstance(stopped, Interrupted) else INTERRUPTED
     if stopped is not None:
         reason = str(stopped).splitlines()[0] if str(stopped) else "out of memory"
+        if certificate and isinstance(stopped, coordlang.OutOfTime) and stopped is built.stopped:
+            reason += ", a part of it kept for the certificate"
         short_of = "" if proved and exact else ", without proof"
         echo(f"coordlang: {reason}; the best language so far is written{short_of}", err=True)
     if exact:

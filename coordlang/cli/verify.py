@@ -143,3 +143,8 @@ def _show_bound(
             f"({counted(len(checked.cnf.clauses), 'clause')})"
         )
     echo(f"lower bound {checked.lower_bound}: {why}")
+    if not found.proved_minimal:
+        echo(
+            "not proved minimal: the least number of words is at least "
+            f"{checked.lower_bound:,} and at most {found.words:,}"
+        )

@@ -13,7 +13,7 @@ import pytest
 
 from coordlang.certificate import read_certificate
 from coordlang.language.file import read_language
-from planners.errors import UsageError
+from planners.errors import OutOfTime, UsageError
 from planners.writing import write_atomically
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
@@ -235,21 +235,32 @@ def test_a_certificate_that_is_not_made_leaves_no_old_one(
         assert outcome.code == 3
 
 
-def test_no_certificate_stands_beside_a_language_without_proof(
-    coordlang: Command, old_pair: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("error", "code"), [(OutOfTime("late"), 3), (KeyboardInterrupt(), 130)])
+def test_a_search_that_is_stopped_leaves_no_old_certificate(
+    error: BaseException,
+    code: int,
+    coordlang: Command,
+    old_pair: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    from planners.errors import OutOfTime
+    """In place of the old certificate is that of the bound that was proved."""
 
     def late(*_: object) -> None:
-        raise OutOfTime("late")
+        raise error
 
     monkeypatch.setattr(sys.modules["coordlang.vocabulary.separating"]._Search, "decide", late)
     tasks = [DOMAINS / "grid" / name for name in ("domain.pddl", "gw2-2x3.pddl")]
     arguments = "--tasks", "all", "--method", "minimal"
     outcome = coordlang("build", *tasks, *arguments, *PAIR)
-    assert outcome.code == 3
-    assert "no certificate is written: the search was stopped" in outcome.err
-    assert os.listdir() == ["l.json"]
+    assert outcome.code == code
+    guarantee = read_language(old_pair / "l.json").guarantee
+    assert (guarantee.lower_bound, guarantee.proved_minimal) == (2, False)
+    if code == 130:
+        assert "it is verified; no certificate is written\n" in outcome.err
+        assert os.listdir() == ["l.json"]
+    else:
+        assert sorted(os.listdir()) == ["c.json", "l.json"]
+        assert read_certificate("c.json").refuted == 1
 
 
 @pytest.mark.parametrize("at", range(1, 4))

@@ -3,18 +3,24 @@
 
 from __future__ import annotations
 
+import json
+import os
 import re
+import signal
 from collections.abc import Callable
 from itertools import count
 from pathlib import Path
 from random import Random
+from typing import Any
 
 import msgspec
 import pytest
 
+from coordlang.api.languages import verify
 from coordlang.building import Built, build_language, certificate_of
 from coordlang.certificate import (
     Certificate,
+    Checked,
     Reason,
     check,
     encode,
@@ -26,8 +32,11 @@ from coordlang.certificate.file import WarpingPath
 from coordlang.required.miscoordination import inseparable
 from coordlang.tasks.candidates import all_pairs, from_listed, from_problems
 from coordlang.tasks.task_file import read_task_file
+from coordlang.vocabulary.minimal import _Search as Search
 from coordlang.vocabulary.minimal import refuting_clauses
-from planners.errors import BadInput, ProvedImpossible, Refuted
+from coordlang.vocabulary.problems_by_size import SolverBudget
+from planners.errors import BadInput, OutOfTime, ProvedImpossible, Refuted
+from planners.limits import time_left
 from planners.loading import ModelOptions
 from planners.pddl import read_domain, read_problem
 from tests.support.candidates import states_of
@@ -330,3 +339,157 @@ def test_what_is_no_certificate(text: str, tmp_path: Path) -> None:
         read_certificate(path)
     with pytest.raises(BadInput, match="no such file"):
         read_certificate(tmp_path / "none.json")
+
+
+# A search that is stopped proves a bound
+
+
+#: The search is stopped when it comes to this number of words; fewer are refuted.
+STOPPED_AT = 4
+GW2 = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "gw2-2x3.pddl"
+MINIMAL = ("--tasks", "all", "--method", "minimal")
+
+
+@pytest.fixture
+def late(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Searches are stopped at `STOPPED_AT` words; the seconds that were left then."""
+    decide, left = Search._decide, list[float]()
+
+    def decide_few(search: Search, size: int, budget: SolverBudget) -> bool:
+        if size == STOPPED_AT:
+            left.append(time_left())
+            raise OutOfTime("late")
+        return decide(search, size, budget)
+
+    monkeypatch.setattr(Search, "_decide", decide_few)
+    return left
+
+
+@pytest.fixture
+def pair(coordlang: Command, late: list[float], tmp_path: Path) -> tuple[Path, Path]:
+    """The language and the certificate of a search that was stopped."""
+    language, proof = tmp_path / "l.json", tmp_path / "c.json"
+    made = coordlang("build", *GW2, *MINIMAL, "-o", language, "--certificate", proof)
+    assert made.code == 3
+    assert "the certificate proves a lower bound of 4 words, not that 7 are the fewest" in made.err
+    return language, proof
+
+
+def test_the_bound_of_a_search_that_was_stopped(
+    pair: tuple[Path, Path], coordlang: Command
+) -> None:
+    """It is verified as a bound, and not as a proof that the language is minimal."""
+    language, proof = pair
+    assert read_certificate(proof).refuted == STOPPED_AT - 1
+    found = coordlang("verify", language, *GW2, "--certificate", proof)
+    assert found.code == 0
+    bound, minimal = found.out.splitlines()[-2:]
+    assert bound.startswith("lower bound 4: ")
+    assert minimal == ("not proved minimal: the least number of words is at least 4 and at most 7")
+    data = json.loads(coordlang("verify", language, *GW2, "--certificate", proof, "--json").out)
+    assert (data["lower_bound"], data["words"], data["proved_minimal"]) == (4, 7, False)
+    assert json.loads(coordlang("verify", language, *GW2, "--json").out)["proved_minimal"] is None
+
+
+Data = dict[str, Any]
+
+
+def _claim_minimal(language: Data, _: Data) -> None:
+    language["guarantee"] |= {"lower_bound": 7, "proved_minimal": True}
+
+
+def _claim_one_more(language: Data, proof: Data) -> None:
+    language["guarantee"]["lower_bound"] += 1
+    proof["refuted"] += 1
+
+
+def _claim_minimality_of_both(language: Data, proof: Data) -> None:
+    _claim_minimal(language, proof)
+    proof["refuted"] = 6
+
+
+def _drop_reasons(_: Data, proof: Data) -> None:
+    del proof["reasons"][1::2]
+
+
+def _repeat_a_reason(_: Data, proof: Data) -> None:
+    proof["reasons"] = proof["reasons"][:1] * len(proof["reasons"])
+
+
+def _refute_less(_: Data, proof: Data) -> None:
+    proof["refuted"] -= 1
+
+
+def _flag_without_bound(language: Data, _: Data) -> None:
+    language["guarantee"]["proved_minimal"] = True
+
+
+FORGED: list[tuple[Callable[[Data, Data], None], int, str]] = [
+    (_claim_minimal, 1, "claims that 7 words are needed; the certificate proves 4 only"),
+    (_claim_one_more, 1, "reasons leave languages with 4 words"),
+    (_claim_minimality_of_both, 1, "reasons leave languages with 6 words"),
+    (_drop_reasons, 1, "reasons leave languages with 3 words"),
+    (_repeat_a_reason, 1, "reasons leave languages with 3 words"),
+    (_refute_less, 1, "claims that 4 words are needed; the certificate proves 3 only"),
+    (_flag_without_bound, 31, "'proved_minimal' contradicts the lower bound"),
+]
+
+
+def test_forged_bounds(pair: tuple[Path, Path], coordlang: Command, tmp_path: Path) -> None:
+    """A bound is never taken for more than its reasons prove."""
+    for forge, code, said in FORGED:
+        texts = [json.loads(path.read_bytes()) for path in pair]
+        forge(*texts)
+        files = [tmp_path / "forged.json", tmp_path / "forged-proof.json"]
+        for path, text in zip(files, texts, strict=True):
+            path.write_text(json.dumps(text))
+        found = coordlang("verify", files[0], *GW2, "--certificate", files[1])
+        assert found.code == code, (forge, found)
+        assert said in found.err
+
+
+def test_a_bound_above_a_verified_language_is_no_answer(
+    pair: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A language of 7 words and a proof that 8 are needed: one of the two is wrong."""
+    wrong = Checked(8, 1, encode([], 1), {})
+    monkeypatch.setattr("coordlang.api.languages.check_certificate", lambda *_: wrong)
+    with pytest.raises(AssertionError, match="one of the two is wrong"):
+        verify(pair[0], *GW2, certificate=pair[1])
+
+
+def test_a_part_of_the_time_is_left_for_the_certificate(
+    late: list[float], coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left: list[float] = []
+
+    def noted(built: Built) -> Certificate:
+        left.append(time_left())
+        return certificate_of(built)
+
+    monkeypatch.setattr("coordlang.api.languages.certificate_of", noted)
+    output = "-o", tmp_path / "l.json", "--time-limit", "1000"
+    made = coordlang("build", *GW2, *MINIMAL, *output, "--certificate", tmp_path / "c.json")
+    assert made.code == 3
+    assert "late, a part of it kept for the certificate; the best language so far is" in made.err
+    assert 600 < late[0] <= 750  # of the search
+    assert 850 < left[0] <= 1000  # the search came to an end long before
+    assert coordlang("build", *GW2, *MINIMAL, *output).code == 3
+    assert 850 < late[1] <= 1000
+
+
+def test_no_time_is_left_for_the_certificate(
+    late: list[float], coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The clock of the whole command rings while the certificate is made."""
+
+    def endless(_: Built) -> Certificate:
+        os.kill(os.getpid(), signal.SIGALRM)
+        raise AssertionError
+
+    monkeypatch.setattr("coordlang.api.languages.certificate_of", endless)
+    output = "-o", tmp_path / "l.json", "--time-limit", "1000"
+    made = coordlang("build", *GW2, *MINIMAL, *output, "--certificate", tmp_path / "c.json")
+    assert (made.code, [p.name for p in tmp_path.iterdir()]) == (3, ["l.json"])
+    assert "no certificate is written: there was no time or memory left for it" in made.err
+    assert "the time limit of 1000 s is over; the best language so far is written" in made.err
