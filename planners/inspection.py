@@ -7,7 +7,7 @@ Robots, subactions, constraints, interference, fluents.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +21,8 @@ from planners.pddl.lifted import (
     Domain,
     StepAtom,
 )
-from planners.tables import Rows, find_rows, unique_rows
+from planners.search.growth import Growth, first_layers
+from planners.tables import Rows
 
 #: States in which an example of interference is looked for.
 _LOOK_AT = 2000
@@ -37,7 +38,7 @@ class Inspection:
     its subactions asks of the others.  ``interfering`` counts pairs of subactions of different
     robots that cannot share a step; the ``example`` is one that meets in a reachable state, None if
     no state near the start has one.  ``start`` counts the fluents that are true at first, ``never``
-    are the predicates that no state can make true.
+    are the predicates that no state can make true.  ``growth`` says how large a search will be.
     """
 
     domain: str
@@ -63,14 +64,17 @@ class Inspection:
     never: tuple[str, ...]
     facts: int
     goal: str
+    growth: Growth
 
 
 def inspect(loaded: PlanningInstance) -> Inspection:
     """Inspect a loaded domain and its first problem.
 
-    O(pairs of subactions) for the interference count.
+    O(pairs of subactions) for the interference count; the work in states is bounded
+    (`planners.search.growth`).
     """
     model, domain = loaded.model, loaded.domain
+    growth, layers = first_layers(model, loaded.tasks[0])
     start = model.codec.true_facts(loaded.tasks[0].init)
     acting = {action.schema for action in model.actions}
     return Inspection(
@@ -90,13 +94,14 @@ def inspect(loaded: PlanningInstance) -> Inspection:
         without_effects=tuple(sorted({a.schema for a in model.actions if not a.effects})),
         costs=_costs(domain, model.cost),
         interfering=model.stepper.interfering_pairs(),
-        example=_example(model, loaded.tasks[0].init),
+        example=_example(model, layers),
         fluents=_counted(fact.predicate for fact in model.codec.facts),
         start=_counted(model.codec.facts.atoms[fact].predicate for fact in start),
         statics=_counted(a.predicate for a in model.statics),
         never=_never_true(domain, model),
         facts=len(model.codec.facts),
         goal=formula_text(loaded.problems[0].goal),
+        growth=growth,
     )
 
 
@@ -179,20 +184,10 @@ def _impossible(atoms: frozenset[StepAtom]) -> str:
     return f"{_some(atoms)}, which no robot can ever do,"
 
 
-def _example(model: JointModel, init: Rows) -> str | None:
-    """Why two subactions interfere that are both possible in some state.
-
-    Breadth first from the start, some states.
-    """
-    layer = seen = init[None, :]
-    while len(layer) and len(seen) <= _LOOK_AT:
-        why = model.stepper.conflict_in(model.codec.facts_part(layer))
-        if why:
-            return why
-        new, _ = unique_rows(model.successors(layer[:_LOOK_AT]).result)
-        layer = new[find_rows(seen, new) < 0]
-        seen, _ = unique_rows(np.concatenate((seen, layer)))
-    return None
+def _example(model: JointModel, layers: Sequence[Rows]) -> str | None:
+    """Why two subactions interfere that are both possible in some state of the first layers."""
+    rows = np.concatenate(layers)[:_LOOK_AT]
+    return model.stepper.conflict_in(model.codec.facts_part(rows))
 
 
 def _costs(domain: Domain, cost: str) -> str:

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from os import fspath
 from typing import Any, Unpack
 
+from coordlang.api.feasibility import feasibility
 from coordlang.api.inputs import (
     DomainSource,
     File,
@@ -119,6 +120,7 @@ class Inspected(Presented):
             ("statics", _counts(found.statics) or "none"),
             ("never true", ", ".join(found.never) or "none"),
             ("goal", found.goal),
+            *feasibility(found.growth),
         ]
         if self.reachable:
             states = counted(self.reachable.states, "joint state")

@@ -91,6 +91,13 @@ class ComposingStepper:
         """
         return [self._options(robot, number, rows) for number, robot in enumerate(self._robot)]
 
+    def most_steps(self, rows: Rows) -> int:
+        """An upper bound on the joint steps out of these states: products of the own choices."""
+        products = [1] * len(rows)
+        for first, _ in self.choices(rows):
+            products = [n * own for n, own in zip(products, np.diff(first).tolist(), strict=True)]
+        return sum(products)
+
     def why_not(self, row: Rows, labels: Sequence[int]) -> str:
         """Why these labels are no joint step in a state: the first rule that they break."""
         chosen = [self._choices[i][label] for i, label in enumerate(labels)]

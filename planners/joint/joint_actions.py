@@ -70,6 +70,19 @@ class JointActionStepper:
         keep = ~same
         return Steps(row[keep], labels[keep], result[keep], cost[keep])
 
+    def choices(self, rows: Rows) -> list[tuple[Ints, Ints]]:
+        """For each robot the labels that it has in joint steps of each state (CSR)."""
+        row, operator = self._operators.applicable(rows)
+        found = []
+        for own in self._labels[operator].T:
+            pairs = np.unique(np.stack((row, own), axis=1), axis=0)
+            found.append((np.searchsorted(pairs[:, 0], np.arange(len(rows) + 1)), pairs[:, 1]))
+        return found
+
+    def most_steps(self, rows: Rows) -> int:
+        """An upper bound on the joint steps out of these states: applicable ground actions."""
+        return len(self._operators.applicable(rows)[0])
+
     def why_not(self, row: Rows, labels: Sequence[int]) -> str:
         """Why these labels are no joint step in a state, in words."""
         found = np.flatnonzero((self._labels == np.array(labels)).all(axis=1))

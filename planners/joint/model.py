@@ -86,6 +86,12 @@ class Stepper(Protocol):
     def steps(self, rows: Rows) -> Steps:
         """All joint steps applicable in the states of a table."""
 
+    def choices(self, rows: Rows) -> list[tuple[Ints, Ints]]:
+        """For each robot its labels that are possible in these states: (first index, labels)."""
+
+    def most_steps(self, rows: Rows) -> int:
+        """An upper bound on the joint steps out of these states, without composing them."""
+
     def why_not(self, row: Rows, labels: Sequence[int]) -> str:
         """Why these labels are no joint step in a state, in words."""
 

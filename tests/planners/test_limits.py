@@ -29,7 +29,7 @@ from planners.search.edge_index import EdgeIndex
 from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PieceSizes, count, explore
-from planners.tables import Rows
+from planners.tables import Ints, Rows
 from tests.support.domains import DOMAINS
 
 
@@ -162,6 +162,12 @@ class Stopping:
         if self.left[0] < 0:
             raise self.error
         return self.stepper.steps(rows)
+
+    def choices(self, rows: Rows) -> list[tuple[Ints, Ints]]:
+        return self.stepper.choices(rows)
+
+    def most_steps(self, rows: Rows) -> int:
+        return self.stepper.most_steps(rows)
 
     def why_not(self, row: Rows, labels: Sequence[int]) -> str:
         return self.stepper.why_not(row, labels)

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The first layers of a search, and what `inspect` says of it, against the whole search."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from coordlang.api.feasibility import feasibility
+from planners.errors import BadInput, ProvedImpossible
+from planners.joint.model import JointModel
+from planners.loading import ModelOptions, PlanningInstance, build, load
+from planners.pddl import parse_domain, parse_problem
+from planners.pddl.robots import RobotSelection
+from planners.pddl.sexpr import Source
+from planners.search.growth import Growth, first_layers
+from planners.search.optimal_plans import search
+from planners.search.reachable import explore
+from planners.tables import Rows, find_rows, unique_rows
+from tests.support.domains import DOMAINS
+from tests.support.random_pddl import random_model
+
+MANY = 10**9
+
+WALK = """(define (domain walk) (:types robot place) (:predicates (at ?r - robot ?p - place) (next ?a ?b - place))
+  (:action go :agent ?r - robot :parameters (?from ?to - place)
+    :precondition (and (at ?r ?from) (next ?from ?to)) :effect (and (not (at ?r ?from)) (at ?r ?to))))"""
+
+
+def walking(robots: int, places: int, goal: str) -> PlanningInstance:
+    """Robots that do not meet, on a line: each of them as far as it likes."""
+    lines = [f"(next p{k} p{k + 1})" for k in range(places - 1)]
+    starts = [f"(at r{k} p0)" for k in range(robots)]
+    problem = f"""(define (problem p) (:domain walk)
+      (:objects {" ".join(f"r{k}" for k in range(robots))} - robot {" ".join(f"p{k}" for k in range(places))} - place)
+      (:init {" ".join(lines + starts)}) (:goal {goal}))"""
+    lifted = parse_domain(Source("d.pddl", WALK))
+    return build(lifted, [parse_problem(Source("p.pddl", problem), lifted)])
+
+
+def naive_layers(model: JointModel, init: Rows) -> list[int]:
+    """The definition: states by their least number of joint steps from the start."""
+    seen = init[None, :]
+    sizes = [1]
+    while True:
+        after, _ = unique_rows(model.successors(seen).result)
+        new = after[find_rows(seen, after) < 0]
+        if not len(new):
+            return sizes
+        sizes.append(len(new))
+        seen, _ = unique_rows(np.concatenate((seen, new)))
+
+
+@pytest.mark.parametrize("style", ["agent", "plain", "joint"])
+def test_layers_bounds_and_choices_are_those_of_the_whole_search(style: str) -> None:
+    solved = unsolved = 0
+    for seed in range(40):
+        text = random_model(seed, style)  # type: ignore[arg-type]
+        lifted = parse_domain(Source("d.pddl", text.domain))
+        problem = parse_problem(Source("p.pddl", text.problem), lifted)
+        options = ModelOptions(RobotSelection(unowned=text.unowned))
+        loaded = build(lifted, [problem], options)
+        model, task = loaded.model, loaded.tasks[0]
+        try:
+            growth, layers = first_layers(model, task, MANY, MANY)
+        except BadInput:  # two joint actions of the same parts that do different things
+            continue
+        assert growth.next_steps is None
+        assert list(growth.layers) == naive_layers(model, task.init) == list(map(len, layers))
+        space = explore(model, task.init[None, :])
+        assert growth.states == len(space)
+        assert model.stepper.most_steps(space.rows) >= len(space.labels)
+        start = model.successors(task.init[None, :]).labels
+        for own, robot in zip(start.T, model.robots, strict=True):
+            assert growth.choices[robot] >= len(np.unique(own))
+        try:
+            makespan = search(model, task).layer.max()
+        except ProvedImpossible:
+            unsolved += 1
+            assert growth.solvable is False
+            continue
+        solved += 1
+        assert growth.solvable
+        assert growth.makespan == makespan == growth.at_least
+        short, _ = first_layers(model, task, 0, 0)
+        assert short.at_least is not None
+        assert short.at_least <= makespan
+    assert solved >= 5
+    assert unsolved >= 1
+
+
+def test_no_layer_is_begun_that_exceeds_the_work() -> None:
+    """Twelve robots, 2^12 joint steps at the start: nothing of it is composed."""
+    loaded = walking(12, 20, "(at r0 p19)")
+    growth, layers = first_layers(loaded.model, loaded.tasks[0], steps=4_000)
+    assert growth.layers == (1,)
+    assert growth.next_steps == 2**12
+    assert growth.choices == {f"r{k}": 2 for k in range(12)}
+    assert growth.at_least == 19
+    assert len(layers) == 1
+    growth, _ = first_layers(loaded.model, loaded.tasks[0], steps=5_000)
+    assert growth.layers == (1, 2**12 - 1)
+
+
+def said(growth: Growth) -> dict[str, str]:
+    return dict(feasibility(growth))
+
+
+def seen(robots: int, places: int, goal: str) -> Growth:
+    loaded = walking(robots, places, goal)
+    return first_layers(loaded.model, loaded.tasks[0])[0]
+
+
+def test_what_is_said() -> None:
+    small = said(seen(2, 3, "(at r0 p2)"))
+    assert small["labels"] == "r0 2 of 3, r1 2 of 3 possible at the start, idling included"
+    assert small["first layers"] == "1, 3, 5 states, and no other can be reached"
+    assert small["this task"] == "makespan 2: plans, coordination and build are feasible"
+    assert small["--tasks all"] == "9 states, at most 72 tasks: every method is feasible"
+    assert "try" not in small
+    assert said(seen(2, 3, "(next p2 p0)"))["this task"] == "no plan: the goal cannot be reached"
+    large = said(seen(7, 60, "(and (at r0 p59) (at r1 p59))"))
+    assert large["this task"].startswith("makespan 59 at least: about ")
+    assert large["this task"].endswith("; plans, and all that needs them, are not likely to end")
+    assert large["try"] == (
+        "fewer robots (r0 has most choices), fewer objects, only a part of the goal"
+    )
+    wide = said(seen(30, 3, "(at r0 p2)"))
+    assert wide["first layers"] == (
+        "1 state; not looked at: the next, with at most about 1,073,741,824 joint steps into it"
+    )
+    unknown = said(seen(17, 3, "(at r0 p2)"))
+    assert unknown["this task"] == (
+        "makespan 2 at least; whether plans ends is not known: set a --time-limit"
+    )
+
+
+def test_the_estimate_of_a_grid_is_not_far_off() -> None:
+    loaded = load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "corners-8x8.pddl"])
+    growth, _ = first_layers(loaded.model, loaded.tasks[0], states=500)
+    whole, _ = first_layers(loaded.model, loaded.tasks[0], MANY, MANY)
+    assert growth.expected is not None
+    assert whole.states / 10 < growth.expected < whole.states * 100
