@@ -8,7 +8,7 @@ import gzip
 import os
 import stat
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -119,6 +119,50 @@ def write_texts(folder: str | Path, texts: Mapping[str, str]) -> None:
         ) from None
     for name, text in texts.items():
         write_atomically(Path(folder) / name, text.encode())
+
+
+def copy_folders(folders: Sequence[str | Path], target: str | Path) -> None:
+    """Copy folders with all files in them into one, which is made if it is missing.
+
+    They are copied beside, and then renamed: all of them are there, and whole, or none.  Signals
+    wait until that is done.
+
+    Raises
+    ------
+    UsageError
+        If one cannot be written, or is there already.
+    """
+    into = Path(target)
+    try:
+        with postponed_signals():
+            into.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(prefix=".coordlang.", dir=into) as beside:
+                for folder in map(Path, folders):
+                    _copy_folder(folder, Path(beside, folder.name))
+                done: list[Path] = []
+                try:
+                    for copy in sorted(Path(beside).iterdir()):
+                        os.rename(copy, into / copy.name)
+                        done.append(copy)
+                except OSError:
+                    for copy in done:
+                        os.rename(into / copy.name, copy)
+                    raise
+    except OSError as error:
+        raise _cannot(into, error.strerror or str(error)) from None
+
+
+def _copy_folder(source: Path, copy: Path) -> None:
+    """Write a folder and its files again, to the disk."""
+    copy.mkdir()
+    for path in sorted(source.iterdir()):
+        if path.is_dir():
+            _copy_folder(path, copy / path.name)
+            continue
+        with open(copy / path.name, "wb") as file:
+            file.write(path.read_bytes())
+            file.flush()
+            os.fsync(file.fileno())
 
 
 @contextmanager

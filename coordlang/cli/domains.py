@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import json
-import shutil
+import os
 from pathlib import Path
 
 import click
 
 from coordlang.cli.echo import echo
+from coordlang.cli.files import check_outputs
 from planners.notebook import counted
 
 ALL = "all"
@@ -31,7 +32,7 @@ def command(copy: tuple[str, str] | None, as_json: bool) -> None:
     names = domain_names(shipped)
     if copy is not None:
         names = _chosen(copy[0], names)
-        _copy(shipped, names, Path(copy[1]))
+        _copy(shipped, names, copy[1])
     if as_json:
         echo(json.dumps({"domains": [_data(shipped / name) for name in names]}))
     elif copy is not None:
@@ -60,21 +61,16 @@ def _chosen(name: str, names: list[str]) -> list[str]:
     return names if name == ALL else [name]
 
 
-def _copy(shipped: Path, names: list[str], target: Path) -> None:
+def _copy(shipped: Path, names: list[str], target: str) -> None:
     """Copy folders, none of which is there already: nobody's changes are written over."""
     from planners.errors import UsageError
+    from planners.writing import copy_folders
 
     for name in names:
-        if (target / name).exists():
+        path = os.path.join(target, name)
+        if target and os.path.lexists(path):
             raise UsageError(
-                f"{target / name} is there already", remedy="Remove it, or name another folder."
+                f"{path} is there already", remedy="Remove it, or name another folder."
             )
-    try:
-        for name in names:
-            shutil.copytree(shipped / name, target / name)
-    except OSError as error:
-        why = error.strerror or "not all files could be copied"
-        raise UsageError(
-            f"the domains cannot be copied to {target}: {why}",
-            remedy="Name a folder that you may write to.",
-        ) from None
+        check_outputs([("--copy", path if target else "")], [], makes_folder=True)
+    copy_folders([shipped / name for name in names], target)

@@ -48,7 +48,7 @@ def command(
     With --factored and --write: the files of all robots as one domain and one problem.
     """
     if folder is not None:
-        written = [("--write", os.path.join(folder, name)) for name in WRITTEN]
+        written = [("--write", os.path.join(folder, name) if folder else "") for name in WRITTEN]
         check_outputs(written, pddl.paths, makes_folder=True)
     with working("reading and grounding"):
         found = coordlang.inspect(

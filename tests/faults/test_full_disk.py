@@ -12,31 +12,29 @@ import resource
 import sys
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-import coordlang
+from planners.errors import UsageError
+from planners.writing import copy_folders
 from tests.support.command import Outcome
 from tests.support.domains import DOMAINS
-from tests.support.forks import fork_command
-from tests.support.writing_commands import OLD, WRITING, Writing, normal
+from tests.support.forks import fork, fork_command
+from tests.support.writing_commands import OLD, WRITING, Writing, given, normal
 
-GW1 = [str(DOMAINS / "grid" / name) for name in ("domain.pddl", "gw1-2x2.pddl")]
 QUICK = ("certificate", "tasks", "export")
+TWO = ("t-map", "three-cells")
 #: What an evaluation keeps besides its outputs: each of these is whole, or not there.
 KEPT = re.compile(r"cache|cache/[0-9a-f]{24}\.json\.gz(\.lock)?|png|png/\w+\.png|\w+\.svg|\.lock")
 
 
 @pytest.fixture(scope="module")
 def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """A language and a sentence of it; what commands use is loaded then."""
-    path = tmp_path_factory.mktemp("given") / "language.json"
-    built = coordlang.build(*GW1, tasks="all", method="minimal")
-    built.language.save(path)
-    plan = coordlang.plan(built.language, *GW1, prefer=["shortest"])
-    return {"LANGUAGE": str(path), "SENTENCE": plan.sentence}
+    """A language, its certificate and a sentence; what commands use is loaded then."""
+    return given(tmp_path_factory.mktemp("given"))
 
 
 class FullDisk:
@@ -165,6 +163,36 @@ def fill_at_every_length(name: str, said: dict[str, str], folder: Path, steps: i
 @pytest.mark.parametrize("name", QUICK)
 def test_the_disk_is_full_at_a_change(name: str, said: dict[str, str], tmp_path: Path) -> None:
     assert fill_at_every_change(name, said, tmp_path) >= 3
+
+
+def test_domains_are_copied_whole_or_not_at_all(tmp_path: Path) -> None:
+    """Two of them: neither is there without the other."""
+    for number in range(1, 1000):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        disk = FullDisk(number, folder)
+        ended = fork(partial(copied_until, disk, folder)).join()
+        found = sorted(p.relative_to(folder) for p in folder.rglob("*"))
+        if ended.code == 0:
+            break
+        assert (ended.code, "No space left on device" in ended.err) == (2, True), ended
+        assert found == []
+    whole = [
+        p.relative_to(DOMAINS) for name in TWO for p in [DOMAINS / name, *DOMAINS.glob(f"{name}/*")]
+    ]
+    assert found == sorted(whole)
+    assert all((folder / p).read_bytes() == (DOMAINS / p).read_bytes() for p in found if p.suffix)
+    assert number > 2 * (len(whole) - 2)  # each is opened and flushed
+
+
+def copied_until(disk: FullDisk, folder: Path) -> None:
+    """Copy domains to a disk that gets full."""
+    disk.begin()
+    try:
+        copy_folders([DOMAINS / name for name in TWO], folder)
+    except UsageError as error:
+        print(error, file=sys.stderr)
+        sys.exit(2)
 
 
 @pytest.mark.slow

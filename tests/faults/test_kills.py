@@ -15,9 +15,9 @@ from pathlib import Path
 
 import pytest
 
-import coordlang
+from tests.support.domains import DOMAINS
 from tests.support.forks import Fork, fork_command, fresh_command
-from tests.support.writing_commands import FILES, OLD, WRITING, Writing, normal
+from tests.support.writing_commands import OLD, WRITING, Writing, given, normal
 
 SIGNALS = (signal.SIGKILL, signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 #: What a kill that nobody can hear may leave, beside an output and in the temporary directory:
@@ -27,12 +27,8 @@ LEFT = re.compile(r"[a-z0-9_]{8}|\.[^/]{1,16}\.[a-z0-9_]{8}|coordlang-[a-z0-9_]{
 
 @pytest.fixture(scope="module")
 def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """A language file and a sentence of it, by the names that `WRITING` has for them."""
-    path = tmp_path_factory.mktemp("given") / "language.json"
-    built = coordlang.build(*FILES, tasks="all", method="minimal")
-    built.language.save(path)
-    plan = coordlang.plan(built.language, *FILES, prefer=["shortest"])
-    return {"LANGUAGE": str(path), "SENTENCE": plan.sentence}
+    """What `WRITING` has names for."""
+    return given(tmp_path_factory.mktemp("given"))
 
 
 @dataclass
@@ -137,6 +133,40 @@ def test_an_evaluation_is_killed(tmp_path: Path, said: dict[str, str]) -> None:
 @pytest.mark.parametrize("name", WRITING)
 def test_many_kills(name: str, tmp_path: Path, said: dict[str, str]) -> None:
     killed(name, 40, tmp_path, said, fresh=True)
+
+
+def copies_killed(number: int, folder: Path, *, fresh: bool) -> int:
+    """How many copies of a domain were there at the end, each whole."""
+    choice, command = random.Random(2), fresh_command if fresh else fork_command
+    whole = {p.name: p.read_bytes() for p in (DOMAINS / "grid").iterdir()}
+    copies = 0
+    for k in range(number):
+        target = folder / str(k)
+        process = command("domains", "--copy", "grid", target)
+        end = time.monotonic() + (60 if choice.random() < 0.6 else choice.uniform(0.0, 0.4))
+        seen = choice.randrange(len(whole))  # files that are there
+        while time.monotonic() < end and not process.ended():
+            if len([*target.rglob("*.*")]) > seen:
+                break
+        process.send(SIGNALS[k % len(SIGNALS)])
+        ended = process.join()
+        assert ended.code in (0, 128 + SIGNALS[k % 4], -SIGNALS[k % 4]), ended
+        found = {p.name for p in target.iterdir()} if target.exists() else set()
+        if "grid" in found:
+            copies += 1
+            assert {p.name: p.read_bytes() for p in (target / "grid").iterdir()} == whole
+        assert found - {"grid"} == set() or SIGNALS[k % 4] == signal.SIGKILL
+        assert all(re.fullmatch(r"\.coordlang\.[a-z0-9_]{8}", name) for name in found - {"grid"})
+    return copies
+
+
+def test_copies_of_domains_are_whole_or_not_there(tmp_path: Path) -> None:
+    assert copies_killed(8, tmp_path, fresh=False) > 0
+
+
+@pytest.mark.slow
+def test_many_copies_of_domains(tmp_path: Path) -> None:
+    assert 0 < copies_killed(80, tmp_path, fresh=True) < 80
 
 
 def test_two_processes_write_one_output(tmp_path: Path, said: dict[str, str]) -> None:

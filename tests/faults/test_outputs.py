@@ -84,10 +84,15 @@ def test_what_cannot_be_written_is_refused_before_the_work(
 def test_a_folder_that_cannot_be_made_is_refused_before_the_work(
     output: str, coordlang: Command, language: Path, here: Path, no_work: None
 ) -> None:
-    files = [language, *CELLS, "w0"]
-    outcome = coordlang("export", *files, "-o", output)
-    assert outcome.code == 2
-    assert "cannot be written" in outcome.err
+    for command in (
+        ("export", language, *CELLS, "w0", "-o"),
+        ("inspect", *CELLS, "--write"),
+        ("domains", "--copy", "grid"),
+    ):
+        outcome = coordlang(*command, output)
+        assert (outcome.code, outcome.out) == (2, "")
+        assert "cannot be written" in outcome.err
+    assert list(here.iterdir()) == [language]
 
 
 @pytest.mark.parametrize("path", ["", "newdir/", "readonly", "x" * (NAME_MAX + 1)])

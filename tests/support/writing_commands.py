@@ -7,7 +7,10 @@ import gzip
 import json
 import re
 from dataclasses import dataclass
+from pathlib import Path
 
+import coordlang
+from coordlang.certificate import write_certificate
 from tests.support.domains import DOMAINS
 
 FILES = [str(DOMAINS / "grid" / name) for name in ("domain.pddl", "gw1-2x2.pddl")]
@@ -43,6 +46,10 @@ WRITING = {
     "understand": Writing(("understand", *SAID, "--max", "5", "-o", "p.txt"), ("p.txt",)),
     "choices": Writing(("choices", *SAID, "--json", "-o", "c.json"), ("c.json",)),
     "export": Writing(("export", *SAID, "-o", "."), ("domain.pddl", "problem.pddl")),
+    "inspect": Writing(("inspect", *FILES, "--write", "."), ("domain.pddl", "problem.pddl")),
+    "verify": Writing(
+        ("verify", "LANGUAGE", *FILES, "--certificate", "PROOF", "--dimacs", "f.cnf"), ("f.cnf",)
+    ),
     "report": Writing(("report", "LANGUAGE", *FILES, "-o", "page.html"), ("page.html",)),
     "check": Writing(("check", *FILES)),
     "evaluate": Writing(
@@ -53,6 +60,16 @@ WRITING = {
         ("scenario.jsonl", "evaluation.md"),
     ),
 }
+
+
+def given(folder: Path) -> dict[str, str]:
+    """A language file, its certificate and a sentence, by the names that `WRITING` has for them."""
+    language, proof = folder / "language.json", folder / "proof.json"
+    built = coordlang.build(*FILES, tasks="all", method="minimal")
+    built.language.save(language)
+    write_certificate(built.certificate(), proof)
+    plan = coordlang.plan(built.language, *FILES, prefer=["shortest"])
+    return {"LANGUAGE": str(language), "PROOF": str(proof), "SENTENCE": plan.sentence}
 
 
 def normal(name: str, data: bytes) -> bytes:

@@ -53,7 +53,7 @@ def test_copy_one(coordlang: Command, tmp_path: Path) -> None:
     )
     (tmp_path / "file").write_text("")
     outcome = coordlang("domains", "--copy", "t-map", tmp_path / "file")
-    assert (outcome.code, "cannot be copied" in outcome.err) == (2, True)
+    assert (outcome.code, "cannot be written" in outcome.err) == (2, True)
 
 
 def test_the_wheel_has_the_domains() -> None:
