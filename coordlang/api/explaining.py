@@ -83,7 +83,11 @@ class WordsExplained(Presented):
         }
 
     def __str__(self) -> str:
-        lines = [self._head()]
+        return f"{self.head}\n{self.formulas_text()}"
+
+    def formulas_text(self) -> str:
+        """Return the formulas as text, without what the language is."""
+        lines = []
         if self.descriptions.in_order:
             lines.append("The first formula that is true in a state gives its word:")
         lines.append(descriptions_text(self.descriptions, self.mapped))
@@ -96,7 +100,9 @@ class WordsExplained(Presented):
         )
         return "\n".join([*lines, *self._proof()])
 
-    def _head(self) -> str:
+    @property
+    def head(self) -> str:
+        """What the language is, in a line."""
         language = self.used.language
         g = language.guarantee
         proof = "proved minimal" if g.proved_minimal else f"at least {g.lower_bound} needed"
@@ -186,7 +192,7 @@ class Explanation(Presented):
         }
 
     def __str__(self) -> str:
-        return f"{self.words}\n\n{self.task_text()}"
+        return f"{self.words.head}\n\n{self.task_text()}\n\n{self.words.formulas_text()}"
 
     def _repr_html_(self) -> str:
         states = self.words.states

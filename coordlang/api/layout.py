@@ -12,6 +12,11 @@ WIDTH = 120
 #: An atom or action, with what it holds in brackets, or any other piece of text.
 _PIECE = re.compile(r"\((?:[^()]|\([^()]*\))*\)\S*|\S+")
 
+#: An atom without brackets in it, with the brackets around it, or any other piece.
+_ATOM = re.compile(r"\([^()]*\)\S*|\S+")
+#: The space after a part of a sentence.
+_CLAUSE_END = re.compile(r"(?<=[,;]) ")
+
 
 def wrapped(text: str, width: int, indent: str, further: str) -> list[str]:
     """Text in lines: the first one begins with ``indent``, the others with ``further``.
@@ -21,7 +26,37 @@ def wrapped(text: str, width: int, indent: str, further: str) -> list[str]:
     """
     if len(indent) + len(text) <= width:
         return [indent + text]
-    return packed(_PIECE.findall(text), width, indent, further)
+    return packed(_pieces(text, width - len(further)), width, indent, further)
+
+
+def _pieces(text: str, room: int) -> list[str]:
+    """What is not broken: atoms and other words; of a formula that is too wide its atoms."""
+    return [
+        part
+        for piece in _PIECE.findall(text)
+        for part in ([piece] if len(piece) <= room else _ATOM.findall(piece))
+    ]
+
+
+def fitted(text: str, width: int, further: int = 4) -> str:
+    """Text whose lines are no wider than a page: the rest of a wider one stands ``further`` in.
+
+    Lines are broken after commas and semicolons, where that suffices.
+    """
+    lines: list[str] = []
+    for line in text.split("\n"):
+        body = line.lstrip()
+        indent = line[: len(line) - len(body)]
+        inner = indent + further * " "
+        if len(line) <= width:
+            lines.append(line)
+            continue
+        pieces: list[str] = []
+        for clause in _CLAUSE_END.split(body):
+            fits = len(inner) + len(clause) <= width
+            pieces += [clause] if fits else _pieces(clause, width - len(inner))
+        lines += packed(pieces, width, indent, inner)
+    return "\n".join(lines)
 
 
 def packed(

@@ -16,6 +16,7 @@ from coordlang.api.inputs import (
     read_instance,
     read_planning,
 )
+from coordlang.api.layout import WIDTH, wrapped
 from coordlang.api.optimal_plans import OptimalPlans
 from coordlang.api.options import GivenOptions, ModelKeywords
 from coordlang.api.presenting import Presented
@@ -28,6 +29,9 @@ from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from planners.search.reachable import count as count_reachable
 from planners.writing import write_texts
+
+#: The most columns of the names on the left.
+_WIDEST_NAME = 30
 
 
 def load(
@@ -93,7 +97,18 @@ class Inspected(Presented):
         return {"domain": found.domain, "problem": found.problem, "robots": found.robots}
 
     def __str__(self) -> str:
-        return "\n".join(f"{name:<14}  {text}" for name, text in self._lines())
+        return self.text()
+
+    def text(self, width: int = WIDTH) -> str:
+        """Return everything as text, a name in the left column, at most ``width`` wide."""
+        lines = self._lines()
+        left = min(_WIDEST_NAME, max(len(name) for name, _ in lines))
+        further = (left + 2) * " "
+        return "\n".join(
+            line
+            for name, text in lines
+            for line in wrapped(text, width, f"{name:<{left}}  ", further)
+        )
 
     def _repr_html_(self) -> str:
         return html_table((), self._lines())

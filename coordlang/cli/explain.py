@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from typing import TYPE_CHECKING
 
 import click
 
@@ -12,7 +13,11 @@ from coordlang.cli.echo import echo
 from coordlang.cli.files import PlanningFiles, language_argument, planning_files
 from coordlang.cli.group import RenamedOptions
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
-from coordlang.cli.terminal import covered_code, working
+from coordlang.cli.terminal import covered_code, line_width, working
+from planners.errors import OutOfMemory
+
+if TYPE_CHECKING:
+    from coordlang.api.explaining import Explanation
 
 
 @click.command(name="explain", cls=RenamedOptions, renamed={"--each": "--formula-per-word"})
@@ -39,9 +44,9 @@ def command(
     as_json: bool,
     model: ModelKeywords,
 ) -> int:
-    """Show each word of a language as a short formula.
+    """Show what the sentences of a task leave open, and each word as a short formula.
 
-    With --task also show what the sentences of a task demand of each robot.
+    With --task also show what the sentences demand of each robot.
     """
     with working("finding formulas of the words"):
         found = coordlang.explain(
@@ -58,8 +63,21 @@ def command(
             data = found.data()
         echo(json.dumps(data))
     else:
-        echo(f"{found.words}\n")  # first: a task may have too many sentences to list
-        with working("listing the sentences of the task"):
-            text = found.task_text()
-        echo(text)
+        echo(found.words.head + "\n")
+        echo(_task_and_words(found))
     return covered_code(found.covered) if task else 0
+
+
+def _task_and_words(found: Explanation) -> str:
+    """What is easier to read comes first; where a task has too many sentences, the words alone."""
+    from coordlang.api.layout import fitted
+
+    width = line_width()
+    words = fitted(found.words.formulas_text(), width)
+    try:
+        with working("listing the sentences of the task"):
+            task = found.task_text()
+    except OutOfMemory:
+        echo(words)
+        raise
+    return f"{fitted(task, width)}\n\n{words}"

@@ -12,7 +12,7 @@ import coordlang
 from coordlang.cli.echo import echo
 from coordlang.cli.files import FOLDER, PlanningFiles, check_outputs, planning_files
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
-from coordlang.cli.terminal import note_single_robot, working
+from coordlang.cli.terminal import line_width, note_single_robot, working
 
 #: The files that --write makes.
 WRITTEN = "domain.pddl", "problem.pddl"
@@ -57,4 +57,4 @@ def command(
     if folder is not None:
         echo(f"coordlang: note: written to {folder}: {', '.join(WRITTEN)}", err=True)
     note_single_robot(found.robots)
-    echo(json.dumps(found.data()) if as_json else str(found))
+    echo(json.dumps(found.data()) if as_json else found.text(line_width()))

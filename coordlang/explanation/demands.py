@@ -22,6 +22,9 @@ _SETS = 5_000
 #: States at which it is computed which robots decide the next word.
 _STATES = 500
 
+#: Subplans of a robot that are listed one by one.
+FEW = 12
+
 #: A robot's subplan: the text of its subaction in each step, None for idling.
 Subplan = tuple[str | None, ...]
 
@@ -101,7 +104,7 @@ class SentenceDemands:
 
 
 def sentence_demands(
-    space: PlanSpace, partition: Partition, formulas: Mapping[str, Cover], few: int = 4
+    space: PlanSpace, partition: Partition, formulas: Mapping[str, Cover], few: int = FEW
 ) -> SentenceDemands:
     """What a sentence demands of the robots.
 

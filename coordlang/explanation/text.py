@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import groupby
+from itertools import groupby, takewhile
+from math import prod
 from typing import Any
 
 from coordlang.explanation.cover import Cover, Literal, Term
@@ -118,7 +119,7 @@ def _term_lines(formula: Cover) -> list[str]:
     for number, (text, count) in enumerate(zip(texts, formula.counts, strict=False)):
         lines.append(f"      {'or ' if number else '   '}{text:{width}}  [{count}]")
     rest = len(formula.terms) - _TERMS
-    return [*lines, f"      .. and {rest} more terms"] if rest > 0 else lines
+    return [*lines, f"      .. and {counted(rest, 'more term')}"] if rest > 0 else lines
 
 
 def demands_text(demands: SentenceDemands) -> str:
@@ -140,10 +141,25 @@ def _part_lines(part: RobotPart, steps: int) -> list[str]:
         only = part.listed[0] if part.listed else [own[0] for own in part.by_step]
         return [f"  {part.robot}: {_sequence(only)}."]
     if part.listed:
-        listed = [f"    {_sequence(subplan)}" for subplan in part.listed]
-        return [f"  {part.robot} may choose:", *listed]
-    number = f"{part.subplans:,}" if part.subplans is not None else "very many"
-    return [f"  {part.robot} has {number} ways:", *_step_lines(part)]
+        first = sum(
+            1 for _ in takewhile(lambda step: len(set(step)) == 1, zip(*part.listed, strict=True))
+        )
+        head = f": {_sequence(part.listed[0][:first])}, then one of" if first else " may choose:"
+        return [
+            f"  {part.robot}{head}",
+            *(f"    {_sequence(subplan[first:])}" for subplan in part.listed),
+        ]
+    return [f"  {part.robot} has {_ways(part)}:", *_step_lines(part)]
+
+
+def _ways(part: RobotPart) -> str:
+    """How many of the combinations that a table of steps shows are subplans."""
+    if part.subplans is None:
+        return "very many ways, among these"
+    combinations = prod(map(len, part.by_step))
+    if part.subplans == combinations:
+        return f"{part.subplans:,} ways, any combination of"
+    return f"{part.subplans:,} ways, not every combination of these (choices lists them)"
 
 
 def _step_lines(part: RobotPart) -> list[str]:
@@ -172,18 +188,17 @@ def _sequence(subplan: Sequence[str | None]) -> str:
 
 def _alternatives(texts: Sequence[str]) -> str:
     rest = len(texts) - _ALTERNATIVES
-    return (
-        " or ".join(texts)
-        if rest <= 0
-        else f"{', '.join(texts[:_ALTERNATIVES])} or one of {rest} others"
-    )
+    if rest <= 1:  # "one of 1 others" would be as long as its name
+        return " or ".join(texts)
+    return f"{', '.join(texts[:_ALTERNATIVES])} or one of {rest} others"
 
 
 def _when(change: WordChange) -> str:
     if change.earliest == change.latest:
         return f"in step {change.earliest}"
-    between = "or" if change.latest == change.earliest + 1 else "to"
-    return f"in step {change.earliest} {between} {change.latest}"
+    if change.latest == change.earliest + 1:
+        return f"in step {change.earliest} or {change.latest}"
+    return f"in steps {change.earliest} to {change.latest}"
 
 
 def _cause(change: WordChange) -> str:
@@ -200,9 +215,10 @@ def _cause(change: WordChange) -> str:
         for does, _ in change.ways
     ]
     rest = len(together) - _ALTERNATIVES
-    more = f"; or in {counted(rest, 'other way')}" if rest > 0 else ""
-    first = "; or ".join(together[:_ALTERNATIVES])
-    return f"{' and '.join(change.robots)} decide it together: {first}{more}"
+    more = f"; or in {counted(rest, 'other way')}" if rest > 1 else ""
+    first = "; or ".join(together[:_ALTERNATIVES] if rest > 1 else together)
+    *others, last = change.robots
+    return f"{', '.join(others)} and {last} decide it together: {first}{more}"
 
 
 def counted(number: int, noun: str) -> str:

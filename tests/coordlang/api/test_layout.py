@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import pytest
 
-from coordlang.api.layout import WIDTH, alike, atoms_of, named, packed, wrapped
+from coordlang.api.layout import WIDTH, alike, atoms_of, fitted, named, packed, wrapped
 from coordlang.api.witness import witness_data, witness_text
 from coordlang.cli import terminal
 from coordlang.required.miscoordination import Miscoordination, Step
@@ -112,3 +113,36 @@ def test_tables_of_choices_fit(coordlang: Command, tmp_path: object) -> None:
     out = coordlang("choices", language, *files, said).out
     assert max(map(len, out.split("\n"))) <= WIDTH
     assert out.count("may ") >= 3
+
+
+def test_long_lines_are_broken_between_clauses() -> None:
+    text = "short\n  r1: move a b, move b c, move c d.\n  (at r1 a) (at r2 b)"
+    assert fitted(text, 18).split("\n") == [
+        "short",
+        "  r1: move a b,",
+        "      move b c,",
+        "      move c d.",
+        "  (at r1 a)",
+        "      (at r2 b)",
+    ]
+    assert fitted(text, 100) == text
+
+
+def test_inspect_keeps_its_columns_apart_and_to_the_page(
+    coordlang: Command, tmp_path: Path
+) -> None:
+    """Users met names of robots that run into the next column, and lines of any length."""
+    domain, problem = tmp_path / "d.pddl", tmp_path / "p.pddl"
+    domain.write_text(
+        """(define (domain d) (:types robot) (:predicates (up ?r - robot))
+        (:action rise :agent ?r - robot :parameters () :precondition (not (up ?r)) :effect (up ?r)))"""
+    )
+    names = " ".join(f"immersion-varnisher-{k}" for k in range(9))
+    goal = " ".join(f"(up immersion-varnisher-{k})" for k in range(9))
+    problem.write_text(
+        f"(define (problem p) (:domain d) (:objects {names} - robot) (:init) (:goal (and {goal})))"
+    )
+    lines = coordlang("inspect", domain, problem).out.splitlines()
+    assert max(map(len, lines)) <= WIDTH
+    assert "  immersion-varnisher-8  1 subaction: rise 1; may idle in every step" in lines
+    assert "read as                  MA-PDDL (:agent)" in lines
