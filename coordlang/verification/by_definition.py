@@ -5,7 +5,8 @@ Shares the joint model and the plan spaces with the builders, nothing else.  Wal
 in step and carries ``(x_1 .. x_n, y or failed)`` and the *leads*: the words by which the sentence
 of plan 1 is ahead of that of plan i, or behind it (one must be a prefix of the other, else the
 sentences differ for good).  A violation is a walk that ends failed with all leads empty: n plans
-with one sentence whose mixture is no optimal plan (Proposition 9 of docs/concepts.md).
+with one sentence whose mixture is no optimal plan (Proposition 9 of docs/concepts.md).  A walk that
+grows is cut off where no mixture of the plans can fail, whatever their sentences are.
 """
 
 from __future__ import annotations
@@ -14,14 +15,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coordlang.language.partition import Partition
 from coordlang.language.sentences import sentence
 from coordlang.required.miscoordination import Miscoordination, Trail, describe_failure
-from coordlang.verification.leads import ANY, NEVER, Leads
-from coordlang.verification.mixtures import FAILED, Mixtures
+from coordlang.verification.leads import ANY, NEVER
+from coordlang.verification.mixtures import FAILED
 from coordlang.verification.trace import trace
-from coordlang.verification.views import views_of_robot
+from coordlang.verification.walk_tables import WalkTables
 from planners.errors import OutOfMemory
 from planners.limits import memory_left, more_memory, reaching
 from planners.search.plan_space import PlanSpace
@@ -29,6 +31,9 @@ from planners.tables import Bools, Ints, ranges, spans, unique_tuples
 
 #: Moves of the walk handled together.
 _CHUNK = 2_000_000
+#: Nodes off the diagonal, for each node of the plan space, with which a walk begins to be cut off.
+#: The robots' continuations take about as long as the walk of so many.
+GROWTH = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,20 +51,21 @@ class Verdict:
     witness: Miscoordination | None
 
 
-def verify(partition: Partition, spaces: Sequence[PlanSpace]) -> Verdict:
+def verify(partition: Partition, spaces: Sequence[PlanSpace], growth: float = GROWTH) -> Verdict:
     """Check a partition against the definition, for all tasks of ``spaces``.
 
     Every plan has a sentence under a partition, so RC-freeness of the plans of each sentence is all
-    there is to check.
+    there is to check.  ``growth`` says when walks begin to be cut off, and changes only ``nodes``.
     """
     nodes = tasks = 0
     for space in spaces:
         word = partition.word_of(space.rows)[space.state]
-        goal, walked = _Walk(space, word).run()
+        tables = WalkTables.of(space, word)
+        goal, walked = _Walk(tables, growth).run()
         nodes += walked
         tasks += len(space.starts)
         if goal is not None:
-            trail, walked = trace(space, word, goal)
+            trail, walked = trace(tables, goal)
             return Verdict(False, tasks, nodes + walked, _explain(space, partition, word, trail))
     return Verdict(True, tasks, nodes, None)
 
@@ -107,14 +113,17 @@ class _Walk:
     nodes are, and the others in a table.
     """
 
-    def __init__(self, space: PlanSpace, word: Ints) -> None:
-        self.space = space
-        self.robots = space.robots
-        self._views = [views_of_robot(space, robot, word) for robot in range(self.robots)]
-        self._leads = Leads(int(word.max(initial=0)) + 1)
-        self._mixtures = Mixtures.of(space)
-        self._diagonal = np.zeros(len(space), np.bool_)
-        self._diagonal[space.starts] = True
+    def __init__(self, tables: WalkTables, growth: float) -> None:
+        self.space = tables.space
+        self.robots = tables.space.robots
+        self._growth = growth
+        self._views = tables.views
+        self._leads = tables.leads
+        self._mixtures = tables.mixtures
+        self._cut = tables.cut
+        self._diagonal = np.zeros(len(self.space), np.bool_)
+        self._diagonal[self.space.starts] = True
+        self._off_diagonal = 0
 
     def run(self) -> tuple[int | None, int]:
         """The goal number of some violating walk (None: there is none), and the nodes walked."""
@@ -145,7 +154,7 @@ class _Walk:
         return None, walked
 
     def _diagonal_in(self, layer: slice) -> Ints:
-        nodes = np.flatnonzero(self._diagonal[layer]) + layer.start
+        nodes = self._cut.kept_nodes(np.flatnonzero(self._diagonal[layer]) + layer.start)
         table = np.zeros((len(nodes), 2 * self.robots), np.int64)
         for robot, views in enumerate(self._views):
             table[:, robot] = views.of[nodes]
@@ -154,19 +163,34 @@ class _Walk:
 
     def _after(self, table: Ints) -> Ints:
         """The nodes one step on that are not diagonal; those that are get into the mask."""
-        sizes = np.ones(len(table))
-        for robot, views in enumerate(self._views):
-            sizes *= np.diff(views.first)[table[:, robot]]
+        sizes = self._sizes(table)
+        if 100 * sizes.max(initial=0) > memory_left() and not self._cut.begun:
+            self._cut.begin()
+            table = self._cut.kept(table)
+            sizes = self._sizes(table)
         if 100 * sizes.max(initial=0) > memory_left():
             raise _too_large(f"a state with {sizes.max():,.0f} combinations of moves")
         parts = [table[:0]]
         for span in spans(sizes, _CHUNK):
             child = self._children(table[span])
             child = child[~self._on_diagonal(child)]
-            parts.append(_different(child))
+            parts.append(self._cut.kept(_different(child)))
+            met = self._off_diagonal + sum(map(len, parts))
+            if not self._cut.begun and met > self._growth * len(self.space):
+                self._cut.begin()
+                parts = list(map(self._cut.kept, parts))
             if 4 * sum(part.nbytes for part in parts) > memory_left():
                 raise _too_large(f"a layer of {len(table):,} nodes")
-        return _different(np.concatenate(parts))
+        after = _different(np.concatenate(parts))
+        self._off_diagonal += len(after)
+        return after
+
+    def _sizes(self, table: Ints) -> NDArray[np.float64]:
+        """How many combinations of the plans' moves each node has."""
+        sizes = np.ones(len(table))
+        for robot, views in enumerate(self._views):
+            sizes *= np.diff(views.first)[table[:, robot]]
+        return sizes
 
     def _on_diagonal(self, child: Ints) -> Bools:
         """Which nodes are diagonal; they are entered in the mask."""

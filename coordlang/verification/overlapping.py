@@ -19,9 +19,9 @@ import numpy as np
 
 from coordlang.language.overlapping import Sentence
 from coordlang.language.partition import Partition
-from coordlang.required.choices import Choices
 from coordlang.required.miscoordination import Miscoordination, Trail, describe_failure
 from coordlang.verification.by_definition import Verdict, verify
+from coordlang.verification.continuations import Continuations
 from planners.errors import OutOfMemory
 from planners.search.plan_space import PlanSpace
 from planners.tables import Bools, Ints
@@ -49,16 +49,10 @@ def verify_overlapping(partition: Partition, spaces: Sequence[PlanSpace]) -> Ver
         words = partition.words_of(space.rows)
         check = _Check(space, words)
         starts = np.unique(space.starts)
-        # A guess at what is left to look at; that the others are RC-free altogether is checked here
-        # and now.
-        guessed = Choices(space).requires[starts]
-        together = verify(
-            Partition(("",), space.rows[:0], starts[:0], 0), [_from(space, starts[~guessed])]
-        )
-        left = starts if not together.holds else starts[guessed]
+        left = starts[Continuations(space).fails[starts]]  # the plans of the others are RC-free
         several = _overlap_after(space, np.array([len(own) > 1 for own in words], np.bool_))[left]
         alone = verify(partition, [_from(space, left[~several])])
-        nodes += together.nodes + alone.nodes
+        nodes += alone.nodes
         if not alone.holds:
             return Verdict(False, tasks, nodes, alone.witness)
         for start in left[several].tolist():

@@ -6,20 +6,18 @@ from __future__ import annotations
 import numpy as np
 
 from coordlang.required.miscoordination import Trail
-from coordlang.verification.leads import Leads
-from coordlang.verification.mixtures import FAILED, Mixtures
-from coordlang.verification.views import views_of_robot
-from planners.search.plan_space import PlanSpace
+from coordlang.verification.mixtures import FAILED
+from coordlang.verification.walk_tables import WalkTables
 from planners.tables import Ints, ranges
 
 
-def trace(space: PlanSpace, word: Ints, goal: int) -> tuple[Trail, int]:
+def trace(tables: WalkTables, goal: int) -> tuple[Trail, int]:
     """A violating walk of a goal's tasks, and the nodes walked.
 
-    Task by task, so that little has to be remembered.  ``word`` (nodes) are the words.
+    Task by task, so that little has to be remembered.
     """
     walked = 0
-    check = _Trace(space, word)
+    space, check = tables.space, _Trace(tables)
     starts = np.unique(space.starts[space.goal[space.starts] == goal])
     for start in starts[np.argsort(space.layer[starts], kind="stable")]:
         trail, nodes = check.from_start(int(start))
@@ -30,12 +28,13 @@ def trace(space: PlanSpace, word: Ints, goal: int) -> tuple[Trail, int]:
 
 
 class _Trace:
-    def __init__(self, space: PlanSpace, word: Ints) -> None:
-        self.space = space
-        self.robots = space.robots
-        self._views = [views_of_robot(space, robot, word) for robot in range(self.robots)]
-        self._leads = Leads(int(word.max(initial=0)) + 1)
-        self._mixtures = Mixtures.of(space)
+    def __init__(self, tables: WalkTables) -> None:
+        self.space = tables.space
+        self.robots = tables.space.robots
+        self._views = tables.views
+        self._leads = tables.leads
+        self._mixtures = tables.mixtures
+        self._cut = tables.cut
 
     def from_start(self, start: int) -> tuple[Trail | None, int]:
         """A violating walk of the task that starts in this node, and the nodes walked."""
@@ -46,7 +45,9 @@ class _Trace:
         for _ in range(int(self.space.layer[start])):
             walked += len(table)
             source, moves, child = self._moves(table)
-            table, first = np.unique(child, axis=0, return_index=True)
+            different, first = np.unique(child, axis=0, return_index=True)
+            kept = self._cut.which(different)
+            table, first = different[kept], first[kept]
             history.append((source[first], moves[first]))
         failed = table[:, self.robots] == FAILED
         bad = np.flatnonzero(failed & (table[:, self.robots + 1 :] == 0).all(axis=1))

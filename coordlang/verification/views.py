@@ -56,7 +56,7 @@ def views_of_robot(space: PlanSpace, robot: int, word: Ints) -> Views:
         pairs, _ = unique_tuples(moves, [span.stop - span.start, labels, max(1, number)])
         here = np.arange(span.start, span.stop)
         own = word[here] * (int(space.goal.max(initial=0)) + 1) + space.goal[here]
-        view, some = _numbered(own, pairs, [labels, max(1, number)])
+        view, some = numbered(own, pairs, [labels, max(1, number)])
         of[here] = view + number
         number += len(some)
         found.append(_Layer.of_nodes(some, word[here], pairs))
@@ -90,7 +90,7 @@ class _Layer:
         return cls(word[some], counts, pairs[ranges(first[some], counts), 1:])
 
 
-def _numbered(own: Ints, pairs: Ints, bounds: list[int]) -> tuple[Ints, Ints]:
+def numbered(own: Ints, pairs: Ints, bounds: list[int]) -> tuple[Ints, Ints]:
     """Numbers of nodes, equal where ``own`` and all moves are, and a node for each number.
 
     ``pairs`` (moves, 3) are the moves (node, ..) of all nodes, sorted.  Move by move: nodes that

@@ -4,22 +4,27 @@
 from __future__ import annotations
 
 from collections import Counter
+from math import inf
 from random import Random
 
 import numpy as np
 import pytest
 
 from coordlang.language.partition import Partition
+from coordlang.required.divergences import first_differences, states_on_plans
 from coordlang.tasks.candidates import all_pairs, from_problems
 from coordlang.verification import leads
 from coordlang.verification.by_definition import verify
+from coordlang.vocabulary import Job, greedy
 from planners.errors import BadInput, ProvedImpossible
-from tests.support.domains import all_tasks
+from tests.support.domains import all_tasks, own_task
 from tests.support.random_models import random_model
 from tests.support.verification_walk import violation
 
 #: Edges to the power of the robots in a plan space that the twin is given.
 MOST = 4_000
+#: Walks are cut off from the beginning, once they have grown, or never.
+GROWTHS = (-1.0, 0.1, inf)
 
 
 def compared(seeds: range, robots: int) -> Counter[bool]:
@@ -40,7 +45,8 @@ def compared(seeds: range, robots: int) -> Counter[bool]:
             word = np.array([random.randrange(size) for _ in found.rows])
             table = Partition(tuple(f"w{n}" for n in range(size)), found.rows, word, 0)
             expected = any(violation(space, word[space.state]) for space in spaces)
-            assert verify(table, spaces).holds == (not expected)
+            for growth in GROWTHS:
+                assert verify(table, spaces, growth).holds == (not expected)
             answers[expected] += 1
     return answers
 
@@ -77,4 +83,17 @@ def test_as_many_nodes_as_before(size: int, nodes: int) -> None:
     candidates = all_tasks("grid", "gw2-2x3")
     word = np.arange(len(candidates.rows)) * 7 % size
     table = Partition(tuple(f"w{n}" for n in range(size)), candidates.rows, word, 0)
-    assert verify(table, candidates.spaces).nodes == nodes
+    assert verify(table, candidates.spaces, growth=inf).nodes == nodes
+
+
+def test_a_walk_that_is_cut_off_stays_on_the_diagonal() -> None:
+    """Under words that separate all divergences: what fails has two sentences."""
+    candidates = own_task("grid", "three-robots-3x3")
+    (space,) = candidates.spaces
+    first = first_differences(candidates.spaces)
+    words = greedy(Job(candidates, tuple(states_on_plans(candidates.spaces).tolist()), first))
+    table = Partition.of_states(candidates.rows, words.partition)
+    whole, cut = (verify(table, candidates.spaces, growth) for growth in (inf, -1.0))
+    assert whole.holds
+    assert cut.holds
+    assert cut.nodes <= len(space) < whole.nodes

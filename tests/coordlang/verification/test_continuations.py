@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What robots can still do, against plans that are listed; what is cut off, against all mixtures."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from functools import cache
+from itertools import product
+from random import Random
+
+import numpy as np
+import pytest
+
+from coordlang.verification.continuations import Continuations, SequenceSets
+from planners.search.plan_space import PlanSpace
+from planners.search.plans import counts
+from tests.support.random_spaces import random_spaces
+
+#: Plans from a node that are listed, by the number of robots.
+PLANS = {1: 40, 2: 40, 3: 12, 4: 8}
+#: One robot's labels, step by step.
+Sequence = tuple[int, ...]
+
+
+def sequences(sets: SequenceSets, number: int) -> set[Sequence]:
+    """The members of a set, written out."""
+    if not sets.moves[number]:
+        return {()}
+    return {
+        (label, *rest)
+        for label, after in sets.moves[number].items()
+        for rest in sequences(sets, after)
+    }
+
+
+class Listed:
+    """The optimal plans from each node, as sequences of label tuples."""
+
+    def __init__(self, space: PlanSpace) -> None:
+        self.space = space
+        self.plans = cache(self._plans)
+
+    def _plans(self, node: int) -> frozenset[tuple[tuple[int, ...], ...]]:
+        edges = self.space.out_edges(node)
+        if not edges:
+            return frozenset({()})
+        return frozenset(
+            (tuple(self.space.labels_of(edge)), *rest)
+            for edge in edges
+            for rest in self.plans(self.space.target_of(edge))
+        )
+
+    def own(self, robot: int, node: int) -> set[Sequence]:
+        """The sequences of one robot's labels."""
+        return {tuple(step[robot] for step in plan) for plan in self.plans(node)}
+
+    def fails(self, x: tuple[int, ...], y: int) -> bool:
+        """Whether some mixture of plans from the ``x`` is no optimal plan from ``y``."""
+        parts = [self.own(robot, node) for robot, node in enumerate(x)]
+        return any(
+            tuple(zip(*mixed, strict=True)) not in self.plans(y) for mixed in product(*parts)
+        )
+
+
+def small_spaces(seeds: range, robots: int | None) -> Iterator[PlanSpace]:
+    for _, space in random_spaces(seeds, robots, most=120):
+        if len(space) and max(counts(space)) <= PLANS[space.robots]:
+            yield space
+
+
+def compared(seeds: range, robots: int | None) -> Counter[str]:
+    met: Counter[str] = Counter()
+    random = Random(7)
+    for space in small_spaces(seeds, robots):
+        listed, found = Listed(space), Continuations(space)
+        for robot, node in product(range(space.robots), range(len(space))):
+            mine = sequences(found.sets, int(found.of[robot, node]))
+            assert mine == listed.own(robot, node)
+        for node in range(len(space)):
+            fails = listed.fails((node,) * space.robots, node)
+            assert found.fails[node] == fails
+            met[f"nodes: {fails}"] += 1
+        for layer in space.layers:
+            for _ in range(6):
+                nodes = [random.randrange(layer.start, layer.stop) for _ in range(space.robots + 1)]
+                *x, y = nodes
+                mine = found.of[np.arange(space.robots), x][:, None]
+                possible = bool(found.can_fail(mine, np.array([y]))[0])
+                fails = listed.fails(tuple(x), y)
+                assert possible or not fails
+                assert fails or not possible or found.fails[y]
+                met[f"mixtures: {fails}"] += 1
+    return met
+
+
+def answers_both_ways(met: Counter[str], least: int) -> bool:
+    kinds = ("nodes: True", "nodes: False", "mixtures: True", "mixtures: False")
+    return all(met[kind] >= least for kind in kinds)
+
+
+@pytest.mark.parametrize(("robots", "number"), [(2, 120), (3, 60), (None, 60)])
+def test_continuations_are_those_of_listed_plans(robots: int | None, number: int) -> None:
+    assert answers_both_ways(compared(range(number), robots), 15)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robots", [2, 3, 4, None])
+def test_continuations_are_those_of_listed_plans_on_many_models(robots: int | None) -> None:
+    met = compared(range(5_000, 6_500), robots)
+    print(robots or "any", "robots:", dict(sorted(met.items())))
+    assert answers_both_ways(met, 100)
+
+
+def test_unions_and_inclusions_of_long_sequences() -> None:
+    """Sets that differ in the last step of 5,000 only."""
+    sets = SequenceSets()
+    one, other = sets.number([(0, 0)]), sets.number([(1, 0)])
+    for _ in range(5_000):
+        one, other = sets.number([(0, one)]), sets.number([(0, other)])
+    both = sets.union((one, other))
+    assert sets.inside(one, both)
+    assert sets.inside(other, both)
+    assert not sets.inside(both, one)
+    assert not sets.inside(one, other)
+    assert sets.union((one, both)) == both
