@@ -85,8 +85,8 @@ def compared(seeds: range, robots: int | None) -> Counter[str]:
             for _ in range(6):
                 nodes = [random.randrange(layer.start, layer.stop) for _ in range(space.robots + 1)]
                 *x, y = nodes
-                mine = found.of[np.arange(space.robots), x][:, None]
-                possible = bool(found.can_fail(mine, np.array([y]))[0])
+                chosen = found.of[np.arange(space.robots), x][:, None]
+                possible = bool(found.can_fail(chosen, np.array([y]))[0])
                 fails = listed.fails(tuple(x), y)
                 assert possible or not fails
                 assert fails or not possible or found.fails[y]
