@@ -22,13 +22,15 @@ from coordlang.api.options import (
 )
 from coordlang.api.presenting import Presented
 from coordlang.api.speaking import SentencePlans, SentenceSource, given_sentence
+from coordlang.use.choices.choices import choices as choices_under
+from coordlang.use.export.behaviour_tree import behaviour_trees
 from coordlang.use.export.ltlf import SentenceFormula, export_ltlf
 from coordlang.use.export.pddl import PddlExport, export_pddl, plan_names
 from coordlang.use.sentence.open_plans import OpenPlans
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import BadInput, Position, Refuted
 from planners.joint.model import JointModel
-from planners.search.plan_file import only_one_plan
+from planners.search.plan_file import json_count, only_one_plan
 from planners.writing import write_texts
 
 #: Beyond this many joint actions robots choose one after another in the exported PDDL.
@@ -177,6 +179,34 @@ class ExportedFormula(Presented):
         }
 
 
+@dataclass(frozen=True, slots=True, repr=False)
+class ExportedTrees(Presented):
+    """Each robot's choices under a sentence as a behaviour tree of its name.
+
+    ``xml`` is a document of BehaviorTree.CPP 4; ``subplans``: how many ways each robot has.
+    """
+
+    xml: str
+    subplans: dict[str, int]
+    guaranteed: bool
+    covered: bool
+
+    def facts(self) -> Mapping[str, object]:
+        """Return the main facts, as a notebook shows them."""
+        return {"subplans": self.subplans, "guaranteed": self.guaranteed}
+
+    def __str__(self) -> str:
+        return self.xml
+
+    def data(self) -> dict[str, Any]:
+        """Return the document, and how many ways each robot has, as JSON data."""
+        return {
+            "xml": self.xml,
+            "subplans": {robot: json_count(n) for robot, n in self.subplans.items()},
+            "guaranteed": self.guaranteed,
+        }
+
+
 @overload
 def export(
     language: LanguageSource,
@@ -207,6 +237,21 @@ def export(
 ) -> ExportedFormula: ...
 
 
+@overload
+def export(
+    language: LanguageSource,
+    domain: DomainSource | None = None,
+    problem: ProblemSource | None = None,
+    sentence: SentenceSource | None = None,
+    *,
+    factored: File | None = None,
+    to: Literal["bt"],
+    max_actions: int = MAX_ACTIONS,
+    for_planner: Reader = "fd",
+    **model: Unpack[ModelKeywords],
+) -> ExportedTrees: ...
+
+
 def export(
     language: LanguageSource,
     domain: DomainSource | None = None,
@@ -218,7 +263,7 @@ def export(
     max_actions: int = MAX_ACTIONS,
     for_planner: Reader = "fd",
     **model: Unpack[ModelKeywords],
-) -> ExportedTask | ExportedFormula:
+) -> ExportedTask | ExportedFormula | ExportedTrees:
     """Write a task under a sentence for other programs.
 
     Parameters
@@ -229,7 +274,8 @@ def export(
         ``"w1 w0"`` or ``("w1", "w0")``.
     to
         ``"pddl"``: a planning problem whose optimal plans are exactly the plans that fit.
-        ``"ltlf"``: a temporal formula over plans.
+        ``"ltlf"``: a temporal formula over plans.  ``"bt"``: each robot's choices as a behaviour
+        tree.
     max_actions
         Beyond this many joint actions robots choose one after another in the PDDL.
     for_planner
@@ -250,9 +296,22 @@ def export(
     words = used.words_of(said)
     if to == "pddl":
         return ExportedTask(OpenPlans.of(used, words), _pddl(used, words, max_actions, for_planner))
+    if to == "bt":
+        return _trees(used, words)
     found: SentenceFormula = export_ltlf(used, words)
     return ExportedFormula(
         found.formula, found.over_words, found.words, found.symbols, used.covered
+    )
+
+
+def _trees(used: TaskLanguage, words: Sequence[int]) -> ExportedTrees:
+    found = choices_under(used, words)
+    robots = used.model.robots
+    return ExportedTrees(
+        xml=behaviour_trees(found),
+        subplans={robots[own.robot]: own.automaton.count for own in found.robots},
+        guaranteed=found.guaranteed,
+        covered=used.covered,
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from coordlang.api.presenting import Presented
 from planners.notebook import html_table
-from planners.search.plan_file import Texts, texts, to_ipc, to_json
+from planners.search.plan_file import Texts, texts, to_ipc, to_json, to_plansys2
 from planners.search.plans import Plan, Plans
 
 #: One plan: for each joint step, each robot's subaction as text, None where it idles.
@@ -82,6 +82,10 @@ class OptimalPlans(Presented):
             If it is no optimal plan of the task.
         """
         return to_ipc(self._plans, self._known(plan))
+
+    def plansys2(self, plan: Sequence[Texts]) -> str:
+        """Return a plan as PlanSys2 reads it (docs/formats.md); raises as `ipc`."""
+        return to_plansys2(self._plans, self._known(plan))
 
     def data(self, listed: Sequence[Sequence[Texts]]) -> dict[str, Any]:
         """Return the data of a JSON plan file with these plans in it (docs/formats.md)."""

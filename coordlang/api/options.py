@@ -18,7 +18,7 @@ Method = Literal["greedy", "separating", "minimal", "exhaustive"]
 BuildPreference = Literal["flexible"]
 Unsolvable = Literal["fail", "skip"]
 HeuristicName = Literal["relaxed", "manhattan", "blind"]
-Target = Literal["pddl", "ltlf"]
+Target = Literal["pddl", "ltlf", "bt"]
 #: Planners whose PDDL differs: what Fast Downward and K* read, or STRIPS alone.
 Reader = Literal["fd", "kstar", "pyperplan"]
 

@@ -265,6 +265,10 @@ class PlanUnderSentence(Presented):
         """Return the plan as an IPC plan file, with its sentence in a comment."""
         return f"{self.open_plans.ipc(self.steps)}; sentence = {self.sentence}\n"
 
+    def plansys2(self) -> str:
+        """Return the plan as PlanSys2 reads it."""
+        return self.open_plans.plansys2(self.steps)
+
     def data(self) -> dict[str, Any]:
         """Return the plan, the search and the preferences as JSON data."""
         data = self.open_plans.data_with([self.steps], None)

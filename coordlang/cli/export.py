@@ -41,14 +41,15 @@ _RENAMED = {"--limit": "--max-actions", "--back": "--translate-plan"}
     type=click.Choice(TARGETS),
     default="pddl",
     show_default=True,
-    help="pddl: a planning problem.  ltlf: a temporal formula over plans.",
+    help="pddl: a planning problem.  ltlf: a temporal formula over plans.  bt: each robot's "
+    "choices as a behaviour tree.",
 )
 @click.option(
     "-o",
     "--output",
     type=FILE,
     metavar="PATH",
-    help="pddl: a folder for domain.pddl and problem.pddl; ltlf: a file.",
+    help="pddl: a folder for domain.pddl and problem.pddl; ltlf, bt: a file.",
 )
 @click.option(
     "--max-actions",
@@ -90,12 +91,13 @@ def command(
     """Write the task under SENTENCE ("w1 w0") for other programs.
 
     The optimal plans of the exported PDDL are exactly the plans that fit, one to one; a plan
-    satisfies the LTLf formula exactly if it has the sentence.
+    satisfies the LTLf formula exactly if it has the sentence; each robot's behaviour tree
+    (BehaviorTree.CPP 4) does exactly its choices.
 
     Exit 1: no plan fits, or the language does not cover the task and guarantees nothing for it.
     """
-    if target == "ltlf":
-        _check_ltlf(translate_plan)
+    if target != "pddl":
+        _check_not_pddl(target, translate_plan)
     inputs = [language, *pddl.paths, translate_plan]
     writes_folder = target == "pddl" and translate_plan is None and not as_json
     if output is not None and output != "-" and writes_folder:
@@ -110,6 +112,11 @@ def command(
             formula = coordlang.export(*files, factored=pddl.factored, to="ltlf", **model)
         _write_formula(formula, output, as_json)
         return covered_code(formula.covered)
+    if target == "bt":
+        with working("finding the robots' choices"):
+            trees = coordlang.export(*files, factored=pddl.factored, to="bt", **model)
+        write(json.dumps(trees.data()) + "\n" if as_json else trees.xml, output)
+        return covered_code(trees.covered)
     with working("compiling the task"):
         exported = coordlang.export(
             *files,
@@ -126,11 +133,11 @@ def command(
     return covered_code(exported.covered)
 
 
-def _check_ltlf(translate_plan: str | None) -> None:
-    """Refuse what has no effect on a formula."""
+def _check_not_pddl(target: Target, translate_plan: str | None) -> None:
+    """Refuse what has an effect on PDDL only."""
     if translate_plan is not None:
         raise click.UsageError(
-            "--translate-plan translates plans of the exported PDDL: leave out --to ltlf"
+            f"--translate-plan translates plans of the exported PDDL: leave out --to {target}"
         )
     if was_given("max_actions"):
         raise click.UsageError("--max-actions belongs to --to pddl")

@@ -13,6 +13,7 @@ from coordlang.api.options import HEURISTICS, HeuristicName
 from coordlang.cli.echo import echo
 from coordlang.cli.files import PlanningFiles, language_argument, planning_files
 from coordlang.cli.group import RenamedOptions
+from coordlang.cli.listing import form_of
 from coordlang.cli.shared_options import ModelKeywords, limits, model_options
 from coordlang.cli.terminal import covered_code, working
 from planners.notebook import counted
@@ -38,7 +39,15 @@ if TYPE_CHECKING:
     show_default=True,
     help="The lower bound of A*.",
 )
-@click.option("--json", "as_json", is_flag=True, help="One JSON object.")
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["ipc", "json", "plansys2"]),
+    default="ipc",
+    show_default=True,
+    help="How the plan is written.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Short for --format json.")
 @model_options
 @limits
 def command(
@@ -47,6 +56,7 @@ def command(
     sentence: str | None,
     prefer: tuple[str, ...],
     heuristic: HeuristicName,
+    form: str,
     as_json: bool,
     model: ModelKeywords,
 ) -> int:
@@ -55,6 +65,7 @@ def command(
     With --prefer the best sentence of the task is found first.  The nodes expanded with and without
     the sentence go to stderr.
     """
+    form = form_of(form, as_json)
     with working("searching for a plan"):
         found = coordlang.plan(
             language,
@@ -66,10 +77,10 @@ def command(
             heuristic=heuristic,
             **model,
         )
-    if as_json:
+    if form == "json":
         echo(json.dumps(found.data()))
         return covered_code(found.covered)
-    echo(found.ipc(), nl=False)
+    echo(found.plansys2() if form == "plansys2" else found.ipc(), nl=False)
     for entry in found.fulfilled:
         _comment(entry)
     expanded = counted(found.expanded, "node")

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -87,7 +87,9 @@ class NoSuchAction(BadInput):
 #: The comments with which a plan of `coordlang plans`, or of another planner, begins and ends.
 _BEGIN = re.compile(r"\s*;\s*(?:sampled )?plan \d+\b", re.IGNORECASE)
 _END = re.compile(r"\s*;\s*(?:makespan|cost) = \d", re.IGNORECASE)
-_LINE = re.compile(r"(?:(?P<step>\d+)\s*:)?\s*(?P<action>\([^()]*\))\s*(?:\[\s*[\d.]+\s*\])?$")
+_LINE = re.compile(
+    r"(?:(?P<step>\d+)(?:\.0+)?\s*:)?\s*(?P<action>\([^()]*\))\s*(?:\[\s*[\d.]+\s*\])?$"
+)
 
 
 def texts(model: JointModel, plan: Plan) -> tuple[Texts, ...]:
@@ -101,16 +103,30 @@ def to_ipc(plans: Plans, plan: Plan) -> str:
     Joint-action PDDL: one ``(action args)`` a line.  Otherwise one subaction a line with its step,
     ``0: (move r1 a b)``, idling left out, a shared subaction once.  Then ``; makespan = 3``.
     """
+    lines = [
+        text if plans.space.model.is_joint_action else f"{number}: {text}"
+        for number, text in _lines(plans, plan)
+    ]
+    return "\n".join([*lines, f"; makespan = {len(plan)}"]) + "\n"
+
+
+def to_plansys2(plans: Plans, plan: Plan) -> str:
+    """A plan as PlanSys2 reads it from a planner: ``0.000: (move r1 a b)  [1.000]``.
+
+    The time is the joint step, and each action lasts one step.  Lines before one with "Solution
+    Found" are skipped by its readers.
+    """
+    lines = [f"{number}.000: {text}  [1.000]" for number, text in _lines(plans, plan)]
+    return "\n".join([";;;; Solution Found", *lines]) + "\n"
+
+
+def _lines(plans: Plans, plan: Plan) -> Iterator[tuple[int, str]]:
+    """The actions of a plan, each with its joint step: joint actions, or robots' subactions."""
     model, rows = plans.space.model, plans.space.rows
-    lines: list[str] = []
     for number, (state, labels) in enumerate(zip(plans.states(plan), plan, strict=False)):
         whole = model.joint_action(rows[state], labels)
-        if whole is not None:
-            lines.append(whole)
-            continue
-        own = dict.fromkeys(model.texts(labels))
-        lines += [f"{number}: {text}" for text in own if text is not None]
-    return "\n".join([*lines, f"; makespan = {len(plan)}"]) + "\n"
+        own = model.texts(labels) if whole is None else (whole,)
+        yield from ((number, text) for text in dict.fromkeys(own) if text is not None)
 
 
 def to_json(plans: Plans, listed: Sequence[Plan], task: int = 0) -> dict[str, Any]:
