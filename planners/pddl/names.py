@@ -8,12 +8,16 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 
 from planners.errors import BadInput, Unsupported, note
-from planners.messages import echoed
+from planners.messages import echoed, visible
 from planners.pddl.lifted import Variable
 from planners.pddl.sexpr import Document, Expression, Group, Token
 
 #: Characters of a wrong name that are compared with the declared names.
 _LONGEST_COMPARED = 200
+#: Arguments in an example.
+_LETTERS = tuple("abcdefghij")
+#: Characters of a name in an example.
+_SHOWN = 60
 
 
 def known(names: Iterable[str], wrong: str, what: str) -> str:
@@ -32,7 +36,9 @@ def token(document: Document, item: Expression, what: str) -> Token:
     """``item`` as a single token, or an error that says what was expected there."""
     if isinstance(item, Token):
         return item
-    raise document.fail(f"expected {what}, found a list", item)
+    raise document.fail(
+        f"expected {what}, found a list", item, f"Write {what} here, without parentheses."
+    )
 
 
 def is_token(item: Expression, *texts: str) -> bool:
@@ -44,7 +50,11 @@ def group(document: Document, item: Expression, what: str) -> Group:
     """``item`` as a list, or an error that says what was expected there."""
     if isinstance(item, Group):
         return item
-    raise document.fail(f"expected {what}, found {echoed(item.text)}", item)
+    raise document.fail(
+        f"expected {what}, found {echoed(item.text)}",
+        item,
+        "Put it in parentheses with all that belongs to it.",
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +81,11 @@ def typed_list(document: Document, items: Sequence[Expression], what: str) -> li
             at += 1
             continue
         if at + 1 == len(items):
-            raise document.fail("expected a type after '-'", item)
+            raise document.fail(
+                "expected a type after '-'",
+                item,
+                "Write the type's name after it, or leave the '-' out.",
+            )
         types = _types(document, items[at + 1])
         if not waiting:
             noun = what.partition(" ")[2]
@@ -89,7 +103,11 @@ def _types(document: Document, item: Expression) -> tuple[str, ...]:
     if isinstance(item, Token):
         return (item.text,)
     if item.head != "either" or len(item) < 2:
-        raise document.fail("expected a type or '(either type ..)'", item)
+        raise document.fail(
+            "expected a type or '(either type ..)'",
+            item,
+            "One type is a name, several are (either name name).",
+        )
     return tuple(token(document, part, "a type").text for part in item.items[1:])
 
 
@@ -133,7 +151,9 @@ class Names:
             self.check_types(entry)
             if any(v.name == entry.token.text for v in variables):
                 raise self.document.fail(
-                    f"variable {entry.token.text} is declared twice", entry.token
+                    f"variable {entry.token.text} is declared twice",
+                    entry.token,
+                    "Give one of the two another name.",
                 )
             variables.append(Variable(entry.token.text, entry.types))
         return tuple(variables)
@@ -157,7 +177,12 @@ class Names:
                     position=self.document.source.position(item.offset),
                     remedy="coordlang reads functions only in '(increase (total-cost) ..)'.",
                 )
-            raise self.document.fail("expected a variable or an object, found a list", item)
+            raise self.document.fail(
+                "expected a variable or an object, found a list",
+                item,
+                "Arguments are names: atoms are not nested, and no list of arguments is in "
+                "parentheses of its own.",
+            )
         if item.text.startswith("?"):
             if item.text not in self.variables:
                 raise self.document.fail(
@@ -178,9 +203,16 @@ class Names:
         found = len(item) - 1
         if found in arities:
             return None
-        wanted = " or ".join(str(n) for n in sorted(arities))
+        numbers = sorted(arities)
+        wanted = " or ".join(str(n) for n in numbers)
+        plural = "" if numbers == [1] else "s"
+        forms = " or ".join(
+            f"({' '.join((visible(name[:_SHOWN]), *_LETTERS[:n]))})" for n in numbers
+        )
         return self.document.fail(
-            f"{what} {echoed(name)} takes {wanted} arguments, found {found}", item
+            f"{what} {echoed(name)} takes {wanted} argument{plural}, found {found}",
+            item,
+            f"Write {forms}, or declare it with {found}.",
         )
 
 
@@ -198,7 +230,11 @@ def read_objects(
         names.check_types(entry)
         name = entry.token.text
         if name.startswith("?"):
-            raise document.fail("a variable cannot be an object", entry.token)
+            raise document.fail(
+                "a variable cannot be an object",
+                entry.token,
+                f"Names of objects have no '?': {visible(name[1:_SHOWN])}.",
+            )
         old = into.get(name, ())
         into[name] = (*old, *(t for t in entry.types if t not in old))
 

@@ -68,7 +68,8 @@ WRONG_DOMAINS = {
     ),
     "wrong arity": (
         DOMAIN.replace(":precondition (and (at ?r ?x)", ":precondition (and (at ?r)"),
-        "d.pddl:6:24: predicate 'at' takes 2 arguments, found 1",
+        "d.pddl:6:24: predicate 'at' takes 2 arguments, found 1\n"
+        "  Write (at a b), or declare it with 1.",
     ),
     "type cycle": (
         DOMAIN.replace("robot room)", "robot - room room - robot)"),
@@ -81,6 +82,10 @@ WRONG_DOMAINS = {
     "unknown variable": (
         DOMAIN.replace("(at ?r ?y)", "(at ?r ?z)"),
         "variable ?z is not declared here",
+    ),
+    "double variable": (
+        DOMAIN.replace("?x ?y - room)\n    :pre", "?x ?x - room)\n    :pre"),
+        "variable ?x is declared twice\n  Give one of the two another name.",
     ),
     "unknown keyword": (
         DOMAIN.replace(":effect", ":effects"),
@@ -117,11 +122,33 @@ WRONG_PROBLEMS = {
     ),
     "object of no type": (
         PROBLEM.replace("a b - room", "a b -"),
-        "p.pddl:2:31: expected a type after '-'",
+        "p.pddl:2:31: expected a type after '-'\n"
+        "  Write the type's name after it, or leave the '-' out.",
     ),
     "object of an unknown type": (
         PROBLEM.replace("- robot a", "- rbot a"),
         "type 'rbot' of 'r1' is not declared",
+    ),
+    "an object that is a variable": (
+        PROBLEM.replace("a b - room", "a ?b - room"),
+        "a variable cannot be an object\n  Names of objects have no '?': b.",
+    ),
+    "an atom of atoms": (
+        PROBLEM.replace("(at r1 b) (at r2 a)", "(at r1 (at r2 a))"),
+        "expected a variable or an object, found a list\n  Arguments are names:",
+    ),
+    "an object in parentheses": (
+        PROBLEM.replace("r1 r2 - robot", "(r1) r2 - robot"),
+        "expected an object, found a list\n  Write an object here, without parentheses.",
+    ),
+    "an atom without parentheses": (
+        PROBLEM.replace("(:init (at r1 a)", "(:init at"),
+        "expected an atom in parentheses, found 'at'\n  Put it in parentheses",
+    ),
+    "either of nothing": (
+        PROBLEM.replace("a b - room", "a b - (either)"),
+        "expected a type or '(either type ..)'\n"
+        "  One type is a name, several are (either name name).",
     ),
     "another domain": (
         PROBLEM.replace("hall", "house"),
