@@ -46,6 +46,12 @@ if TYPE_CHECKING:
     help="Where the places are drawn (default: coordinates.json beside the "
     "first PROBLEM, else by their names, else laid out).",
 )
+@click.option(
+    "--planviz",
+    "with_planviz",
+    is_flag=True,
+    help="Also write a plan of the first task for PlanViz, and its map, beside PAGE.",
+)
 @click.option("--seed", type=int, default=0, show_default=True, help="Draws the tasks.")
 @model_options
 @limits
@@ -55,6 +61,7 @@ def command(
     output: str,
     tasks_shown: int,
     coordinates: str | None,
+    with_planviz: bool,
     seed: int,
     model: ModelKeywords,
 ) -> None:
@@ -68,13 +75,17 @@ def command(
     from coordlang.api.options import GivenOptions
     from coordlang.language.recorded import check_source
     from coordlang.report.page import make_report
+    from coordlang.report.planviz import planviz
     from planners.writing import write_atomically
 
     places = coordinates if coordinates is not None else str(_beside(pddl))
-    check_outputs([("-o", output)], [language, *pddl.paths, places])
+    inputs = [language, *pddl.paths, places]
+    beside = _planviz_paths(output) if with_planviz else []
+    check_outputs([("-o", output), *(("--planviz", path) for path in beside)], inputs)
     read, position = read_language_source(language)
     files = read_planning(pddl.domain, pddl.problems, pddl.factored, GivenOptions.of(**model))
     check_source(read, files.domain, files.problems, position)
+    known = _coordinates(coordinates, pddl)
     with working("drawing the page"):
         report = make_report(
             read,
@@ -83,16 +94,27 @@ def command(
             tasks_shown=tasks_shown,
             seed=seed,
             options=files.options_of(read),
-            coordinates=_coordinates(coordinates, pddl),
+            coordinates=known,
             position=position,
         )
+        shown_plan = planviz(report.first, known) if with_planviz else None
     if output == "-":
         echo(report.html.decode(), nl=False)
     else:
         write_atomically(output, report.html)
+    if shown_plan is not None:
+        for path, text in zip(beside, (shown_plan.plan, shown_plan.map), strict=True):
+            write_atomically(path, text.encode())
     shown = f"{counted(report.tasks, 'task')} of {report.candidates:,}"
     place = "stdout" if output == "-" else visible(output)
     echo(f"{shown}, {len(report.html):,} bytes, written to {place}", err=output == "-")
+
+
+def _planviz_paths(output: str) -> list[str]:
+    """Where the plan and the map for PlanViz are written: beside the page, under its name."""
+    if output == "-":
+        raise click.UsageError("--planviz writes files beside PAGE: give -o a file")
+    return [str(Path(output).with_suffix(f".planviz.{kind}")) for kind in ("json", "map")]
 
 
 def _beside(pddl: PlanningFiles) -> Path:

@@ -16,6 +16,7 @@ from coordlang.report.data import MOST_PLACES, page_data
 from coordlang.report.places import Point
 from coordlang.report.shown import select_tasks
 from coordlang.report.task import task_part
+from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import OutOfMemory, Position
 from planners.loading import ModelOptions
 from planners.pddl.lifted import Domain, Problem
@@ -30,11 +31,12 @@ _FEW_WORDS = 8
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A page, and how many tasks are shown in it of how many candidate tasks."""
+    """A page, and how many tasks are shown in it of how many candidate tasks; the first of them."""
 
     html: bytes
     tasks: int
     candidates: int
+    first: TaskLanguage
 
 
 def make_report(
@@ -81,7 +83,8 @@ def make_report(
         data = page_data(language, selection, parts, coordinates, most_places)
         html = _render(language, domain, problems, data, seed)
         if len(html) <= largest:
-            return Report(html, len(parts), int(language.provenance.tasks.get("count", 0)))
+            candidates = int(language.provenance.tasks.get("count", 0))
+            return Report(html, len(parts), candidates, parts[0].shown.language)
         if len(parts) == 1:
             raise OutOfMemory(
                 f"the page of one task would have {len(html):,} bytes, more than {largest:,}",

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A plan of a task in the form that PlanViz, the viewer of multi-agent path finding, shows.
+
+PlanViz (MAPF-Competition/PlanViz) reads a map in movingai format and a JSON file with each agent's
+start and moves, in the form of the League of Robot Runners with the action model ``MAPF``.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from coordlang.report.places import Point, place_layout
+from coordlang.report.world import World, find_world
+from coordlang.use.sentence.task_language import TaskLanguage
+from planners.errors import UsageError
+from planners.search.plans import Plans
+
+#: A cell: row and column, from 0.
+Cell = tuple[int, int]
+
+#: (rows, columns) that a robot moves in one step -> the letter for it.  Rows grow downwards, and in
+#: this format U adds a row and D takes one away.
+_MOVES = {(0, 0): "W", (0, 1): "R", (0, -1): "L", (1, 0): "U", (-1, 0): "D"}
+
+
+@dataclass(frozen=True, slots=True)
+class PlanVizFiles:
+    """The text of a plan in JSON, and that of the map on which it is shown."""
+
+    plan: str
+    map: str
+
+
+def planviz(task_language: TaskLanguage, known: Mapping[str, Point] | None = None) -> PlanVizFiles:
+    """Write the first optimal plan of a task for PlanViz.
+
+    ``known`` are coordinates of places from a file.
+
+    Raises
+    ------
+    UsageError
+        If the robots are not always in cells of a grid, or move to others than the neighbours.
+    """
+    space = task_language.space
+    plans = Plans.of(space, task_language.task)
+    codec = space.model.codec
+    states = [codec.decode(space.rows[state]) for state in plans.states(plans.unrank(0))]
+    world = find_world(space.model, states)
+    cells = _cells(world, known)
+    robots = space.model.robots
+    paths = [
+        [cells.get(world.located(state).get(robot, "")) for state in states] for robot in robots
+    ]
+    found = [_moves(path) for path in paths]
+    starts = [path[0] for path in paths if path[0] is not None]
+    if not cells or any(moves is None for moves in found):
+        raise UsageError(
+            "--planviz: the robots do not move from cell to cell of a grid",
+            remedy="Leave it out, or give --coordinates whole numbers as [column, row].",
+        )
+    moves = [",".join(own) for own in found if own is not None]
+    steps = len(states) - 1
+    data = {
+        "actionModel": "MAPF",
+        "AllValid": "Yes",
+        "teamSize": len(robots),
+        "start": [[row, column, "N/A"] for row, column in starts],
+        "numTaskFinished": len(robots),
+        "sumOfCost": steps * len(robots),
+        "makespan": steps,
+        "actualPaths": moves,
+        "plannerPaths": moves,
+        "plannerTimes": [],
+        "errors": [],
+        "events": [
+            [[robot, 0, "assigned"], [robot, steps, "finished"]] for robot in range(len(robots))
+        ],
+        "tasks": [[robot, *path[-1]] for robot, path in enumerate(paths) if path[-1] is not None],
+    }
+    return PlanVizFiles(json.dumps(data) + "\n", _map_text(set(cells.values())))
+
+
+def _cells(world: World, known: Mapping[str, Point] | None) -> dict[str, Cell]:
+    """The row and column of each place, the least ones being 0; none if it is no grid."""
+    if not world.places:
+        return {}
+    layout = place_layout(world.places, [link.ends for link in world.links], known)
+    if not layout.is_grid:
+        return {}
+    left = min(x for x, _ in layout.points.values())
+    top = min(y for _, y in layout.points.values())
+    return {place: (int(y - top), int(x - left)) for place, (x, y) in layout.points.items()}
+
+
+def _moves(path: Sequence[Cell | None]) -> list[str] | None:
+    """A robot's moves as letters; None if it is nowhere, or moves farther than to a neighbour."""
+    letters = []
+    for before, after in zip(path, [*path[1:], path[-1]], strict=True):
+        if before is None or after is None:
+            return None
+        letters.append(_MOVES.get((after[0] - before[0], after[1] - before[1]), ""))
+    return letters[:-1] or ["W"] if all(letters) else None
+
+
+def _map_text(cells: set[Cell]) -> str:
+    """A map in movingai format: ``.`` for each cell, ``@`` elsewhere."""
+    height, width = (max(cell[k] for cell in cells) + 1 for k in (0, 1))
+    rows = [
+        "".join("." if (row, column) in cells else "@" for column in range(width))
+        for row in range(height)
+    ]
+    return "\n".join(["type octile", f"height {height}", f"width {width}", "map", *rows]) + "\n"
