@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from time import perf_counter
 from typing import Literal
 
@@ -38,7 +39,7 @@ class Built:
 
     ``figures`` are the method's own (rounds, clauses, ..), ``seconds`` are by phase.  ``stopped``
     is the error that ended the method before its proof was complete, or None.  ``job`` and
-    ``evidence`` are what `certificate_of` needs.
+    ``evidence``, clauses that prove the lower bound, are what `certificate_of` needs.
     """
 
     language: Language
@@ -195,7 +196,7 @@ def build_language(
         seconds=clock.seconds,
         stopped=outcome.stopped,
         job=job,
-        evidence=outcome.evidence,
+        evidence=dict(islice(outcome.evidence.items(), outcome.refuting)),
     )
 
 

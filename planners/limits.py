@@ -42,6 +42,8 @@ _NO_MEMORY = (
     "can't start new thread",
     "std::bad_alloc",
 )
+#: Seconds of processor time in which numpy is loaded, on a slow machine, too.
+_LOADING = 20
 _LONGER = "Use a larger --time-limit."
 #: Of the memory that is free, what a process takes that is given no limit.
 _SHARE = 0.8
@@ -205,7 +207,8 @@ def require_memory(size: int) -> None:
 def require_libraries() -> None:
     """Raise `OutOfMemory` if numpy does not load under the limit that the process started with.
 
-    BLAS ends the process then (``ulimit -v``), so that a child process tries it.
+    BLAS ends the process then (``ulimit -v``), or asks for memory without end, so that a child
+    process tries it, for some seconds.
     """
     soft, _ = resource.getrlimit(resource.RLIMIT_AS)
     if soft == resource.RLIM_INFINITY or "numpy" in sys.modules:
@@ -221,9 +224,18 @@ def require_libraries() -> None:
         )
 
 
+def limit_processor_time(seconds: int) -> None:
+    """Let this process end after so many more seconds of its own, whatever it does."""
+    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    end = math.ceil(time.process_time()) + seconds
+    soft = end if hard == resource.RLIM_INFINITY else min(end, hard)
+    resource.setrlimit(resource.RLIMIT_CPU, (soft, hard))
+
+
 def _load_quietly() -> int:
     """Load numpy, silently: the exit code of the process that tries it."""
     try:
+        limit_processor_time(_LOADING)
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, 1)
         os.dup2(nowhere, 2)
@@ -246,11 +258,13 @@ def lacks_memory(error: BaseException) -> bool:
 
 def memory_left() -> int:
     """Bytes that this process may still take: under its limit and as the machine has them free."""
-    free = _available()
+    return int(min(_available(), address_space_left()))
+
+
+def address_space_left() -> float:
+    """Bytes that the limit of this process leaves it; infinite without one."""
     soft, _ = resource.getrlimit(resource.RLIMIT_AS)
-    if soft == resource.RLIM_INFINITY:
-        return free
-    return max(0, min(free, soft - address_space()))
+    return math.inf if soft == resource.RLIM_INFINITY else max(0, soft - address_space())
 
 
 def _available() -> int:

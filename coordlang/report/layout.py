@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from planners.graphs import csgraph
 from planners.tables import Ints
 
 Floats = NDArray[np.float64]
@@ -59,12 +60,12 @@ def graph_layout(number: int, links: Sequence[tuple[int, int]]) -> Floats:
 
 def _path_lengths(number: int, links: Sequence[tuple[int, int]]) -> Floats:
     """Return the path lengths (number, number); without a path a little more than the longest."""
+    graphs = csgraph()
     from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import shortest_path
 
     ends = np.array(links, np.int64).reshape(-1, 2)
     graph = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(number, number))
-    lengths: Floats = shortest_path(graph.tocsr(), directed=False, unweighted=True)
+    lengths: Floats = graphs.shortest_path(graph.tocsr(), directed=False, unweighted=True)
     known = np.isfinite(lengths)
     lengths[~known] = lengths[known].max() + 1.5
     return lengths

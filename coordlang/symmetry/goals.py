@@ -15,6 +15,7 @@ import numpy as np
 from coordlang.symmetry.check import SymmetryCheck
 from coordlang.symmetry.graph import automorphism_generators
 from coordlang.tasks.candidates import Candidates
+from planners.graphs import parts_of_graph
 from planners.tables import Ints, unique_rows
 
 #: Pairs of a goal and a state, times robots, from which on symmetries are looked for: below, what
@@ -43,13 +44,9 @@ class SymmetricGoals:
     @classmethod
     def of(cls, generators: Sequence[Ints], states: int) -> SymmetricGoals:
         """Find the orbits of the group that permutations of state numbers generate."""
-        from scipy.sparse import csr_matrix
-        from scipy.sparse.csgraph import connected_components
-
         here = np.tile(np.arange(states), len(generators))
         there = np.concatenate([*generators, here[:0]])
-        graph = csr_matrix((np.ones(len(here)), (here, there)), (states, states))
-        count, orbit = connected_components(graph, directed=False)
+        count, orbit = parts_of_graph(states, here, there)
         least = np.full(count, states)
         np.minimum.at(least, orbit, np.arange(states))
         return cls(tuple(generators), least[orbit])

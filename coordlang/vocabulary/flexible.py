@@ -11,6 +11,7 @@ definition before it counts.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -67,7 +68,7 @@ class _Search:
             "improvements": self._improvements,
             **self._measures(),
         }
-        return Outcome(self.best, self._found.lower_bound, figures, stopped, self._found.evidence)
+        return replace(self._found, partition=self.best, figures=figures, stopped=stopped)
 
     def _measures(self) -> dict[str, float]:
         """The flexibility before and after; nothing where it takes too much memory."""

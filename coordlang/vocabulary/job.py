@@ -92,8 +92,10 @@ class Outcome:
     stopped
         The error that ended the search early, None if it came to its end.
     evidence
-        The necessary clauses that were met, of which no partition into ``lower_bound - 1`` words
-        satisfies all; empty for methods that meet none.
+        The necessary clauses that were met, in their order; empty for methods that meet none.
+    refuting
+        The first so many of them are those that were known when the bound was proved: no partition
+        into ``lower_bound - 1`` words satisfies them all.
     """
 
     partition: Assignment
@@ -101,6 +103,7 @@ class Outcome:
     figures: Mapping[str, float] = field(default_factory=dict)
     stopped: BaseException | None = None
     evidence: Mapping[Clause, Evidence] = field(default_factory=dict)
+    refuting: int = 0
 
     @property
     def size(self) -> int:

@@ -61,7 +61,14 @@ def minimal(job: Job) -> Outcome:
     if search.best is None:
         assert stopped is not None
         raise stopped
-    return Outcome(search.best, search.lower, search.figures(), stopped, search.known.evidence)
+    return Outcome(
+        search.best,
+        search.lower,
+        search.figures(),
+        stopped,
+        search.known.evidence,
+        search.refuting,
+    )
 
 
 def refuting_clauses(job: Job, size: int) -> Mapping[Clause, Evidence]:
@@ -83,12 +90,14 @@ def refuting_clauses(job: Job, size: int) -> Mapping[Clause, Evidence]:
 class _Search:
     """Closes in on the least number of words.
 
-    ``lower`` words are proved to be needed, ``best`` is a language.
+    ``lower`` words are proved to be needed, by the first ``refuting`` of the ``known`` clauses;
+    ``best`` is a language.
     """
 
     def __init__(self, job: Job) -> None:
         self._job = job
         self.lower = job.lower_bound
+        self.refuting = 1  # any clause refutes one word
         self.best: Assignment | None = job.incumbent
         self.known = NecessaryClauses(SymmetryGroup(()))
         self._partitions = _Partitions(job.states, self.known)
@@ -158,6 +167,8 @@ class _Search:
             return False
         self._partitions.drop(size)
         if partition is None:
+            # In this order: a signal in between leaves more clauses than the bound needs.
+            self.refuting = len(self.known.clauses)
             self.lower = size + 1
         else:
             self._job.check(partition)

@@ -15,6 +15,7 @@ from typing import Protocol, overload
 import numpy as np
 
 from planners.errors import OutOfMemory
+from planners.graphs import parts_of_graph
 from planners.joint.model import FullState, Goal, JointModel
 from planners.limits import memory_left, more_memory
 from planners.pieces.work import digest
@@ -272,18 +273,12 @@ def require_room(source: Source) -> None:
 
 def _pairs(space: Space, goals: Sequence[Goal]) -> int:
     """How many pairs there are of a goal and a state that reaches it in one step or more."""
-    from scipy.sparse import csr_matrix
-    from scipy.sparse.csgraph import connected_components
-
     if not goals:
         return 0
     reached = _holding(space, goals[:1])
     size = len(space)
     if all(isinstance(goal, FullState) for goal in goals) and reached.sum() == 1:
-        graph = csr_matrix(
-            (np.ones(len(space.target)), (space.sources, space.target)), (size, size)
-        )
-        parts, _ = connected_components(graph, connection="strong")
+        parts, _ = parts_of_graph(size, space.sources, space.target, directed=True)
         if parts == 1:
             return len(goals) * (size - 1)
     return sum(

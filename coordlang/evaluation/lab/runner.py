@@ -12,7 +12,7 @@ import numpy as np
 
 from coordlang.evaluation.lab.recipe import Recipe, Record, Result, Settings, Status, Unit
 from coordlang.evaluation.lab.results import Results, name_of
-from planners.errors import CoordlangError, OutOfMemory, OutOfTime
+from planners.errors import BadInput, CoordlangError, OutOfMemory, OutOfTime, UsageError
 from planners.limits import time_limit
 from planners.pieces.processes import Processes
 from planners.pieces.work import Done, Runner, Table, Work
@@ -42,7 +42,10 @@ class Progress:
 
 
 class UnitFailed(CoordlangError):
-    """A work unit ended with an error that is no limit: a bug, or an invalid input file."""
+    """A work unit ended with an error that is no limit.
+
+    Its exit code is that of an invalid input file or of an output that cannot be written.
+    """
 
 
 def run(
@@ -135,10 +138,13 @@ def _record(unit: Unit, done: Done) -> Record:
         text = (
             str(error) if isinstance(error, CoordlangError) else f"{type(error).__name__}: {error}"
         )
-        raise UnitFailed(
+        failed = UnitFailed(
             f"{name_of(unit)}: {text}",
             remedy="The results so far are kept: run it again when that is put right.",
         )
+        if isinstance(error, BadInput | UsageError):
+            failed.exit_code = error.exit_code
+        raise failed
     if done.table is None:
         lost: Status = "out of memory" if done.lost == "died" else "out of time"
         return Record(unit, lost, {}, done.seconds)

@@ -6,6 +6,8 @@ from __future__ import annotations
 import fcntl
 import json
 from hashlib import sha256
+from pathlib import Path
+from typing import TextIO
 
 from coordlang.building import build_language
 from coordlang.evaluation.lab.identity import code_hash, file_hash
@@ -15,6 +17,7 @@ from coordlang.language.file import read_language, write_language
 from coordlang.language.words import Language
 from coordlang.tasks.candidates import Candidates
 from coordlang.tasks.listed import ListedTask
+from planners.errors import UsageError
 
 #: The methods that experiments compare, in the order of tables.
 COMPARED = ("greedy", "separating", "minimal", "flexible")
@@ -39,11 +42,12 @@ def language_for(
     ------
     OutOfTime, OutOfMemory
         If a limit ended the method early: what it then has depends on the machine.
+    UsageError
+        If the language cannot be stored.
     """
     candidates = world.candidates(settings.domains, listed)
     path = settings.cache / f"{_key(world, method, settings, listed)}.json.gz"
-    settings.cache.mkdir(parents=True, exist_ok=True)
-    with open(f"{path}.lock", "w") as lock:
+    with _opened_lock(settings.cache, path) as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # waits for a process that builds it
         if path.exists():
             return candidates, read_language(path)
@@ -55,6 +59,18 @@ def language_for(
             raise built.stopped
         write_language(built.language, path)
         return candidates, built.language
+
+
+def _opened_lock(cache: Path, path: Path) -> TextIO:
+    """The file by which processes wait for each other, in a folder that is made."""
+    try:
+        cache.mkdir(parents=True, exist_ok=True)
+        return open(f"{path}.lock", "w")
+    except OSError as error:
+        raise UsageError(
+            f"{cache} cannot be written: {error.strerror}",
+            remedy="Say --results DIR, with a folder that you may write to.",
+        ) from None
 
 
 def _key(world: World, method: str, settings: Settings, listed: tuple[ListedTask, ...]) -> str:

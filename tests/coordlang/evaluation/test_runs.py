@@ -178,8 +178,17 @@ def test_an_error_ends_the_run_and_keeps_what_is_done(finished: Path, tmp_path: 
     (domains / "handover" / "domain.pddl").write_text("(define")
     (domains / "handover" / "two-doors.pddl").write_text("")
     broken = Settings(domains, tmp_path / "cache", samples=2, quick=True)
-    with pytest.raises(UnitFailed, match=r"game/handover/.*domain.pddl"):
+    with pytest.raises(UnitFailed, match=r"game/handover/.*domain.pddl") as failed:
         run([GAME], broken, Results(tmp_path))
+    assert failed.value.exit_code == 31
+
+
+def test_languages_that_cannot_be_kept_are_no_bug(tmp_path: Path) -> None:
+    """A worker meets it when it keeps a language for other units."""
+    (tmp_path / "cache").write_text("in the way")
+    with pytest.raises(UnitFailed, match=r"cache cannot be written: File exists") as failed:
+        run([GAME], settings(tmp_path), Results(tmp_path))
+    assert failed.value.exit_code == 2
 
 
 def test_command(coordlang: Command, tmp_path: Path) -> None:
