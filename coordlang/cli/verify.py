@@ -89,6 +89,7 @@ def command(
             tasks=tasks,
             certificate=certificate,
             progress=progress,
+            **pieces,
             **model,
         )
     echo(json.dumps(found.data()) if as_json else _text(found))

@@ -111,3 +111,19 @@ def test_pieces_on_the_command_line(
     }
     assert len(outcomes) == 1
     assert len(list((tmp_path / "kept").iterdir())) == 1
+
+
+def test_every_command_hands_on_who_does_the_pieces(
+    coordlang: Command, t_map: tuple[Path, Path], tmp_path: Path
+) -> None:
+    language = tmp_path / "l.json"
+    assert coordlang("build", *t_map, "-o", language).code == 0
+    for command in (
+        ("coordination", *t_map),
+        ("build", *t_map, "-o", language),
+        ("verify", language, *t_map),
+    ):
+        outcome = coordlang(*command, "--jobs", "2", "--scheduler", "tcp://127.0.0.1:9")
+        assert (outcome.code, "Give one of them" in outcome.err) == (2, True)
+        coordlang(*command, "--resume", tmp_path / "kept" / command[0])
+        assert (tmp_path / "kept" / command[0]).is_dir()
