@@ -44,7 +44,7 @@ from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
 from coordlang.use.unified import NAME
 from coordlang.use.unified.options import PLAN_KINDS, EngineOptions
 from coordlang.use.unified.plans import NoSteps, of_up, to_up
-from coordlang.use.unified.translation import Subactions, Translated, translate
+from coordlang.use.unified.translation import Concurrency, Subactions, Translated
 from planners.check.validate import validate
 from planners.errors import (
     BadInput,
@@ -77,8 +77,11 @@ _FEATURES = {
         "CONDITIONAL_EFFECTS",
         "FORALL_EFFECTS",
         "STATIC_FLUENTS_IN_BOOLEAN_ASSIGNMENTS",
+        "STATIC_FLUENTS_IN_OBJECT_ASSIGNMENTS",
+        "FLUENTS_IN_OBJECT_ASSIGNMENTS",
         "FLUENTS_IN_BOOLEAN_ASSIGNMENTS",
     ),
+    "fluents_type": ("OBJECT_FLUENTS",),
     "multi_agent": ("AGENT_SPECIFIC_PRIVATE_GOAL", "AGENT_SPECIFIC_PUBLIC_GOAL"),
     "quality_metrics": ("MAKESPAN",),
 }
@@ -104,6 +107,9 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         found as in PDDL (docs/pddl.md).
     subactions
         Each action is a whole joint step: action -> robot -> its part, as in joint-action PDDL.
+    concurrency
+        For a problem with agents, formulas about the same joint step as further preconditions:
+        action -> PDDL text, in which ``?agent`` is the one that acts and ``agent`` their type.
     cost, remember_actions
         As on the command line.
     language, sentence
@@ -127,6 +133,7 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         robot_type: Any = None,
         unowned: str | None = None,
         subactions: Subactions | None = None,
+        concurrency: Concurrency | None = None,
         cost: str | None = None,
         remember_actions: bool = False,
         language: Language | str | None = None,
@@ -141,6 +148,7 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
             robot_type=robot_type,
             unowned=unowned,
             subactions=subactions,
+            concurrency=concurrency,
             cost=cost,
             remember_actions=remember_actions,
             language=language,
@@ -253,7 +261,7 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
             raise UPUsageError(str(error)) from error
 
     def _search(self, problem: Any) -> _Solved:
-        found = translate(problem, self._options.subactions)
+        found = self._options.translated(problem)
         if self._options.language is None:
             loaded = build(found.domain, [found.problem], self._options.model_options(found))
             return _Solved(found, search(loaded.model, loaded.tasks[0]), None)
@@ -325,7 +333,7 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         Under a sentence the plan must be optimal and have it, too.
         """
         try:
-            found = translate(problem, self._options.subactions)
+            found = self._options.translated(problem)
             loaded = build(found.domain, [found.problem], self._options.model_options(found))
             steps = of_up(found, loaded.model, loaded.team, plan)
             texts = [step for step, _ in steps]

@@ -13,7 +13,7 @@ from unified_planning.plans import PlanKind
 from coordlang.language.file import read_language
 from coordlang.language.recorded import options_of
 from coordlang.language.words import Language
-from coordlang.use.unified.translation import Subactions, Translated
+from coordlang.use.unified.translation import Concurrency, Subactions, Translated, translate
 from planners.errors import BadInput, UsageError
 from planners.loading import ModelOptions
 from planners.pddl.robots import RobotSelection, find_team
@@ -34,6 +34,7 @@ class EngineOptions:
     robot_type: str | None = None
     unowned: str | None = None
     subactions: Subactions | None = None
+    concurrency: Concurrency | None = None
     cost: str | None = None
     remember_actions: bool = False
     language: Language | None = None
@@ -82,6 +83,10 @@ class EngineOptions:
         except UsageError as error:
             raise UPUsageError(str(error)) from None
         return options
+
+    def translated(self, problem: Any) -> Translated:
+        """Return the problem as PDDL; raises what `translate` raises."""
+        return translate(problem, self.subactions, self.concurrency)
 
     def model_options(self, found: Translated) -> ModelOptions:
         """How a translated problem is to be understood.

@@ -22,6 +22,10 @@ from planners.pddl.sexpr import Source
 #: "(move ?b ?a)"}}``.
 Subactions = Mapping[str, Mapping[str, str | None]]
 
+#: Action -> a formula about the same joint step, as PDDL text: ``{"lift": "(exists (?o - agent)
+#: (and (not (= ?o ?agent)) (lift ?o)))"}``; the acting agent is ``?agent``.
+Concurrency = Mapping[str, str]
+
 #: Action schema -> the actions that it stands for, by agent (None where there are no agents).
 Schemas = dict[str, dict[str | None, Any]]
 
@@ -29,7 +33,7 @@ _AGENT = "?agent"
 _COMPILE = (
     "coordlang reads InstantaneousAction: states of true and false facts, steps without time."
 )
-_BOOLEAN = "coordlang reads Boolean fluents: True or False, no numbers and no objects as values."
+_BOOLEAN = "coordlang reads Boolean and object fluents, no numbers."
 #: Kinds of unified-planning's expressions -> their PDDL operators.
 _QUANTIFIERS = {"exists": "exists", "forall": "forall"}
 _CONNECTIVES = {"and": "and", "or": "or", "not": "not", "implies": "imply"}
@@ -57,17 +61,24 @@ class Translated:
         return self.domain.source.text, self.problem.source.text
 
 
-def translate(problem: Any, subactions: Subactions | None = None) -> Translated:
+def translate(
+    problem: Any,
+    subactions: Subactions | None = None,
+    concurrency: Concurrency | None = None,
+) -> Translated:
     """PDDL for a `unified_planning.model.Problem` or a `MultiAgentProblem`.
 
-    Boolean fluents over objects, instantaneous actions.  An agent becomes an object, its own
-    fluents get it as their first argument, and its actions ``:agent``; goals of agents are goals.
-    With ``subactions`` an action is a whole joint step.
+    Boolean and object fluents over objects, instantaneous actions.  An agent becomes an object, its
+    own fluents get it as their first argument, and its actions ``:agent``; goals of agents are
+    goals.  An object fluent becomes a predicate with its value as the last argument.  With
+    ``subactions`` an action is a whole joint step; the formulas of ``concurrency`` are further
+    preconditions.
 
     Raises `Unsupported` for anything else, `BadInput` for a problem without a robot.
     """
     _check_subactions(problem, subactions or {})
-    writer = _Writer(problem)
+    _check_concurrency(problem, concurrency or {})
+    writer = _Writer(problem, concurrency or {})
     domain_text, problem_text, schemas = writer.write(subactions or {})
     name = problem.name or "unnamed"
     domain = parse_domain(Source(f"unified-planning problem {name!r} (domain)", domain_text))
@@ -98,9 +109,40 @@ def _check_subactions(problem: Any, subactions: Subactions) -> None:
             )
 
 
+def _check_concurrency(problem: Any, concurrency: Concurrency) -> None:
+    """Raise `UsageError` for a formula of an action that no agent has, or that is no text."""
+    agents = getattr(problem, "agents", None)
+    if concurrency and not agents:
+        raise UsageError(
+            "concurrency is given for a problem without agents",
+            remedy="Write a MultiAgentProblem: its actions can speak of other agents' actions.",
+        )
+    names = {action.name for agent in agents or () for action in agent.actions}
+    for name, formula in concurrency.items():
+        if name not in names:
+            raise UsageError(
+                f"concurrency: no agent has an action {name!r}",
+                remedy=f"The actions are {', '.join(sorted(names))}.",
+            )
+        if not isinstance(formula, str):
+            raise UsageError(
+                f"concurrency: the formula of {name!r} is no text",
+                remedy='Write it as PDDL, as in "(forall (?o - agent) (not (take ?o)))".',
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class _Bound:
+    """A variable that stands for the value of an object fluent: its declaration, and the atom."""
+
+    declared: str
+    atom: str
+
+
 class _Writer:
-    def __init__(self, problem: Any) -> None:
-        self.problem = problem
+    def __init__(self, problem: Any, concurrency: Concurrency) -> None:
+        self.problem, self.concurrency = problem, concurrency
+        self.values = 0
         self.agents: tuple[Any, ...] = tuple(getattr(problem, "agents", ()))
         self.types, self.predicates, self.actions, self.objects = Names(), Names(), Names(), Names()
         self.variable_names = Names()
@@ -218,10 +260,12 @@ class _Writer:
                 f"action {action.name!r} has simulated effects",
                 remedy="Write its effects as add_effect.",
             )
+        self.values = 0  # agents' equal actions are equal texts
         parameters = " ".join(
             f"{self.parameter(p)} - {self.type_name(p.type)}" for p in action.parameters
         )
         conditions = [self.text(c, agent, inside=True) for c in action.preconditions]
+        conditions += [self.concurrency[action.name]] if action.name in self.concurrency else []
         effects = [text for effect in action.effects for text in self.effect(effect, agent)]
         return [
             f"  :parameters ({parameters})",
@@ -230,37 +274,85 @@ class _Writer:
         ]
 
     def effect(self, effect: Any, agent: Any) -> Iterable[str]:
-        """An assignment; of a value that is not constant both cases."""
+        """An assignment; of a truth value that is not constant both cases."""
         if not effect.is_assignment():
             raise Unsupported(
-                f"the effect {effect}: only assignments of truth values are supported",
+                f"the effect {effect}: only assignments of truth values and objects are supported",
                 remedy=_BOOLEAN,
             )
-        atom = self.text(effect.fluent, agent, inside=True)
-        value, condition = effect.value, effect.condition
+        condition = effect.condition
+        conditions = [] if condition.is_true() else [self.text(condition, agent, inside=True)]
+        bound: list[_Bound] = []
+        parts = self.parts(effect.fluent, agent, bound, inside=True)
+        fluent, value = effect.fluent.fluent(), effect.value
+        if fluent.type.is_user_type():
+            yield from self.object_effect(effect, parts, conditions, bound, agent)
+            return
+        atom = f"({' '.join(parts)})"
         cases = [(value, atom), (None, f"(not {atom})")]
         if value.is_bool_constant():
             cases = [(True, atom if value.is_true() else f"(not {atom})")]
         for case, literal in cases:
-            conditions = [] if condition.is_true() else [self.text(condition, agent, inside=True)]
+            own = list(conditions)
             if case is not True:
                 holds = self.text(value, agent, inside=True)
-                conditions.append(holds if case is not None else f"(not {holds})")
-            text = f"(when (and {' '.join(conditions)}) {literal})" if conditions else literal
-            yield f"(forall ({self.variables(effect.forall)}) {text})" if effect.forall else text
+                own.append(holds if case is not None else f"(not {holds})")
+            yield self.effect_text(literal, own, bound, effect.forall)
+
+    def object_effect(
+        self,
+        effect: Any,
+        parts: Sequence[str],
+        conditions: Sequence[str],
+        bound: list[_Bound],
+        agent: Any,
+    ) -> Iterable[str]:
+        """The new value of an object fluent becomes true, every other one false."""
+        value = self.term(effect.value, agent, bound, inside=True)
+        atom, old = f"({' '.join((*parts, value))})", self.fresh()
+        yield self.effect_text(atom, conditions, bound, effect.forall)
+        former = f"({' '.join((*parts, old))})"
+        kind = self.type_name(effect.fluent.fluent().type)
+        others = [*bound, _Bound(f"{old} - {kind}", former)]
+        other = [*conditions, f"(not (= {old} {value}))"]
+        yield self.effect_text(f"(not {former})", other, others, effect.forall)
+
+    def effect_text(
+        self,
+        literal: str,
+        conditions: Sequence[str],
+        bound: Sequence[_Bound],
+        variables: Sequence[Any],
+    ) -> str:
+        """An effect under conditions, for all values of the variables."""
+        when = [*(b.atom for b in bound), *conditions]
+        text = f"(when (and {' '.join(when)}) {literal})" if when else literal
+        declared = " ".join(filter(None, [self.variables(variables), *(b.declared for b in bound)]))
+        return f"(forall ({declared}) {text})" if declared else text
 
     def facts(self) -> list[str]:
         """The atoms that are true at the start."""
         found = []
         for fluent, value in self.problem.initial_values.items():
-            if not value.is_bool_constant():
+            if value.is_object_exp():
+                found.append(self.initial(fluent, value))
+            elif not value.is_bool_constant():
                 raise Unsupported(
-                    f"the initial value {fluent} := {value}: only truth values are supported",
+                    f"the initial value {fluent} := {value}: only truth values and objects are "
+                    "supported",
                     remedy=_BOOLEAN,
                 )
-            if value.is_true():
+            elif value.is_true():
                 found.append(self.text(fluent, None))
         return sorted(found)
+
+    def initial(self, fluent: Any, value: Any) -> str:
+        """The atom of an object fluent's value at the start."""
+        agent = self.problem.agent(fluent.agent()) if fluent.is_dot() else None
+        node = fluent.arg(0) if fluent.is_dot() else fluent
+        bound: list[_Bound] = []
+        parts = self.parts(node, agent, bound, inside=False)
+        return f"({' '.join((*parts, self.objects.of(value.object().name, value.object().name)))})"
 
     def text(self, node: Any, agent: Any, *, inside: bool = False) -> str:
         """An expression as PDDL.
@@ -270,11 +362,15 @@ class _Writer:
         if node.is_bool_constant():
             return "(and)" if node.is_true() else "(or)"
         if node.is_fluent_exp():
-            return self.atom(node, agent, inside=inside)
+            bound: list[_Bound] = []
+            parts = self.parts(node, agent, bound, inside=inside)
+            return _with(f"({' '.join(parts)})", bound)
         if node.is_dot():
             return self.text(node.arg(0), self.problem.agent(node.agent()))
         if node.is_equals():
-            return f"(= {self.term(node.arg(0))} {self.term(node.arg(1))})"
+            bound = []
+            sides = [self.term(arg, agent, bound, inside=inside) for arg in node.args]
+            return _with(f"(= {' '.join(sides)})", bound)
         parts = [self.text(arg, agent, inside=inside) for arg in node.args]
         if node.is_iff():
             return f"(and (imply {parts[0]} {parts[1]}) (imply {parts[1]} {parts[0]}))"
@@ -290,26 +386,43 @@ class _Writer:
             "equality and quantifiers.",
         )
 
-    def atom(self, node: Any, agent: Any, *, inside: bool) -> str:
-        """A fluent with its arguments."""
+    def parts(self, node: Any, agent: Any, bound: list[_Bound], *, inside: bool) -> list[str]:
+        """The predicate of a fluent and its arguments, without the value of an object fluent.
+
+        What arguments are values of object fluents is added to ``bound``.
+        """
         fluent = node.fluent()
         own = agent if agent is not None and fluent in agent.fluents else None
-        args = [self.term(arg) for arg in node.args]
+        args = [self.term(arg, agent, bound, inside=inside) for arg in node.args]
         if own is not None:
             args.insert(0, _AGENT if inside else self.agent_name(own))
-        return f"({' '.join((self.predicate(fluent, own), *args))})"
+        return [self.predicate(fluent, own), *args]
 
-    def term(self, node: Any) -> str:
+    def term(self, node: Any, agent: Any, bound: list[_Bound], *, inside: bool) -> str:
+        """An object or a variable; for an object fluent a new variable, added to ``bound``."""
         if node.is_object_exp():
             return self.objects.of(node.object().name, node.object().name)
         if node.is_parameter_exp():
             return self.parameter(node.parameter())
         if node.is_variable_exp():
             return self.variable(node.variable())
+        if node.is_dot():
+            return self.term(node.arg(0), self.problem.agent(node.agent()), bound, inside=False)
+        if node.is_fluent_exp() and node.fluent().type.is_user_type():
+            parts = self.parts(node, agent, bound, inside=inside)
+            value = self.fresh()
+            kind = self.type_name(node.fluent().type)
+            bound.append(_Bound(f"{value} - {kind}", f"({' '.join((*parts, value))})"))
+            return value
         raise Unsupported(
             f"the term {node}",
-            remedy="Object fluents can be compiled away: USERTYPE_FLUENTS_REMOVING.",
+            remedy="Arguments are objects, parameters, variables, and object fluents.",
         )
+
+    def fresh(self) -> str:
+        """A variable of its own."""
+        self.values += 1
+        return f"?{self.variable_names.of(self.values, f'value-{self.values}')}"
 
     def variables(self, variables: Sequence[Any]) -> str:
         return " ".join(f"{self.variable(v)} - {self.type_name(v.type)}" for v in variables)
@@ -322,12 +435,15 @@ class _Writer:
 
     def predicate(self, fluent: Any, owner: Any) -> str:
         """The predicate of a fluent; own fluents of agents with one signature share one."""
-        if not fluent.type.is_bool_type():
+        if not fluent.type.is_bool_type() and not fluent.type.is_user_type():
             raise Unsupported(
-                f"fluent {fluent.name!r} of type {fluent.type}: only Boolean fluents are supported",
-                remedy="Object fluents can be compiled away: USERTYPE_FLUENTS_REMOVING.",
+                f"fluent {fluent.name!r} of type {fluent.type}: only Boolean and object fluents "
+                "are supported",
+                remedy=_BOOLEAN,
             )
         types = tuple(self.type_name(p.type) for p in fluent.signature)
+        if fluent.type.is_user_type():
+            types = (*types, self.type_name(fluent.type))
         key = (fluent.name, types, owner is not None)
         name = self.predicates.of(key, fluent.name)
         if name not in self.declared:
@@ -368,6 +484,14 @@ class _Writer:
         if self.agents:
             kinds.append((self.agent_type(), "object"))
         return [f"  {name} - {father}" for name, father in kinds if name != "object"]
+
+
+def _with(text: str, bound: Sequence[_Bound]) -> str:
+    """A formula about values of object fluents: each fluent has exactly one."""
+    if not bound:
+        return text
+    declared = " ".join(value.declared for value in bound)
+    return f"(exists ({declared}) (and {' '.join(value.atom for value in bound)} {text}))"
 
 
 def _has_father(kind: Any, name: str) -> bool:

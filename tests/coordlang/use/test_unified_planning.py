@@ -371,15 +371,15 @@ def shortest(problem: Any) -> tuple[int, int] | None:
         start = simulator.get_initial_state()
         atoms = [*problem.initial_values]
 
-        def key(state: Any) -> tuple[bool, ...]:
-            return tuple(state.get_value(atom).is_true() for atom in atoms)
+        def key(state: Any) -> tuple[str, ...]:
+            return tuple(str(state.get_value(atom)) for atom in atoms)
 
         layer, seen, length = {key(start): (start, 1)}, {key(start)}, 0
         while layer:
             goals = sum(ways for state, ways in layer.values() if simulator.is_goal(state))
             if goals:
                 return length, goals
-            following: dict[tuple[bool, ...], tuple[Any, int]] = {}
+            following: dict[tuple[str, ...], tuple[Any, int]] = {}
             for state, ways in layer.values():
                 for action, args in simulator.get_applicable_actions(state):
                     after = simulator.apply(state, action, args)
@@ -408,6 +408,182 @@ def test_formulas_and_effects_mean_what_they_mean_to_the_library() -> None:
         assert isinstance(result.plan, SequentialPlan)
         answers["long" if expected[0] > 1 else "short"] += 1
     assert min(answers["unsolvable"], answers["long"], answers["short"]) >= 2, answers
+
+
+# Object fluents.
+
+
+def random_with_objects(seed: int) -> Any:
+    """One robot in places that point at places; object fluents nested, compared, copied."""
+    random = Random(seed)
+    robot, place = up.UserType("robot"), up.UserType("place")
+    room = up.UserType("room", place)
+    problem = up.Problem(f"objects {seed}")
+    at, next_ = up.Fluent("at", place, r=robot), up.Fluent("next", place, p=place)
+    seen = up.Fluent("seen", up.BoolType(), p=place)
+    problem.add_fluents([at, next_, seen])
+    r = problem.add_object("r", robot)
+    places = [problem.add_object(f"p{n}", room if n == 2 else place) for n in range(3)]
+    for p in places:
+        problem.set_initial_value(next_(p), random.choice(places))
+        problem.set_initial_value(seen(p), random.random() < 0.3)
+    problem.set_initial_value(at(r), random.choice(places))
+
+    def value(x: Any, y: Any, depth: int = 2) -> Any:
+        if depth == 0 or random.random() < 0.3:
+            return random.choice([y, at(x), random.choice(places)])
+        return next_(value(x, y, depth - 1))
+
+    def formula(x: Any, y: Any) -> Any:
+        z = up.Variable("z", random.choice([place, room]))
+        return random.choice(
+            [
+                up.Equals(value(x, y), value(x, y)),
+                up.Not(up.Equals(value(x, y), value(x, y))),
+                seen(value(x, y)),
+                up.Not(seen(value(x, y))),
+                up.Exists(up.And(up.Equals(next_(z), value(x, y)), up.Not(seen(z))), z),
+                up.Forall(up.Or(seen(z), up.Equals(z, value(x, y))), z),
+            ]
+        )
+
+    for number in range(3):
+        action = up.InstantaneousAction(f"a{number}", x=robot, y=place)
+        x, y = action.x, action.y
+        action.add_precondition(formula(x, y))
+        condition = formula(x, y) if random.random() < 0.5 else up.TRUE()
+        if random.random() < 0.8:
+            action.add_effect(at(x), value(x, y), condition)
+        if random.random() < 0.5:
+            action.add_effect(next_(random.choice([y, places[0]])), value(x, y))
+        action.add_effect(seen(random.choice([y, places[1]])), random.random() < 0.8)
+        problem.add_action(action)
+    problem.add_goal(up.Equals(at(r), random.choice(places)))
+    problem.add_goal(seen(random.choice(places)))
+    problem.add_goal(formula(r, places[0]))
+    return problem
+
+
+#: Seeds with quick answers of each kind.
+SOME = (8, 9, 11, 12, 13, 14, 21, 26, 41, 44)
+
+
+@pytest.mark.parametrize(
+    "seeds", [SOME, pytest.param(tuple(range(60)), marks=pytest.mark.thorough)], ids=len
+)
+def test_object_fluents_mean_what_they_mean_to_the_library(seeds: tuple[int, ...]) -> None:
+    answers = Counter[str]()
+    for seed in seeds:
+        problem = random_with_objects(seed)
+        expected = shortest(problem)
+        result = solve(problem, robots=("r",))
+        if expected is None:
+            assert result.status == Status.UNSOLVABLE_PROVEN, seed
+            answers["unsolvable"] += 1
+            continue
+        assert result.status == Status.SOLVED_OPTIMALLY
+        assert (int(result.metrics["makespan"]), int(result.metrics["plans"])) == expected, seed
+        assert problem.kind <= up.get_environment().factory.engine("coordlang").supported_kind()
+        answers["long" if expected[0] > 1 else "short"] += 1
+    assert min(answers["unsolvable"], answers["long"], answers["short"]) >= 1, answers
+
+
+def test_agents_with_object_fluents() -> None:
+    same = agents()
+    problem = MultiAgentProblem("crossing")
+    cell = up.UserType("Cell")
+    near, free = (
+        up.Fluent("near", up.BoolType(), a=cell, b=cell),
+        up.Fluent("free", up.BoolType(), c=cell),
+    )
+    for fluent in (near, free):
+        problem.ma_environment.add_fluent(fluent, default_initial_value=False)
+    places = [up.Object(f"c{n}", cell) for n in range(4)]
+    problem.add_objects(places)
+    for name, start, goal in (("R1", 0, 2), ("R2", 2, 0)):
+        agent = Agent(name, problem)
+        where = up.Fluent("Where", cell)
+        agent.add_public_fluent(where)
+        move = up.InstantaneousAction("Move", a=cell, b=cell)
+        for condition in (up.Equals(where(), move.a), near(move.a, move.b), free(move.b)):
+            move.add_precondition(condition)
+        for changed, value in ((where(), move.b), (free(move.b), False), (free(move.a), True)):
+            move.add_effect(changed, value)
+        agent.add_action(move)
+        problem.add_agent(agent)
+        problem.set_initial_value(up.Dot(agent, where()), places[start])
+        problem.add_goal(up.Equals(up.Dot(agent, where()), places[goal]))
+    for n in (0, 2, 3):
+        problem.set_initial_value(near(places[n], places[1]), True)
+        problem.set_initial_value(near(places[1], places[n]), True)
+    for n in (1, 3):
+        problem.set_initial_value(free(places[n]), True)
+    found = translate(problem)
+    assert [schema.name for schema in found.domain.schemas] == ["move"], "equal actions are one"
+    plans = all_plans(problem)
+    ours = [steps_of(translate(same), plan) for plan in all_plans(same)]
+    assert sorted(steps_of(found, plan) for plan in plans) == sorted(ours)
+    assert verdict(problem, plans[0]).status == Validity.VALID
+
+
+# What is done in the same step.
+
+
+def lifting() -> Any:
+    """Two agents at a table with glasses; each may lift its end."""
+    problem = MultiAgentProblem("table")
+    for name in ("ann", "bob"):
+        agent = Agent(name, problem)
+        up_ = up.Fluent("up", up.BoolType())
+        agent.add_public_fluent(up_, default_initial_value=False)
+        lift = up.InstantaneousAction("lift")
+        lift.add_precondition(up.Not(up_()))
+        lift.add_effect(up_(), True)
+        agent.add_action(lift)
+        problem.add_agent(agent)
+    return problem
+
+
+PARTNER = {"lift": "(exists (?o - agent) (and (not (= ?o ?agent)) (lift ?o)))"}
+ALONE = {"lift": "(forall (?o - agent) (not (lift ?o)))"}
+
+
+def test_concurrency_constraints() -> None:
+    problem = lifting()
+    problem.add_goal(up.Dot(problem.agent("ann"), problem.agent("ann").fluent("up")()))
+    free, partner, alone = (
+        [steps_of(translate(problem, None, given), plan) for plan in all_plans(problem, **params)]
+        for given, params in (
+            (None, {}),
+            (PARTNER, {"concurrency": PARTNER}),
+            (ALONE, {"concurrency": ALONE}),
+        )
+    )
+    both, one = [["(lift ann)", "(lift bob)"]], [["(lift ann)"]]
+    assert sorted(free) == sorted([both, one])
+    assert partner == [both]
+    assert alone == [one]
+    problem.add_goal(up.Dot(problem.agent("bob"), problem.agent("bob").fluent("up")()))
+    assert solve(problem, concurrency=ALONE).metrics["makespan"] == "2"
+    (together,) = all_plans(problem, concurrency=PARTNER)
+    assert verdict(problem, together, concurrency=PARTNER).status == Validity.VALID
+    assert verdict(problem, together, concurrency=ALONE).status == Validity.INVALID
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"lft": "(up ?agent)"}, "no agent has an action 'lft'"),
+        ({"lift": 3}, "is no text"),
+        ({"lift": "(exists (?o - agent) (lft ?o))"}, "lft"),
+        ({"lift": "(and (lift ?agent)"}, "never closed|unexpected|expected"),
+    ],
+)
+def test_wrong_concurrency(given: Any, message: str) -> None:
+    with pytest.raises(UPUsageError, match=message):
+        solve(lifting(), concurrency=given)
+    with pytest.raises(UPUsageError, match="without agents"):
+        solve(crossing(), concurrency=given)
 
 
 # Joint actions.
@@ -669,6 +845,22 @@ def test_odd_names() -> None:
         "object__2",
         "x",
     ]
+
+
+def test_the_engine_by_a_file_beside_the_program(tmp_path: Path) -> None:
+    """The lines of docs/unified-planning.md: no `register` is needed."""
+    page = (ROOT / "docs" / "unified-planning.md").read_text()
+    lines = page[page.index("[engine coordlang]") :].split("```")[0]
+    (tmp_path / "up.ini").write_text(lines)
+    program = tmp_path / "program.py"
+    program.write_text(
+        "from unified_planning.shortcuts import OneshotPlanner, get_environment\n"
+        "with OneshotPlanner(name='coordlang') as planner:\n    print(planner.name)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, str(program)], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split("\n")[-2] == "coordlang"
 
 
 def test_nothing_is_printed(capfd: pytest.CaptureFixture[str]) -> None:
