@@ -12,7 +12,9 @@ from coordlang.tasks.candidates import Candidates
 from coordlang.tasks.task_file import task_data
 from planners.joint.model import show
 from planners.pddl.lifted import Domain, Problem
+from planners.pddl.pddl_text import domain_text
 from planners.pddl.robots import fluent_predicates, static_atoms
+from planners.pddl.sexpr import JoinedSource, Source
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +75,7 @@ def provenance_of(
         guarantee=guarantee,
         domain={
             "name": loaded.domain.name,
-            "sha256": loaded.domain.source.sha256,
+            "sha256": domain_sha256(loaded.domain),
             "fluents": key_predicates(loaded.domain, loaded.options.remember_actions),
         },
         model={
@@ -92,6 +94,16 @@ def provenance_of(
 def key_predicates(domain: Domain, remember_actions: bool) -> list[str]:
     """The predicates of the atoms that a state key may hold, sorted."""
     return sorted(fluent_predicates(domain) | ({"last"} if remember_actions else set()))
+
+
+def domain_sha256(domain: Domain) -> str:
+    """A hash of what a domain says; that of factored files is the hash of their union as one file.
+
+    So a language built with ``--factored DIR`` belongs to what ``inspect --write`` makes of DIR.
+    """
+    if isinstance(domain.source, JoinedSource):
+        return Source(domain.source.name, domain_text(domain)).sha256
+    return domain.source.sha256
 
 
 def world_sha256(domain: Domain, problem: Problem) -> str:

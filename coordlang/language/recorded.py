@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from coordlang.language.provenance import world_sha256
+from coordlang.language.provenance import domain_sha256, world_sha256
 from coordlang.language.words import Language
 from coordlang.tasks.candidates import (
     Candidates,
@@ -76,10 +76,12 @@ def check_source(
 ) -> None:
     """Raise `BadInput` when domain or problem are not those that the language was built for.
 
-    The recorded hash is that of what the domain says, or, in older files, of its text.
+    The recorded hash is that of what the domain says; in older files that of its text, or of the
+    files of all robots one below the other.
     """
     wanted = language.provenance.domain.get("sha256")
-    if wanted not in (None, domain.source.sha256, domain.source.text_sha256):
+    known = domain_sha256(domain), domain.source.sha256, domain.source.text_sha256
+    if wanted not in (None, *known):
         raise BadInput(
             "this language belongs to another domain "
             f"({echoed(language.provenance.domain.get('name'))}): what "

@@ -11,6 +11,7 @@ from importlib.resources import files
 from typing import Any
 
 from coordlang.explanation.text import counted
+from coordlang.language.provenance import domain_sha256
 from coordlang.language.words import Language
 from coordlang.report.data import MOST_PLACES, page_data
 from coordlang.report.places import Point
@@ -194,7 +195,7 @@ def _about(
         ("Program", f"coordlang {version('coordlang')}"),
         ("Problems", ", ".join(problem.name for problem in problems)),
         ("Optimal means", str(model.get("cost", "makespan"))),
-        ("Domain, SHA-256", str(domain.source.sha256)[:16]),
+        ("Domain, SHA-256", domain_sha256(domain)[:16]),
         ("Last actions are part of the state", "yes" if model.get("remember_actions") else "no"),
         (
             "Tasks of this page verified anew",

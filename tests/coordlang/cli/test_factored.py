@@ -73,6 +73,29 @@ def _union(folder: Path, tmp_path: Path, coordlang: Command) -> None:
     shown = [door.plans(*files), door.plans(factored=folder)]
     assert shown[0].count == shown[1].count
     assert shown[0].first(20) == shown[1].first(20)
+    _one_language(folder, files, tmp_path, coordlang)
+
+
+def _one_language(
+    folder: Path, files: tuple[Path, Path], tmp_path: Path, coordlang: Command
+) -> None:
+    """A language built from either belongs to both, and is the same; one with the older hash too."""
+    factored, union = tmp_path / "factored.json", tmp_path / "union.json"
+    inseparable = coordlang("build", "--factored", folder, "-o", factored).code == 11
+    more = ("--remember-actions",) if inseparable else ()
+    assert coordlang("build", "--factored", folder, *more, "-o", factored).code == 0
+    assert coordlang("build", *files, *more, "-o", union).code == 0
+    read = [json.loads(path.read_text()) for path in (factored, union)]
+    for key in ("domain", "states", "words", "guarantee"):
+        assert read[0][key] == read[1][key]
+    for language in (factored, union):
+        assert coordlang("verify", language, *files).code == 0
+        assert coordlang("verify", language, "--factored", folder).code == 0
+    older = read[0] | {"domain": {"name": read[0]["domain"]["name"]}}
+    older["domain"]["sha256"] = door.load(factored=folder).domain.source.sha256
+    factored.write_text(json.dumps(older))
+    assert coordlang("verify", factored, "--factored", folder).code == 0
+    assert coordlang("verify", factored, *files).code == 31
 
 
 @pytest.mark.parametrize("name", UNIFIED)
