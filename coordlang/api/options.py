@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Literal, TypedDict, get_args
@@ -68,6 +68,25 @@ def require_one_of(option: str, value: str | None, known: Sequence[str]) -> None
         )
 
 
+def names_in(option: str, given: str | Sequence[str] | None) -> list[str]:
+    """Return the names that an option is given, in one text or several; none for None.
+
+    Raises `UsageError` for what is no text.
+    """
+    from planners.errors import UsageError
+    from planners.messages import echoed
+
+    if isinstance(given, str):
+        return given.split(",")
+    found = list(given) if isinstance(given, Iterable) else [given] * (given is not None)
+    for name in found:
+        if not isinstance(name, str):
+            raise UsageError(
+                f"{option}: {echoed(name)} is no name", remedy="Give texts, such as 'r1'."
+            )
+    return [name for name in found if isinstance(name, str)]
+
+
 @dataclass(frozen=True, slots=True)
 class GivenOptions:
     """The model options as they were given; None (no robots, False) where they were not."""
@@ -92,21 +111,29 @@ class GivenOptions:
         Raises
         ------
         UsageError
-            For no robots, and for robots that are named in two ways.
+            For no robots, for robots that are named in two ways, and for what is no value of an
+            option.
         """
         from planners.errors import UsageError
+        from planners.messages import echoed
 
-        names = robots.split(",") if isinstance(robots, str) else list(robots or ())
+        names = names_in("--robots", robots)
         chosen = tuple(name.strip().lower() for name in names if name.strip())
         if robots is not None and not chosen:
             raise UsageError("--robots: expected names", remedy="As in --robots r1,r2.")
+        if robot_type is not None and (not isinstance(robot_type, str) or not robot_type.strip()):
+            raise UsageError("--robot-type: expected a name", remedy="As in --robot-type robot.")
         if chosen and robot_type:
             raise UsageError(
                 "--robots and --robot-type both say who the robots are: give one of them",
                 remedy="--robots names them one by one.",
             )
-        kind = robot_type.lower() if robot_type else None
-        return cls(chosen, kind, unowned, cost, bool(remember_actions))
+        if not isinstance(remember_actions, bool):
+            raise UsageError(
+                f"--remember-actions is given or not: {echoed(remember_actions)} is neither",
+                remedy="In Python it is True or False.",
+            )
+        return cls(chosen, robot_type and robot_type.lower(), unowned, cost, remember_actions)
 
     def options(self) -> ModelOptions:
         """Return the options of a model that no language file describes.
@@ -119,8 +146,10 @@ class GivenOptions:
         from planners.loading import ModelOptions
         from planners.pddl.robots import RobotSelection
 
-        selection = RobotSelection(self.robots, self.robot_type, self.unowned or "error")
-        return ModelOptions(selection, self.cost or "makespan", self.remember_actions)
+        unowned = "error" if self.unowned is None else self.unowned
+        cost = "makespan" if self.cost is None else self.cost
+        selection = RobotSelection(self.robots, self.robot_type, unowned)
+        return ModelOptions(selection, cost, self.remember_actions)
 
     def for_language(self, language: Language) -> ModelOptions:
         """Return the options that the language records.

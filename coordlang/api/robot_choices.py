@@ -11,7 +11,7 @@ from typing import Any, Unpack
 
 from coordlang.api.inputs import DomainSource, File, ProblemSource
 from coordlang.api.language_inputs import LanguageSource, read_task_language
-from coordlang.api.options import GivenOptions, ModelKeywords
+from coordlang.api.options import GivenOptions, ModelKeywords, names_in
 from coordlang.api.presenting import Presented
 from coordlang.api.speaking import SentenceSource, given_sentence
 from coordlang.required.miscoordination import Miscoordination
@@ -165,7 +165,7 @@ def choices(
 
 
 def _numbers(known: tuple[str, ...], whose: str | Sequence[str]) -> tuple[int, ...]:
-    names = [whose] if isinstance(whose, str) else list(whose)
+    names = [whose] if isinstance(whose, str) else names_in("--robot", whose)
     for name in names:
         if name.lower() not in known:
             raise UsageError(

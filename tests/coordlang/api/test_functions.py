@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 from itertools import islice, pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -351,3 +352,40 @@ def test_results_show_themselves(language: Path) -> None:
     assert len(repr(loaded)) < 200
     for word, states in loaded.sizes().items():
         assert f"<td>{word}</td><td>{states}" in loaded._repr_html_()
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"remember_actions": "no"},
+        {"remember_actions": 1},
+        {"remember_actions": None},
+        {"cost": ""},
+        {"cost": 3},
+        {"unowned": ""},
+        {"unowned": ["error"]},
+        {"robot_type": ""},
+        {"robot_type": 3},
+        {"robots": 5},
+        {"robots": [1]},
+        {"robots": ""},
+    ],
+    ids=str,
+)
+def test_a_wrong_value_is_an_error_and_never_another_answer(wrong: dict[str, Any]) -> None:
+    """Users met remember_actions="no", which was taken for True, and cost="", for the default."""
+    files = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
+    with pytest.raises(coordlang.UsageError) as caught:
+        coordlang.plans(*files, **wrong)
+    assert caught.value.remedy
+    with pytest.raises(coordlang.UsageError):  # where a language says how the files are understood
+        coordlang.explain(coordlang.build(*files).language, *files, **wrong)
+
+
+@pytest.mark.parametrize("robot", [3, [3], "r9", ["r1", "r9"]], ids=str)
+def test_a_robot_that_is_none(robot: Any) -> None:
+    files = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
+    language = coordlang.build(*files).language
+    sentence = coordlang.explain(language, *files).sentences[0].words
+    with pytest.raises(coordlang.UsageError):
+        coordlang.choices(language, *files, sentence, robot=robot)
