@@ -11,6 +11,9 @@ from typing import NoReturn
 
 import coordlang
 
+if sys.platform != "win32":  # it has no SIGHUP
+    from planners.signals import Interruptions
+
 #: Digits of a number of plans: more than there are plans of any space that fits into memory.
 _DIGITS = 100_000
 
@@ -24,23 +27,15 @@ def main() -> NoReturn:
     Ctrl-C (SIGINT), SIGTERM and SIGHUP end the work at any moment, imports included: what is half
     done is removed, and the exit code is 128 and the number of the signal.
     """
-    if why_not := coordlang.why_not_here():
-        print(f"coordlang: {why_not}", file=sys.stderr)
-        sys.exit(_NOT_HERE)
-    from planners.signals import Interruptions
-
+    if sys.platform == "win32":
+        sys.exit(_refused())
     interruptions = Interruptions()
     if 0 < sys.get_int_max_str_digits() < _DIGITS:  # 0: there is no limit
         sys.set_int_max_str_digits(_DIGITS)
     code = 0
     try:
         try:
-            from coordlang.cli import run
-            from coordlang.cli.standard_error import flush_stdout, whatever_stderr
-
-            sys.stderr = whatever_stderr()
-            code = run(sys.argv[1:], interruptions)
-            flush_stdout()
+            code = _refused() or _run(interruptions)
         finally:
             interruptions.end()
     except Exception:
@@ -52,6 +47,24 @@ def main() -> NoReturn:
     if interruptions.first is not None:
         code = 128 + interruptions.first
     sys.exit(code)
+
+
+def _refused() -> int:
+    """The exit code on a system that coordlang does not run on, with a message; 0 elsewhere."""
+    if why_not := coordlang.why_not_here():
+        print(f"coordlang: {why_not}", file=sys.stderr)
+        return _NOT_HERE
+    return 0
+
+
+def _run(interruptions: Interruptions) -> int:
+    from coordlang.cli import run
+    from coordlang.cli.standard_error import flush_stdout, whatever_stderr
+
+    sys.stderr = whatever_stderr()
+    code = run(sys.argv[1:], interruptions)
+    flush_stdout()
+    return code
 
 
 if __name__ == "__main__":

@@ -46,8 +46,17 @@ from coordlang.__main__ import main
 sys.meta_path.insert(0, Finder)
 main()
 """
-#: Before the first line of `coordlang.__main__` it is Python that hears the signal.
-_MODULES = ("click", "coordlang.cli.group", "coordlang.cli.plans", "msgspec", "numpy", "clingo")
+#: Before the first line of `coordlang.__main__` it is Python that hears the signal.  1: the first
+#: module of all that is looked for after it.
+_MODULES = (
+    "1",
+    "click",
+    "coordlang.cli.group",
+    "coordlang.cli.plans",
+    "msgspec",
+    "numpy",
+    "clingo",
+)
 
 
 def ended_at(number: int, at: object) -> subprocess.CompletedProcess[str]:

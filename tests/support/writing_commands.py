@@ -81,4 +81,5 @@ def normal(name: str, data: bytes) -> bytes:
         for line in lines:
             line.pop("seconds"), line.pop("cpu")
         return b"\n".join(sorted(json.dumps(line).encode() for line in lines))
+    data = re.sub(rb"\d+ seconds of processor time", b"0 seconds", data)
     return re.sub(rb"\d+\.\d+( s)?(?=\D)", b"0.0", data)
