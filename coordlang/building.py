@@ -153,7 +153,7 @@ def build_language(
     options = BuildOptions(method, seed, alpha_only, prefer, overlap)
     require_solvable(candidates)
     runner = runner or Processes(jobs=1)
-    clock = _Clock()
+    clock = Clock()
     found = differences(candidates, runner, progress)
     clock.note("coordination")
     states = tuple(found.states.tolist())
@@ -211,7 +211,7 @@ def _with_incumbent(job: Job) -> Job:
 
 
 def _outcome(
-    job: Job, options: BuildOptions, verified: Sequence[_Verified], clock: _Clock
+    job: Job, options: BuildOptions, verified: Sequence[_Verified], clock: Clock
 ) -> Outcome:
     """What the method finds; if it is stopped early, the last partition that was verified."""
     found: list[Outcome] = []
@@ -305,7 +305,7 @@ def _verified(
     return _Verified(assignment, partition, verdict)
 
 
-class _Clock:
+class Clock:
     """Seconds by phase."""
 
     def __init__(self) -> None:
@@ -313,6 +313,7 @@ class _Clock:
         self._since = perf_counter()
 
     def note(self, phase: str) -> None:
+        """Say that a phase has ended."""
         now = perf_counter()
         self.seconds[phase] = now - self._since
         self._since = now

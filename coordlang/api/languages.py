@@ -30,6 +30,7 @@ from coordlang.api.options import (
     require_one_of,
 )
 from coordlang.api.presenting import Presented
+from coordlang.api.repair import repair_data
 from coordlang.api.witness import witness_data
 from coordlang.api.workers import opened_runner, say_size
 from coordlang.building import BuildOptions, Built, build_language, certificate_of
@@ -37,12 +38,19 @@ from coordlang.certificate import Certificate, Checked, read_certificate
 from coordlang.certificate import check as check_certificate
 from coordlang.language.file import read_language
 from coordlang.language.provenance import Guarantee
-from coordlang.language.recorded import check_source, recorded_candidates
+from coordlang.language.recorded import (
+    check_domain,
+    check_source,
+    recorded_candidates,
+    with_recorded,
+)
 from coordlang.language.words import Language
+from coordlang.repairing import Repaired, repair_language
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.tasks.candidates import Candidates
 from coordlang.verification.pieces import verify_candidates
-from planners.errors import ProvedImpossible
+from planners.errors import ProvedImpossible, UsageError
+from planners.loading import ModelOptions
 
 #: Called with what is being done, now and then.
 Progress = Callable[[str], None]
@@ -64,7 +72,8 @@ class BuiltLanguage(Presented):
     """A verified language, and how it was made.
 
     ``seconds`` are by phase.  ``stopped`` is the error that ended the method before its proof was
-    complete, or None: the language is a verified one all the same.
+    complete, or None: the language is a verified one all the same.  ``repaired`` says what became
+    of the language that it started from, None without one.
     """
 
     language: Language
@@ -72,6 +81,7 @@ class BuiltLanguage(Presented):
     candidates: Candidates
     built: Built
     seconds: Mapping[str, float]
+    repaired: Repaired | None = None
 
     @property
     def guarantee(self) -> Guarantee:
@@ -120,6 +130,7 @@ class BuiltLanguage(Presented):
             "verified": self.built.verdict.holds,
             "proved_minimal": guarantee.proved_minimal,
             **self.built.figures,
+            **({"repair": repair_data(self.repaired)} if self.repaired else {}),
             "seconds": {name: round(value, 3) for name, value in self.seconds.items()},
         }
 
@@ -143,6 +154,7 @@ def build(
     alpha_only: bool = False,
     prefer: BuildPreference | None = None,
     overlap: bool = False,
+    start: LanguageSource | None = None,
     unsolvable: Unsolvable = "fail",
     seed: int = 0,
     reserve: float = 0.0,
@@ -171,6 +183,9 @@ def build(
         plans open; with ``"minimal"`` or ``"exhaustive"``.
     overlap
         Whether states get further words while that leaves more plans open.
+    start
+        A language to repair in place of building one: as few states as possible change their word.
+        It then also serves the tasks that this language records, unless the map has changed.
     unsolvable
         ``"fail"`` or ``"skip"``: what to do about candidate tasks without plans.
     seed
@@ -200,29 +215,36 @@ def build(
     require_one_of("--unsolvable", unsolvable, UNSOLVABLE)
     begin = perf_counter()
     files = read_planning(domain, problems, factored, GivenOptions.of(**model))
-    candidates = _candidates(files, tasks, unsolvable)
+    if start is None:
+        candidates = _candidates(files, tasks, unsolvable, files.given.options())
+    else:
+        _require_no_method(options)
+        old, candidates, contained = _to_repair(start, files, tasks, unsolvable)
     seconds = {"space": perf_counter() - begin}
     say_size(candidates, note or progress)
+    repaired = None
     with opened_runner(jobs, scheduler, resume, note) as runner:
-        built = build_language(
-            candidates,
-            **asdict(options),
-            reserve=reserve,
-            progress=progress or _silent,
-            runner=runner,
-        )
+        say = progress or _silent
+        if start is None:
+            built = build_language(
+                candidates, **asdict(options), reserve=reserve, progress=say, runner=runner
+            )
+        else:
+            built, repaired = repair_language(
+                candidates, old, contained=contained, seed=seed, progress=say, runner=runner
+            )
     seconds |= built.seconds
     producer = {
         "program": "coordlang",
         "version": coordlang.__version__,
-        "arguments": _arguments(tasks, options),
+        "arguments": _arguments(tasks, options, start),
         "seed": seed,
         "solver": f"python-sat {version('python-sat')}",
         "seconds": {name: round(value, 3) for name, value in seconds.items()},
     }
     provenance = replace(built.language.provenance, producer=producer)
     language = replace(built.language, provenance=provenance)
-    return BuiltLanguage(language, options, candidates, built, seconds)
+    return BuiltLanguage(language, options, candidates, built, seconds, repaired)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -365,10 +387,10 @@ def _certificate(certificate: File | Certificate | None) -> Certificate | None:
 
 
 def _candidates(
-    files: PlanningInput, tasks: TasksSource | None, unsolvable: Unsolvable
+    files: PlanningInput, tasks: TasksSource | None, unsolvable: Unsolvable, options: ModelOptions
 ) -> Candidates:
     try:
-        return files.candidates(tasks, files.given.options(), skip_unsolvable=unsolvable == "skip")
+        return files.candidates(tasks, options, skip_unsolvable=unsolvable == "skip")
     except ProvedImpossible as error:
         if unsolvable == "fail":
             advice = (error.remedy, "--unsolvable skip leaves out such tasks.")
@@ -376,11 +398,32 @@ def _candidates(
         raise
 
 
-def _arguments(tasks: TasksSource | None, options: BuildOptions) -> list[str]:
+def _require_no_method(options: BuildOptions) -> None:
+    """Raise `UsageError` for options of a method, where a language is repaired."""
+    if options != BuildOptions(seed=options.seed):
+        raise UsageError(
+            "--start changes the words of a language, and no method makes new ones",
+            remedy="Leave out --method, --alpha-only, --prefer and --overlap, or --start.",
+        )
+
+
+def _to_repair(
+    start: LanguageSource, files: PlanningInput, tasks: TasksSource | None, unsolvable: Unsolvable
+) -> tuple[Language, Candidates, bool]:
+    """Return the language, the tasks that it is to serve, and whether its own are among them."""
+    language, position = read_language_source(start)
+    check_domain(language, files.domain, position)
+    candidates = _candidates(files, tasks, unsolvable, files.options_of(language))
+    return language, *with_recorded(language, candidates, position)
+
+
+def _arguments(
+    tasks: TasksSource | None, options: BuildOptions, start: LanguageSource | None
+) -> list[str]:
     """Return the keywords of a call as a language file records them."""
     given = {name: value for name, value in asdict(options).items() if value}
-    if isinstance(tasks, str | PathLike):
-        given["tasks"] = fspath(tasks)
+    files = {"tasks": tasks, "start": start}
+    given |= {k: fspath(file) for k, file in files.items() if isinstance(file, str | PathLike)}
     return [f"{name}={value}" for name, value in sorted(given.items())]
 
 

@@ -77,6 +77,13 @@ _FOR_CERTIFICATE = 0.25
     help="Then give states further words while that leaves more plans open.",
 )
 @click.option(
+    "--start",
+    type=FILE,
+    metavar="LANGUAGE",
+    help="Repair this language in place of building one: as few states as possible change their "
+    "word.",
+)
+@click.option(
     "--certificate",
     type=FILE,
     metavar="FILE",
@@ -110,6 +117,7 @@ def command(
     alpha_only: bool,
     prefer: BuildPreference | None,
     overlap: bool,
+    start: str | None,
     certificate: str | None,
     unsolvable: Unsolvable,
     output: str,
@@ -128,7 +136,7 @@ def command(
     end = monotonic() + time_left()
     never_stdout("--certificate", certificate)
     listed = tasks if tasks != "all" else None
-    check_outputs([("-o", output), ("--certificate", certificate)], [*pddl.paths, listed])
+    check_outputs([("-o", output), ("--certificate", certificate)], [*pddl.paths, listed, start])
     built = _build(
         pddl,
         tasks=tasks,
@@ -136,6 +144,7 @@ def command(
         alpha_only=alpha_only,
         prefer=prefer,
         overlap=overlap,
+        start=start,
         unsolvable=unsolvable,
         seed=seed,
         reserve=_FOR_CERTIFICATE if certificate else 0.0,
@@ -151,7 +160,7 @@ def command(
         if as_json and output != "-":
             echo(json.dumps(figures))
         else:
-            echo(_summary(figures, output), err=output == "-")
+            echo(_summary(built, figures, output), err=output == "-")
     except KeyboardInterrupt as error:
         stopped = error
     return _exit_code(built, output, certificate, stopped)
@@ -280,7 +289,7 @@ def _written(built: BuiltLanguage, output: str, certificate: str | None = None) 
     return f"{text}; {'and so is its certificate' if is_there else 'no certificate is written'}"
 
 
-def _summary(figures: dict[str, Any], output: str) -> str:
+def _summary(built: BuiltLanguage, figures: dict[str, Any], output: str) -> str:
     total = sum(figures["seconds"].values())
     proof = f"at least {figures['lower_bound']} needed, "
     if figures["proved_minimal"]:
@@ -292,9 +301,18 @@ def _summary(figures: dict[str, Any], output: str) -> str:
         f"{figures['states_on_plans']:,} states on optimal plans, "
         f"{figures['divergences']:,} divergences, "
         f"{figures['walk_nodes']:,} nodes of plans, {total:.2f} s\n"
-        f"{_flexibility(figures)}"
+        f"{_flexibility(figures)}{_repair(built, err=output == '-')}"
         f"written to {'stdout' if output == '-' else visible(output)}"
     )
+
+
+def _repair(built: BuiltLanguage, *, err: bool) -> str:
+    """What became of the language that it started from; whole lines."""
+    if built.repaired is None:
+        return ""
+    from coordlang.api.repair import repair_text
+
+    return f"{repair_text(built.repaired, line_width(err=err))}\n"
 
 
 def _flexibility(figures: dict[str, Any]) -> str:

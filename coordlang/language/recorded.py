@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
+from coordlang.language.keys import read_keys
 from coordlang.language.provenance import domain_sha256, world_sha256
 from coordlang.language.words import Language
 from coordlang.tasks.candidates import (
@@ -21,6 +23,7 @@ from planners.loading import ModelOptions
 from planners.messages import echoed
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.robots import ENVIRONMENT, RobotSelection
+from planners.tables import find_rows
 
 
 def options_of(
@@ -79,6 +82,20 @@ def check_source(
     The recorded hash is that of what the domain says; in older files that of its text, or of the
     files of all robots one below the other.
     """
+    check_domain(language, domain, position)
+    for problem in problems:
+        if not _is_of_world(language, domain, problem):
+            raise BadInput(
+                f"{problem.source.name} has other objects or static facts than the language's "
+                "problem",
+                position=position,
+                remedy="A language serves the problems of one world: same objects, same static "
+                "facts.",
+            )
+
+
+def check_domain(language: Language, domain: Domain, position: Position) -> None:
+    """Raise `BadInput` when a domain is not that of the language; see `check_source`."""
     wanted = language.provenance.domain.get("sha256")
     known = domain_sha256(domain), domain.source.sha256, domain.source.text_sha256
     if wanted not in (None, *known):
@@ -89,16 +106,12 @@ def check_source(
             position=position,
             remedy="Give the domain file that the language was built from.",
         )
+
+
+def _is_of_world(language: Language, domain: Domain, problem: Problem) -> bool:
+    """Whether a problem has the objects and static facts that a language records, if it does."""
     world = language.provenance.model.get("world_sha256")
-    for problem in problems:
-        if world is not None and world != world_sha256(domain, problem):
-            raise BadInput(
-                f"{problem.source.name} has other objects or static facts than the language's "
-                "problem",
-                position=position,
-                remedy="A language serves the problems of one world: same objects, same static "
-                "facts.",
-            )
+    return world is None or bool(world == world_sha256(domain, problem))
 
 
 def recorded_list(language: Language) -> list[ListedTask]:
@@ -150,3 +163,52 @@ def recorded_candidates(
         if error.position is not None:
             raise
         raise BadInput(error.what, position=position, remedy=error.remedy) from None
+
+
+def with_recorded(
+    language: Language, candidates: Candidates, position: Position
+) -> tuple[Candidates, bool]:
+    """Candidate tasks together with those that a language records, and whether these are contained.
+
+    On another map, where problems have other objects or static facts, the recorded tasks do not
+    count.  Among all pairs of states no recorded tasks are added, and then they are not contained.
+
+    Raises
+    ------
+    BadInput
+        For a language for all pairs of states, where the candidate tasks are not, or are fewer.
+    """
+    domain, problems = candidates.loaded.domain, list(candidates.loaded.problems)
+    if not all(_is_of_world(language, domain, problem) for problem in problems):
+        return candidates, False
+    if language.provenance.tasks["kind"] == "all":
+        _require_all_pairs(language, candidates, position)
+        rows, _ = read_keys(candidates.model.codec, language.states)
+        return candidates, bool((find_rows(candidates.rows, rows) >= 0).all())
+    recorded = recorded_list(language)
+    more = [task for task in recorded if task not in candidates.listed]
+    if candidates.kind == "all" or not more:
+        return candidates, bool(recorded) and not more
+    listed = [*recorded, *(task for task in candidates.listed if task not in recorded)]
+    kinds = {candidates.kind, language.provenance.tasks["kind"]}
+    make = from_recorded if kinds == {"problems"} else from_listed
+    together = make(domain, problems, listed, candidates.loaded.options, position)
+    return replace(together, skipped=candidates.skipped), True
+
+
+def _require_all_pairs(language: Language, candidates: Candidates, position: Position) -> None:
+    """Raise `BadInput` unless the candidate tasks are all pairs, and no fewer than recorded."""
+    if candidates.kind != "all":
+        raise BadInput(
+            "this language serves all pairs of states, and others cannot be added to them",
+            position=position,
+            remedy="Say --tasks all, with the problems whose states count.",
+        )
+    recorded = language.provenance.tasks["count"]
+    if candidates.count < recorded:
+        raise BadInput(
+            f"this language serves {recorded:,} pairs of states, but these problems have "
+            f"{candidates.count:,}",
+            position=position,
+            remedy="Also give the problem that it was built for.",
+        )

@@ -10,7 +10,6 @@ definition before it counts.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,11 +20,10 @@ from coordlang.symmetry.group import symmetry_group
 from coordlang.vocabulary.annealing import Annealing, AnnealingSettings, Violations
 from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from coordlang.vocabulary.job import Assignment, Job, Outcome
-from coordlang.vocabulary.necessary_clauses import TaskPart
+from coordlang.vocabulary.necessary_clauses import task_parts
 from planners.errors import OutOfMemory
 from planners.limits import run_until_stopped
-from planners.search.plan_space import PlanSpace
-from planners.tables import Bools, Ints
+from planners.tables import Ints
 
 _USUAL = AnnealingSettings()
 #: The search ends where no language is more flexible by more than rounding.
@@ -96,7 +94,7 @@ class _Search:
         self._bound = flexibility_bounds(spaces, requires)
         if self._found.size < 2:
             return
-        parts = _parts(spaces, requires, self._settings.tasks_of_a_part)
+        parts = task_parts(spaces, requires, self._settings.tasks_of_a_part)
         violations = Violations(self._job.states, parts, symmetry_group(self._job.candidates))
         for clause in self._found.evidence:
             violations.add(clause)
@@ -143,18 +141,3 @@ def _measured(job: Job, partition: Assignment) -> Flexibility:
     return flexibility(
         job.candidates.spaces, [word[space.state] for space in job.candidates.spaces]
     )
-
-
-def _parts(spaces: Sequence[PlanSpace], requires: Sequence[Bools], tasks: int) -> list[TaskPart]:
-    """The tasks that require coordination, in parts of about so many tasks."""
-    parts = []
-    for space, required in zip(spaces, requires, strict=True):
-        wanted = required[space.starts]
-        goals = space.goal[space.starts]
-        count = 1 + len(np.unique(space.starts[wanted])) // tasks
-        parts += [
-            TaskPart.of(space, mine)
-            for number in range(count)
-            if (mine := wanted & (goals % count == number)).any()
-        ]
-    return parts

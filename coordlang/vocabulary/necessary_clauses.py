@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from coordlang.language.warping import Clause, separation_clause
 from coordlang.required.choices import Choices
@@ -67,6 +69,33 @@ class TaskPart:
             assert clause, "the plans have one sentence, and none of them is the other"
             found.setdefault(clause, example)
         return found
+
+
+def task_parts(
+    spaces: Sequence[PlanSpace], requires: Sequence[Bools], tasks: int
+) -> list[TaskPart]:
+    """The tasks that require coordination, in parts of about so many tasks.
+
+    Parameters
+    ----------
+    spaces
+        The plan spaces of the tasks.
+    requires
+        (nodes) of each space, which nodes require coordination.
+    tasks
+        About how many tasks a part has.
+    """
+    parts = []
+    for space, required in zip(spaces, requires, strict=True):
+        wanted = required[space.starts]
+        goals = space.goal[space.starts]
+        count = 1 + len(np.unique(space.starts[wanted])) // tasks
+        parts += [
+            TaskPart.of(space, mine)
+            for number in range(count)
+            if (mine := wanted & (goals % count == number)).any()
+        ]
+    return parts
 
 
 class NecessaryClauses:

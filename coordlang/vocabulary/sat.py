@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from coordlang.language.warping import Clause, Pair, pair
@@ -52,6 +52,13 @@ class PartitionProblem:
                 self.separate_one([states])
             return
         self._solver.add_clause([self._separate_all(pairs) for pairs in alternatives])
+
+    def keep_words(self, kept: Mapping[int, int], changes: int) -> None:
+        """Require that at most so many states have another word than ``kept`` gives them."""
+        changed = [-self._word[state][word] for state, word in sorted(kept.items())]
+        clauses, self._last = at_most(changed, changes, self._last)
+        for clause in clauses:
+            self._solver.add_clause(clause)
 
     def add_lex_leaders(self, symmetries: Sequence[Sequence[int]], pairs: Sequence[Pair]) -> None:
         """Of partitions that are images of each other, allow the lexicographic leader.
@@ -157,6 +164,29 @@ class PartitionProblem:
         self._solver.add_clause([variable, -first])
         self._solver.add_clause([variable, -second])
         return variable
+
+
+def at_most(literals: Sequence[int], number: int, last: int) -> tuple[list[list[int]], int]:
+    """Clauses by which at most so many literals are true, as a sequential counter.
+
+    Parameters
+    ----------
+    literals, number
+        Of which at most so many are true.
+    last
+        The greatest variable that is in use.
+
+    Returns
+    -------
+    clauses, last
+        The clauses, and the greatest variable that is in use then.
+    """
+    from pysat.card import CardEnc, EncType
+
+    if number >= len(literals):
+        return [], last
+    encoded = CardEnc.atmost(literals, number, top_id=last, encoding=EncType.seqcounter)
+    return [list(clause) for clause in encoded.clauses], max(last, encoded.nv)
 
 
 class Undecided(Exception):

@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from itertools import product
 from random import Random
 
+from coordlang.required.miscoordination import inseparable
 from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
 from coordlang.tasks.listed import ListedTask
 from planners.errors import ProvedImpossible
@@ -19,6 +20,7 @@ from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan
 from tests.support import naive
 from tests.support.composition_walk import walk
+from tests.support.domains import all_tasks
 from tests.support.random_models import graph_text
 
 #: More plans of one task are not listed.
@@ -71,9 +73,53 @@ def listed(
             yield space, task, plans, [naive.states(space, task, plan) for plan in plans]
 
 
+def failing(candidates: Candidates) -> list[list[tuple[int, ...]]]:
+    """The state sequences of every failing tuple of plans."""
+    robots = len(candidates.model.robots)
+    found = set()
+    for _, _, plans, sequences in listed(candidates):
+        number = {plan: n for n, plan in enumerate(plans)}
+        for chosen in naive.failing(plans, robots):
+            found.add(tuple(sequences[number[plan]] for plan in chosen))
+    return [list(states) for states in sorted(found)]
+
+
+def is_language(word: Mapping[int, int], bad: list[list[tuple[int, ...]]]) -> bool:
+    """Whether no failing tuple of plans has one sentence."""
+    return not any(
+        len({naive.sentence([word[s] for s in states]) for states in plans}) == 1 for plans in bad
+    )
+
+
 def partitions(states: list[int], size: int) -> Iterator[dict[int, int]]:
     for words in product(range(size), repeat=len(states)):
         if [words.index(w) for w in range(size) if w in words] == sorted(
             words.index(w) for w in set(words)
         ):
             yield dict(zip(states, words, strict=True))
+
+
+@cache
+def small_worlds(states: int = 7, number: int = 16) -> tuple[Candidates, ...]:
+    """Tasks of two and three robots that require coordination, with few states and few plans."""
+    found: list[Candidates] = []
+    worlds = [("grid", "gw1-2x2"), ("three-cells", "problem"), ("t-map", "problem")]
+    for seed in range(10_000):
+        random = Random(seed)
+        drawn: Candidates | None
+        if seed % 3:
+            drawn = on_graph(seed, 2 + seed % 2)
+        else:
+            drawn = some_tasks(all_tasks(*random.choice(worlds)), random, random.randint(1, 4))
+        if drawn is None or states_of(drawn.spaces) > states or not requiring(drawn):
+            continue
+        if any(inseparable(space) is not None for space in drawn.spaces):
+            continue
+        try:
+            failing(drawn)
+        except naive.TooLarge:
+            continue
+        found.append(drawn)
+        if len(found) == number:
+            return tuple(found)
+    raise AssertionError("too few small worlds")

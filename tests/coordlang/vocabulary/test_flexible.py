@@ -26,7 +26,15 @@ from planners.errors import ProvedImpossible
 from planners.pddl import read_domain, read_problem
 from planners.search.plans import Plan
 from tests.support import naive
-from tests.support.candidates import listed, on_graph, partitions, requiring, some_tasks
+from tests.support.candidates import (
+    failing,
+    is_language,
+    listed,
+    on_graph,
+    partitions,
+    requiring,
+    some_tasks,
+)
 from tests.support.composition_walk import walk
 from tests.support.domains import DOMAINS, all_tasks
 from tests.support.random_models import random_model
@@ -138,17 +146,6 @@ def test_objective_measures_the_same() -> None:
         assert changes > 8
 
 
-def failing(candidates: Candidates) -> list[list[tuple[int, ...]]]:
-    """The state sequences of every failing tuple of plans."""
-    robots = len(candidates.model.robots)
-    found = set()
-    for _, _, plans, sequences in listed(candidates):
-        number = {plan: n for n, plan in enumerate(plans)}
-        for chosen in naive.failing(plans, robots):
-            found.add(tuple(sequences[number[plan]] for plan in chosen))
-    return [list(states) for states in sorted(found)]
-
-
 def all_languages(candidates: Candidates, size: int) -> list[tuple[Fraction, dict[int, int]]]:
     """All languages with so many words, with their flexibility."""
     states = sorted({int(s) for space in candidates.spaces for s in space.state})
@@ -156,10 +153,7 @@ def all_languages(candidates: Candidates, size: int) -> list[tuple[Fraction, dic
     every = [sequences for _, _, _, sequences in listed(candidates)]
     found = []
     for word in partitions(states, size):
-        if any(
-            len({naive.sentence([word[s] for s in states]) for states in plans}) == 1
-            for plans in bad
-        ):
+        if not is_language(word, bad):
             continue
         table = [word.get(s, 0) for s in range(len(candidates.rows))]
         found.append(

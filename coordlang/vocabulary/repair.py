@@ -1,0 +1,291 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A language and other tasks -> a language in which as few states as possible change their word.
+
+Counterexamples to the old words give clauses that every language satisfies.  A state with a word of
+its own is separated from all others, so the states that change must meet every clause that the old
+words violate, and any states that do suffice: the fewest are a least hitting set
+(Proposition 16 of docs/concepts.md).  Of the languages with so few changes one with the fewest new
+words is then looked for, as `minimal` does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+
+import numpy as np
+
+from coordlang.language.warping import Clause
+from coordlang.required.divergences import required_nodes
+from coordlang.symmetry.group import symmetry_group
+from coordlang.vocabulary.clauses import most_constrained_first, without_implied
+from coordlang.vocabulary.hitting import LeastHitting, StateSet, greedy_hitting
+from coordlang.vocabulary.job import Assignment, Job
+from coordlang.vocabulary.necessary_clauses import NecessaryClauses, TaskPart, task_parts
+from coordlang.vocabulary.problems_by_size import ProblemsBySize, SolverBudget, close_bounds
+from coordlang.vocabulary.sat import PartitionProblem, Undecided
+from planners.limits import run_until_stopped
+
+#: Tasks that are searched for counterexamples together, about so many.
+_TASKS_OF_A_PART = 1_500
+#: Comparisons of clauses to find which are implied, a second's work: the solver finds the others.
+_COMPARISONS = 5_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Repair:
+    """A partition, and how far it is from the old words.
+
+    Attributes
+    ----------
+    partition
+        State number -> word number, below ``old_words`` for an old word.
+    changed
+        The states that had another word.
+    new_words
+        How many words are new.
+    changes_bound, new_words_bound
+        No language changes the words of fewer states; of those that change so few, none has fewer
+        new words.
+    figures
+        The work done, by name.
+    stopped
+        The error that ended the search early, None if it came to its end.
+    """
+
+    partition: Assignment
+    changed: tuple[int, ...]
+    new_words: int
+    changes_bound: int
+    new_words_bound: int
+    figures: Mapping[str, float]
+    stopped: BaseException | None
+
+
+def repair(job: Job, kept: Assignment, old_words: int, default: int) -> Repair:
+    """The language that is nearest to old words.
+
+    Anytime: out of time or memory, or interrupted, it returns the best language so far, with the
+    error in ``stopped``; before there is one it raises that error.
+
+    Parameters
+    ----------
+    job
+        What the language is for.  ``check`` is called for every better one.
+    kept
+        State number -> old word number, below ``old_words``.  States that are not named here are
+        new: whatever word they get, they do not change it.
+    old_words
+        The number of old words.
+    default
+        The old word that a new state gets where any will do.
+    """
+    with closing(_Repair(job, kept, old_words, default)) as search:
+        stopped = run_until_stopped(search.run)
+    if search.best is None:
+        assert stopped is not None
+        raise stopped
+    return search.result(stopped)
+
+
+class _Repair:
+    """``best`` is the language with the fewest changes, and then new words, that was verified."""
+
+    def __init__(self, job: Job, kept: Assignment, old_words: int, default: int) -> None:
+        self._job, self._old_words, self._default = job, old_words, default
+        self._kept = {state: kept[state] for state in job.states if state in kept}
+        self.best: dict[int, int] | None = None
+        self._known = NecessaryClauses(symmetry_group(job.candidates))
+        self._parts: list[TaskPart] = []
+        self._current = 0
+        self._hitting = LeastHitting(list(self._kept))
+        self._seen = 0
+        self._new_words_bound = 0
+        self._rounds = 0
+        self._anchors = [-1 - word for word in range(old_words)]
+        self._problems: ProblemsBySize[Clause] = ProblemsBySize(
+            self._start, PartitionProblem.separate_one
+        )
+
+    def close(self) -> None:
+        """Give back what the solvers hold."""
+        self._hitting.close()
+        self._problems.close()
+
+    def result(self, stopped: BaseException | None) -> Repair:
+        """The best language, with what is proved of it."""
+        assert self.best is not None
+        changes, new_words = self._distance(self.best)
+        proved = changes == self._hitting.bound
+        return Repair(
+            self.best,
+            tuple(sorted(s for s, word in self._kept.items() if self.best[s] != word)),
+            new_words,
+            self._hitting.bound,
+            self._new_words_bound if proved else 0,
+            {
+                "rounds": self._rounds,
+                "clauses": len(self._known.clauses),
+                "symmetries": len(self._known.group.symmetries),
+            },
+            stopped,
+        )
+
+    def run(self) -> None:
+        """A language soon, then the fewest changes, then the fewest new words."""
+        spaces = self._job.candidates.spaces
+        self._parts = task_parts(
+            spaces, [required_nodes(space) for space in spaces], _TASKS_OF_A_PART
+        )
+        self._join_words(self._hit_greedily())
+        self._join_words(self._hit_least())
+        close_bounds(lambda: (self._new_words_bound, self._upper), self._decide)
+
+    @property
+    def _upper(self) -> int:
+        assert self.best is not None
+        return self._distance(self.best)[1]
+
+    def _distance(self, partition: Assignment) -> tuple[int, int]:
+        """How many states change their word, and how many words are new."""
+        changes = sum(partition[state] != word for state, word in self._kept.items())
+        return changes, len({word for word in partition.values() if word >= self._old_words})
+
+    def _hit_greedily(self) -> set[int]:
+        """States that suffice to change; few, and soon."""
+        changed: set[int] = set()
+        while not self._holds(self._apart(changed)):
+            changed = greedy_hitting(self._violated_sets(), changed)
+        return changed
+
+    def _hit_least(self) -> set[int]:
+        """As few states as suffice to change."""
+        while True:
+            self._hitting.add(self._violated_sets(self._seen))
+            self._seen = len(self._known.clauses)
+            changed = self._hitting.find()
+            if self._holds(self._apart(changed)):
+                return changed
+
+    def _violated_sets(self, first: int = 0) -> Iterable[StateSet]:
+        """The states of every clause, from number ``first`` on, that the old words violate."""
+        kept = self._kept
+        for clause in self._known.clauses[first:]:
+            if all(a in kept and b in kept and kept[a] == kept[b] for a, b in clause):
+                yield frozenset(state for states in clause for state in states)
+
+    def _apart(self, changed: Iterable[int]) -> dict[int, int]:
+        """The old words, changed and new states each in a word of its own."""
+        own = set(changed)
+        partition = {}
+        fresh = self._old_words
+        for state in self._job.states:
+            if state in self._kept and state not in own:
+                partition[state] = self._kept[state]
+            else:
+                partition[state] = fresh
+                fresh += 1
+        return partition
+
+    def _join_words(self, changed: set[int]) -> None:
+        """Where only these states change: a language with few new words, by first fit.
+
+        States with a word of their own take the first word that violates no known clause, until
+        there is no counterexample.
+        """
+        best = self._apart(changed)
+        if self._is_better(best):
+            self._accept(best)
+        while not self._holds(partition := self._first_fit(changed)):
+            pass
+        if self._is_better(partition):
+            self._accept(partition)
+
+    def _is_better(self, partition: Assignment) -> bool:
+        return self.best is None or self._distance(partition) < self._distance(self.best)
+
+    def _accept(self, partition: dict[int, int]) -> None:
+        self._job.check(partition)
+        self.best = partition
+
+    def _first_fit(self, changed: set[int]) -> dict[int, int]:
+        partition = self._apart(changed)
+        clauses = without_implied(self._known.clauses, _COMPARISONS)
+        of_state: dict[int, list[Clause]] = {}
+        for clause in clauses:
+            for state in {state for states in clause for state in states}:
+                of_state.setdefault(state, []).append(clause)
+        used = self._old_words
+        own = [s for s in self._job.states if partition[s] >= self._old_words]
+        # Until a state is placed its word is a number that no placed state has.
+        partition |= {state: -1 - state for state in own}
+        for state in most_constrained_first(own, clauses):
+            first = self._kept.get(state, self._default)
+            words = sorted(range(used), key=lambda word: (word != first, word))
+            for word in words:
+                partition[state] = word
+                if not any(_joins(clause, partition) for clause in of_state.get(state, ())):
+                    break
+            else:
+                partition[state] = used
+                used += 1
+        return partition
+
+    def _holds(self, partition: Assignment) -> bool:
+        """Whether there is no counterexample; those that are found are added to the clauses."""
+        self._rounds += 1
+        word = np.zeros(len(self._job.candidates.rows), np.int64)
+        word[list(partition)] = list(partition.values())
+        changes, new_words = self._distance(partition)
+        self._job.progress(
+            f"at least {self._hitting.bound} states change their word; trying {changes}, and "
+            f"{new_words} new words: round {self._rounds}, {len(self._known.clauses):,} clauses"
+        )
+        for _ in self._parts:
+            part = self._parts[self._current]
+            if found := part.violated(word):
+                self._known.add(found, part.space)
+                return False
+            self._current = (self._current + 1) % len(self._parts)
+        return True
+
+    def _decide(self, new_words: int, budget: SolverBudget) -> bool:
+        """Find a language with so many new words or prove that there is none.
+
+        False if the budget was not enough.
+        """
+        size = self._old_words + new_words
+        for _ in range(budget.rounds):
+            try:
+                found = self._problems.under(size, self._known.clauses).solve(budget.conflicts)
+            except Undecided:
+                return False
+            if found is None:
+                self._problems.drop(size)
+                self._new_words_bound = new_words + 1
+                return True
+            partition = {state: found[state] for state in self._job.states}
+            if self._holds(partition):
+                self._problems.drop(size)
+                self._accept(partition)
+                return True
+        return False
+
+    def _start(self, size: int, known: Sequence[Clause]) -> PartitionProblem:
+        """Partitions with the fewest changes; an anchor for each old word fixes its name."""
+        clauses = without_implied(known, _COMPARISONS)
+        states = [*self._anchors, *most_constrained_first(self._job.states, clauses)]
+        problem = PartitionProblem(states, size)
+        for anchor in self._anchors:
+            for other in self._anchors[: -1 - anchor]:
+                problem.separate_one([(anchor, other)])
+        problem.keep_words(self._kept, self._hitting.bound)
+        for clause in clauses:
+            problem.separate_one(clause)
+        return problem
+
+
+def _joins(clause: Clause, word: Assignment) -> bool:
+    """Whether a partition separates no pair of a clause."""
+    return all(word[a] == word[b] for a, b in clause)
