@@ -6,15 +6,16 @@ Static atoms, equalities and types are evaluated.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from planners.errors import BadInput, Unsupported
 from planners.grounding.actions import GroundAction, GroundEffect
 from planners.grounding.bindings import Binding, Bindings
+from planners.grounding.interned import Interned
 from planners.grounding.reachability import reachable_arguments
 from planners.limits import reaching
 from planners.messages import echoed
-from planners.pddl.formula_tree import distinct, joined, label, literals
+from planners.pddl.formula_tree import label, literals
 from planners.pddl.formulas import MAX_COST
 from planners.pddl.lifted import (
     FALSE,
@@ -59,12 +60,12 @@ def ground_actions(
     BadInput
         An action that no robot owns (``--unowned error``), or a missing cost value.
     """
-    grounder = _Grounder(domain, problem, team)
     world = f"{len(domain.schemas):,} action schemas over {len(problem.objects):,} objects"
     with reaching(lambda: f"looking for the applicable instances of {world}", FEWER):
         reachable = reachable_arguments(
             domain, problem.objects, sorted({*problem.init, *also}, key=str)
         )
+    grounder = _Grounder(domain, problem, team, reachable)
     total = sum(map(len, reachable.values()))
     actions: list[GroundAction] = []
     with reaching(
@@ -80,11 +81,17 @@ def ground_actions(
 
 def ground_goal(domain: Domain, problem: Problem, goal: Formula) -> Formula:
     """A goal formula over fluent atoms, in negation normal form."""
-    return _Grounder(domain, problem, Team((), "")).formula(goal, {}, True)
+    return _Grounder(domain, problem, Team((), ""), {}).formula(goal, {}, True)
 
 
 class _Grounder:
-    def __init__(self, domain: Domain, problem: Problem, team: Team) -> None:
+    def __init__(
+        self,
+        domain: Domain,
+        problem: Problem,
+        team: Team,
+        reachable: Mapping[str, Sequence[tuple[str, ...]]],
+    ) -> None:
         self._domain = domain
         self._problem = problem
         self._team = team
@@ -93,8 +100,12 @@ class _Grounder:
         self._schemas = {schema.name: schema for schema in domain.schemas}
         self._named = {atom.action for schema in domain.schemas for atom in _step_atoms(schema)}
         self._named |= {name for constraint in domain.constraints for name, _ in constraint.actions}
-        self._bindings = Bindings(domain, problem, self._fluents, self._statics)
-        self._atoms: dict[tuple[str, tuple[str, ...]], Atom] = {}
+        self._bindings = Bindings(domain, problem, self._fluents, self._statics, reachable)
+        self._interned = Interned()
+        #: The owners of a subaction that a formula names; None for arguments of other types.
+        self._acting: dict[tuple[str, tuple[str, ...]], frozenset[int] | None] = {}
+        #: Ground quantified formulas by the values of their free variables: actions share most.
+        self._quantified: dict[tuple[object, ...], Formula] = {}
 
     def action(self, schema: Schema, args: tuple[str, ...], costs: bool) -> GroundAction | None:
         """The instance, or None if its precondition is false in every state."""
@@ -138,41 +149,56 @@ class _Grounder:
         match f:
             case Not(part):
                 return self.formula(part, binding, not positive, acting)
-            case And() | Or() | Forall() | Exists():
-                kind = And if isinstance(f, And | Forall) == positive else Or
-                instances = self._instances(f, binding)
-                ground = (self.formula(part, inner, positive, acting) for part, inner in instances)
-                return distinct(joined(kind, ground))
+            case And(parts) | Or(parts):
+                kind = And if isinstance(f, And) == positive else Or
+                ground = (self.formula(part, binding, positive, acting) for part in parts)
+                return self._interned.joined(kind, ground)
+            case Forall() | Exists():
+                return self._quantifier(f, binding, positive, acting)
             case StepAtom(action, args):
-                values = tuple(binding.get(a, a) for a in args)
+                values = tuple([binding.get(a, a) for a in args])
                 return self._step_atom(action, values, positive, acting)
         return self._state_literal(f, binding, positive)
 
-    def _instances(
-        self, f: And | Or | Forall | Exists, binding: Binding
-    ) -> Iterator[tuple[Formula, Binding]]:
-        """The parts of a formula with the values of their variables."""
-        if isinstance(f, And | Or):
-            yield from ((part, binding) for part in f.parts)
-        else:
-            guards = self._bindings.guards_of(f)
-            for inner in self._bindings.values(f.variables, binding, guards):
-                yield f.part, inner
+    def _quantifier(
+        self, f: Forall | Exists, binding: Binding, positive: bool, acting: tuple[int, ...]
+    ) -> Formula:
+        known = self._bindings.quantified(f)
+        key = id(f), positive, acting, *(binding.get(name) for name in known.free)
+        found = self._quantified.get(key)
+        if found is None:
+            kind = And if isinstance(f, Forall) == positive else Or
+            instances = self._bindings.values(f.variables, binding, known.statics, known.steps)
+            ground = (self.formula(f.part, inner, positive, acting) for inner in instances)
+            found = self._quantified[key] = self._interned.joined(kind, ground)
+        return found
 
     def _state_literal(self, f: Truth | Equal | Atom, binding: Binding, positive: bool) -> Formula:
         if isinstance(f, Truth):
-            return Truth(f.value == positive)
+            return TRUE if f.value == positive else FALSE
         if isinstance(f, Equal):
             same = binding.get(f.left, f.left) == binding.get(f.right, f.right)
-            return Truth(same == positive)
-        atom = self._atom(f.predicate, f.args, binding)
+            return TRUE if same == positive else FALSE
         if f.predicate not in self._fluents:
-            return Truth((atom in self._statics) == positive)
-        return atom if positive else Not(atom)
+            atom = self._atom(f.predicate, f.args, binding)
+            return TRUE if (atom in self._statics) == positive else FALSE
+        args = tuple([binding.get(a, a) for a in f.args])
+        return self._interned.literal(Atom, f.predicate, args, positive)
 
     def _step_atom(
         self, action: str, args: tuple[str, ...], positive: bool, acting: tuple[int, ...]
     ) -> Formula:
+        key = action, args
+        if key not in self._acting:
+            self._acting[key] = self._owners_named(action, args)
+        owners = self._acting[key]
+        if owners is None:
+            return FALSE if positive else TRUE
+        if not positive and not owners.isdisjoint(acting):
+            return TRUE
+        return self._interned.literal(StepAtom, action, args, positive)
+
+    def _owners_named(self, action: str, args: tuple[str, ...]) -> frozenset[int] | None:
         schema = self._schemas[action]
         if self._domain.is_joint_action:
             raise BadInput(
@@ -182,11 +208,8 @@ class _Grounder:
             )
         for parameter, arg in zip(schema.parameters, args, strict=True):
             if arg not in self._bindings.objects(parameter.types):
-                return FALSE if positive else TRUE
-        if not positive and set(self._team.owners(schema, args)) & set(acting):
-            return TRUE
-        atom = StepAtom(action, args)
-        return atom if positive else Not(atom)
+                return None
+        return frozenset(self._team.owners(schema, args))
 
     def _effect(self, effect: Effect, binding: Binding) -> Iterator[GroundEffect]:
         guards = self._bindings.static_atoms(effect.condition) if effect.variables else ()
@@ -197,11 +220,7 @@ class _Grounder:
                 yield GroundEffect(atom, effect.adds, condition)
 
     def _atom(self, predicate: str, args: tuple[str, ...], binding: Binding) -> Atom:
-        key = (predicate, tuple([binding.get(a, a) for a in args]))
-        atom = self._atoms.get(key)
-        if atom is None:
-            atom = self._atoms[key] = Atom(*key)
-        return atom
+        return self._interned.atom(predicate, tuple([binding.get(a, a) for a in args]))
 
     def _parts(self, schema: Schema, binding: Binding) -> tuple[str | None, ...]:
         if not schema.parts:

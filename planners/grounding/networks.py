@@ -6,7 +6,7 @@ The formulas stand in the preconditions of the ground actions that they bind.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
 from itertools import combinations, product
 
@@ -35,11 +35,16 @@ def apply_network(
     for constraint in domain.constraints:
         _check_types(domain, problem, constraint)
     by_name = {c.name: c for c in domain.constraints}
+    members = {
+        variable.types: frozenset(objects_of(domain, problem, variable.types))
+        for constraint in domain.constraints
+        for variable in constraint.parameters
+    }
     groups: _Groups = {}
     keys: dict[GroundAction, list[tuple[str, tuple[str, ...]]]] = {}
     for action in actions:
         for constraint in domain.constraints:
-            for binding in _bindings(domain, problem, constraint, action):
+            for binding in _bindings(members, constraint, action):
                 groups.setdefault((constraint.name, binding), []).append(action)
                 keys.setdefault(action, []).append((constraint.name, binding))
     return tuple(
@@ -77,14 +82,14 @@ def _check_types(domain: Domain, problem: Problem, constraint: Constraint) -> No
 
 
 def _bindings(
-    domain: Domain, problem: Problem, constraint: Constraint, action: GroundAction
+    members: Mapping[tuple[str, ...], Set[str]], constraint: Constraint, action: GroundAction
 ) -> list[tuple[str, ...]]:
     found = []
     for name, positions in constraint.actions:
         if name == action.schema:
             binding = tuple(action.args[p] for p in positions)
             typed = all(
-                value in objects_of(domain, problem, variable.types)
+                value in members[variable.types]
                 for value, variable in zip(binding, constraint.parameters, strict=True)
             )
             if typed and binding not in found:

@@ -140,12 +140,15 @@ def _least_model(rules: Sequence[str]) -> dict[str, list[Arguments]]:
             remedy="Install clingo again (`pip install --force-reinstall clingo`).",
         )
     return {
-        predicate: [
-            tuple([argument.name for argument in atom.symbol.arguments])
-            for atom in atoms.by_signature(predicate, arity)
-        ]
+        predicate: [_arguments(str(atom.symbol)) for atom in atoms.by_signature(predicate, arity)]
         for predicate, arity, _ in atoms.signatures
     }
+
+
+def _arguments(symbol: str) -> Arguments:
+    """The arguments of ``p(o1,o2)``: one call of clingo for all of them."""
+    _, _, inner = symbol.partition("(")
+    return tuple(inner[:-1].split(",")) if inner else ()
 
 
 def _interruptible(rule: str, objects: int) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.grounding import GroundAction
+from planners.grounding import GroundAction, GroundEffect
 from planners.pddl.formula_tree import Leaf, forbidden_steps, label, literals, substituted
 from planners.pddl.lifted import FALSE, Atom, Formula, StepAtom, Truth
 
@@ -41,32 +41,29 @@ def footprint(action: GroundAction, step: frozenset[StepAtom] | None = None) -> 
     ``step`` are the subactions of the pair: effects whose condition needs others, or none of these,
     are left out.  None: every effect counts.
     """
-    conditions = (action.precondition, *(effect.condition for effect in action.effects))
-    partners = {
-        leaf
-        for condition in conditions
-        for leaf, positive in literals(condition)
-        if positive and isinstance(leaf, StepAtom)
-    }
-    effects = [e for e in action.effects if step is None or _can_fire(e.condition, step)]
     signs: dict[bool, set[Leaf]] = {True: set(), False: set()}
-    for condition in (action.precondition, *(effect.condition for effect in effects)):
-        for leaf, positive in literals(condition):
-            signs[positive].add(leaf)
-    adds = frozenset(e.atom for e in effects if e.adds)
+    for leaf, positive in literals(action.precondition):
+        signs[positive].add(leaf)
+    partners = {leaf for leaf in signs[True] if isinstance(leaf, StepAtom)}
+    conditional_on: set[StepAtom] = set()
+    effects: list[GroundEffect] = []
+    for effect in action.effects:
+        found = literals(effect.condition)
+        partners |= {leaf for leaf, positive in found if positive and isinstance(leaf, StepAtom)}
+        conditional_on |= {leaf for leaf, _ in found if isinstance(leaf, StepAtom)}
+        if step is None or not found or _can_fire(effect.condition, step):
+            effects.append(effect)
+            for leaf, positive in found:
+                signs[positive].add(leaf)
+    adds = frozenset([e.atom for e in effects if e.adds])
     return Footprint(
-        requires_true=frozenset(a for a in signs[True] if isinstance(a, Atom)),
-        requires_false=frozenset(a for a in signs[False] if isinstance(a, Atom)),
+        requires_true=frozenset([a for a in signs[True] if isinstance(a, Atom)]),
+        requires_false=frozenset([a for a in signs[False] if isinstance(a, Atom)]),
         adds=adds,
-        deletes=frozenset(e.atom for e in effects if not e.adds) - adds,
+        deletes=frozenset([e.atom for e in effects if not e.adds]) - adds,
         partners=action.links | partners,
         excluded=frozenset(forbidden_steps(action.precondition)),
-        conditional_on=frozenset(
-            leaf
-            for effect in action.effects
-            for leaf, _ in literals(effect.condition)
-            if isinstance(leaf, StepAtom)
-        ),
+        conditional_on=frozenset(conditional_on),
     )
 
 
@@ -122,95 +119,103 @@ def _show(atoms: frozenset[Atom]) -> str:
     return label(atom.predicate, atom.args)
 
 
+class Choices:
+    """What one robot can choose, as the interference rule reads it: looked up once for all pairs.
+
+    Where no condition of an effect names another action, an action alone decides what can fire.
+
+    Parameters
+    ----------
+    actions
+        The ground action of each label; None is idling.
+    """
+
+    def __init__(self, actions: Sequence[GroundAction | None]) -> None:
+        self.actions = actions
+        #: Action -> its label.
+        self.numbers = {_name(a): number for number, a in enumerate(actions) if a}
+        #: The labels of subactions with more than one owner.
+        self.shared = [n for n, a in enumerate(actions) if a and len(a.owners) > 1]
+        self._labels: dict[str, dict[Leaf, list[int]]] = {
+            field: {} for field in Footprint.__slots__
+        }
+        for number, action in enumerate(actions):
+            if action:
+                own = footprint(action, frozenset((_name(action),)))
+                for field, labels in self._labels.items():
+                    for leaf in getattr(own, field):
+                        labels.setdefault(leaf, []).append(number)
+
+    def labels(self, field: str) -> dict[Leaf, list[int]]:
+        """The labels in whose footprint's field each atom stands."""
+        return self._labels[field]
+
+
 def compatible(
     left: Sequence[GroundAction | None], right: Sequence[GroundAction | None], i: int, j: int
 ) -> NDArray[np.bool_]:
-    """Table: may robot ``i`` do ``left[a]`` while robot ``j`` does ``right[b]``?  None is idling.
+    """As `compatible_choices`, for labels that are not looked up yet."""
+    return compatible_choices(Choices(left), Choices(right), i, j)
+
+
+def compatible_choices(left: Choices, right: Choices, i: int, j: int) -> NDArray[np.bool_]:
+    """Which labels of robots ``i`` (rows) and ``j`` (columns) may share a step, as a table.
 
     A shared subaction of both goes only with itself; one that only names other robots goes with
     idling too. O(pairs that touch one atom) beside the table itself.
     """
-    # Where no condition of an effect names the other, its own action alone decides what can fire.
-    mine, theirs = (
-        [footprint(a, frozenset((_name(a),))) if a else None for a in side]
-        for side in (left, right)
-    )
-    table = ~_meeting(mine, theirs, [("requires_true", "deletes"), ("requires_false", "adds")])
-    for row, column in _naming("partners", left, right, mine, theirs):  # meant to be done together
+    table = np.ones((len(left.actions), len(right.actions)), np.bool_)
+    for kinds in (("requires_true", "deletes"), ("requires_false", "adds")):
+        _forbid_meeting(table, left, right, *kinds)
+    for row, column in _naming("partners", left, right):  # meant to be done together
         table[row, column] = True
-    table &= ~_meeting(mine, theirs, [("adds", "deletes")])
-    for row, column in _naming("excluded", left, right, mine, theirs):
+    _forbid_meeting(table, left, right, "adds", "deletes")
+    for row, column in _naming("excluded", left, right):
         table[row, column] = False
     # The condition of an effect of one names the other: what can fire depends on both.
-    for row, column in _naming("conditional_on", left, right, mine, theirs):
-        a, b = left[row], right[column]
+    for row, column in _naming("conditional_on", left, right):
+        a, b = left.actions[row], right.actions[column]
         table[row, column] = not (a and b and conflict(a, b))
     _share(table, left, right, i, j)
     return table
 
 
-def _naming(
-    field: str,
-    left: Sequence[GroundAction | None],
-    right: Sequence[GroundAction | None],
-    left_prints: Sequence[Footprint | None],
-    right_prints: Sequence[Footprint | None],
-) -> Iterator[tuple[int, int]]:
+def _naming(field: str, left: Choices, right: Choices) -> Iterator[tuple[int, int]]:
     """Pairs (of the left, of the right) in which one's footprint names the other in this field."""
-    columns, rows = _numbers(right), _numbers(left)
-    for row, one in enumerate(left_prints):
-        for named in getattr(one, field) if one else ():
-            if named in columns:
-                yield row, columns[named]
-    for column, one in enumerate(right_prints):
-        for named in getattr(one, field) if one else ():
-            if named in rows:
-                yield rows[named], column
+    for row, column in _named(field, left, right):
+        yield row, column
+    for column, row in _named(field, right, left):
+        yield row, column
 
 
-def _numbers(side: Sequence[GroundAction | None]) -> dict[StepAtom, int]:
-    return {_name(a): number for number, a in enumerate(side) if a}
+def _named(field: str, naming: Choices, named: Choices) -> Iterator[tuple[int, int]]:
+    for action, labels in naming.labels(field).items():
+        number = named.numbers.get(action) if isinstance(action, StepAtom) else None
+        if number is not None:
+            for label_number in labels:
+                yield label_number, number
 
 
-def _meeting(
-    left: Sequence[Footprint | None],
-    right: Sequence[Footprint | None],
-    kinds: Sequence[tuple[str, str]],
-) -> NDArray[np.bool_]:
-    """Whether an atom stands in one field of the one and in the other field of the other.
-
-    A table, either way round.
-    """
-    table = np.zeros((len(left), len(right)), np.bool_)
-    for first, second in (*kinds, *((b, a) for a, b in kinds)):
-        columns = _where(right, second)
-        for atom, rows in _where(left, first).items():
-            if atom in columns:
-                table[np.ix_(rows, columns[atom])] = True
-    return table
-
-
-def _where(side: Sequence[Footprint | None], field: str) -> dict[Atom, list[int]]:
-    """In which footprints' field each atom stands."""
-    found: dict[Atom, list[int]] = {}
-    for number, one in enumerate(side):
-        for atom in getattr(one, field) if one else ():
-            found.setdefault(atom, []).append(number)
-    return found
-
-
-def _share(
-    table: NDArray[np.bool_],
-    left: Sequence[GroundAction | None],
-    right: Sequence[GroundAction | None],
-    i: int,
-    j: int,
+def _forbid_meeting(
+    table: NDArray[np.bool_], left: Choices, right: Choices, one: str, other: str
 ) -> None:
+    """Forbid the pairs in which an atom stands in the one field here and in the other there."""
+    for first, second in ((one, other), (other, one)):
+        rows, columns = left.labels(first), right.labels(second)
+        few, many = sorted((rows, columns), key=len)
+        for atom in few:
+            if atom in many:
+                table[np.ix_(rows[atom], columns[atom])] = False
+
+
+def _share(table: NDArray[np.bool_], left: Choices, right: Choices, i: int, j: int) -> None:
     """A subaction owned by both robots is chosen by both or by neither."""
-    columns = {(b.schema, b.args): n for n, b in enumerate(right) if b and i in b.owners}
-    for column in columns.values():
-        table[:, column] = False
-    for row, action in enumerate(left):
+    for one, robot in ((left, j), (right, i)):
+        for number in one.shared:
+            action = one.actions[number]
+            if action and robot in action.owners:
+                table[(number, slice(None)) if one is left else (slice(None), number)] = False
+    for number in left.shared:
+        action = left.actions[number]
         if action and j in action.owners:
-            table[row, :] = False
-            table[row, columns[action.schema, action.args]] = True
+            table[number, right.numbers[_name(action)]] = True

@@ -72,17 +72,45 @@ def literals(formula: Formula) -> tuple[tuple[Atom | StepAtom | Equal, bool], ..
 
     A literal is a leaf and whether it is positive; quantified variables stay in it.
     """
+    found: list[tuple[Atom | StepAtom | Equal, bool]] = []
+    _collect(formula, True, found)
+    return tuple(found)
 
-    def compound(kind: Compound, parts: Iterator[_Literals]) -> _Literals:
-        found = tuple([literal for part in parts for literal in part])
-        if isinstance(kind, Not):
-            return tuple([(leaf, not positive) for leaf, positive in found])
+
+def _collect(
+    formula: Formula, positive: bool, found: list[tuple[Atom | StepAtom | Equal, bool]]
+) -> None:
+    """Append the literals; every ground action is taken apart so, hence no `fold`."""
+    if isinstance(formula, And | Or):
+        for part in formula.parts:
+            _collect(part, positive, found)
+    elif isinstance(formula, Not):
+        _collect(formula.part, not positive, found)
+    elif isinstance(formula, Forall | Exists):
+        _collect(formula.part, positive, found)
+    elif not isinstance(formula, Truth):
+        found.append((formula, positive))
+
+
+def free_variables(formula: Formula) -> tuple[str, ...]:
+    """The names of the variables that no quantifier in the formula declares, sorted."""
+
+    def leaf(found: Leaf) -> frozenset[str]:
+        match found:
+            case Atom(_, args) | StepAtom(_, args):
+                return frozenset(arg for arg in args if arg.startswith("?"))
+            case Equal(left, right):
+                return frozenset(arg for arg in (left, right) if arg.startswith("?"))
+        return frozenset()
+
+    def compound(kind: Compound, parts: Iterator[frozenset[str]]) -> frozenset[str]:
+        found: frozenset[str] = frozenset().union(*parts)
+        if isinstance(kind, Forall | Exists):
+            return found - {variable.name for variable in kind.variables}
         return found
 
-    return fold(formula, lambda leaf: () if isinstance(leaf, Truth) else ((leaf, True),), compound)
-
-
-_Literals = tuple[tuple[Atom | StepAtom | Equal, bool], ...]
+    names: frozenset[str] = fold(formula, leaf, compound)
+    return tuple(sorted(names))
 
 
 def conjuncts(formula: Formula) -> tuple[Formula, ...]:
@@ -142,13 +170,6 @@ def joined(kind: type[And] | type[Or], parts: Iterable[Formula]) -> Formula:
     if not kept:
         return Truth(neutral)
     return kept[0] if len(kept) == 1 else kind(tuple(kept))
-
-
-def distinct(formula: Formula) -> Formula:
-    """A conjunction or disjunction without a part that stands in it before."""
-    if isinstance(formula, And | Or):
-        return joined(type(formula), dict.fromkeys(formula.parts))
-    return formula
 
 
 def substituted(formula: Formula, value: Callable[[GroundLeaf], Formula]) -> Formula:

@@ -5,16 +5,23 @@ same order.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import pytest
 
+import planners.grounding.bindings
 from planners.grounding import ground_actions
 from planners.grounding.actions import GroundAction
 from planners.grounding.bindings import Bindings
 from planners.grounding.instantiate import _Grounder
+from planners.grounding.interned import Interned
 from planners.loading import build
 from planners.pddl import parse_domain, parse_problem
+from planners.pddl.lifted import FALSE, And, Formula, StepAtom
 from planners.pddl.robots import RobotSelection, Unowned, find_team
 from planners.pddl.sexpr import Source
+from tests.support.naive_grounding import NaiveGrounding, without_impossible
 from tests.support.random_pddl import random_model
 
 DOMAIN = """(define (domain halls) (:types robot place - thing hall - place)
@@ -65,11 +72,22 @@ def grounded(domain: str, problem: str, unowned: Unowned = "error") -> tuple[Gro
 
 def both(
     domain: str, problem: str, unowned: Unowned = "error"
-) -> tuple[tuple[GroundAction, ...], ...]:
-    fast = grounded(domain, problem, unowned)
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(Bindings, "_facts_of", lambda *_: None)
-        return fast, grounded(domain, problem, unowned)
+) -> tuple[tuple[GroundAction, ...], tuple[GroundAction, ...]]:
+    """The ground actions, and the same ones with preconditions and effects by definition."""
+    lifted = parse_domain(Source("d", domain))
+    read = parse_problem(Source("p", problem), lifted)
+    team = find_team(lifted, read, RobotSelection(unowned=unowned))
+    twin = NaiveGrounding(lifted, read, team)
+    schemas = {schema.name: schema for schema in lifted.schemas}
+    fast = ground_actions(lifted, read, team)
+    return fast, tuple(
+        replace(
+            action,
+            precondition=twin.precondition(schemas[action.schema], action.args),
+            effects=twin.effects(schemas[action.schema], action.args),
+        )
+        for action in fast
+    )
 
 
 @pytest.mark.parametrize("condition", CONDITIONS)
@@ -85,17 +103,78 @@ def test_random_models() -> None:
         assert fast == slow
 
 
+def test_actions_share_their_formulas() -> None:
+    text = DOMAIN.format(condition="(not (lit ?p)) (or (lit home) (exists (?x) (lit ?x)))")
+    preconditions = [a.precondition for a in grounded(text.replace("(at ?r ?p)", ""), PROBLEM)]
+    parts = [{id(p) for p in f.parts} for f in preconditions if isinstance(f, And)]
+    assert len(parts) > 2
+    assert len(set.intersection(*parts)) == 1
+
+
+STEP_CONDITIONS = [
+    "(forall (?o - robot ?x - place) (not (act ?o ?x)))",
+    "(forall (?x - place) (not (act ?r ?x)))",
+    "(forall (?o - robot ?x) (or (= ?o ?r) (not (way ?p ?x)) (not (act ?o ?x))))",
+    "(forall (?o - robot ?x - place) (imply (act ?o ?x) (lit ?x)))",
+    "(forall (?o - robot ?x - place) (and (lit ?x) (not (act ?o ?x))))",
+    "(not (exists (?o - robot) (and (act ?o ?p) (not (lit ?p)))))",
+    "(exists (?o - robot ?x - place) (and (not (= ?o ?r)) (act ?o ?x)))",
+    "(not (forall (?x - place) (not (act ?r ?x))))",
+    "(or (lit home) (not (exists (?o - robot ?x - place) (and (not (= ?o ?r)) (act ?o ?x)))))",
+]
+
+
+@pytest.mark.parametrize("condition", STEP_CONDITIONS)
+def test_only_possible_subactions_are_tried_where_there_are_many(
+    condition: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Not every subaction is possible: from some places there is no way.
+    domain = DOMAIN.format(condition=f"(way ?p home) {condition}").replace("(at ?r ?p)", "")
+    _, slow = both(domain, PROBLEM)
+    monkeypatch.setattr(planners.grounding.bindings, "_MANY", 0)
+    fast, _ = both(domain, PROBLEM)
+    possible = frozenset(StepAtom(action.schema, action.args) for action in slow)
+
+    def simplified(actions: Sequence[GroundAction]) -> dict[str, Formula]:
+        found = {a.label: without_impossible(a.precondition, possible) for a in actions}
+        return {label: formula for label, formula in found.items() if formula != FALSE}
+
+    assert simplified(fast) == simplified(slow)
+    assert [a.label for a in fast] == [a.label for a in slow if a.label in simplified(fast)]
+    assert [a.effects for a in fast] == [a.effects for a in slow if a.label in simplified(fast)]
+
+
+def test_what_is_possible_is_looked_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 9,000 subactions that a precondition forbids, the few that can be done are looked at."""
+    asked: list[str] = []
+    original = Interned.literal
+
+    def counting(self: Interned, kind: type, name: str, *rest: object) -> object:
+        asked.append(name)
+        return original(self, kind, name, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Interned, "literal", counting)
+    places = " ".join(f"q{n}" for n in range(3000))
+    problem = PROBLEM.replace("p1 - place", f"p1 {places} - place")
+    domain = DOMAIN.format(
+        condition="(way ?p home) (forall (?o - robot ?x - place) (not (act ?o ?x)))"
+    ).replace("(at ?r ?p)", "")
+    actions = grounded(domain, problem)
+    assert actions
+    assert 0 < asked.count("act") < 100
+
+
 def test_the_facts_are_looked_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """Few instances are tried: one for each way, not one for each object."""
     tried = 0
-    original = _Grounder._atom
+    original = _Grounder._state_literal
 
     def counting(self: _Grounder, *arguments: object) -> object:
         nonlocal tried
         tried += 1
         return original(self, *arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(_Grounder, "_atom", counting)
+    monkeypatch.setattr(_Grounder, "_state_literal", counting)
     places = " ".join(f"q{n}" for n in range(200))
     problem = PROBLEM.replace("p1 - place", f"p1 {places} - place")
     grounded(DOMAIN.format(condition=CONDITIONS[0]), problem)

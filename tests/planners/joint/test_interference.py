@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import pytest
 
 from planners.check.rules import Rules
@@ -124,6 +126,24 @@ def test_random_models_have_pairs_that_this_rule_allows() -> None:
                     footprint(a, pair) != footprint(a)
                 )
     assert changed >= 20
+
+
+def test_tables_of_random_models_are_the_rule_for_each_pair() -> None:
+    """All labels of all pairs of robots, shared subactions and idling included."""
+    seen = dict.fromkeys(((shared, allowed) for shared in (0, 1) for allowed in (False, True)), 0)
+    for seed in range(40):
+        model = built(random_model(seed, ("agent", "plain")[seed % 2])).model
+        own = [
+            [None, *(a for a in model.actions if robot in a.owners)]
+            for robot in range(len(model.robots))
+        ]
+        for (i, j), table in model.stepper.tables.items():  # type: ignore[attr-defined]
+            for (row, a), (column, b) in product(enumerate(own[i]), enumerate(own[j])):
+                shared = bool((a and j in a.owners) or (b and i in b.owners))
+                allowed = a == b if shared else not (a and b and conflict(a, b))
+                assert table[row, column] == allowed
+                seen[shared, allowed] += 1
+    assert min(seen.values()) > 10
 
 
 def test_an_unreachable_goal_comes_with_the_interference_met_most_often() -> None:

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from planners.pddl.formula_tree import (
     conjuncts,
-    distinct,
     fold,
     forbidden_steps,
     formula_text,
@@ -80,7 +79,6 @@ def test_taking_apart_and_putting_together_keeps_the_meaning(formula: Formula) -
     assert not any(isinstance(part, And) or part == TRUE for part in conjuncts(formula))
     assert same(Not(formula), negated(formula))
     assert same(substituted(formula, lambda leaf: leaf), formula)
-    assert same(distinct(formula), formula)
     assert joined(And, [formula, FALSE]) == FALSE
     part, positive = signed(formula)
     assert (part if positive else Not(part)) == formula
