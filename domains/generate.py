@@ -21,6 +21,7 @@ from typing import Literal
 from gridmap import GridMap, open_grid, read_map, ring, three_cells
 from picture import draw
 
+from coordlang.movingai import grid_problem_text
 from planners.errors import BadInput, CoordlangError, UsageError
 
 HERE = Path(__file__).resolve().parent
@@ -88,42 +89,17 @@ def problem_text(task: Scenario, domain: str, style: Style = "agents") -> str:
     """The PDDL problem.  Raises `UsageError` for the joint style with other than two robots."""
     if style == "joint" and len(task.robots) != 2:
         raise UsageError("the joint style is for two robots", remedy="Use --style agents.")
-    # In the joint style the robots are constants of the domain.
-    robots = [f"    {' '.join(task.robots)} - robot"] if style == "agents" else []
-    adjacent = [
-        "    " + " ".join(f"(adjacent {cell} {other})" for other in near)
-        for cell in task.grid.cells
-        if (near := task.grid.neighbours(cell))
-    ]
-    lines = [
-        "; Written by domains/generate.py.",
-        f"(define (problem {task.name})",
-        f"  (:domain {domain})",
-        "  (:objects",
-        *robots,
-        *_rows_of_cells(task.grid),
-        "  )",
-        "  (:init",
-        f"    {_positions(task.robots, task.starts)}",
-        *adjacent,
-        "  )",
-        f"  (:goal (and {_positions(task.robots, task.goals)}))",
-        ")",
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _rows_of_cells(grid: GridMap) -> list[str]:
-    """The cells as typed objects, a line for each row of the map."""
-    rows: dict[int, list[str]] = {}
-    for name, (row, _) in grid.cells.items():
-        rows.setdefault(row, []).append(name)
-    lines = ["    " + " ".join(names) for names in rows.values()]
-    return [*lines[:-1], lines[-1] + " - cell"]
-
-
-def _positions(robots: Sequence[str], cells: Sequence[str]) -> str:
-    return " ".join(f"(at {robot} {cell})" for robot, cell in zip(robots, cells, strict=True))
+    grid = task.grid
+    return grid_problem_text(
+        task.name,
+        domain,
+        grid.cells,
+        {cell: grid.neighbours(cell) for cell in grid.cells},
+        task.starts,
+        task.goals,
+        written_by="domains/generate.py",
+        declare_robots=style == "agents",  # in the joint style they are constants of the domain
+    )
 
 
 def tasks_text(task: Scenario, at_least: int) -> str:

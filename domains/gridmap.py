@@ -7,12 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from planners.errors import BadInput, Position
-
-#: The characters of a movingai map: ground, ground, swamp | out of bounds, out of bounds, trees,
-#: water.
-PASSABLE = ".GS"
-BLOCKED = "@OTW"
+from coordlang import movingai
+from coordlang.movingai import cell_name
 
 Cell = tuple[int, int]
 
@@ -47,11 +43,6 @@ class GridMap:
         return abs(row - other_row) + abs(col - other_col)
 
 
-def cell_name(cell: Cell) -> str:
-    """``c0-2``: the cell in the top row, third from the left."""
-    return "c{}-{}".format(*cell)
-
-
 def open_grid(rows: int, columns: int) -> GridMap:
     """A full rectangle: every cell is adjacent to the up to four cells around it."""
     return _of({(row, col) for row in range(rows) for col in range(columns)})
@@ -76,73 +67,8 @@ def three_cells() -> GridMap:
 
 
 def read_map(path: Path) -> GridMap:
-    """A map in the format of movingai.com, with or without its ``type`` line; raises `BadInput`
-    with the line.
-    """
-    try:
-        lines = path.read_text(encoding="ascii").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(f"cannot read this map ({error})", position=Position(str(path))) from error
-    rows, first = _map_rows(path, lines)
-    passable = set()
-    for row, text in enumerate(rows):
-        for col, character in enumerate(text):
-            if character in PASSABLE:
-                passable.add((row, col))
-            elif character not in BLOCKED:
-                raise BadInput(
-                    f"unknown character {character!r} in the map",
-                    position=Position(str(path), first + row, col + 1),
-                    remedy=f"Passable: {' '.join(PASSABLE)}; blocked: {' '.join(BLOCKED)}.",
-                )
-    if not passable:
-        raise BadInput("this map has no passable cell", position=Position(str(path)))
-    return _of(passable)
-
-
-def _map_rows(path: Path, lines: list[str]) -> tuple[list[str], int]:
-    """The rows of the map, checked against its header, and the number of the first one's line."""
-    sizes: dict[str, int] = {}
-    for number, line in enumerate(lines, start=1):
-        words = line.split()
-        match words:
-            case [] | ["type", _]:
-                continue
-            case ["height" | "width" as key, value] if (
-                value.isdigit() and int(value) > 0 and key not in sizes
-            ):
-                sizes[key] = int(value)
-            case ["map"] if len(sizes) == 2:
-                return _checked_rows(
-                    path, lines, number, sizes["height"], sizes["width"]
-                ), number + 1
-            case _:
-                raise BadInput(
-                    f"unexpected {line!r} in the header of a map",
-                    position=Position(str(path), number, 1),
-                    remedy="Expected 'height N' and 'width N' (once each, N from 1), then 'map'.",
-                )
-    raise BadInput(
-        "this file has no line 'map'", position=Position(str(path), max(1, len(lines)), 1)
-    )
-
-
-def _checked_rows(path: Path, lines: list[str], header: int, height: int, width: int) -> list[str]:
-    rows = [line.rstrip() for line in lines[header:]]
-    while len(rows) > height and not rows[-1]:
-        rows.pop()
-    for number, row in enumerate(rows[:height], start=header + 1):
-        if len(row) != width:
-            raise BadInput(
-                f"this row has {len(row)} cells where the header says {width}",
-                position=Position(str(path), number, 1),
-            )
-    if len(rows) != height:
-        position = Position(str(path), header + 1 + min(len(rows), height), 1)
-        raise BadInput(
-            f"the map has {len(rows)} rows where the header says {height}", position=position
-        )
-    return rows
+    """A map in the format of movingai.com, see `coordlang.movingai.read_map`."""
+    return _of(set(movingai.read_map(path).passable))
 
 
 def _clockwise(rows: int, columns: int) -> list[Cell]:

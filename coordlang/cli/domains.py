@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``coordlang domains``: the domains that come with coordlang."""
+"""``coordlang domains``: the domains that come with coordlang, and maps as problems of theirs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from pathlib import Path
 import click
 
 from coordlang.cli.echo import echo
-from coordlang.cli.files import check_outputs
+from coordlang.cli.files import FILE, FOLDER, check_outputs
+from planners.messages import visible
 from planners.notebook import counted
 
 ALL = "all"
@@ -23,9 +24,71 @@ ALL = "all"
     metavar="NAME|all DIR",
     help="Copy this domain, or all of them, with problems and README into DIR/NAME.",
 )
+@click.option(
+    "--map",
+    "map_file",
+    type=FILE,
+    metavar="FILE.map",
+    help="A map of movingai.com, to be written as a problem of the grid domain.",
+)
+@click.option(
+    "--scen", type=FILE, metavar="FILE.scen", help="The scenario: where robots start and go."
+)
+@click.option("--agents", type=int, metavar="K", help="The first K robots of the scenario.")
+@click.option(
+    "-o", "output", type=FOLDER, metavar="DIR", help="The folder for a map's domain and problem."
+)
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
-def command(copy: tuple[str, str] | None, as_json: bool) -> None:
-    """List the domains that come with coordlang, one a line, or copy them."""
+def command(
+    copy: tuple[str, str] | None,
+    map_file: str | None,
+    scen: str | None,
+    agents: int | None,
+    output: str | None,
+    as_json: bool,
+) -> None:
+    """List the domains that come with coordlang, one a line, copy them, or write a map as PDDL."""
+    if map_file is None and scen is None and agents is None and output is None:
+        _list_or_copy(copy, as_json)
+        return
+    if copy is not None or map_file is None or scen is None or agents is None or output is None:
+        raise click.UsageError(
+            "a map needs --map FILE.map, --scen FILE.scen, --agents K and -o DIR, and no --copy"
+        )
+    names = _write_map(map_file, scen, agents, output)
+    if as_json:
+        echo(json.dumps({"folder": output, "files": names}))
+    else:
+        echo(f"{counted(agents, 'robot')}, written to {visible(output)}: {', '.join(names)}")
+
+
+def _write_map(map_file: str, scen: str, agents: int, output: str) -> list[str]:
+    """Write a map's files, over none that says something else; their names are returned."""
+    from coordlang.movingai import planning_files
+    from planners.errors import UsageError
+    from planners.writing import write_texts
+
+    texts = planning_files(Path(map_file), Path(scen), agents)
+    paths = {name: os.path.join(output, name) for name in texts}
+    check_outputs([("-o", path) for path in paths.values()], [map_file, scen], makes_folder=True)
+    for name, path in paths.items():
+        if os.path.lexists(path) and _bytes(path) != texts[name].encode():
+            raise UsageError(
+                f"-o: {path} is there already, and says something else",
+                remedy="Remove it, or name another folder.",
+            )
+    write_texts(output, texts)
+    return sorted(texts)
+
+
+def _bytes(path: str) -> bytes | None:
+    try:
+        return Path(path).read_bytes()
+    except OSError:
+        return None
+
+
+def _list_or_copy(copy: tuple[str, str] | None, as_json: bool) -> None:
     from coordlang.shipped import about, domain_names, shipped_domains
 
     shipped = shipped_domains()

@@ -29,6 +29,7 @@ BY_HAND = {
     "grid/domain.pddl",
     "grid-joint/domain.pddl",
     "t-map/t-map.map",
+    "t-map/t-map.scen",
     "corridor/corridor.map",
     "corridor/rooms.tasks.json",
     *(
@@ -125,7 +126,7 @@ def test_a_problem_from_a_map_on_stdout(capsys: pytest.CaptureFixture[str], tmp_
         (["open", "2x2", "--starts", "c0-0", "c9-9"], 2, "no start cell 'c9-9'"),
         (["open", "2x2", "--goals", "c0-0", "c0-0"], 2, "the same goal cell"),
         (["open", "2x2", "--robots", "3", "--style", "joint"], 2, "for two robots"),
-        (["map", "no/such.map"], 31, "cannot read this map"),
+        (["map", "no/such.map"], 31, "no/such.map: there is no such file"),
         (["open", "2x2", "-o", "no/such/folder/p.pddl"], 31, "cannot write no/such/folder/p.pddl"),
     ],
 )
