@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import combinations, product
 
 import numpy as np
@@ -16,6 +17,7 @@ from planners.joint.interference import compatible, conflict
 from planners.joint.model import Cost, Steps
 from planners.joint.operators import Operators
 from planners.joint.states import StateCodec
+from planners.joint.step_clauses import Clause, StepClauses, Waiting, clauses
 from planners.limits import memory_left, more_memory
 from planners.pddl.formula_tree import conjuncts, formula_text, signed
 from planners.pddl.lifted import Atom, Formula, StepAtom
@@ -70,10 +72,12 @@ class ComposingStepper:
 
     def steps(self, rows: Rows) -> Steps:
         """All joint steps applicable in the states of a table, sorted by source and labels."""
-        options = self.choices(rows)
+        options = [
+            self._possible(robot, rows, *own) for robot, own in enumerate(self.choices(rows))
+        ]
         sizes = np.ones(len(rows))
-        for first, _ in options:
-            sizes *= np.diff(first)
+        for own in options:
+            sizes *= np.diff(own.first)
         parts = [self._compose(rows, options, span) for span in spans(sizes, self.piece)] or [
             self._compose(rows, options, slice(0, 0))
         ]
@@ -194,24 +198,41 @@ class ComposingStepper:
             row, label = row[order], label[order]
         return np.searchsorted(row, np.arange(len(rows) + 1)), label
 
-    def _compose(self, rows: Rows, options: list[tuple[Ints, Ints]], span: slice) -> Steps:
+    def _possible(self, robot: int, rows: Rows, first: Ints, label: Ints) -> _Options:
+        """One robot's options; those that no choice of the others makes possible are left out."""
+        row = np.repeat(np.arange(len(rows)), np.diff(first))
+        possible, waiting = self._robot[robot].clauses.waiting(rows, row, label)
+        if not possible.all():
+            row, label = row[possible], label[possible]
+            first = np.searchsorted(row, np.arange(len(rows) + 1))
+            waiting = {stage: open_.only(possible) for stage, open_ in waiting.items()}
+        return _Options(first, label, waiting)
+
+    def _compose(self, rows: Rows, options: Sequence[_Options], span: slice) -> Steps:
         source = np.arange(span.start, span.stop)
-        chosen: list[Ints] = []
-        for j, (first, label) in enumerate(options):
-            counts = first[source + 1] - first[source]
+        chosen = np.zeros((0, len(source)), np.int64)
+        option = chosen
+        for j, own in enumerate(options):
+            counts = own.first[source + 1] - own.first[source]
             self._require_room(int(counts.sum()), j, len(rows[span]))
-            new = label[ranges(first[source], counts)]
+            mine = ranges(own.first[source], counts)
             source = np.repeat(source, counts)
-            chosen = [np.repeat(old, counts) for old in chosen]
+            option = np.vstack((np.repeat(option, counts, axis=1), mine))
+            chosen = np.vstack((np.repeat(chosen, counts, axis=1), own.label[mine]))
             fits = np.ones(len(source), np.bool_)
-            for i, old in enumerate(chosen):
-                fits &= self.tables[i, j][old, new]
-            source, chosen = source[fits], [old[fits] for old in chosen] + [new[fits]]
-        labels = np.stack(chosen, axis=1).astype(np.int32)
+            for i in range(j):
+                fits &= self.tables[i, j][chosen[i], chosen[j]]
+            source, option, chosen = source[fits], option[:, fits], chosen[:, fits]
+            for i, others in enumerate(options[: j + 1]):
+                if j in others.waiting:
+                    clauses = self._robot[i].clauses
+                    fits = ~clauses.unmet(others.waiting[j], option[i], chosen)
+                    source, option, chosen = source[fits], option[:, fits], chosen[:, fits]
+        labels = chosen.T.astype(np.int32)
         fits = np.ones(len(source), np.bool_)
         for i, robot in enumerate(self._robot):
             robot.drop_unmet(fits, i, rows, source, labels)
-        source, labels = source[fits], labels[fits]
+        source, labels = source[fits], np.ascontiguousarray(labels[fits])
         return Steps(source, labels, *self._apply(rows, source, labels))
 
     def _require_room(self, combinations: int, robot: int, states: int) -> None:
@@ -249,6 +270,19 @@ class ComposingStepper:
         return (rows[source] & ~deletes) | adds, cost
 
 
+@dataclass(frozen=True, slots=True)
+class _Options:
+    """One robot's labels in a table of states, CSR.
+
+    ``waiting`` are the clauses for which they wait, by the robot after whose choice these are
+    decided.
+    """
+
+    first: Ints
+    label: Ints
+    waiting: dict[int, Waiting]
+
+
 class _Subactions:
     """One robot's subactions as tables; index 0 of ``adds``, ``deletes`` and ``cost`` is idling.
 
@@ -272,8 +306,19 @@ class _Subactions:
         # A shared subaction is paid once, by the first of its owners.
         own = [cost_of(a, cost) if a.owners[0] == robot else 0 for a in actions]
         self.cost = np.array([0, *own], np.int64)
-        self._has_step_formula = np.zeros(len(actions) + 1, np.bool_)
-        self._has_step_formula[[n + 1 for n in self._operators.step_formulas]] = True
+        of_label: dict[int, list[Clause]] = {}
+        #: Formulas about the step that have too many clauses, by label.
+        self._formulas: dict[int, list[Formula]] = {}
+        for number, formulas in self._operators.step_formulas.items():
+            for formula in formulas:
+                found = clauses(formula, evaluator, robot, number + 1)
+                if found is None:
+                    self._formulas.setdefault(number + 1, []).append(formula)
+                else:
+                    of_label.setdefault(number + 1, []).extend(found)
+        self.clauses = StepClauses(robot, of_label, len(actions) + 1)
+        self._has_formula = np.zeros(len(actions) + 1, np.bool_)
+        self._has_formula[list(self._formulas)] = True
 
     def applicable(self, rows: Rows) -> tuple[Ints, Ints]:
         """Pairs (row, subaction) whose conditions on the state hold, sorted."""
@@ -281,11 +326,13 @@ class _Subactions:
 
     def drop_unmet(self, fits: Bools, robot: int, rows: Rows, source: Ints, labels: Labels) -> None:
         """Clear ``fits`` where a formula of this robot's subaction about the step is not met."""
-        asks = np.flatnonzero(self._has_step_formula[labels[:, robot]])
+        if not self._formulas:
+            return
+        asks = np.flatnonzero(self._has_formula[labels[:, robot]])
         own = labels[asks, robot]
         for label in np.flatnonzero(np.bincount(own)):
             there = asks[own == label]
-            for formula in self._operators.step_formulas[int(label) - 1]:
+            for formula in self._formulas[int(label)]:
                 fits[there] &= self._evaluator.holds(formula, rows, source[there], labels[there])
 
 

@@ -12,8 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planners.joint.states import test_bits
+from planners.joint.states import set_bits, test_bits
 from planners.tables import Ints, Rows, ranges
+
+#: Looking up one true fact takes about as long as testing so many.
+_LOOK_UP = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +27,43 @@ class _Level:
     child_fact: Ints
     first_operator: Ints
     operators: Ints
+
+    def below(self, rows: Rows, true: _TrueFacts, row: Ints, node: Ints) -> tuple[Ints, Ints]:
+        """The children (row, child) whose fact is true, of pairs of a row and a node.
+
+        Either each child's fact is tested, or each true fact is looked up among the children,
+        whichever is less work.
+        """
+        counts = self.first_child[node + 1] - self.first_child[node]
+        if int(counts.sum()) <= _LOOK_UP * int(true.counts[row].sum()):
+            child = ranges(self.first_child[node], counts)
+            row = np.repeat(row, counts)
+            holds = test_bits(rows, row, self.child_fact[child])
+            return row[holds], child[holds]
+        own, counts = true.first[row], true.counts[row]
+        fact = true.fact[ranges(own, counts)]
+        row, node = np.repeat(row, counts), np.repeat(node, counts)
+        parents = np.repeat(np.arange(len(self.first_child) - 1), np.diff(self.first_child))
+        facts = int(max(self.child_fact.max(), true.fact.max(initial=0))) + 1
+        keys, wanted = parents * facts + self.child_fact, node * facts + fact
+        child = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        found = keys[child] == wanted
+        return row[found], child[found]
+
+
+@dataclass(frozen=True, slots=True)
+class _TrueFacts:
+    """The numbers of the facts that are true in each row of a table."""
+
+    first: Ints
+    counts: Ints
+    fact: Ints
+
+    @classmethod
+    def of(cls, rows: Rows) -> _TrueFacts:
+        row, fact = set_bits(rows)
+        counts = np.bincount(row, minlength=len(rows))
+        return cls(np.cumsum(counts) - counts, counts, fact)
 
 
 class Matcher:
@@ -73,6 +113,7 @@ class Matcher:
 
     def match(self, rows: Rows) -> tuple[Ints, Ints]:
         """All pairs (row number, operator) with the operator's literals satisfied, sorted."""
+        true = _TrueFacts.of(rows)
         row = np.arange(len(rows))
         node = np.zeros(len(rows), np.int64)
         found_rows: list[Ints] = []
@@ -81,11 +122,7 @@ class Matcher:
             counts = level.first_operator[node + 1] - level.first_operator[node]
             found_rows.append(np.repeat(row, counts))
             found_operators.append(level.operators[ranges(level.first_operator[node], counts)])
-            counts = level.first_child[node + 1] - level.first_child[node]
-            child = ranges(level.first_child[node], counts)
-            row = np.repeat(row, counts)
-            holds = test_bits(rows, row, level.child_fact[child])
-            row, node = row[holds], child[holds]
+            row, node = level.below(rows, true, row, node)
         rows_out = np.concatenate(found_rows)
         operators_out = np.concatenate(found_operators)
         if self._has_forbidden:

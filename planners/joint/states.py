@@ -214,3 +214,11 @@ def test_bits(rows: Rows, which: Ints, facts: Ints) -> Bools:
     """Whether fact ``facts[k]`` is true in ``rows[which[k]]``."""
     blocks = rows[which, facts // _BLOCK_BITS]
     return (blocks >> (facts % _BLOCK_BITS).astype(np.uint64) & np.uint64(1)).astype(np.bool_)
+
+
+def set_bits(rows: Rows) -> tuple[Ints, Ints]:
+    """All pairs (row, fact) of a table with a fact that is true, sorted."""
+    row, block = np.nonzero(rows)
+    blocks = np.ascontiguousarray(rows[row, block], "<u8")[:, None]
+    which, bit = np.nonzero(np.unpackbits(blocks.view(np.uint8), axis=1, bitorder="little"))
+    return row[which], block[which] * _BLOCK_BITS + bit
