@@ -14,7 +14,7 @@ from planners.errors import OutOfMemory
 from planners.grounding import GroundAction
 from planners.joint.conditions import Evaluator, Labels, speaks_of_step
 from planners.joint.interference import compatible, conflict
-from planners.joint.model import Cost, Steps
+from planners.joint.model import Cost, Options, Steps
 from planners.joint.operators import Operators
 from planners.joint.states import StateCodec
 from planners.joint.step_clauses import Clause, StepClauses, Waiting, clauses
@@ -70,16 +70,18 @@ class ComposingStepper:
             for number, own in enumerate(subactions)
         ]
 
-    def steps(self, rows: Rows) -> Steps:
-        """All joint steps applicable in the states of a table, sorted by source and labels."""
-        options = [
-            self._possible(robot, rows, *own) for robot, own in enumerate(self.choices(rows))
-        ]
+    def steps(self, rows: Rows, options: Options | None = None) -> Steps:
+        """All joint steps applicable in the states of a table, sorted by source and labels.
+
+        Of ``options`` only, some of the `choices`, if they are given.
+        """
+        chosen = self.choices(rows) if options is None else options
+        possible = [self._possible(robot, rows, *own) for robot, own in enumerate(chosen)]
         sizes = np.ones(len(rows))
-        for own in options:
+        for own in possible:
             sizes *= np.diff(own.first)
-        parts = [self._compose(rows, options, span) for span in spans(sizes, self.piece)] or [
-            self._compose(rows, options, slice(0, 0))
+        parts = [self._compose(rows, possible, span) for span in spans(sizes, self.piece)] or [
+            self._compose(rows, possible, slice(0, 0))
         ]
         return Steps(
             np.concatenate([p.source for p in parts]),
@@ -88,7 +90,7 @@ class ComposingStepper:
             np.concatenate([p.cost for p in parts]),
         )
 
-    def choices(self, rows: Rows) -> list[tuple[Ints, Ints]]:
+    def choices(self, rows: Rows) -> Options:
         """For each robot the labels whose conditions on the state hold, by state.
 
         (first index, labels), CSR.

@@ -11,7 +11,7 @@ from planners.errors import BadInput, Position
 from planners.grounding import GroundAction, GroundEffect
 from planners.joint.composition import cost_of
 from planners.joint.conditions import Evaluator
-from planners.joint.model import Cost, Steps
+from planners.joint.model import Cost, Options, Steps
 from planners.joint.operators import Operators
 from planners.joint.states import StateCodec
 from planners.tables import Ints, Rows
@@ -45,8 +45,11 @@ class JointActionStepper:
         ).reshape(len(actions), len(robots))
         self._cost = np.array([_cost_of(action, cost) for action in actions], np.int64)
 
-    def steps(self, rows: Rows) -> Steps:
-        """All joint steps applicable in the states of a table, sorted by source and labels."""
+    def steps(self, rows: Rows, options: Options | None = None) -> Steps:
+        """All joint steps applicable in the states of a table, sorted by source and labels.
+
+        ``options`` are not looked at: no robot chooses by itself.
+        """
         row, operator = self._operators.applicable(rows)
         result = (rows[row] & ~self._operators.deletes[operator]) | self._operators.adds[operator]
         for number, effects in self._operators.conditional.items():
@@ -70,7 +73,7 @@ class JointActionStepper:
         keep = ~same
         return Steps(row[keep], labels[keep], result[keep], cost[keep])
 
-    def choices(self, rows: Rows) -> list[tuple[Ints, Ints]]:
+    def choices(self, rows: Rows) -> Options:
         """For each robot the labels that it has in joint steps of each state (CSR)."""
         row, operator = self._operators.applicable(rows)
         found = []

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planners.joint.states import set_bits, test_bits
+from planners.joint.states import TrueFacts, test_bits
 from planners.tables import Ints, Rows, ranges
 
 #: Looking up one true fact takes about as long as testing so many.
@@ -28,42 +28,27 @@ class _Level:
     first_operator: Ints
     operators: Ints
 
-    def below(self, rows: Rows, true: _TrueFacts, row: Ints, node: Ints) -> tuple[Ints, Ints]:
+    def below(self, rows: Rows, true: TrueFacts, row: Ints, node: Ints) -> tuple[Ints, Ints]:
         """The children (row, child) whose fact is true, of pairs of a row and a node.
 
         Either each child's fact is tested, or each true fact is looked up among the children,
         whichever is less work.
         """
         counts = self.first_child[node + 1] - self.first_child[node]
-        if int(counts.sum()) <= _LOOK_UP * int(true.counts[row].sum()):
+        facts_of_row = true.first[row + 1] - true.first[row]
+        if int(counts.sum()) <= _LOOK_UP * int(facts_of_row.sum()):
             child = ranges(self.first_child[node], counts)
             row = np.repeat(row, counts)
             holds = test_bits(rows, row, self.child_fact[child])
             return row[holds], child[holds]
-        own, counts = true.first[row], true.counts[row]
-        fact = true.fact[ranges(own, counts)]
-        row, node = np.repeat(row, counts), np.repeat(node, counts)
+        fact = true.fact[ranges(true.first[row], facts_of_row)]
+        row, node = np.repeat(row, facts_of_row), np.repeat(node, facts_of_row)
         parents = np.repeat(np.arange(len(self.first_child) - 1), np.diff(self.first_child))
         facts = int(max(self.child_fact.max(), true.fact.max(initial=0))) + 1
         keys, wanted = parents * facts + self.child_fact, node * facts + fact
         child = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
         found = keys[child] == wanted
         return row[found], child[found]
-
-
-@dataclass(frozen=True, slots=True)
-class _TrueFacts:
-    """The numbers of the facts that are true in each row of a table."""
-
-    first: Ints
-    counts: Ints
-    fact: Ints
-
-    @classmethod
-    def of(cls, rows: Rows) -> _TrueFacts:
-        row, fact = set_bits(rows)
-        counts = np.bincount(row, minlength=len(rows))
-        return cls(np.cumsum(counts) - counts, counts, fact)
 
 
 class Matcher:
@@ -113,7 +98,7 @@ class Matcher:
 
     def match(self, rows: Rows) -> tuple[Ints, Ints]:
         """All pairs (row number, operator) with the operator's literals satisfied, sorted."""
-        true = _TrueFacts.of(rows)
+        true = TrueFacts.of(rows)
         row = np.arange(len(rows))
         node = np.zeros(len(rows), np.int64)
         found_rows: list[Ints] = []

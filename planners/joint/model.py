@@ -8,7 +8,7 @@ applicable, a whole table of states at a time.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -36,6 +36,9 @@ class FullState:
 
     facts: tuple[int, ...]
 
+
+#: For each robot the labels that it may choose in each state of a table: CSR (first index, labels).
+Options = list[tuple[Ints, Ints]]
 
 #: What a task asks for: a ground formula, or one full state.
 Goal = Formula | FullState
@@ -83,11 +86,11 @@ class Steps:
 class Stepper(Protocol):
     """What composes joint steps: `planners.joint.composition` or `planners.joint.joint_actions`."""
 
-    def steps(self, rows: Rows) -> Steps:
-        """All joint steps applicable in the states of a table."""
+    def steps(self, rows: Rows, options: Options | None = None) -> Steps:
+        """All joint steps applicable in the states of a table; of some of the `choices` only."""
 
-    def choices(self, rows: Rows) -> list[tuple[Ints, Ints]]:
-        """For each robot its labels that are possible in these states: (first index, labels)."""
+    def choices(self, rows: Rows) -> Options:
+        """For each robot its labels that are possible in these states."""
 
     def most_steps(self, rows: Rows) -> int:
         """An upper bound on the joint steps out of these states, without composing them."""
@@ -145,11 +148,18 @@ class JointModel:
         ways = [*others, *(["--cost makespan+actions"] if self.cost == "makespan" else [])]
         return " or ".join(filter(None, (", ".join(ways[:-1]), ways[-1])))
 
-    def successors(self, rows: Rows) -> Steps:
-        """All joint steps from a table of states (see `Steps`)."""
+    def successors(
+        self, rows: Rows, only: Callable[[Rows, Options], Options] | None = None
+    ) -> Steps:
+        """All joint steps from a table of states (see `Steps`).
+
+        ``only`` may leave out some of the robots' own choices.
+        """
+        facts = self.codec.facts_part(rows)
+        options = only(facts, self.stepper.choices(facts)) if only else None
+        base = self.stepper.steps(facts, options)
         if not self.remembers:
-            return self.stepper.steps(rows)
-        base = self.stepper.steps(self.codec.facts_part(rows))
+            return base
         result = self.codec.remembering(base.result, base.labels)
         return Steps(base.source, base.labels, result, base.cost)
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -216,9 +217,45 @@ def test_bits(rows: Rows, which: Ints, facts: Ints) -> Bools:
     return (blocks >> (facts % _BLOCK_BITS).astype(np.uint64) & np.uint64(1)).astype(np.bool_)
 
 
-def set_bits(rows: Rows) -> tuple[Ints, Ints]:
-    """All pairs (row, fact) of a table with a fact that is true, sorted."""
-    row, block = np.nonzero(rows)
-    blocks = np.ascontiguousarray(rows[row, block], "<u8")[:, None]
-    which, bit = np.nonzero(np.unpackbits(blocks.view(np.uint8), axis=1, bitorder="little"))
-    return row[which], block[which] * _BLOCK_BITS + bit
+@dataclass(frozen=True, slots=True)
+class TrueFacts:
+    """The facts that are true in each row of a table, in order, CSR."""
+
+    first: Ints
+    fact: Ints
+
+    @property
+    def counts(self) -> Ints:
+        """How many are true in each row."""
+        return np.diff(self.first)
+
+    @property
+    def row(self) -> Ints:
+        """The row of each entry."""
+        return np.repeat(np.arange(len(self.first) - 1), self.counts)
+
+    @classmethod
+    def of(cls, rows: Rows) -> TrueFacts:
+        """Of rows that hold facts only; O(blocks), and O(true facts log true facts)."""
+        row, block = np.nonzero(rows)
+        left = rows[row, block]
+        code = row * (rows.shape[1] * _BLOCK_BITS) + block * _BLOCK_BITS
+        found = []
+        while len(left):
+            lowest = left & (~left + np.uint64(1))
+            # A power of two is exact as a float.
+            found.append(code + np.frexp(lowest.astype(np.float64))[1] - 1)
+            left = left ^ lowest
+            more = left != 0
+            left, code = left[more], code[more]
+        codes = np.sort(np.concatenate(found)) if found else np.zeros(0, np.int64)
+        bounds = np.arange(len(rows) + 1) * (rows.shape[1] * _BLOCK_BITS)
+        return cls(np.searchsorted(codes, bounds), codes % (rows.shape[1] * _BLOCK_BITS))
+
+    def reduced(self, of: np.ufunc, values: NDArray[np.generic], empty: int) -> Any:
+        """Per row the values of its facts reduced by ``of``; ``empty`` where none is true."""
+        result = np.full(len(self.first) - 1, empty, values.dtype)
+        some = np.flatnonzero(self.counts)
+        if len(some):
+            result[some] = of.reduceat(values[self.fact], self.first[some])
+        return result

@@ -14,122 +14,76 @@ import numpy as np
 
 from planners.errors import ProvedImpossible
 from planners.joint.conditions import Labels
-from planners.joint.model import Goal, JointModel, PlanningTask, Steps
+from planners.joint.model import Goal, JointModel, PlanningTask
 from planners.limits import reaching
+from planners.search.guides import guide_for
+from planners.search.layers import BoundedSearch, Layers
 from planners.search.plan_space import PlanSpace
-from planners.search.reachable import PIECES, PieceSizes, Space, blocks
-from planners.tables import Bools, Ints, Rows, find_rows, ranges, unique_rows
+from planners.search.reachable import PIECES, PieceSizes, Space
+from planners.search.state_table import Packing
+from planners.search.state_variables import state_variables
+from planners.search.unreachable import searched
+from planners.tables import Bools, Ints, Rows, ranges, unique_rows
 
 #: Where fewer than one in so many states are new, only the joint steps into these are looked at.
 _FEW = 8
 
 _FAR = np.iinfo(np.int64).max // 4
 
-#: States in which the reason why actions cannot share a step is looked for.
-_LOOK_AT = 1_000
-#: The steps of a layer in pieces: (number of the first state, steps).
-Stored = list[tuple[int, Steps]]
 
+def search(
+    model: JointModel, task: PlanningTask, pieces: PieceSizes = PIECES, heuristic: str = "auto"
+) -> PlanSpace:
+    """All optimal plans of one task, expanding only states that may be on one.
 
-def search(model: JointModel, task: PlanningTask, pieces: PieceSizes = PIECES) -> PlanSpace:
-    """All optimal plans of one task, expanding only states nearer than the goal.
+    Forward in layers, bounded by ``heuristic`` (`planners.search.guides`), then back along optimal
+    edges.
 
-    Forward search to the first layer that holds a goal state, then back along optimal edges.
-    Raises `ProvedImpossible` if the goal cannot be reached.
+    Raises
+    ------
+    ProvedImpossible
+        If the goal cannot be reached.
     """
-    layers: list[Rows] = []
-    kept: list[Stored | None] = []
-
-    def so_far() -> str:
-        return (
-            f"{sum(map(len, layers)):,} states within {len(layers) - 1} steps of the initial "
-            f"state of {task.name}, "
-            f"{len(layers[-1]) if layers else 0:,} of them new in the last step"
-        )
-
-    with reaching(so_far, "a task with a shorter plan, fewer objects or fewer robots"):
-        _forward(model, task, layers, kept, pieces)
-        return _backward(model, task, layers, kept, pieces)
-
-
-def _forward(
-    model: JointModel,
-    task: PlanningTask,
-    layers: list[Rows],
-    kept: list[Stored | None],
-    pieces: PieceSizes,
-) -> None:
-    """Fill ``layers`` with the states by their distance from the start.
-
-    ``kept`` gets the joint steps out of them.
-    """
-    layer = task.init[None, :]
-    seen = layer
-    total = 0
-    layers.append(layer)
-    while not model.holds(task.goal, layer).any():
-        fresh: list[Rows] = []
-        steps_here: Stored | None = []
-        for start, steps in blocks(model, layer, pieces):
-            total += len(steps)
-            if total > pieces.kept:
-                steps_here = None
-            if steps_here is not None:
-                steps_here.append((start, steps))
-            fresh.append(unique_rows(steps.result)[0])
-        new, _ = unique_rows(np.concatenate(fresh))
-        layer = new[find_rows(seen, new) < 0]
-        if not len(layer):
-            raise ProvedImpossible(
-                f"task {task.name}: the goal cannot be reached",
-                position=task.position,
-                remedy=_searched(model, seen),
-            )
-        seen, _ = unique_rows(np.concatenate((seen, layer)))
-        layers.append(layer)
-        kept.append(steps_here)
-
-
-def _searched(model: JointModel, seen: Rows) -> str:
-    """What was searched without reaching the goal, and what kept robots from acting together."""
-    said = (
-        f"All {len(seen):,} reachable states were searched."
-        if len(seen) > 1
-        else "No other state can be reached."
-    )
-    looked_at = model.codec.facts_part(seen[:: len(seen) // _LOOK_AT + 1])
-    found = model.stepper.frequent_conflict(looked_at)
-    if found is None:
-        return said
-    why, states = found
-    return (
-        f"{said}\n  Of pairs of actions that cannot share a step, the one met most often "
-        f"({states:,} of {len(looked_at):,} states looked at): {why}."
-    )
+    variables = state_variables(model, task.init)
+    packing = Packing(model.codec, variables)
+    guide = guide_for(heuristic, model, task, variables)
+    forward = BoundedSearch(model, task, guide, packing, pieces)
+    with reaching(forward.so_far, "a task with a shorter plan, fewer objects or fewer robots"):
+        layers = forward.run()
+        return _backward(model, task, layers, forward)
 
 
 def _backward(
-    model: JointModel,
-    task: PlanningTask,
-    layers: list[Rows],
-    kept: list[Stored | None],
-    pieces: PieceSizes,
+    model: JointModel, task: PlanningTask, layers: Layers, forward: BoundedSearch
 ) -> PlanSpace:
     """Keep the edges that lead to the goal in time and at least cost, from the last layer back."""
-    goal_rows = layers[-1][model.holds(task.goal, layers[-1])]
-    tables = [goal_rows]
-    best = [np.zeros(len(goal_rows), np.int64)]
+    last = layers.table.rows(layers.states[-1])
+    goals = layers.states[-1][model.holds(task.goal, last)]
+    value = np.full(len(layers.table), _FAR)
+    value[goals] = 0
+    node = np.full(len(layers.table), -1)
+    tables = [_numbered(layers.table.rows(goals), goals, node)]
+    best = [np.zeros(len(goals), np.int64)]
     edges: list[tuple[Ints, Ints, Labels, Ints]] = []
-    for rows, stored in zip(reversed(layers[:-1]), reversed(kept), strict=True):
-        source, target, labels, cost = _edges_into(model, rows, stored, tables[-1], pieces)
-        value = np.full(len(rows), _FAR)
-        np.minimum.at(value, source, cost + best[-1][target])
-        tight = cost + best[-1][target] == value[source]
-        alive = np.flatnonzero(value < _FAR)
-        number = np.cumsum(value < _FAR) - 1
-        edges.append((number[source[tight]], target[tight], labels[tight], cost[tight]))
-        tables.append(rows[alive])
-        best.append(value[alive])
+    for depth in range(layers.makespan, 0, -1):
+        below = layers.edges[depth - 1] or forward.edges_into(depth)
+        live = np.flatnonzero(node[below.target] >= 0)
+        source, target = below.source[live], below.target[live]
+        cost = below.cost[live]
+        through = cost + value[target]
+        here = np.unique(source)
+        np.minimum.at(value, source, through)
+        tight = np.flatnonzero(through == value[source])
+        into = node[target[tight]]
+        node[layers.states[depth]] = -1
+        rows = _numbered(layers.table.rows(here), here, node)
+        begin = node[source[tight]]
+        order = np.argsort(begin, kind="stable")
+        edges.append(
+            (begin[order], into[order], below.labels[live[tight]][order], cost[tight][order])
+        )
+        tables.append(rows)
+        best.append(value[here[np.argsort(node[here])]])
     offsets = np.cumsum([0, *(len(t) for t in tables)])
     source = np.concatenate([e[0] + offsets[k + 1] for k, e in enumerate(edges)] or [_none()])
     graph = PlanSpace(
@@ -151,17 +105,11 @@ def _backward(
     return _sort_states(graph).reduced()
 
 
-def _edges_into(
-    model: JointModel, rows: Rows, stored: Stored | None, table: Rows, pieces: PieceSizes
-) -> tuple[Ints, Ints, Labels, Ints]:
-    """The steps from ``rows`` into the sorted ``table``."""
-    parts: list[tuple[Ints, Ints, Labels, Ints]] = []
-    for start, block in stored if stored is not None else blocks(model, rows, pieces):
-        target = find_rows(table, block.result)
-        hit = target >= 0
-        parts.append((block.source[hit] + start, target[hit], block.labels[hit], block.cost[hit]))
-    source, target, labels, cost = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return source, target, labels, cost
+def _numbered(rows: Rows, states: Ints, node: Ints) -> Rows:
+    """The rows of different states, sorted; ``node`` gets each one's number among them."""
+    table, number = unique_rows(rows)
+    node[states] = number
+    return table
 
 
 def _sort_states(graph: PlanSpace) -> PlanSpace:
@@ -265,7 +213,7 @@ def _batch(space: Space, tasks: Sequence[tuple[Goal, Rows | None]]) -> PlanSpace
         if len(bad):
             raise ProvedImpossible(
                 f"the goal cannot be reached from {space.model.state_text(inits[bad[0]])}",
-                remedy=_searched(space.model, space.rows),
+                remedy=searched(space.model, space.rows),
             )
         states.append(found)
     second, graph = _second_costs(space, distance)

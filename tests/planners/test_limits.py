@@ -22,14 +22,14 @@ from planners import grounding
 from planners.errors import OutOfMemory, OutOfTime
 from planners.grounding import instantiate
 from planners.joint.composition import ComposingStepper
-from planners.joint.model import Stepper, Steps
+from planners.joint.model import Options, Stepper, Steps
 from planners.limits import limited_memory, reaching, time_left, time_limit
 from planners.loading import PlanningInstance, load
 from planners.search.edge_index import EdgeIndex
 from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PieceSizes, count, explore
-from planners.tables import Ints, Rows
+from planners.tables import Rows
 from tests.support.domains import DOMAINS
 
 
@@ -157,13 +157,13 @@ class Stopping:
     error: BaseException
     left: list[int]
 
-    def steps(self, rows: Rows) -> Steps:
+    def steps(self, rows: Rows, options: Options | None = None) -> Steps:
         self.left[0] -= 1
         if self.left[0] < 0:
             raise self.error
-        return self.stepper.steps(rows)
+        return self.stepper.steps(rows, options)
 
-    def choices(self, rows: Rows) -> list[tuple[Ints, Ints]]:
+    def choices(self, rows: Rows) -> Options:
         return self.stepper.choices(rows)
 
     def most_steps(self, rows: Rows) -> int:

@@ -158,9 +158,9 @@ def test_an_unreachable_goal_comes_with_the_interference_met_most_often() -> Non
     with pytest.raises(ProvedImpossible) as caught:
         search(loaded.model, loaded.tasks[0])
     assert caught.value.remedy == (
-        "All 3 reachable states were searched.\n  Of pairs of actions that cannot share a step, "
-        "the one met most often (1 of 3 states looked at): (lift r1) deletes (level), which "
-        "(lift r2) needs."
+        "1 state was searched. From 2 more the goal could not be reached even if no action "
+        "deleted anything.\n  Of pairs of actions that cannot share a step, the one met most "
+        "often (1 of 1 states looked at): (lift r1) deletes (level), which (lift r2) needs."
     )
 
 

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the search for optimal plans is bounded by, by name, and which one suits a task."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from planners.errors import UsageError
+from planners.joint.model import JointModel, PlanningTask
+from planners.search.bounds import relaxed
+from planners.search.layers import Guide
+from planners.search.projections import Projections
+from planners.search.state_variables import StateVariable
+from planners.tables import Ints, Rows
+
+#: The names of all guides; ``auto`` chooses one.
+GUIDES = ("auto", "blind", "projections", "relaxed")
+
+
+def guide_for(
+    name: str, model: JointModel, task: PlanningTask, variables: Sequence[StateVariable]
+) -> Guide:
+    """The guide of this name for a task."""
+    if name == "blind":
+        return Guide("blind")
+    projections = Projections(model, task.goal, variables)
+    if name == "projections":
+        return Guide(name, projections.value, projections.in_time)
+    if name not in GUIDES:
+        raise UsageError(f"there is no heuristic {name}", remedy=f"One of {', '.join(GUIDES)}.")
+    hmax = relaxed(model, task.goal)
+    start = task.init[None, :]
+    if name == "auto" and not max(hmax(start)[0], projections.value(start)[0]):
+        return Guide("blind")
+    if name == "auto" and _as_good(model, task, projections):
+        return Guide("projections", projections.value, projections.in_time)
+
+    def both(rows: Rows) -> Ints:
+        return np.maximum(projections.value(rows), hmax(rows))
+
+    return Guide("relaxed", both, projections.in_time)
+
+
+def _as_good(model: JointModel, task: PlanningTask, projections: Projections) -> bool:
+    """Whether the projections say as much as h^max in the first states of the search."""
+    rows = task.init[None, :]
+    for _ in range(2):
+        bound = relaxed(model, task.goal)(rows)
+        if (projections.value(rows) < bound).any():
+            return False
+        rows = model.successors(rows[:20]).result[:2_000]
+        if not len(rows):
+            break
+    return True

@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bounded search forward: the states that a task's optimal plans may pass through, in layers.
+
+A state ``g`` joint steps from the start is kept if ``g + h <= B``, where ``h`` is a consistent
+lower bound on the joint steps left, for B from ``h(I)`` upwards until a goal state is met.  Then
+all optimal plans are in the layers (Proposition 16 of docs/concepts.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planners.errors import ProvedImpossible
+from planners.joint.conditions import Labels
+from planners.joint.model import JointModel, Options, PlanningTask, Steps
+from planners.search.bounds import FAR
+from planners.search.reachable import PieceSizes
+from planners.search.state_table import Packing, StateTable
+from planners.search.unreachable import searched
+from planners.tables import Ints, Rows
+
+#: A table of states -> lower bounds on the joint steps left, `FAR` where the goal is out of reach.
+Bound = Callable[[Rows], Ints]
+#: Choices after which a robot's own variables need at most so many joint steps more, and the least
+#: number of steps that some other choice needs.
+InTime = Callable[[Rows, Options, int], tuple[Options, int]]
+_NEVER = np.iinfo(np.int32).max
+#: Bytes of the states that joint steps lead to, composed at a time.
+_BYTES = 1 << 28
+
+
+@dataclass(frozen=True, slots=True)
+class Guide:
+    """What a search is bounded by; ``name`` is what messages call it.
+
+    Where nothing is known (``bound`` None) all states are searched, in one round.
+    """
+
+    name: str
+    bound: Bound | None = None
+    in_time: InTime | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Edges:
+    """Joint steps between two layers, states by their numbers in the table."""
+
+    source: Ints
+    target: Ints
+    labels: Labels
+    cost: Ints
+
+
+@dataclass(slots=True)
+class Layers:
+    """The states of each layer, the start first, and the joint steps between two layers.
+
+    ``edges[k]`` lead from layer k to the next one; None where they were too many to keep.  Goal
+    states are in the last layer only.
+    """
+
+    model: JointModel
+    table: StateTable
+    guide: Guide
+    states: list[Ints] = field(default_factory=list)
+    edges: list[Edges | None] = field(default_factory=list)
+    makespan: int = 0
+    #: Joint steps composed, in all rounds.
+    composed: int = 0
+
+
+class BoundedSearch:
+    """Layers of states within a bound that grows until the goal is met."""
+
+    def __init__(
+        self,
+        model: JointModel,
+        task: PlanningTask,
+        guide: Guide,
+        packing: Packing,
+        pieces: PieceSizes,
+    ) -> None:
+        self._model, self._task, self._guide, self._pieces = model, task, guide, pieces
+        self._packing = packing
+        self.table = StateTable(packing)
+        #: Per state the lower bound, and the layer that it was met in, in this round.
+        self._h: NDArray[np.int32] = np.zeros(0, np.int32)
+        self._depth: NDArray[np.int32] = np.zeros(0, np.int32)
+        self.layers = Layers(model, self.table, guide)
+        self.bound = 0
+        self.rounds = 0
+
+    def run(self) -> Layers:
+        """Search, in as many rounds as it takes."""
+        start = self._numbers(self._task.init[None, :])
+        following = int(self._h[start[0]]) if self._guide.bound else FAR - 1
+        work = 0
+        slow = 1
+        while following < FAR:
+            self.bound, before = following, work
+            self.rounds += 1
+            done = self.layers.composed
+            following = self._round(start)
+            work = self.layers.composed - done
+            if following < 0:
+                return self.layers
+            # Rounds that hardly grow are left out: more than needed is searched then, never less.
+            slow = 2 * slow if work < 1.5 * before else 1
+            following += slow - 1
+        seen = np.flatnonzero(self._depth[: len(self.table)] < _NEVER)
+        raise ProvedImpossible(
+            f"task {self._task.name}: the goal cannot be reached",
+            position=self._task.position,
+            remedy=searched(self._model, self.table.rows(seen), len(self.table) - len(seen)),
+        )
+
+    def _round(self, start: Ints) -> int:
+        """Search within the bound; the least bound that was too large, -1 if the goal is met."""
+        self._depth[: len(self.table)] = _NEVER
+        self._depth[start] = 0
+        layers = self.layers
+        layers.states, layers.edges = [start], []
+        kept = 0
+        beyond = FAR
+        while not self._model.holds(self._task.goal, self._last()).any():
+            depth = len(layers.states)
+            edges, low = self._expand(layers.states[-1], depth)
+            beyond = min(beyond, low)
+            new = np.flatnonzero(self._depth[: len(self.table)] == depth)
+            if not len(new):
+                return beyond
+            kept += len(edges.source)
+            layers.edges.append(edges if kept <= self._pieces.kept else None)
+            layers.states.append(new)
+        layers.makespan = len(layers.states) - 1
+        return -1
+
+    def edges_into(self, depth: int) -> Edges:
+        """The joint steps into a layer of the last round, composed again."""
+        return self._expand(self.layers.states[depth - 1], depth)[0]
+
+    def so_far(self) -> str:
+        """How far it got, for messages."""
+        states = self.layers.states
+        return (
+            f"{sum(map(len, states)):,} states within {max(0, len(states) - 1)} steps of the "
+            f"initial state of {self._task.name}, {len(states[-1]) if states else 0:,} of them new "
+            "in the last step"
+        )
+
+    def _last(self) -> Rows:
+        return self.table.rows(self.layers.states[-1])
+
+    def _expand(self, states: Ints, depth: int) -> tuple[Edges, int]:
+        """The joint steps from a layer into the next, and the least bound that was too large."""
+        parts: list[Edges] = []
+        beyond = FAR
+        for numbers, steps, low in self._steps(states, self.bound - depth):
+            target = self._numbers(steps.result)
+            h = self._h[target].astype(np.int64)
+            late = h > self.bound - depth
+            beyond = min(beyond, low + depth, int(h[late].min(initial=FAR)) + depth)
+            into = target[~late]
+            self._depth[into] = np.minimum(self._depth[into], depth)
+            kept = np.flatnonzero(~late & (self._depth[target] == depth))
+            parts.append(
+                Edges(
+                    numbers[steps.source[kept]], target[kept], steps.labels[kept], steps.cost[kept]
+                )
+            )
+        return _joined(parts, self._model), beyond
+
+    def _steps(self, states: Ints, left: int) -> Iterator[tuple[Ints, Steps, int]]:
+        """Joint steps out of states, in pieces, without choices that leave too few steps.
+
+        With the states of each piece, and the least number of steps that such a choice needs.
+        """
+        low = FAR
+
+        def only(rows: Rows, options: Options) -> Options:
+            nonlocal low
+            assert self._guide.in_time is not None
+            options, low = self._guide.in_time(rows, options, left)
+            return options
+
+        start, size = 0, 500
+        most = max(1, min(self._pieces.steps, _BYTES // (8 * self._model.codec.width)))
+        while start < len(states):
+            numbers = states[start : start + size]
+            rows = self.table.rows(numbers)
+            steps = self._model.successors(rows, only if self._guide.in_time else None)
+            self.layers.composed += len(steps)
+            yield numbers, steps, low
+            start += size
+            size = max(1, min(self._pieces.states, int(most * size / max(1, len(steps)))))
+
+    def _numbers(self, rows: Rows) -> Ints:
+        """The numbers of states, with bounds for those that are new."""
+        numbers, fresh = self.table.add(rows)
+        grown = len(self.table) - len(self._h)
+        if grown > 0:
+            more = np.full(max(grown, len(self._h)), _NEVER, np.int32)
+            self._h = np.concatenate((self._h, more))
+            self._depth = np.concatenate((self._depth, more))
+        new = np.flatnonzero(fresh)
+        self._h[numbers[new]] = self._guide.bound(rows[new]) if self._guide.bound else 0
+        return numbers
+
+
+def _joined(parts: Sequence[Edges], model: JointModel) -> Edges:
+    none = np.zeros(0, np.int64)
+    labels = np.zeros((0, len(model.robots)), np.int32)
+    every = [Edges(none, none, labels, none), *parts]
+    return Edges(
+        *(
+            np.concatenate([getattr(part, name) for part in every])
+            for name in ("source", "target", "labels", "cost")
+        )
+    )

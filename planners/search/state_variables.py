@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""State variables: groups of facts of which exactly one is true in every reachable state.
+
+Where a robot is, where a package is or who carries it.  A group is found by its facts' common
+object and proved by induction over the ground actions (invariant synthesis, after Helmert 2009,
+here on ground actions and for joint steps): one of its facts is true at the start, and whatever
+makes another one true needs and deletes the one that was.  Two actions that need and delete the
+same fact interfere, so a joint step changes a variable at most once.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+from planners.grounding import GroundAction
+from planners.joint.conditions import split_condition
+from planners.joint.model import JointModel
+from planners.pddl.formula_tree import literals
+from planners.pddl.lifted import TRUE, StepAtom
+from planners.tables import Rows
+
+#: Predicates, each with a position of the object, that facts of one variable may have.
+_SHAPES = 3
+
+
+@dataclass(frozen=True, slots=True)
+class StateVariable:
+    """A group of facts of which exactly one is true.
+
+    Attributes
+    ----------
+    facts
+        Their numbers, sorted: the variable's values.
+    changes
+        For each action that may change it, by number in `JointModel.actions`: the facts of the
+        variable that it needs to be true (none: it does not say), and the one that it makes true.
+    """
+
+    facts: tuple[int, ...]
+    changes: Mapping[int, tuple[tuple[int, ...], int]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Touch:
+    """What an action does to facts, by number, and which robots choose it together.
+
+    ``linked``: it may share a step with actions that interfere with it.
+    """
+
+    owners: frozenset[int]
+    needs: frozenset[int]
+    adds: frozenset[int]
+    deletes: frozenset[int]
+    conditional: frozenset[int]
+    linked: bool
+
+
+def state_variables(model: JointModel, init: Rows) -> list[StateVariable]:
+    """Disjoint variables for the states that are reachable from ``init``, large ones first."""
+    true = set(model.codec.true_facts(model.codec.facts_part(init)))
+    touches = [_touch(model, action) for action in model.actions]
+    touching: dict[int, list[int]] = defaultdict(list)
+    for number, touch in enumerate(touches):
+        for fact in touch.adds | touch.deletes | touch.conditional:
+            touching[fact].append(number)
+    found = []
+    for facts in _candidates(model, true):
+        actions = sorted({number for fact in facts for number in touching.get(fact, ())})
+        changes = _changes(facts, [(number, touches[number]) for number in actions])
+        if changes is not None:
+            found.append(StateVariable(tuple(sorted(facts)), changes))
+    found.sort(key=lambda variable: (-len(variable.facts), variable.facts))
+    taken: set[int] = set()
+    chosen = []
+    for variable in found:
+        if taken.isdisjoint(variable.facts):
+            taken.update(variable.facts)
+            chosen.append(variable)
+    return chosen
+
+
+def _touch(model: JointModel, action: GroundAction) -> _Touch:
+    index = model.codec.facts.index
+    known, _ = split_condition(action.precondition, model.evaluator)
+    effects = [e for e in action.effects if e.atom in index]
+    certain = [e for e in effects if e.condition == TRUE]
+    adds = frozenset(index[e.atom] for e in certain if e.adds)
+    return _Touch(
+        owners=frozenset(action.owners),
+        needs=frozenset(fact for fact, positive in known if positive),
+        adds=adds,
+        deletes=frozenset(index[e.atom] for e in certain if not e.adds) - adds,
+        conditional=frozenset(index[e.atom] for e in effects if e.condition != TRUE),
+        linked=bool(action.links)
+        or any(
+            positive and isinstance(leaf, StepAtom)
+            for condition in (action.precondition, *(e.condition for e in action.effects))
+            for leaf, positive in literals(condition)
+        ),
+    )
+
+
+def _candidates(model: JointModel, true: set[int]) -> Iterator[frozenset[int]]:
+    """Groups with a common object, one fact of which is true at the start; without repetition."""
+    shapes: dict[str, dict[tuple[str, int], list[int]]] = defaultdict(lambda: defaultdict(list))
+    for number, atom in enumerate(model.codec.facts.atoms):
+        for position, name in enumerate(atom.args):
+            shapes[name][atom.predicate, position].append(number)
+    met: set[frozenset[int]] = set()
+    for name in sorted(shapes):
+        own = shapes[name]
+        count = {shape: sum(fact in true for fact in facts) for shape, facts in own.items()}
+        usable = sorted(shape for shape in own if count[shape] <= 1)
+        for size in range(min(_SHAPES, len(usable)), 0, -1):
+            for chosen in combinations(usable, size):
+                facts = frozenset(fact for shape in chosen for fact in own[shape])
+                if sum(count[shape] for shape in chosen) == 1 and facts not in met:
+                    met.add(facts)
+                    if len(facts) > 1:
+                        yield facts
+
+
+def _changes(
+    facts: frozenset[int], touches: Sequence[tuple[int, _Touch]]
+) -> dict[int, tuple[tuple[int, ...], int]] | None:
+    """What the actions do to a group; None if it may stop to have exactly one true fact."""
+    changes: dict[int, tuple[tuple[int, ...], int]] = {}
+    changing: list[_Touch] = []
+    for number, touch in touches:
+        adds, deletes, needs = touch.adds & facts, touch.deletes & facts, touch.needs & facts
+        if touch.conditional & facts or len(adds) > 1:
+            return None
+        if not adds:
+            if deletes:
+                return None
+            continue
+        (value,) = adds
+        lost = needs - {value}
+        if not needs or not lost <= deletes:
+            return None
+        if lost:
+            changes[number] = (tuple(sorted(lost)), value)
+            changing.append(touch)
+    # Of two actions of one robot a joint step has one; of two robots', none that interfere.
+    same_robot = changing and frozenset.intersection(*(touch.owners for touch in changing))
+    if not same_robot and any(touch.linked for touch in changing):
+        return None
+    return changes
