@@ -39,6 +39,8 @@ class ComposingStepper:
 
     Attributes
     ----------
+    labelled
+        For each robot its labels' ground actions, None first (idling).
     piece
         Joint steps composed at a time, before compatibility is looked up; it changes no result.
     memory_left
@@ -59,9 +61,9 @@ class ComposingStepper:
     ) -> None:
         self._codec, self._evaluator, self._robots = codec, evaluator, tuple(robots)
         self._keeps_idle = tuple(keeps_idle)
-        self._choices: list[list[GroundAction | None]] = [[None, *own] for own in subactions]
+        self.labelled: list[list[GroundAction | None]] = [[None, *own] for own in subactions]
         self.tables = {
-            (i, j): compatible(self._choices[i], self._choices[j], i, j)
+            (i, j): compatible(self.labelled[i], self.labelled[j], i, j)
             for j in range(len(robots))
             for i in range(j)
         }
@@ -69,6 +71,11 @@ class ComposingStepper:
             _Subactions(own, codec, evaluator, number, cost)
             for number, own in enumerate(subactions)
         ]
+
+    @property
+    def costs(self) -> list[Ints]:
+        """For each robot the second cost component of each of its labels."""
+        return [robot.cost for robot in self._robot]
 
     def steps(self, rows: Rows, options: Options | None = None) -> Steps:
         """All joint steps applicable in the states of a table, sorted by source and labels.
@@ -106,7 +113,7 @@ class ComposingStepper:
 
     def why_not(self, row: Rows, labels: Sequence[int]) -> str:
         """Why these labels are no joint step in a state: the first rule that they break."""
-        chosen = [self._choices[i][label] for i, label in enumerate(labels)]
+        chosen = [self.labelled[i][label] for i, label in enumerate(labels)]
         return (
             self._unmet_in_state(row, chosen)
             or self._unshared(labels, chosen)
@@ -174,7 +181,7 @@ class ComposingStepper:
 
     def _conflict(self, pair: tuple[int, int, int, int]) -> str | None:
         i, j, mine, theirs = pair
-        first, second = self._choices[i][mine], self._choices[j][theirs]
+        first, second = self.labelled[i][mine], self.labelled[j][theirs]
         return conflict(first, second) if first and second else None
 
     def _clashing(self, rows: Rows) -> Iterator[tuple[int, int, int, int]]:

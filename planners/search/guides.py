@@ -11,6 +11,7 @@ from planners.errors import UsageError
 from planners.joint.model import JointModel, PlanningTask
 from planners.search.bounds import relaxed
 from planners.search.layers import Guide
+from planners.search.plan_formula import may_be_exact
 from planners.search.projections import Projections
 from planners.search.state_variables import StateVariable
 from planners.tables import Ints, Rows
@@ -33,14 +34,16 @@ def guide_for(
     hmax = relaxed(model, task.goal)
     start = task.init[None, :]
     if name == "auto" and not max(hmax(start)[0], projections.value(start)[0]):
-        return Guide("blind")
+        return Guide("blind", exact=may_be_exact(model))
     if name == "auto" and _as_good(model, task, projections):
-        return Guide("projections", projections.value, projections.in_time)
+        return Guide(
+            "projections", projections.value, projections.in_time, exact=may_be_exact(model)
+        )
 
     def both(rows: Rows) -> Ints:
         return np.maximum(projections.value(rows), hmax(rows))
 
-    return Guide("relaxed", both, projections.in_time)
+    return Guide("relaxed", both, projections.in_time, exact=name == "auto" and may_be_exact(model))
 
 
 def _as_good(model: JointModel, task: PlanningTask, projections: Projections) -> bool:

@@ -18,8 +18,10 @@ from planners.errors import ProvedImpossible
 from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, PlanningTask, Steps
 from planners.search.bounds import FAR
+from planners.search.exact_bound import ExactBound, exact_bound
 from planners.search.reachable import PieceSizes
 from planners.search.state_table import Packing, StateTable
+from planners.search.state_variables import StateVariable
 from planners.search.unreachable import searched
 from planners.tables import Ints, Rows
 
@@ -29,6 +31,14 @@ Bound = Callable[[Rows], Ints]
 #: number of steps that some other choice needs.
 InTime = Callable[[Rows, Options, int], tuple[Options, int]]
 _NEVER = np.iinfo(np.int32).max
+#: In place of the layer of a state: no optimal plan passes through it.
+_LEFT_OUT = -1
+#: How a round ended: the goal was met, or more joint steps were composed than are tried without
+#: exact bounds.
+_MET, _GROWN = -1, -2
+#: States of a layer that are asked for first, and the share of them on optimal plans above which
+#: the others are not asked for.
+_SAMPLE, _MOSTLY = 64, 0.9
 #: Bytes of the states that joint steps lead to, composed at a time.
 _BYTES = 1 << 28
 
@@ -37,12 +47,14 @@ _BYTES = 1 << 28
 class Guide:
     """What a search is bounded by; ``name`` is what messages call it.
 
-    Where nothing is known (``bound`` None) all states are searched, in one round.
+    Where nothing is known (``bound`` None) all states are searched, in one round.  ``exact``: once
+    the search has grown, a SAT solver finds the optimal cost and what leads to it.
     """
 
     name: str
     bound: Bound | None = None
     in_time: InTime | None = None
+    exact: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,15 +93,19 @@ class BoundedSearch:
         model: JointModel,
         task: PlanningTask,
         guide: Guide,
-        packing: Packing,
+        variables: Sequence[StateVariable],
         pieces: PieceSizes,
     ) -> None:
         self._model, self._task, self._guide, self._pieces = model, task, guide, pieces
-        self._packing = packing
-        self.table = StateTable(packing)
+        self._variables = variables
+        self.table = StateTable(Packing(model.codec, variables))
         #: Per state the lower bound, and the layer that it was met in, in this round.
         self._h: NDArray[np.int32] = np.zeros(0, np.int32)
         self._depth: NDArray[np.int32] = np.zeros(0, np.int32)
+        #: The least second cost component of the way to each state; kept with exact bounds only.
+        self._paid: Ints = np.zeros(0, np.int64)
+        self._exact: ExactBound | None = None
+        self._probing = guide.exact
         self.layers = Layers(model, self.table, guide)
         self.bound = 0
         self.rounds = 0
@@ -106,8 +122,11 @@ class BoundedSearch:
             done = self.layers.composed
             following = self._round(start)
             work = self.layers.composed - done
-            if following < 0:
+            if following == _MET:
                 return self.layers
+            if following == _GROWN:
+                following = self._bounded_exactly()
+                continue
             # Rounds that hardly grow are left out: more than needed is searched then, never less.
             slow = 2 * slow if work < 1.5 * before else 1
             following += slow - 1
@@ -118,18 +137,32 @@ class BoundedSearch:
             remedy=searched(self._model, self.table.rows(seen), len(self.table) - len(seen)),
         )
 
+    def _bounded_exactly(self) -> int:
+        """Ask the solver for the optimal cost; what the next round is bounded by."""
+        self._probing = False
+        at_least = self.bound if self.bound < FAR - 1 else 0
+        self._exact = exact_bound(
+            self._model, self._task, self._variables, at_least, self._pieces.effort
+        )
+        return self.bound if self._exact is None else self._exact.makespan
+
     def _round(self, start: Ints) -> int:
-        """Search within the bound; the least bound that was too large, -1 if the goal is met."""
+        """Search within the bound; the least bound that was too large, `_MET` or `_GROWN`."""
         self._depth[: len(self.table)] = _NEVER
         self._depth[start] = 0
         layers = self.layers
         layers.states, layers.edges = [start], []
+        self._paid = np.zeros(len(self._depth), np.int64)
         kept = 0
         beyond = FAR
         while not self._model.holds(self._task.goal, self._last()).any():
             depth = len(layers.states)
             edges, low = self._expand(layers.states[-1], depth)
             beyond = min(beyond, low)
+            if self._probing and layers.composed > self._pieces.probe:
+                return _GROWN
+            if self._exact is not None:
+                edges = self._on_optimal_plans(self._exact, edges, depth)
             new = np.flatnonzero(self._depth[: len(self.table)] == depth)
             if not len(new):
                 return beyond
@@ -137,7 +170,32 @@ class BoundedSearch:
             layers.edges.append(edges if kept <= self._pieces.kept else None)
             layers.states.append(new)
         layers.makespan = len(layers.states) - 1
-        return -1
+        return _MET
+
+    def _on_optimal_plans(self, exact: ExactBound, edges: Edges, depth: int) -> Edges:
+        """Leave out what leads to states through which no optimal plan passes.
+
+        Of large layers a sample is asked for first, and all if enough of it is left out.
+        """
+        new, number = np.unique(edges.target, return_inverse=True)
+        paid = np.full(len(new), FAR)
+        np.minimum.at(paid, number, self._paid[edges.source] + edges.cost)
+        if len(self._paid) < len(self._depth):
+            more = np.zeros(len(self._depth) - len(self._paid), np.int64)
+            self._paid = np.concatenate((self._paid, more))
+        self._paid[new] = paid
+        left = exact.makespan - depth
+        some = np.arange(0, len(new), -(-len(new) // _SAMPLE) or 1)
+        passes = exact.may_pass(self.table.rows(new[some]), left, paid[some])
+        if len(some) == len(new):
+            good = passes
+        elif passes.mean() > _MOSTLY:
+            return edges
+        else:
+            good = exact.may_pass(self.table.rows(new), left, paid)
+        self._depth[new[~good]] = _LEFT_OUT
+        kept = good[number]
+        return Edges(edges.source[kept], edges.target[kept], edges.labels[kept], edges.cost[kept])
 
     def edges_into(self, depth: int) -> Edges:
         """The joint steps into a layer of the last round, composed again."""
@@ -159,7 +217,7 @@ class BoundedSearch:
         """The joint steps from a layer into the next, and the least bound that was too large."""
         parts: list[Edges] = []
         beyond = FAR
-        for numbers, steps, low in self._steps(states, self.bound - depth):
+        for numbers, steps, low in self._steps(states, depth):
             target = self._numbers(steps.result)
             h = self._h[target].astype(np.int64)
             late = h > self.bound - depth
@@ -174,8 +232,8 @@ class BoundedSearch:
             )
         return _joined(parts, self._model), beyond
 
-    def _steps(self, states: Ints, left: int) -> Iterator[tuple[Ints, Steps, int]]:
-        """Joint steps out of states, in pieces, without choices that leave too few steps.
+    def _steps(self, states: Ints, depth: int) -> Iterator[tuple[Ints, Steps, int]]:
+        """Joint steps into a layer, in pieces, without choices that leave too few steps.
 
         With the states of each piece, and the least number of steps that such a choice needs.
         """
@@ -183,8 +241,10 @@ class BoundedSearch:
 
         def only(rows: Rows, options: Options) -> Options:
             nonlocal low
-            assert self._guide.in_time is not None
-            options, low = self._guide.in_time(rows, options, left)
+            if self._exact is not None:
+                options = self._exact.only(depth - 1, rows, options)
+            if self._guide.in_time is not None:
+                options, low = self._guide.in_time(rows, options, self.bound - depth)
             return options
 
         start, size = 0, 500
@@ -192,7 +252,7 @@ class BoundedSearch:
         while start < len(states):
             numbers = states[start : start + size]
             rows = self.table.rows(numbers)
-            steps = self._model.successors(rows, only if self._guide.in_time else None)
+            steps = self._model.successors(rows, only)
             self.layers.composed += len(steps)
             yield numbers, steps, low
             start += size

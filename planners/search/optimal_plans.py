@@ -20,7 +20,6 @@ from planners.search.guides import guide_for
 from planners.search.layers import BoundedSearch, Layers
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, PieceSizes, Space
-from planners.search.state_table import Packing
 from planners.search.state_variables import state_variables
 from planners.search.unreachable import searched
 from planners.tables import Bools, Ints, Rows, ranges, unique_rows
@@ -45,9 +44,8 @@ def search(
         If the goal cannot be reached.
     """
     variables = state_variables(model, task.init)
-    packing = Packing(model.codec, variables)
     guide = guide_for(heuristic, model, task, variables)
-    forward = BoundedSearch(model, task, guide, packing, pieces)
+    forward = BoundedSearch(model, task, guide, variables, pieces)
     with reaching(forward.so_far, "a task with a shorter plan, fewer objects or fewer robots"):
         layers = forward.run()
         return _backward(model, task, layers, forward)

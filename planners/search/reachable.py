@@ -26,12 +26,18 @@ class PieceSizes:
         Joint steps kept from a forward search; beyond, layers are expanded again on the way back.
     pairs
         (goal, state) pairs handled in one plan space when many tasks are asked for.
+    probe
+        Joint steps of a forward search that may be bounded exactly, before it is.
+    effort
+        Conflicts that a SAT solver may spend on these bounds.
     """
 
     states: int = 20_000
     steps: int = 4_000_000
     kept: int = 8_000_000
     pairs: int = 2_000_000
+    probe: int = 100_000
+    effort: int = 5_000_000
 
 
 PIECES = PieceSizes()

@@ -89,10 +89,8 @@ class Packing:
         for place, shift, mask, own in self._fields:
             value = (packed[:, place] >> shift & mask).astype(np.int64)
             self._codec.set_each(facts, every, own[value])
-        for fact, (block, shift) in self._single:
-            self._codec.set(
-                facts, (packed[:, block] >> np.uint64(shift) & np.uint64(1)) != 0, [fact]
-            )
+        for fact, (alone, bit) in self._single:
+            self._codec.set(facts, (packed[:, alone] >> np.uint64(bit) & np.uint64(1)) != 0, [fact])
         result[:, : self._codec.fact_blocks] = facts
         result[:, self._codec.fact_blocks :] = packed[:, self._blocks :]
         return result

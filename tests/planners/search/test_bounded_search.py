@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The bounded search against the blind one: the same plan space, whatever it is bounded by."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import fields, replace
+from random import Random
+
+import numpy as np
+import pytest
+
+from planners.errors import BadInput, ProvedImpossible
+from planners.joint.model import Cost, JointModel, PlanningTask
+from planners.loading import ModelOptions, PlanningInstance, build
+from planners.pddl import parse_domain, parse_problem
+from planners.pddl.robots import RobotSelection
+from planners.pddl.sexpr import Source
+from planners.search.guides import GUIDES
+from planners.search.optimal_plans import search
+from planners.search.plan_space import PlanSpace
+from planners.search.reachable import PIECES
+from tests.support import blind_search
+from tests.support.random_models import random_model
+from tests.support.random_pddl import random_model as random_pddl
+
+#: A search that asks the solver at once, and one that composes steps again on the way back.
+PIECE_SIZES = (
+    PIECES,
+    replace(PIECES, probe=0, effort=3_000),
+    replace(PIECES, probe=0, effort=100_000, kept=0, states=3),
+    replace(PIECES, kept=0, states=2, steps=5),
+)
+COSTS: tuple[Cost, ...] = ("makespan", "makespan+actions", "makespan+cost")
+
+
+def instances(seeds: range, robots: int | None) -> Iterator[PlanningInstance]:
+    """Random models; ``robots`` None: MA-PDDL with formulas, shared actions, joint actions."""
+    for seed in seeds:
+        random = Random(seed)
+        options = ModelOptions(cost=random.choice(COSTS), remember_actions=random.random() < 0.2)
+        try:
+            if robots is not None:
+                domain, problem, _ = random_model(seed, robots)
+            else:
+                text = random_pddl(seed, random.choice(["agent", "plain", "joint"]))
+                domain = parse_domain(Source("domain", text.domain))
+                problem = parse_problem(Source("problem", text.problem), domain)
+                options = replace(options, robots=RobotSelection(unowned=text.unowned))
+            yield build(domain, [problem], options)
+        except BadInput:
+            continue
+
+
+def equal(one: PlanSpace, other: PlanSpace) -> None:
+    """Every column is the same; of the table of states, what nodes stand for."""
+    assert (one.rows[one.state] == other.rows[other.state]).all()
+    for field in fields(PlanSpace):
+        a, b = getattr(one, field.name), getattr(other, field.name)
+        if isinstance(a, np.ndarray) and field.name not in ("rows", "state"):
+            assert a.shape == b.shape, field.name
+            assert (a == b).all(), field.name
+
+
+def expected(model: JointModel, task: PlanningTask) -> PlanSpace | None:
+    try:
+        return blind_search.search(model, task)
+    except ProvedImpossible:
+        return None
+
+
+def compared(seeds: range, robots: int | None) -> Counter[str]:
+    met: Counter[str] = Counter()
+    for number, loaded in enumerate(instances(seeds, robots)):
+        task = loaded.tasks[0]
+        try:
+            twin = expected(loaded.model, task)
+        except BadInput:  # joint actions that no robot can tell apart, somewhere
+            continue
+        for heuristic in GUIDES:
+            pieces = PIECE_SIZES[number % len(PIECE_SIZES)]
+            if twin is None:
+                with pytest.raises(ProvedImpossible):
+                    search(loaded.model, task, pieces, heuristic)
+            else:
+                equal(search(loaded.model, task, pieces, heuristic), twin)
+        met["unsolvable" if twin is None else "solved" if len(twin) > 1 else "at the goal"] += 1
+    return met
+
+
+@pytest.mark.parametrize(("robots", "number"), [(2, 60), (3, 40), (None, 110)])
+def test_bounds_lose_no_optimal_plan(robots: int | None, number: int) -> None:
+    met = compared(range(number), robots)
+    assert met["solved"] >= 10
+    assert met["unsolvable"] >= 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robots", [2, 3, 4, None])
+def test_bounds_lose_no_optimal_plan_of_many_models(robots: int | None) -> None:
+    met = compared(range(10_000, 10_800), robots)
+    print(robots or "any", "robots:", dict(met))
+    assert min(met["solved"], met["unsolvable"]) >= 20
