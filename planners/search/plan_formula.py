@@ -26,7 +26,8 @@ from planners.sat import sat_solver, solve_slice
 from planners.search.state_variables import StateVariable
 from planners.tables import Ints, Rows
 
-SOLVER = "glucose4"
+#: Many easy questions and some hard ones: MiniSat answers both as fast as any.
+SOLVER = "minisat22"
 #: Conflicts between two looks at the limits.
 _SLICE = 2_000
 #: What a question costs for each of its steps, in conflicts.
@@ -158,6 +159,8 @@ class PlanFormula:
 
         At most of ``cost`` (after `count_costs`), with the literals ``extra``.
         """
+        if cost is not None and cost < 0:
+            return False
         self._require_steps(steps)
         facts = np.full(len(self.model.codec.facts), -1)
         facts[self.model.codec.true_facts(row)] = 1

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""State variables have exactly one value in every reachable state, and states packed by them come
+back; the table of states numbers each state once.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from random import Random
+
+import numpy as np
+import pytest
+
+from planners.errors import BadInput
+from planners.joint.states import TrueFacts
+from planners.loading import ModelOptions, PlanningInstance, build, load
+from planners.pddl import parse_domain, parse_problem
+from planners.pddl.robots import RobotSelection
+from planners.pddl.sexpr import Source
+from planners.search.bounds import FAR, relaxed
+from planners.search.goals import goal_facts
+from planners.search.optimal_plans import distances
+from planners.search.projections import Projections
+from planners.search.reachable import Space, explore
+from planners.search.state_table import Packing, StateTable
+from planners.search.state_variables import StateVariable, state_variables
+from tests.support.domains import DOMAINS
+from tests.support.random_models import random_model
+from tests.support.random_pddl import random_model as random_pddl
+
+
+def random_instance(seed: int) -> PlanningInstance | None:
+    random = Random(seed)
+    try:
+        if seed % 2:
+            domain, problem, options = random_model(seed, random.choice((2, 3)))
+        else:
+            text = random_pddl(seed, random.choice(["agent", "plain", "joint"]))
+            domain = parse_domain(Source("domain", text.domain))
+            problem = parse_problem(Source("problem", text.problem), domain)
+            options = ModelOptions(
+                RobotSelection(unowned=text.unowned), remember_actions=random.random() < 0.3
+            )
+        return build(domain, [problem], options)
+    except BadInput:
+        return None
+
+
+def explored(loaded: PlanningInstance) -> Space | None:
+    try:
+        return explore(loaded.model, loaded.tasks[0].init[None, :])
+    except BadInput:  # joint actions that no robot can tell apart
+        return None
+
+
+def checked(loaded: PlanningInstance, space: Space) -> list[StateVariable]:
+    """The variables, each with exactly one value in every reachable state."""
+    variables = state_variables(loaded.model, loaded.tasks[0].init)
+    truth = loaded.model.codec.truth(space.rows)
+    for variable in variables:
+        assert (truth[:, list(variable.facts)].sum(axis=1) == 1).all()
+    packing = Packing(loaded.model.codec, variables)
+    packed = packing.packed(space.rows)
+    assert (packing.rows(packed) == space.rows).all()
+    assert len(np.unique(packed, axis=0)) == len(space.rows)
+    return variables
+
+
+def consistent(loaded: PlanningInstance, space: Space, variables: list[StateVariable]) -> int:
+    """Bounds are 0 in goal states, no larger than distances, and fall by at most 1 in a step."""
+    model, goal = loaded.model, loaded.tasks[0].goal
+    reached = model.holds(goal, space.rows)
+    far = distances(space, reached[None, :])[0]
+    largest = 0
+    for bound in (Projections(model, goal, variables).value, relaxed(model, goal)):
+        value = bound(space.rows)
+        assert (value[reached] == 0).all()
+        assert (value[far >= 0] <= far[far >= 0]).all()
+        assert (value[space.sources] <= value[space.target] + 1).all()
+        largest = max(largest, int(value[value < FAR].max(initial=0)))
+    return largest
+
+
+def test_variables_and_bounds_of_random_models() -> None:
+    met: Counter[str] = Counter()
+    for seed in range(160):
+        loaded = random_instance(seed)
+        if loaded is None or (space := explored(loaded)) is None or len(space) > 3_000:
+            continue
+        variables = checked(loaded, space)
+        met["with variables" if variables else "without"] += 1
+        met["bounded"] += consistent(loaded, space, variables) > 1
+    assert met["with variables"] >= 20
+    assert met["without"] >= 5
+    assert met["bounded"] >= 10
+
+
+@pytest.mark.parametrize(
+    ("folder", "problem", "variables", "facts"),
+    [
+        ("grid", "corners-4x4", 2, 32),  # where each robot is
+        ("handover", "exchange", 4, 12),  # and who has a parcel
+        ("push-box", "around", 2, 8),  # not the box: two robots push it together
+    ],
+)
+def test_variables_of_domains(folder: str, problem: str, variables: int, facts: int) -> None:
+    loaded = load(DOMAINS / folder / "domain.pddl", [DOMAINS / folder / f"{problem}.pddl"])
+    space = explored(loaded)
+    assert space is not None
+    found = checked(loaded, space)
+    assert len(found) == variables
+    assert sum(len(variable.facts) for variable in found) == facts
+
+
+def test_labels_too_late_for_a_robots_own_variable_lead_nowhere_in_time() -> None:
+    loaded = load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "gw4-3x3.pddl"])
+    model, task = loaded.model, loaded.tasks[0]
+    space = explore(model, task.init[None, :])
+    variables = state_variables(model, task.init)
+    projections = Projections(model, task.goal, variables)
+    assert goal_facts(model, task.goal)
+    for left in range(5):
+
+        def only(rows, options, left=left):  # type: ignore[no-untyped-def]
+            return projections.in_time(rows, options, left)[0]
+
+        kept = model.successors(space.rows, only)
+        every = model.successors(space.rows)
+        late = projections.value(every.result) > left
+        assert len(kept) == int((~late).sum())
+        assert (kept.result == every.result[~late]).all()
+
+
+def test_a_state_table_numbers_each_state_once() -> None:
+    loaded = load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "gw4-3x3.pddl"])
+    space = explore(loaded.model, loaded.tasks[0].init[None, :])
+    variables = state_variables(loaded.model, loaded.tasks[0].init)
+    table = StateTable(Packing(loaded.model.codec, variables))
+    random = np.random.default_rng(3)
+    known: dict[bytes, int] = {}
+    for _ in range(40):
+        rows = space.rows[random.integers(0, len(space), 50)]
+        numbers, fresh = table.add(rows)
+        before = len(known)
+        for row, number in zip(rows, numbers.tolist(), strict=True):
+            assert known.setdefault(row.tobytes(), number) == number
+        assert fresh.sum() == len(known) - before
+        assert (table.rows(numbers) == rows).all()
+        assert len(table) == len(known)
+    assert sorted(known.values()) == list(range(len(table)))
+
+
+def test_many_states_collide_and_are_told_apart() -> None:
+    """More states than slots at the start: the table grows, and every state is found again."""
+    loaded = load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "corners-10x10.pddl"])
+    space = explore(loaded.model, loaded.tasks[0].init[None, :])
+    table = StateTable(Packing(loaded.model.codec, []))
+    first, fresh = table.add(space.rows)
+    assert fresh.all()
+    again, fresh = table.add(space.rows[::-1])
+    assert not fresh.any()
+    assert (again[::-1] == first).all()
+
+
+def test_a_state_without_a_value_is_refused() -> None:
+    loaded = load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "gw4-3x3.pddl"])
+    variables = state_variables(loaded.model, loaded.tasks[0].init)
+    packing = Packing(loaded.model.codec, variables)
+    nowhere = np.zeros((1, loaded.model.codec.width), np.uint64)
+    with pytest.raises(AssertionError, match="exactly one value"):
+        packing.packed(nowhere)
+
+
+def test_true_facts_of_rows() -> None:
+    random = np.random.default_rng(5)
+    rows = random.integers(0, 2**63, (50, 3)).astype(np.uint64) & random.integers(
+        0, 2**63, (50, 3)
+    ).astype(np.uint64)
+    rows[7] = 0
+    rows[9] = ~np.uint64(0)
+    found = TrueFacts.of(rows)
+    bits = np.unpackbits(
+        np.ascontiguousarray(rows, "<u8").view(np.uint8), axis=1, bitorder="little"
+    )
+    row, fact = np.nonzero(bits)
+    assert (found.row == row).all()
+    assert (found.fact == fact).all()
