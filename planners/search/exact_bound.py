@@ -9,15 +9,21 @@ models are only hints (states and costs come from the joint model); its refutati
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
 from planners.joint.model import JointModel, Options, PlanningTask
+from planners.search.cheapest import least_cost
 from planners.search.plan_formula import OutOfEffort, PlanFormula, TooManyClauses, countable
 from planners.search.state_variables import StateVariable
 from planners.tables import Bools, Ints, Rows
 
+#: Conflicts for the first tries to find the least cost.
+_FIRST, _SECOND = 50_000, 300_000
+#: What a makespan that is refuted at once costs for each of its steps, in conflicts.
+_EASY = 20
 #: The robots' labels, step by step.
 Plan = list[tuple[int, ...]]
 
@@ -66,38 +72,69 @@ def exact_bound(
     """
     try:
         formula = PlanFormula(model, task.goal, variables, effort)
-        makespan, plan = _shortest(formula, task, at_least)
-    except (TooManyClauses, OutOfEffort):
+    except TooManyClauses:
         return None
-    cost = None
-    if model.cost != "makespan" and countable(model):
-        try:
-            cost, plan = _cheapest(formula, task, plan)
-        except OutOfEffort:
-            cost = None
     try:
-        used = _used(formula, task, makespan, cost, plan)
+        return _bound(formula, task, at_least)
     except OutOfEffort:
-        used = [[np.ones(len(own), np.bool_) for own in model.labels]] * makespan
+        formula.close()
+        return None
+    except BaseException:
+        formula.close()
+        raise
+
+
+def _bound(formula: PlanFormula, task: PlanningTask, at_least: int) -> ExactBound:
+    makespan, plan = _shortest(formula, task, at_least)
+    cost = None
+    if formula.model.cost != "makespan" and countable(formula.model):
+        with suppress(OutOfEffort):
+            cost, plan = _cheapest(formula, task, plan)
     formula.without_limit()
-    return ExactBound(formula, makespan, cost, used)
+    return ExactBound(formula, makespan, cost, _used(formula, task, cost, plan))
 
 
 def _shortest(formula: PlanFormula, task: PlanningTask, at_least: int) -> tuple[int, Plan]:
     makespan = at_least
     while not formula.solvable(task.init, makespan):
+        formula.spend(_EASY * makespan)
         makespan += 1
     return makespan, formula.labels_chosen(makespan)
 
 
 def _cheapest(formula: PlanFormula, task: PlanningTask, plan: Plan) -> tuple[int, Plan]:
-    """Cheaper and cheaper plans until there is none."""
-    cost = _cost_of(formula, plan)
-    formula.count_costs(cost)
-    while cost and formula.solvable(task.init, len(plan), cost - 1):
-        plan = formula.labels_chosen(len(plan))
-        cost = _cost_of(formula, plan)
-    return cost, plan
+    """The least cost, and a plan that has it.
+
+    From above, and from below by cores: neither is always the faster one, so both are tried.
+    """
+    best = plan
+    formula.count_costs(_cost_of(formula, plan))
+
+    def from_above() -> Plan:
+        nonlocal best
+        while (cost := _cost_of(formula, best)) and formula.solvable(
+            task.init, len(best), cost - 1
+        ):
+            best = formula.labels_chosen(len(best))
+        return best
+
+    def from_below() -> Plan:
+        least_cost(formula, task, len(plan))
+        return formula.labels_chosen(len(plan))
+
+    ways = [(from_above, _FIRST), (from_below, _SECOND), (from_above, formula.left)]
+    if any(int(own.max(initial=0)) > 1 for own in formula.costs):
+        ways = ways[-1:]
+    for number, (way, effort) in enumerate(ways):
+        try:
+            with formula.at_most(effort):
+                cheapest = way()
+        except OutOfEffort:
+            if number == len(ways) - 1:
+                raise
+        else:
+            return _cost_of(formula, cheapest), cheapest
+    raise AssertionError("the last way ended or raised")
 
 
 def _cost_of(formula: PlanFormula, plan: Plan) -> int:
@@ -106,13 +143,10 @@ def _cost_of(formula: PlanFormula, plan: Plan) -> int:
 
 
 def _used(
-    formula: PlanFormula,
-    task: PlanningTask,
-    makespan: int,
-    cost: int | None,
-    plan: Plan,
+    formula: PlanFormula, task: PlanningTask, cost: int | None, plan: Plan
 ) -> list[list[Bools]]:
     """Which labels occur where in optimal plans: each that is found shows one a robot and step."""
+    makespan = len(plan)
     sizes = [len(own) for own in formula.model.labels]
     used = [[np.zeros(size, np.bool_) for size in sizes] for _ in range(makespan)]
 
@@ -123,10 +157,11 @@ def _used(
 
     enter(plan)
     for depth in range(makespan):
-        for robot, size in enumerate(sizes):
-            for label in range(size):
-                if not used[depth][robot][label]:
-                    wanted = formula.label(makespan - depth, robot, label)
-                    if formula.solvable(task.init, makespan, cost, [wanted]):
-                        enter(formula.labels_chosen(makespan))
+        for robot in range(len(sizes)):
+            while not (own := used[depth][robot]).all():
+                step = makespan - depth
+                others = [formula.label(step, robot, k) for k in np.flatnonzero(~own).tolist()]
+                if not formula.solvable(task.init, makespan, cost, [formula.some_of(others)]):
+                    break
+                enter(formula.labels_chosen(makespan))
     return used

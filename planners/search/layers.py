@@ -33,6 +33,11 @@ InTime = Callable[[Rows, Options, int], tuple[Options, int]]
 _NEVER = np.iinfo(np.int32).max
 #: In place of the layer of a state: no optimal plan passes through it.
 _LEFT_OUT = -1
+#: States expanded first; from the joint steps that they have the next numbers of states follow.
+_FIRST, _FIRST_PROBED = 500, 8
+#: Combinations of labels, for each joint step that is tried without exact bounds, that are not even
+#: composed.
+_TOO_MANY = 10
 #: How a round ended: the goal was met, or more joint steps were composed than are tried without
 #: exact bounds.
 _MET, _GROWN = -1, -2
@@ -83,6 +88,10 @@ class Layers:
     makespan: int = 0
     #: Joint steps composed, in all rounds.
     composed: int = 0
+
+
+class _GrownError(Exception):
+    """More joint steps than are composed without exact bounds."""
 
 
 class BoundedSearch:
@@ -157,10 +166,11 @@ class BoundedSearch:
         beyond = FAR
         while not self._model.holds(self._task.goal, self._last()).any():
             depth = len(layers.states)
-            edges, low = self._expand(layers.states[-1], depth)
-            beyond = min(beyond, low)
-            if self._probing and layers.composed > self._pieces.probe:
+            try:
+                edges, low = self._expand(layers.states[-1], depth)
+            except _GrownError:
                 return _GROWN
+            beyond = min(beyond, low)
             if self._exact is not None:
                 edges = self._on_optimal_plans(self._exact, edges, depth)
             new = np.flatnonzero(self._depth[: len(self.table)] == depth)
@@ -196,6 +206,16 @@ class BoundedSearch:
         self._depth[new[~good]] = _LEFT_OUT
         kept = good[number]
         return Edges(edges.source[kept], edges.target[kept], edges.labels[kept], edges.cost[kept])
+
+    @property
+    def asked_solver(self) -> bool:
+        """Whether exact bounds were found."""
+        return self._exact is not None
+
+    def close(self) -> None:
+        """Give the solver back."""
+        if self._exact is not None:
+            self._exact.formula.close()
 
     def edges_into(self, depth: int) -> Edges:
         """The joint steps into a layer of the last round, composed again."""
@@ -241,15 +261,21 @@ class BoundedSearch:
 
         def only(rows: Rows, options: Options) -> Options:
             nonlocal low
+            if self._probing and _combinations(options) > _TOO_MANY * self._pieces.probe:
+                raise _GrownError
             if self._exact is not None:
                 options = self._exact.only(depth - 1, rows, options)
             if self._guide.in_time is not None:
                 options, low = self._guide.in_time(rows, options, self.bound - depth)
             return options
 
-        start, size = 0, 500
+        start, size = 0, _FIRST_PROBED if self._probing else _FIRST
         most = max(1, min(self._pieces.steps, _BYTES // (8 * self._model.codec.width)))
+        if self._probing:
+            most = min(most, self._pieces.probe)
         while start < len(states):
+            if self._probing and self.layers.composed > self._pieces.probe:
+                raise _GrownError
             numbers = states[start : start + size]
             rows = self.table.rows(numbers)
             steps = self._model.successors(rows, only)
@@ -269,6 +295,14 @@ class BoundedSearch:
         new = np.flatnonzero(fresh)
         self._h[numbers[new]] = self._guide.bound(rows[new]) if self._guide.bound else 0
         return numbers
+
+
+def _combinations(options: Options) -> float:
+    """How many joint labels the robots' own choices have, in all states."""
+    counts = np.ones(len(options[0][0]) - 1)
+    for first, _ in options:
+        counts *= np.diff(first)
+    return float(counts.sum())
 
 
 def _joined(parts: Sequence[Edges], model: JointModel) -> Edges:

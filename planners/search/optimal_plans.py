@@ -7,6 +7,7 @@ The set ``Pi(I, G)`` of the paper, as the paths of a graph (Proposition 1 of doc
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -30,6 +31,29 @@ _FEW = 8
 _FAR = np.iinfo(np.int64).max // 4
 
 
+@dataclass(frozen=True, slots=True)
+class SearchEffort:
+    """What a search took: machine-independent work.
+
+    Attributes
+    ----------
+    heuristic
+        What it was bounded by, with ``+ SAT`` where a solver was asked.
+    rounds
+        How many bounds were tried.
+    states
+        The different states that were met; ``state_bytes`` is what the table of them takes.
+    steps
+        The joint steps that were composed, in all rounds.
+    """
+
+    heuristic: str
+    rounds: int
+    states: int
+    state_bytes: int
+    steps: int
+
+
 def search(
     model: JointModel, task: PlanningTask, pieces: PieceSizes = PIECES, heuristic: str = "auto"
 ) -> PlanSpace:
@@ -43,12 +67,25 @@ def search(
     ProvedImpossible
         If the goal cannot be reached.
     """
+    return search_with_effort(model, task, pieces, heuristic)[0]
+
+
+def search_with_effort(
+    model: JointModel, task: PlanningTask, pieces: PieceSizes = PIECES, heuristic: str = "auto"
+) -> tuple[PlanSpace, SearchEffort]:
+    """The plans as `search` finds them, and the work that it took."""
     variables = state_variables(model, task.init)
     guide = guide_for(heuristic, model, task, variables)
     forward = BoundedSearch(model, task, guide, variables, pieces)
-    with reaching(forward.so_far, "a task with a shorter plan, fewer objects or fewer robots"):
+    with (
+        closing(forward),
+        reaching(forward.so_far, "a task with a shorter plan, fewer objects or fewer robots"),
+    ):
         layers = forward.run()
-        return _backward(model, task, layers, forward)
+        found = _backward(model, task, layers, forward)
+    table = layers.table
+    name = f"{guide.name} + SAT" if forward.asked_solver else guide.name
+    return found, SearchEffort(name, forward.rounds, len(table), table.bytes, layers.composed)
 
 
 def _backward(

@@ -9,7 +9,9 @@ every state how many steps, and how much of the second cost component, lead from
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -30,8 +32,6 @@ from planners.tables import Ints, Rows
 SOLVER = "minisat22"
 #: Conflicts between two looks at the limits.
 _SLICE = 2_000
-#: What a question costs for each of its steps, in conflicts.
-_QUESTION = 20
 #: The largest cost of one action that is counted.
 _COST = 8
 
@@ -76,7 +76,8 @@ class PlanFormula:
         self, model: JointModel, goal: Goal, variables: Sequence[StateVariable], effort: int
     ) -> None:
         self.model = model
-        self._left: int | None = effort
+        #: The effort that is left.
+        self.left = effort
         self.costs = label_costs(model)
         self._template = _TemplateBuilder(model).build(variables)
         self._solver = sat_solver(SOLVER)
@@ -169,20 +170,62 @@ class PlanFormula:
         if cost is not None and cost < len(self._counted[steps]):
             assumptions.append(-self._counted[steps][cost])
         self.calls += 1
-        self._spend(_QUESTION * steps)
         while (answer := solve_slice(self._solver, _SLICE, assumptions)) is None:
-            self._spend(_SLICE)
+            self.spend(_SLICE)
         return answer
 
-    def _spend(self, effort: int) -> None:
-        if self._left is not None:
-            self._left -= effort
-            if self._left < 0:
-                raise OutOfEffort
+    def spend(self, effort: int) -> None:
+        """Take some of the effort away; raises `OutOfEffort` where it is used up."""
+        self.left -= effort
+        if self.left < 0:
+            raise OutOfEffort
 
     def without_limit(self) -> None:
         """Answer every question from now on, however long it takes."""
-        self._left = None
+        self.left = sys.maxsize
+
+    @contextmanager
+    def at_most(self, effort: int) -> Iterator[None]:
+        """Spend no more than this inside, of what is left."""
+        before = self.left
+        self.left = min(effort, before)
+        given = self.left
+        try:
+            yield
+        finally:
+            self.left = before - (given - self.left)
+
+    def core(self, literals: Iterable[int]) -> Literals:
+        """Of literals whose negations were assumed in the last question: those that refuted it."""
+        refuted = {-literal for literal in self._solver.get_core() or ()}
+        return sorted(refuted & set(literals))
+
+    def any_of(self, literals: Literals) -> int:
+        """A literal that is implied by each of these."""
+        implied = self._fresh()
+        for literal in literals:
+            self._solver.add_clause([-literal, implied])
+        return implied
+
+    def counter(self, literals: Literals) -> Literals:
+        """Literals, the k-th of which is implied where more than k of these hold: a totalizer."""
+        if len(literals) == 1:
+            return literals
+        half = len(literals) // 2
+        left, right = self.counter(literals[:half]), self.counter(literals[half:])
+        sums = [self._fresh() for _ in literals]
+        for k, literal in enumerate(sums):
+            for mine in range(max(0, k + 1 - len(right)), min(len(left), k + 1) + 1):
+                holding = [left[mine - 1]] if mine else []
+                holding += [right[k - mine]] if k + 1 - mine else []
+                self._solver.add_clause([*(-one for one in holding), literal])
+        return sums
+
+    def some_of(self, literals: Literals) -> int:
+        """A literal that says: one of these holds."""
+        asked = self._fresh()
+        self._solver.add_clause([-asked, *literals])
+        return asked
 
     def label(self, step: int, robot: int, label: int) -> int:
         """The variable of a robot's label in a step."""
