@@ -224,10 +224,12 @@ class BoundedSearch:
     def so_far(self) -> str:
         """How far it got, for messages."""
         states = self.layers.states
+        if not states:
+            return "no state"
+        within = f" with a bound of {self.bound}" if self.bound < FAR - 1 else ""
         return (
-            f"{sum(map(len, states)):,} states within {max(0, len(states) - 1)} steps of the "
-            f"initial state of {self._task.name}, {len(states[-1]) if states else 0:,} of them new "
-            "in the last step"
+            f"{sum(map(len, states)):,} states within {len(states) - 1} steps of the initial state "
+            f"of {self._task.name}{within}, {len(states[-1]):,} of them new in the last step"
         )
 
     def _last(self) -> Rows:

@@ -154,6 +154,7 @@ def test_build_for_given_problems(coordlang: Command, tmp_path: Path) -> None:
         "nodes": 15,
         "miscoordination": None,
         "lower_bound": None,
+        "proved_minimal": None,
         "reasons": None,
     }
 
