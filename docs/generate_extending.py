@@ -26,6 +26,7 @@ ROOMS = (
     "planners/grounding",
     "planners/joint",
     "planners/search",
+    "planners/cache",
     "planners/check",
     "planners/classical",
     "coordlang",

@@ -12,6 +12,12 @@ from tests.support.command import Command, Outcome
 from tests.support.domains import DOMAINS, Worlds, world_of
 
 
+@pytest.fixture(autouse=True)
+def _no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No test reads what another one, or this machine's user, has found: not in processes either."""
+    monkeypatch.setenv("COORDLANG_CACHE", "off")
+
+
 @pytest.fixture
 def coordlang(capfd: pytest.CaptureFixture[str]) -> Command:
     def call(*arguments: object) -> Outcome:

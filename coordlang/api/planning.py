@@ -20,12 +20,12 @@ from coordlang.api.layout import WIDTH, wrapped
 from coordlang.api.optimal_plans import OptimalPlans
 from coordlang.api.options import GivenOptions, ModelKeywords
 from coordlang.api.presenting import Presented
+from planners.cache import search
 from planners.inspection import Inspection
 from planners.inspection import inspect as inspect_instance
 from planners.loading import PlanningInstance
 from planners.notebook import counted, html_table
 from planners.pddl.pddl_text import domain_text, problem_text
-from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from planners.search.reachable import count as count_reachable
 from planners.writing import write_texts

@@ -27,6 +27,7 @@ from coordlang.cli.files import FILE, PlanningFiles, check_outputs, never_stdout
 from coordlang.cli.shared_options import (
     ModelKeywords,
     PiecesKeywords,
+    kept_plans,
     limits,
     model_options,
     pieces_options,
@@ -109,6 +110,7 @@ _FOR_CERTIFICATE = 0.25
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as one JSON object.")
 @pieces_options
 @model_options
+@kept_plans
 @limits
 def command(
     pddl: PlanningFiles,

@@ -24,7 +24,7 @@ from coordlang.cli.files import (
 )
 from coordlang.cli.group import RenamedOptions
 from coordlang.cli.listing import form_of
-from coordlang.cli.shared_options import ModelKeywords, limits, model_options
+from coordlang.cli.shared_options import ModelKeywords, kept_plans, limits, model_options
 from coordlang.cli.terminal import covered_code, line_width, working
 from planners.notebook import counted
 
@@ -86,6 +86,7 @@ _LEAST_ROOM = 30
     "-o", "--output", type=FILE, metavar="FILE", help="Write to this file instead of stdout."
 )
 @model_options
+@kept_plans
 @limits
 def command(
     language: str,

@@ -13,6 +13,7 @@ from coordlang.cli.files import PlanningFiles, planning_files
 from coordlang.cli.shared_options import (
     ModelKeywords,
     PiecesKeywords,
+    kept_plans,
     limits,
     model_options,
     pieces_options,
@@ -25,6 +26,7 @@ from coordlang.cli.terminal import line_width, note_single_robot, working
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
 @pieces_options
 @model_options
+@kept_plans
 @limits
 def command(
     pddl: PlanningFiles, as_json: bool, pieces: PiecesKeywords, model: ModelKeywords

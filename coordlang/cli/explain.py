@@ -12,7 +12,7 @@ import coordlang
 from coordlang.cli.echo import echo
 from coordlang.cli.files import PlanningFiles, language_argument, planning_files
 from coordlang.cli.group import RenamedOptions
-from coordlang.cli.shared_options import ModelKeywords, limits, model_options
+from coordlang.cli.shared_options import ModelKeywords, kept_plans, limits, model_options
 from coordlang.cli.terminal import covered_code, line_width, working
 from planners.errors import OutOfMemory
 
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 )
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
 @model_options
+@kept_plans
 @limits
 def command(
     language: str,

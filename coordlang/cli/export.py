@@ -21,7 +21,7 @@ from coordlang.cli.files import (
     write,
 )
 from coordlang.cli.group import RenamedOptions
-from coordlang.cli.shared_options import ModelKeywords, limits, model_options, was_given
+from coordlang.cli.shared_options import ModelKeywords, kept_plans, limits, model_options, was_given
 from coordlang.cli.terminal import covered_code, working
 from planners.messages import visible
 from planners.notebook import counted
@@ -75,6 +75,7 @@ _RENAMED = {"--limit": "--max-actions", "--back": "--translate-plan"}
 )
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
 @model_options
+@kept_plans
 @limits
 def command(
     language: str,

@@ -14,7 +14,7 @@ from coordlang.cli.echo import echo
 from coordlang.cli.files import PlanningFiles, language_argument, planning_files
 from coordlang.cli.group import RenamedOptions
 from coordlang.cli.listing import form_of
-from coordlang.cli.shared_options import ModelKeywords, limits, model_options
+from coordlang.cli.shared_options import ModelKeywords, kept_plans, limits, model_options
 from coordlang.cli.terminal import covered_code, working
 from planners.notebook import counted
 
@@ -49,6 +49,7 @@ if TYPE_CHECKING:
 )
 @click.option("--json", "as_json", is_flag=True, help="Short for --format json.")
 @model_options
+@kept_plans
 @limits
 def command(
     language: str,

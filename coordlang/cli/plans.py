@@ -11,7 +11,7 @@ import coordlang
 from coordlang.cli.echo import echo
 from coordlang.cli.files import PlanningFiles, planning_files
 from coordlang.cli.listing import Listing, form_of, listing_options
-from coordlang.cli.shared_options import ModelKeywords, limits, model_options
+from coordlang.cli.shared_options import ModelKeywords, kept_plans, limits, model_options
 from coordlang.cli.terminal import note_single_robot, working
 
 
@@ -23,6 +23,7 @@ from coordlang.cli.terminal import note_single_robot, working
 @click.option("--json", "as_json", is_flag=True, help="Short for --format json.")
 @model_options
 @planning_files("DOMAIN PROBLEM", most=1)
+@kept_plans
 @limits
 def command(
     only_count: bool,

@@ -16,7 +16,7 @@ from coordlang.cli.files import (
     language_argument,
     planning_files,
 )
-from coordlang.cli.shared_options import ModelKeywords, limits, model_options
+from coordlang.cli.shared_options import ModelKeywords, kept_plans, limits, model_options
 from coordlang.cli.terminal import working
 from planners.messages import visible
 from planners.notebook import counted
@@ -54,6 +54,7 @@ if TYPE_CHECKING:
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Draws the tasks.")
 @model_options
+@kept_plans
 @limits
 def command(
     language: str,

@@ -10,7 +10,7 @@ import click
 import coordlang
 from coordlang.cli.echo import echo
 from coordlang.cli.files import PlanningFiles, language_argument, planning_files
-from coordlang.cli.shared_options import ModelKeywords, limits, model_options
+from coordlang.cli.shared_options import ModelKeywords, kept_plans, limits, model_options
 from coordlang.cli.terminal import covered_code, working
 
 
@@ -19,6 +19,7 @@ from coordlang.cli.terminal import covered_code, working
 @planning_files("DOMAIN PROBLEM PLAN", most=1, then="plan")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
 @model_options
+@kept_plans
 @limits
 def command(
     language: str, pddl: PlanningFiles, plan: str, as_json: bool, model: ModelKeywords

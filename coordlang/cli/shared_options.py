@@ -91,6 +91,23 @@ def model_options(function: CommandFunction) -> CommandFunction:
     return wrapped
 
 
+def kept_plans(function: CommandFunction) -> CommandFunction:
+    """``--no-cache``; the command searches no task again that it finds in the user's cache."""
+
+    @click.option(
+        "--no-cache", is_flag=True, help="Search anew: read no plans that were found before."
+    )
+    @functools.wraps(function)
+    def wrapped(no_cache: bool, **arguments: object) -> int | None:
+        from planners.cache import Folder, default_folder, keeping_plans
+
+        place = None if no_cache else default_folder()
+        with keeping_plans(None if place is None else Folder(place)):
+            return function(**arguments)
+
+    return wrapped
+
+
 def pieces_options(function: CommandFunction) -> CommandFunction:
     """``--jobs``, ``--scheduler`` and ``--resume``; the command gets them as ``pieces``."""
 
@@ -170,6 +187,7 @@ __all__ = [
     "CommandFunction",
     "ModelKeywords",
     "PiecesKeywords",
+    "kept_plans",
     "limits",
     "model_options",
     "note",

@@ -19,7 +19,7 @@ from coordlang.cli.files import (
     write,
 )
 from coordlang.cli.listing import Listing, form_of, listing_options
-from coordlang.cli.shared_options import ModelKeywords, limits, model_options
+from coordlang.cli.shared_options import ModelKeywords, kept_plans, limits, model_options
 from coordlang.cli.terminal import covered_code, working
 
 if TYPE_CHECKING:
@@ -52,6 +52,7 @@ _DRAWN = ("dot", "svg")
     "-o", "--output", type=FILE, metavar="FILE", help="Write to this file instead of stdout."
 )
 @model_options
+@kept_plans
 @limits
 def command(
     language: str,

@@ -23,6 +23,7 @@ from coordlang.cli.group import RenamedOptions
 from coordlang.cli.shared_options import (
     ModelKeywords,
     PiecesKeywords,
+    kept_plans,
     limits,
     model_options,
     pieces_options,
@@ -59,6 +60,7 @@ if TYPE_CHECKING:
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
 @pieces_options
 @model_options
+@kept_plans
 @limits
 def command(
     language: str,

@@ -32,11 +32,11 @@ from coordlang.required.miscoordination import (
 from coordlang.required.partings import minimal
 from coordlang.symmetry.goals import SymmetricGoals, symmetric_goals
 from coordlang.tasks.candidates import Candidates
+from planners.cache import Folder, keeping_plans, search, shared_folder
 from planners.joint.model import JointModel, PlanningTask
 from planners.limits import reaching
 from planners.loading import PlanningInstance
 from planners.pieces.work import Runner, Table, Work, digest, tables
-from planners.search.optimal_plans import search
 from planners.search.plans import counts
 from planners.search.portions import PORTION, Explored, Source, cut
 from planners.tables import Ints
@@ -158,15 +158,16 @@ def answers(loaded: PlanningInstance, runner: Runner) -> list[TaskAnswer]:
     numbers = range(len(tasks))
     hashes = (loaded.domain.source.sha256, *(p.source.sha256 for p in loaded.problems))
     identity = digest(*hashes, repr(loaded.options))
-    shared = (model, tasks)
+    shared = (model, tasks, shared_folder())
     work = Work("coordination", _answer, shared, numbers, identity, [effort for _ in numbers])
     return [_read_answer(table) for table in tables(runner.run(work))]
 
 
-def _answer(shared: tuple[JointModel, Sequence[PlanningTask]], number: int) -> Table:
+def _answer(shared: tuple[JointModel, Sequence[PlanningTask], Folder | None], number: int) -> Table:
     """One piece: a task."""
-    model, tasks = shared
-    space = search(model, tasks[number])
+    model, tasks, folder = shared
+    with keeping_plans(folder):
+        space = search(model, tasks[number])
     witness = miscoordination(space, 0)
     return {
         "makespan": np.array(space.cost_of(0)[0]),

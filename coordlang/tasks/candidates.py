@@ -11,17 +11,12 @@ from typing import Literal
 import numpy as np
 
 from coordlang.tasks.listed import ListedTask, goal_text, listed_task, model_of_listed
+from planners.cache import search, search_each
 from planners.errors import BadInput, Position, ProvedImpossible
 from planners.joint.model import NO_FACT, FullState, Goal, JointModel, PlanningTask
 from planners.loading import ModelOptions, PlanningInstance, build
 from planners.pddl.lifted import Domain, Problem
-from planners.search.optimal_plans import (
-    joined,
-    plan_spaces,
-    search,
-    search_each,
-    solvable,
-)
+from planners.search.optimal_plans import joined, plan_spaces, solvable
 from planners.search.plan_space import PlanSpace
 from planners.search.portions import Explored, PlanSpaces, Searched, Source
 from planners.search.reachable import explore

@@ -27,6 +27,7 @@ SHARED = {
     "factored files": "Factored files",
     "model options": "Model options",
     "cores and machines": "Cores and machines",
+    "plans that are kept": "Plans that are kept",
     "limits": "Limits",
 }
 

@@ -15,13 +15,13 @@ from coordlang.language.words import Language
 from coordlang.tasks.candidates import Candidates, describe
 from coordlang.tasks.listed import ListedTask, model_of_listed
 from coordlang.use.sentence.fitting_plans import plans_with_sentence
+from planners.cache import search
 from planners.errors import BadInput, Position
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask
 from planners.loading import ModelOptions
 from planners.messages import echoed
 from planners.pddl.formula_tree import conjuncts
 from planners.pddl.lifted import Domain, Problem
-from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.tables import Ints
 

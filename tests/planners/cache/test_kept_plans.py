@@ -1,0 +1,355 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Plans that are kept are the plans that are found, whatever happens to the folder."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import fields
+from itertools import pairwise
+from pathlib import Path
+from types import SimpleNamespace
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from planners.cache import Folder, default_folder, keeping_plans, search, searching, shared_folder
+from planners.cache.plan_spaces import as_table, key_of, model_digest, plan_space
+from planners.errors import BadInput, Note, ProvedImpossible
+from planners.joint.model import Cost, PlanningTask
+from planners.loading import ModelOptions, PlanningInstance, build
+from planners.pddl import parse_domain, parse_problem
+from planners.pddl.robots import RobotSelection
+from planners.pddl.sexpr import Source
+from planners.pieces.kept import as_bytes
+from planners.pieces.work import Table
+from planners.search import optimal_plans
+from planners.search.plan_space import PlanSpace
+from tests.support.domains import DOMAINS
+from tests.support.random_pddl import KINDS, random_model
+
+GRID = (DOMAINS / "grid" / "domain.pddl").read_text()
+PROBLEM = (DOMAINS / "grid" / "gw4-3x3.pddl").read_text()
+
+
+def loaded(
+    domain: str = GRID, problem: str = PROBLEM, options: ModelOptions | None = None
+) -> PlanningInstance:
+    lifted = parse_domain(Source("d", domain))
+    return build(lifted, [parse_problem(Source("p", problem), lifted)], options)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Folder:
+    return Folder(tmp_path / "cache")
+
+
+@pytest.fixture
+def searches(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The names of the tasks that were really searched."""
+    done: list[str] = []
+    original = optimal_plans.search
+
+    def counting(model, task, *rest):  # type: ignore[no-untyped-def]
+        done.append(task.name)
+        return original(model, task, *rest)
+
+    monkeypatch.setattr(searching, "optimal_plans", SimpleNamespace(search=counting))
+    return done
+
+
+def entries(folder: Folder) -> list[Path]:
+    return sorted(path for path in folder.path.rglob("*") if path.is_file())
+
+
+def same(one: PlanSpace, other: PlanSpace) -> bool:
+    """All fields, and the types of arrays."""
+    for field in fields(PlanSpace):
+        mine, theirs = getattr(one, field.name), getattr(other, field.name)
+        if isinstance(mine, np.ndarray):
+            if mine.dtype != theirs.dtype or not np.array_equal(mine, theirs):
+                return False
+        elif field.name != "model" and mine != theirs:
+            return False
+    return True
+
+
+def test_nothing_is_kept_unasked(folder: Folder, searches: list[str]) -> None:
+    world = loaded()
+    search(world.model, world.tasks[0])
+    assert shared_folder() is None
+    with keeping_plans(folder):
+        assert shared_folder() is folder
+        with keeping_plans(None):
+            search(world.model, world.tasks[0])
+    assert (len(searches), entries(folder)) == (2, [])
+
+
+def test_a_task_is_searched_once(folder: Folder, searches: list[str]) -> None:
+    first = loaded()
+    with keeping_plans(folder):
+        found = search(first.model, first.tasks[0])
+    again = loaded(GRID + "; a comment", PROBLEM.replace("gw4-3x3", "other"))
+    with keeping_plans(folder):
+        read = search(again.model, again.tasks[0])
+    assert len(searches) == 1
+    assert read.model is again.model
+    assert same(found, read)
+
+
+def test_random_models_come_back_as_they_were(folder: Folder, searches: list[str]) -> None:
+    kept = 0
+    for seed in range(30):
+        text = random_model(seed, KINDS[seed % 3])
+        for cost in get_args(Cost):
+            robots = RobotSelection(unowned=text.unowned)
+            world = loaded(text.domain, text.problem, ModelOptions(robots=robots, cost=cost))
+            with keeping_plans(folder):
+                try:
+                    found = search(world.model, world.tasks[0])
+                except (ProvedImpossible, BadInput):
+                    continue
+                before = len(searches)
+                assert same(found, search(world.model, world.tasks[0]))
+            assert len(searches) == before
+            kept += 1
+    assert kept > 10
+
+
+def test_what_changes_plans_changes_the_key() -> None:
+    worlds = [
+        loaded(),
+        loaded(options=ModelOptions(cost="makespan+actions")),
+        loaded(options=ModelOptions(remember_actions=True)),
+        loaded(options=ModelOptions(idle=("r1",))),
+        loaded(problem=PROBLEM.replace("(adjacent c0-0 c0-1)", "")),
+        loaded(problem=PROBLEM.replace("(:goal (and (at r1 c2-2)", "(:goal (and (at r1 c2-1)")),
+        loaded(problem=PROBLEM.replace("(at r1 c0-0)", "(at r1 c0-1)", 1)),
+        loaded(GRID.replace("(not (move ?o ?to ?from))", "(not (move ?r ?to ?from))")),
+        loaded(GRID.replace("(at ?r ?to)))", "(at ?r ?to) (when (at ?r ?to) (at ?r ?from))))")),
+    ]
+    keys = [key_of(model_digest(world.model), world.tasks[0]) for world in worlds]
+    assert len(set(keys)) == len(worlds)
+    again = loaded()
+    assert key_of(model_digest(again.model), again.tasks[0]) == keys[0]
+    state = PlanningTask("t", again.tasks[0].init, again.model.full_state(again.tasks[0].init))
+    assert key_of(model_digest(again.model), state) not in keys
+
+
+def damages(data: bytes) -> Iterator[bytes]:
+    yield from (data[:length] for length in np.linspace(0, len(data) - 1, 20).astype(int).tolist())
+    for position in np.linspace(0, len(data) - 1, 20).astype(int).tolist():
+        yield data[:position] + bytes([data[position] ^ 1]) + data[position + 1 :]
+
+
+def test_a_damaged_entry_is_ignored_said_and_replaced(folder: Folder, searches: list[str]) -> None:
+    world = loaded()
+    with keeping_plans(folder):
+        found = search(world.model, world.tasks[0])
+        (path,) = entries(folder)
+        whole = path.read_bytes()
+        for number, data in enumerate(damages(whole), 1):
+            path.write_bytes(data)
+            with pytest.warns(Note, match="damaged: it is ignored, and the task is searched again"):
+                assert same(found, search(world.model, world.tasks[0]))
+            assert len(searches) == 1 + number
+            assert path.read_bytes() == whole
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            search(world.model, world.tasks[0])
+
+
+def test_an_entry_of_another_task_is_ignored(folder: Folder, searches: list[str]) -> None:
+    world = loaded()
+    other = loaded(problem=PROBLEM.replace("(at r1 c0-0)", "(at r1 c0-1)", 1))
+    with keeping_plans(folder):
+        found = search(world.model, world.tasks[0])
+        (path,) = entries(folder)
+        search(other.model, other.tasks[0])
+        (foreign,) = set(entries(folder)) - {path}
+        shutil.copy(foreign, path)
+        with pytest.warns(Note, match="is not of this task"):
+            assert same(found, search(world.model, world.tasks[0]))
+    assert len(searches) == 3
+
+
+def changed(name: str, change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Table], Table]:
+    return lambda table: {**table, name: change(table[name].copy())}
+
+
+def at(position: int, value: int) -> Callable[[np.ndarray], np.ndarray]:
+    def change(array: np.ndarray) -> np.ndarray:
+        array[position] = value
+        return array
+
+    return change
+
+
+def one_edge_less(table: Table) -> Table:
+    """Without the last edge of all: its source, the start, keeps others."""
+    first = table["first"].copy()
+    first[-1] -= 1
+    return {
+        **table,
+        "first": first,
+        **{name: table[name][:-1] for name in ("target", "labels", "cost")},
+    }
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        changed("state", at(0, -1)),
+        changed("state", at(1, 10**6)),
+        changed("state", lambda array: array[:-1]),
+        changed("state", lambda array: array.astype(np.int32)),
+        changed("rows", lambda array: array[::-1]),
+        changed("rows", lambda array: array[:, :0]),
+        changed("layer", at(0, 1)),
+        changed("first", at(-1, 0)),
+        changed("target", at(-1, 0)),
+        changed("target", at(0, 10**9)),
+        changed("labels", at(-1, 10**6)),
+        changed("labels", lambda array: array[::-1]),
+        changed("cost", at(-1, 7)),
+        changed("second", at(0, 3)),
+        changed("starts", at(0, 0)),
+        one_edge_less,
+        lambda table: {k: v for k, v in table.items() if k != "cost"},
+        lambda table: {**table, "more": table["cost"]},
+    ],
+)
+def test_what_cannot_be_of_the_task_is_not_believed(change: Callable[[Table], Table]) -> None:
+    world = loaded(options=ModelOptions(cost="makespan+actions"))
+    task = world.tasks[0]
+    table = as_table(optimal_plans.search(world.model, task))
+    assert plan_space(table, world.model, task) is not None
+    assert plan_space(change(table), world.model, task) is None
+
+
+def test_plans_that_are_none_in_the_model_are_not_believed() -> None:
+    """A right graph, with two robots that swap labels: only the model can tell."""
+    world = loaded()
+    task = world.tasks[0]
+    table = as_table(optimal_plans.search(world.model, task))
+    labels = table["labels"][:, ::-1]
+    first = table["first"]
+    order = np.concatenate(
+        [low + np.lexsort(labels[low:high].T[::-1]) for low, high in pairwise(first)]
+    ).astype(np.int64)
+    swapped = {**table, "labels": labels[order], "target": table["target"][order]}
+    assert plan_space(swapped, world.model, task) is None
+
+
+def test_the_oldest_entries_go(tmp_path: Path) -> None:
+    table = {"numbers": np.arange(1000)}
+    size = len(as_bytes(table))
+    folder = Folder(tmp_path / "cache", most_bytes=5 * size)
+    for number in range(5):
+        folder.write(f"k{number}", table)
+        os.utime(folder._path(f"k{number}"), (number, number))
+    other = tmp_path / "cache" / "plans-0" / "old"
+    other.parent.mkdir()
+    other.write_bytes(b"x" * size)
+    os.utime(other, (-1, -1))
+    for name, seconds in ((".k9.killed", 0.0), (".k9.writing", time.time())):
+        (tmp_path / "cache" / "plans-1" / name).write_bytes(b"x")
+        os.utime(tmp_path / "cache" / "plans-1" / name, (seconds, seconds))
+    assert folder.read("k0") is not None  # and is the newest now
+    folder.write("k5", table)
+    assert sorted(path.name for path in entries(folder)) == [
+        ".k9.writing",
+        *("k0", "k2", "k3", "k4", "k5"),
+    ]
+    folder.write("large", {"numbers": np.arange(10_000)})
+    assert len(entries(folder)) == 6
+
+
+@pytest.mark.parametrize("call", ["fsync", "replace"])
+def test_a_full_disk_is_said(
+    call: str, folder: Folder, searches: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    world = loaded()
+    with monkeypatch.context() as patched, keeping_plans(folder):
+        patched.setattr(f"planners.writing.os.{call}", full)
+        with pytest.warns(Note, match="not kept: .*No space left"):
+            search(world.model, world.tasks[0])
+    assert (len(searches), entries(folder)) == (1, [])
+
+
+def test_a_folder_that_cannot_be_written_to(tmp_path: Path, searches: list[str]) -> None:
+    (tmp_path / "file").write_text("")
+    world = loaded()
+    for place in (tmp_path / "file", tmp_path / "file" / "below"):
+        with keeping_plans(Folder(place)), pytest.warns(Note, match="not kept"):
+            search(world.model, world.tasks[0])
+    assert len(searches) == 2
+
+
+def test_a_folder_that_is_only_read(
+    folder: Folder, searches: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is there is read, and what is new is not kept (an administrator may write anywhere)."""
+    world = loaded()
+
+    def refused(*_: object, **__: object) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    with keeping_plans(folder):
+        search(world.model, world.tasks[0])
+        for name in ("utime", "unlink", "open", "replace"):
+            monkeypatch.setattr(f"planners.cache.folder.os.{name}", refused)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            search(world.model, world.tasks[0])
+        assert len(searches) == 1
+        other = loaded(options=ModelOptions(cost="makespan+actions"))
+        with pytest.warns(Note, match="not kept: .*Read-only"):
+            search(other.model, other.tasks[0])
+        entries(folder)[0].write_bytes(b"")
+        with pytest.warns(Note, match="damaged"), pytest.warns(Note, match="not kept"):
+            search(world.model, world.tasks[0])
+    assert len(searches) == 3
+
+
+def test_many_at_once(tmp_path: Path) -> None:
+    """Each reader gets a whole entry of its key, or none, while others write it and let it go."""
+    tables = {f"k{number}": {"n": np.full(500 + number, number)} for number in range(10)}
+    folder = Folder(tmp_path, most_bytes=6 * len(as_bytes(tables["k0"])))
+
+    def work(worker: int) -> int:
+        read = 0
+        for turn in range(50):
+            key = f"k{(worker * 7 + turn) % 10}"
+            folder.write(key, tables[key])
+            found = folder.read(f"k{turn % 10}")
+            if found is not None:
+                assert np.array_equal(found["n"], tables[f"k{turn % 10}"]["n"])
+                read += 1
+        return read
+
+    with warnings.catch_warnings(), ThreadPoolExecutor(6) as pool:
+        warnings.simplefilter("error")
+        assert sum(pool.map(work, range(6))) > 20
+    assert all(path.name in tables for path in entries(folder))
+
+
+def test_where_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert default_folder({}) == tmp_path / ".cache" / "coordlang"
+    assert default_folder({"XDG_CACHE_HOME": "relative"}) == tmp_path / ".cache" / "coordlang"
+    assert default_folder({"XDG_CACHE_HOME": f"{tmp_path}/xdg"}) == tmp_path / "xdg" / "coordlang"
+    assert default_folder({"XDG_CACHE_HOME": f"{tmp_path}/no/xdg"}) is None
+    assert default_folder({"COORDLANG_CACHE": "here"}) == Path("here")
+    assert default_folder({"COORDLANG_CACHE": "OFF", "XDG_CACHE_HOME": str(tmp_path)}) is None
+    monkeypatch.setenv("HOME", str(tmp_path / "missing"))
+    assert default_folder({}) is None
