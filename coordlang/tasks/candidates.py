@@ -11,8 +11,10 @@ from typing import Literal
 import numpy as np
 
 from coordlang.tasks.listed import ListedTask, goal_text, listed_task, model_of_listed
+from coordlang.tasks.reached import MOST_STATES, explored_if_small, surely_unreachable, unchecked
+from coordlang.tasks.shared_search import SharedSearch
 from planners.cache import search, search_each
-from planners.errors import BadInput, Position, ProvedImpossible
+from planners.errors import BadInput, Position, ProvedImpossible, note
 from planners.joint.model import NO_FACT, FullState, Goal, JointModel, PlanningTask
 from planners.loading import ModelOptions, PlanningInstance, build
 from planners.pddl.lifted import Domain, Problem
@@ -20,7 +22,7 @@ from planners.search.optimal_plans import joined, plan_spaces, solvable
 from planners.search.plan_space import PlanSpace
 from planners.search.portions import Explored, PlanSpaces, Searched, Source
 from planners.search.reachable import explore
-from planners.tables import Rows, find_rows, unique_rows
+from planners.tables import Ints, Rows, find_rows, unique_rows
 
 Kind = Literal["problems", "all", "file"]
 
@@ -146,6 +148,9 @@ def from_listed(
 ) -> Candidates:
     """The tasks of a task file; everything static comes from the problem.
 
+    A small space is explored once for all of them; in a large one each task is searched by itself,
+    and of its initial state only state variables are checked (a note says what is not).
+
     Raises
     ------
     ProvedImpossible
@@ -160,9 +165,12 @@ def from_listed(
         )
     loaded, tasks = model_of_listed(domain, problems, listed, options, position)
     model = loaded.model
-    space = explore(model, np.stack([task.init for task in loaded.tasks]))
+    space = explored_if_small(model, np.stack([task.init for task in loaded.tasks]))
+    if space is None:
+        return _one_by_one(loaded, problems[0], listed, tasks, position, skip_unsolvable)
     reached, _ = unique_rows(model.codec.facts_part(space.rows))
-    _require_reached(model, tasks, reached, problems[0], position)
+    inits = model.codec.facts_part(np.stack([task.init for task in tasks]))
+    _refuse(model, tasks, np.flatnonzero(find_rows(reached, inits) < 0), problems[0], position)
     by_goal = _by_goal(tasks)
     if model.remembers:  # a task starts with no action to remember: those are states of their own
         space = explore(model, np.concatenate([inits for _, inits in by_goal]))
@@ -180,27 +188,24 @@ def from_listed(
         spaces = tuple(plan_spaces(space, kept or by_goal))
     except ProvedImpossible as error:
         number = _served(tasks, solvable(space, by_goal)).index(False)
-        raise ProvedImpossible(
-            f"task {number + 1}: the goal {_goal_text(listed[number])} cannot be reached from "
-            f"{_init_text(listed[number])}",
-            position=position,
-            remedy=error.remedy,
-        ) from None
+        raise _unsolvable(number + 1, listed[number], position, error) from None
     source = Explored(space, kept or by_goal)
     return Candidates("file", loaded, tuple(listed), spaces, source, len(reached), skipped)
 
 
-def _require_reached(
+def _refuse(
     model: JointModel,
     tasks: Sequence[PlanningTask],
-    reached: Rows,
+    unreachable: Sequence[int] | Ints,
     problem: Problem,
     position: Position | None,
 ) -> None:
-    inits = model.codec.facts_part(np.stack([task.init for task in tasks]))
-    unknown = np.flatnonzero(find_rows(reached, inits) < 0)
-    if len(unknown):
-        number = int(unknown[0])
+    """Raise `BadInput` for the first of the tasks whose start cannot be reached, if there is one.
+
+    Such a state is taken for a mistake.
+    """
+    if len(unreachable):
+        number = int(unreachable[0])
         raise BadInput(
             f"task {number + 1}: the state {model.state_text(tasks[number].init)} cannot be "
             "reached "
@@ -208,6 +213,53 @@ def _require_reached(
             position=position,
             remedy="Is a fluent missing or one too many?  List all fluents that are true.",
         )
+
+
+def _one_by_one(
+    loaded: PlanningInstance,
+    problem: Problem,
+    listed: Sequence[ListedTask],
+    tasks: Sequence[PlanningTask],
+    position: Position | None,
+    skip_unsolvable: bool,
+) -> Candidates:
+    """Listed tasks in a large space, each searched by itself, see `from_listed`."""
+    model = loaded.model
+    starts = [task.init for task in loaded.tasks]
+    inits = np.stack([task.init for task in tasks])
+    _refuse(model, tasks, surely_unreachable(model, starts, inits), problem, position)
+    if unknown := unchecked(starts, inits):
+        note(
+            f"{len(unknown):,} of {len(tasks):,} tasks start elsewhere than the problem, which has "
+            f"more than {MOST_STATES:,} states or many joint steps: that it reaches these states "
+            "is not checked",
+            position=position,
+        )
+    known = SharedSearch(model)
+    spaces: list[PlanSpace] = []
+    kept: list[ListedTask] = []
+    skipped: list[str] = []
+    for number, (text, task) in enumerate(zip(listed, tasks, strict=True), 1):
+        try:
+            spaces.append(known.search(task))
+        except ProvedImpossible as error:
+            if not skip_unsolvable or len(skipped) == len(tasks) - 1:
+                raise _unsolvable(number, text, position, error) from None
+            skipped.append(f"task {number} ({_init_text(text)} -> {_goal_text(text)})")
+            continue
+        kept.append(text)
+    plans = joined(spaces)
+    return Candidates("file", loaded, tuple(kept), (plans,), Searched(plans), None, tuple(skipped))
+
+
+def _unsolvable(
+    number: int, task: ListedTask, position: Position | None, error: ProvedImpossible
+) -> ProvedImpossible:
+    return ProvedImpossible(
+        f"task {number}: the goal {_goal_text(task)} cannot be reached from {_init_text(task)}",
+        position=position,
+        remedy=error.remedy,
+    )
 
 
 def _by_goal(tasks: Sequence[PlanningTask]) -> list[tuple[Goal, Rows]]:
