@@ -13,7 +13,7 @@ import numpy as np
 from planners.errors import OutOfMemory
 from planners.grounding import GroundAction
 from planners.joint.conditions import Evaluator, Labels, speaks_of_step
-from planners.joint.interference import compatible, conflict
+from planners.joint.interference import Choices, compatible, conflict
 from planners.joint.model import Cost, Options, Steps
 from planners.joint.operators import Operators
 from planners.joint.states import StateCodec
@@ -62,8 +62,9 @@ class ComposingStepper:
         self._codec, self._evaluator, self._robots = codec, evaluator, tuple(robots)
         self._keeps_idle = tuple(keeps_idle)
         self.labelled: list[list[GroundAction | None]] = [[None, *own] for own in subactions]
+        known = [Choices(own) for own in self.labelled]
         self.tables = {
-            (i, j): compatible(self.labelled[i], self.labelled[j], i, j)
+            (i, j): compatible(known[i], known[j], i, j)
             for j in range(len(robots))
             for i in range(j)
         }

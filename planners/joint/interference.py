@@ -151,14 +151,7 @@ class Choices:
         return self._labels[field]
 
 
-def compatible(
-    left: Sequence[GroundAction | None], right: Sequence[GroundAction | None], i: int, j: int
-) -> NDArray[np.bool_]:
-    """As `compatible_choices`, for labels that are not looked up yet."""
-    return compatible_choices(Choices(left), Choices(right), i, j)
-
-
-def compatible_choices(left: Choices, right: Choices, i: int, j: int) -> NDArray[np.bool_]:
+def compatible(left: Choices, right: Choices, i: int, j: int) -> NDArray[np.bool_]:
     """Which labels of robots ``i`` (rows) and ``j`` (columns) may share a step, as a table.
 
     A shared subaction of both goes only with itself; one that only names other robots goes with
