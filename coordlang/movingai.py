@@ -129,7 +129,9 @@ def planning_files(map_file: Path, scenario: Path, agents: int) -> dict[str, str
         Fewer than one robot.
     """
     if agents < 1:
-        raise UsageError(f"--agents {agents}: at least one robot is needed")
+        raise UsageError(
+            f"--agents {agents}: at least one robot is needed", remedy="Use --agents 2 or more."
+        )
     grid = read_map(map_file)
     found = read_agents(scenario, grid, agents)
     stem = scenario.name.removesuffix(".scen")

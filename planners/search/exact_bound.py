@@ -20,6 +20,9 @@ from planners.search.plan_formula import OutOfEffort, PlanFormula, TooManyClause
 from planners.search.state_variables import StateVariable
 from planners.tables import Bools, Ints, Rows
 
+#: States that are asked for to see whether exact bounds pay, and the share on optimal plans above
+#: which they do not.
+_SAMPLE, _MOST = 50, 0.5
 #: Conflicts for the first tries to find the least cost.
 _FIRST, _SECOND = 50_000, 300_000
 #: What a makespan that is refuted at once costs for each of its steps, in conflicts.
@@ -64,18 +67,25 @@ def exact_bound(
     variables: Sequence[StateVariable],
     at_least: int,
     effort: int,
+    some: tuple[Rows, int],
 ) -> ExactBound | None:
-    """The bound of a task; None where it is not found with the effort that is spent on it.
+    """The bound of a task; None where it is not found with the effort that is spent, or not needed.
 
     ``at_least`` is a lower bound on the makespan, ``effort`` are the solver's conflicts to be
-    spent.  Of a task without plan none is found.
+    spent.  Of a task without plan none is found.  ``some`` are states that a search met within the
+    bound ``at_least``, and how many steps they are from the start: if the bound is the makespan,
+    costs do not count, and optimal plans pass through most of them, the search does as well alone.
     """
     try:
         formula = PlanFormula(model, task.goal, variables, effort)
     except TooManyClauses:
         return None
     try:
-        return _bound(formula, task, at_least)
+        makespan, plan = _shortest(formula, task, at_least)
+        if model.cost == "makespan" and makespan == at_least and _mostly_pass(formula, plan, some):
+            formula.close()
+            return None
+        return _bound(formula, task, plan)
     except OutOfEffort:
         formula.close()
         return None
@@ -84,14 +94,21 @@ def exact_bound(
         raise
 
 
-def _bound(formula: PlanFormula, task: PlanningTask, at_least: int) -> ExactBound:
-    makespan, plan = _shortest(formula, task, at_least)
+def _mostly_pass(formula: PlanFormula, plan: Plan, some: tuple[Rows, int]) -> bool:
+    """Whether optimal plans pass through most of some states."""
+    rows, depth = some
+    sample = rows[:: -(-len(rows) // _SAMPLE)]
+    passing = sum(formula.solvable(row, len(plan) - depth) for row in sample)
+    return passing > _MOST * len(sample)
+
+
+def _bound(formula: PlanFormula, task: PlanningTask, plan: Plan) -> ExactBound:
     cost = None
     if formula.model.cost != "makespan" and countable(formula.model):
         with suppress(OutOfEffort):
             cost, plan = _cheapest(formula, task, plan)
     formula.without_limit()
-    return ExactBound(formula, makespan, cost, _used(formula, task, cost, plan))
+    return ExactBound(formula, len(plan), cost, _used(formula, task, cost, plan))
 
 
 def _shortest(formula: PlanFormula, task: PlanningTask, at_least: int) -> tuple[int, Plan]:

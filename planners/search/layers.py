@@ -35,6 +35,9 @@ _NEVER = np.iinfo(np.int32).max
 _LEFT_OUT = -1
 #: States expanded first; from the joint steps that they have the next numbers of states follow.
 _FIRST, _FIRST_PROBED = 500, 8
+#: Labels in all steps for which the solver's formula takes as long as the steps that are tried
+#: before it is asked; steps that are counted where nothing bounds them.
+_FORMULA, _STEPS = 50_000, 20
 #: Combinations of labels, for each joint step that is tried without exact bounds, that are not even
 #: composed.
 _TOO_MANY = 10
@@ -150,8 +153,14 @@ class BoundedSearch:
         """Ask the solver for the optimal cost; what the next round is bounded by."""
         self._probing = False
         at_least = self.bound if self.bound < FAR - 1 else 0
+        depth = len(self.layers.states) - 1
         self._exact = exact_bound(
-            self._model, self._task, self._variables, at_least, self._pieces.effort
+            self._model,
+            self._task,
+            self._variables,
+            at_least,
+            self._pieces.effort,
+            (self._last(), depth),
         )
         return self.bound if self._exact is None else self._exact.makespan
 
@@ -181,6 +190,12 @@ class BoundedSearch:
             layers.states.append(new)
         layers.makespan = len(layers.states) - 1
         return _MET
+
+    @property
+    def _probe(self) -> int:
+        """Joint steps that are composed before exact bounds: more where their formula is large."""
+        size = sum(map(len, self._model.labels)) * (self.bound if self.bound < FAR - 1 else _STEPS)
+        return self._pieces.probe * (1 + size // _FORMULA)
 
     def _on_optimal_plans(self, exact: ExactBound, edges: Edges, depth: int) -> Edges:
         """Leave out what leads to states through which no optimal plan passes.
@@ -263,7 +278,7 @@ class BoundedSearch:
 
         def only(rows: Rows, options: Options) -> Options:
             nonlocal low
-            if self._probing and _combinations(options) > _TOO_MANY * self._pieces.probe:
+            if self._probing and _combinations(options) > _TOO_MANY * self._probe:
                 raise _GrownError
             if self._exact is not None:
                 options = self._exact.only(depth - 1, rows, options)
@@ -274,9 +289,9 @@ class BoundedSearch:
         start, size = 0, _FIRST_PROBED if self._probing else _FIRST
         most = max(1, min(self._pieces.steps, _BYTES // (8 * self._model.codec.width)))
         if self._probing:
-            most = min(most, self._pieces.probe)
+            most = min(most, self._probe)
         while start < len(states):
-            if self._probing and self.layers.composed > self._pieces.probe:
+            if self._probing and self.layers.composed > self._probe:
                 raise _GrownError
             numbers = states[start : start + size]
             rows = self.table.rows(numbers)

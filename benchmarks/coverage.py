@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which published tasks are solved: all their optimal plans counted, within a limit.
+
+    python benchmarks/coverage.py [--limit SECONDS] [--kept FILE] [--cost COST] [--first N] [ROW ..]
+    python benchmarks/coverage.py --list
+
+Rows are the problems of the twelve CoDMAP domains in ../shared/data (``--first N`` of each, the
+smallest files first), robots in the corners of open grids, and agents of a MovingAI scenario.
+Every row is a process of its own on one core with 8 GB of address space and ``--limit`` CPU
+seconds (60).  Columns: CPU seconds to load and to search, the least makespan and the second cost
+component, the exact number of optimal plans and the nodes of their graph; the states that the
+search met and what a state takes in its table, the joint steps that it composed, in how many
+rounds and by which bound; the process's peak memory.  With ``--kept`` lines are kept in a file, and
+rows that it has are printed from there: a long run can be resumed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from time import process_time
+from typing import TYPE_CHECKING, Any
+
+from foreign_rows import SHARED
+from printed_table import PrintedTable
+from processes import run_python
+from scale import Grid
+
+if TYPE_CHECKING:
+    from planners.loading import PlanningInstance
+
+MEMORY = 8 << 30
+COLUMNS = (
+    ("row", -38),
+    ("load", 6),
+    ("search", 7),
+    ("makespan", 8),
+    ("second", 6),
+    ("plans", 16),
+    ("nodes", 8),
+    ("states", 9),
+    ("B/state", 7),
+    ("steps", 10),
+    ("rounds", 6),
+    ("bound", -17),
+    ("MB", 5),
+)
+CORNERS = (
+    *((side, 2) for side in (5, 8, 10, 16, 24, 32)),
+    *((side, 3) for side in (5, 8, 10, 16)),
+    *((side, 4) for side in (5, 6, 8)),
+)
+AGENTS = (2, 3, 4)
+SCENARIOS = SHARED / "mapf"
+
+
+def codmap(first: int) -> dict[str, tuple[Path, Path]]:
+    """The problems of each domain, the smallest files first: domain and problem by name."""
+    found = {}
+    for folder in sorted(path for path in (SHARED / "codmap").iterdir() if path.is_dir()):
+        problems = [path for path in folder.glob("*.pddl") if path.name != "domain.pddl"]
+        problems.sort(key=lambda path: (path.stat().st_size, path.name))
+        for problem in problems[:first]:
+            found[f"{folder.name}/{problem.stem}"] = (folder / "domain.pddl", problem)
+    return found
+
+
+def rows(first: int) -> list[str]:
+    """The names of all rows."""
+    corners = [f"corners {side}x{side}, {robots} robots" for side, robots in CORNERS]
+    if not SHARED.is_dir():
+        return corners
+    scenarios = [
+        f"{path.stem}, {agents} agents"
+        for path in sorted(SCENARIOS.glob("*.scen"))
+        for agents in AGENTS
+    ]
+    return [*codmap(first), *corners, *scenarios]
+
+
+def load(name: str, cost: str) -> PlanningInstance:
+    """The joint model of a row."""
+    from planners.loading import ModelOptions
+    from planners.loading import load as load_files
+
+    if name.startswith("corners"):
+        size, robots = name.split()[1:3]
+        return Grid(name.replace(",", ""), int(size.split("x")[0]), int(robots), False).load()
+    if name.endswith("agents"):
+        return scenario(name)
+    domain, problem = codmap(sys.maxsize)[name]
+    return load_files(domain, [problem], ModelOptions(cost=cost))  # type: ignore[arg-type]
+
+
+def scenario(name: str) -> PlanningInstance:
+    """The first agents of a scenario."""
+    from coordlang.movingai import planning_files
+    from planners.loading import load as load_files
+
+    stem, agents = name.removesuffix(" agents").rsplit(", ", 1)
+    file = SCENARIOS / f"{stem}.scen"
+    map_name = file.read_text().splitlines()[1].split("\t")[1]
+    texts = planning_files(SCENARIOS / Path(map_name).name, file, int(agents))
+    with tempfile.TemporaryDirectory() as folder:
+        for file_name, text in texts.items():
+            (Path(folder) / file_name).write_text(text)
+        (problem,) = [n for n in texts if n.endswith(".pddl") and n != "domain.pddl"]
+        return load_files(Path(folder) / "domain.pddl", [Path(folder) / problem])
+
+
+def one(name: str, cost: str) -> dict[str, Any]:
+    """The figures of a row, in this process."""
+    from planners.search.optimal_plans import search_with_effort
+    from planners.search.plans import counts
+
+    loaded = load(name, cost)
+    figures: dict[str, Any] = {"load": round(process_time(), 2)}
+    space, effort = search_with_effort(loaded.model, loaded.tasks[0])
+    makespan, second = space.cost_of(0)
+    return {
+        **figures,
+        "search": round(process_time() - figures["load"], 2),
+        "makespan": makespan,
+        "second": second,
+        "plans": counts(space)[int(space.starts[0])],
+        "nodes": len(space),
+        "states": effort.states,
+        "state_bytes": effort.state_bytes,
+        "steps": effort.steps,
+        "rounds": effort.rounds,
+        "bound": effort.heuristic,
+    }
+
+
+def measured(name: str, limit: int, cost: str) -> dict[str, Any]:
+    """The figures of a row from a process of its own."""
+    arguments = (__file__, "--one", name, "--cost", cost, "--limit", str(limit))
+    done = run_python(arguments, most=20 * limit)
+    figures: dict[str, Any] = {"row": name, **done.data, "memory": done.memory}
+    if "plans" not in figures:
+        last = (done.errors.strip().splitlines() or [""])[-1]
+        out_of_memory = "Memory" in last or "bad_alloc" in last
+        figures["failed"] = "no memory" if out_of_memory else "no time" if done.code < 0 else last
+    return figures
+
+
+def cells(figures: dict[str, Any]) -> Iterator[object]:
+    """The line of a row."""
+    yield figures["row"]
+    if "failed" in figures:
+        yield from (None, figures["failed"][:20], *[None] * (len(COLUMNS) - 3))
+        return
+    plans = figures["plans"]
+    yield from (figures[key] for key in ("load", "search", "makespan", "second"))
+    yield plans if plans < 10**15 else f"{plans:.3e}"
+    yield from (figures["nodes"], figures["states"])
+    yield round(figures["state_bytes"] / figures["states"], 1)
+    yield from (figures[key] for key in ("steps", "rounds", "bound", "memory"))
+
+
+def main() -> None:
+    """Print what the arguments say."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("rows", nargs="*", metavar="ROW", help="beginnings of rows' names")
+    parser.add_argument("--list", action="store_true", help="the names of all rows")
+    parser.add_argument("--first", type=int, default=10, metavar="N", help="problems of a domain")
+    parser.add_argument("--limit", type=int, default=60, metavar="SECONDS", help="CPU seconds (60)")
+    parser.add_argument("--cost", default="makespan+actions", help="of CoDMAP's tasks")
+    parser.add_argument("--kept", type=Path, metavar="FILE", help="where lines are kept")
+    parser.add_argument("--one", metavar="ROW", help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.one:
+        resource.setrlimit(resource.RLIMIT_CPU, (given.limit, given.limit + 1))
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        print(json.dumps(one(given.one, given.cost)))
+        return
+    names = [n for n in rows(given.first) if not given.rows or n.startswith(tuple(given.rows))]
+    if given.list:
+        print(*names, sep="\n")
+        return
+    known: dict[str, dict[str, Any]] = {}
+    if given.kept is not None and given.kept.exists():
+        lines = map(json.loads, given.kept.read_text().splitlines())
+        known = {figures["row"]: figures for figures in lines}
+    table, solved = PrintedTable(*COLUMNS), 0
+    for name in names:
+        if name not in known:
+            known[name] = measured(name, given.limit, given.cost)
+            if given.kept is not None:
+                with given.kept.open("a") as file:
+                    file.write(json.dumps(known[name]) + "\n")
+        solved += "plans" in known[name]
+        table.print(*cells(known[name]))
+    print(f"{solved} of {len(names)} solved")
+
+
+if __name__ == "__main__":
+    main()
