@@ -18,7 +18,7 @@ from coordlang.api.inputs import (
 )
 from coordlang.api.layout import WIDTH, wrapped
 from coordlang.api.optimal_plans import OptimalPlans
-from coordlang.api.options import GivenOptions, ModelKeywords
+from coordlang.api.options import GivenOptions, ModelKeywords, require_one_of
 from coordlang.api.presenting import Presented
 from planners.cache import search
 from planners.inspection import Inspection
@@ -26,6 +26,8 @@ from planners.inspection import inspect as inspect_instance
 from planners.loading import PlanningInstance
 from planners.notebook import counted, html_table
 from planners.pddl.pddl_text import domain_text, problem_text
+from planners.search.guides import GUIDES
+from planners.search.optimal_plans import search as bounded_search
 from planners.search.plans import Plans
 from planners.search.reachable import count as count_reachable
 from planners.writing import write_texts
@@ -200,6 +202,7 @@ def plans(
     problem: ProblemSource | None = None,
     *,
     factored: File | None = None,
+    heuristic: str = "auto",
     **model: Unpack[ModelKeywords],
 ) -> OptimalPlans:
     """Find all optimal plans of a task.
@@ -208,16 +211,25 @@ def plans(
     ----------
     domain, problem, factored, **model
         As in `load`.
+    heuristic
+        What the search is bounded by (`planners.search.guides.GUIDES`); the plans are the same.
+        With another one than ``auto`` plans that are kept are not used.
 
     Raises
     ------
     ProvedImpossible
         If there is no plan.
+    UsageError
+        If there is no such heuristic.
     OutOfMemory
         Before the reachable part of the joint model uses up the memory.
     """
+    require_one_of("--heuristic", heuristic, GUIDES)
     loaded = read_instance(domain, problem, factored, GivenOptions.of(**model))
-    return OptimalPlans(Plans.of(search(loaded.model, loaded.tasks[0])))
+    if heuristic == "auto":
+        return OptimalPlans(Plans.of(search(loaded.model, loaded.tasks[0])))
+    space = bounded_search(loaded.model, loaded.tasks[0], heuristic=heuristic)
+    return OptimalPlans(Plans.of(space))
 
 
 def _counts(counts: dict[str, int]) -> str:

@@ -20,6 +20,13 @@ from coordlang.cli.terminal import note_single_robot, working
 @click.option(
     "--format", "form", type=click.Choice(["ipc", "json"]), default="ipc", show_default=True
 )
+@click.option(
+    "--heuristic",
+    type=click.Choice(["auto", "blind", "projections", "relaxed"]),
+    default="auto",
+    show_default=True,
+    help="What the search is bounded by; the plans are the same.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Short for --format json.")
 @model_options
 @planning_files("DOMAIN PROBLEM", most=1)
@@ -31,6 +38,7 @@ def command(
     sample: int | None,
     seed: int,
     form: str,
+    heuristic: str,
     as_json: bool,
     pddl: PlanningFiles,
     model: ModelKeywords,
@@ -42,7 +50,7 @@ def command(
     listing = Listing.of(only_count, most, sample, seed)
     form = form_of(form, as_json)
     with working("finding all optimal plans"):
-        plans = coordlang.plans(*pddl.files, factored=pddl.factored, **model)
+        plans = coordlang.plans(*pddl.files, factored=pddl.factored, heuristic=heuristic, **model)
     note_single_robot(plans.robots)
     listed = listing.chosen(plans)
     if form == "json":

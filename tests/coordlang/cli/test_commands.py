@@ -13,7 +13,9 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+import coordlang as door
 from planners.check.validate import validate
+from planners.errors import UsageError
 from planners.loading import load
 from planners.pddl.robots import RobotSelection, find_team
 from planners.search.plan_file import read_plans
@@ -51,6 +53,15 @@ def test_every_printed_plan_is_valid(
         verdict = validate(loaded.domain, loaded.problems[0], team, plan)
         assert verdict.valid, verdict.reason
         assert verdict.makespan == 4
+
+
+@pytest.mark.parametrize("heuristic", ["auto", "relaxed", "projections", "blind"])
+def test_plans_do_not_depend_on_the_heuristic(heuristic: str, coordlang: Command) -> None:
+    files = (GRID / "domain.pddl", GRID / "corners-4x4.pddl")
+    expected = coordlang("plans", *files, "--max", "40").out
+    assert coordlang("plans", *files, "--max", "40", "--heuristic", heuristic).out == expected
+    with pytest.raises(UsageError, match="--heuristic"):
+        door.plans(*files, heuristic="best")
 
 
 def test_plans_json(coordlang: Command) -> None:
