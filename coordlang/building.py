@@ -10,6 +10,7 @@ from time import perf_counter
 from typing import Literal
 
 from coordlang.certificate import Certificate, certify
+from coordlang.explanation.simple import simple
 from coordlang.language.partition import Partition
 from coordlang.language.provenance import Guarantee, provenance_of
 from coordlang.language.warping import Clause
@@ -21,6 +22,7 @@ from coordlang.verification.by_definition import Verdict
 from coordlang.verification.overlapping import verify_overlapping
 from coordlang.verification.pieces import verify_candidates
 from coordlang.vocabulary import EXACT, METHODS, Job, Outcome, greedy
+from coordlang.vocabulary.early import early
 from coordlang.vocabulary.enlarging import enlarge
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Assignment, Evidence
@@ -31,6 +33,14 @@ from planners.messages import echoed
 from planners.pieces.processes import Processes
 from planners.pieces.work import Runner
 from planners.search.portions import require_room
+
+#: What the language should be like, of those with the fewest words, by the value of ``--prefer``.
+BuildPreference = Literal["flexible", "simple", "early"]
+PREFERENCES: Mapping[BuildPreference, Callable[[Job, Outcome], Outcome]] = {
+    "flexible": flexible,
+    "simple": simple,
+    "early": early,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,8 +76,9 @@ class BuildOptions:
     alpha_only
         For the method "separating": separate plans where they part, never where they meet.
     prefer
-        "flexible": of the languages with as many words as the method finds, one whose sentences
-        leave many plans open; for the exact methods, "minimal" and "exhaustive".
+        Of the languages with as many words as the method finds, "flexible": one whose sentences
+        leave many plans open; "simple": one whose words have short formulas; "early": one whose
+        sentences differ early.  For the exact methods, "minimal" and "exhaustive".
     overlap
         Then give states further words as long as that leaves more plans open
         (`coordlang.language.overlapping`).
@@ -81,7 +92,7 @@ class BuildOptions:
     method: str = "greedy"
     seed: int = 0
     alpha_only: bool = False
-    prefer: Literal["flexible"] | None = None
+    prefer: BuildPreference | None = None
     overlap: bool = False
 
     def __post_init__(self) -> None:
@@ -95,9 +106,10 @@ class BuildOptions:
                 "--alpha-only belongs to --method separating",
                 remedy="Add --method separating, or leave out --alpha-only.",
             )
-        if self.prefer not in (None, "flexible"):
+        if self.prefer is not None and self.prefer not in PREFERENCES:
             raise UsageError(
-                f"there is no preference {echoed(self.prefer)}", remedy="--prefer takes flexible."
+                f"there is no preference {echoed(self.prefer)}",
+                remedy=f"--prefer takes {', '.join(PREFERENCES)}.",
             )
         if self.prefer and not self.is_exact:
             raise UsageError(
@@ -117,7 +129,7 @@ def build_language(
     *,
     seed: int = 0,
     alpha_only: bool = False,
-    prefer: Literal["flexible"] | None = None,
+    prefer: BuildPreference | None = None,
     overlap: bool = False,
     reserve: float = 0.0,
     progress: Callable[[str], None] = lambda _: None,
@@ -219,9 +231,9 @@ def _outcome(
     def run() -> None:
         outcome = METHODS[options.method](job)
         clock.note("vocabulary")
-        if options.prefer == "flexible" and outcome.stopped is None:
-            outcome = flexible(job, outcome)
-            clock.note("flexible")
+        if options.prefer and outcome.stopped is None:
+            outcome = PREFERENCES[options.prefer](job, outcome)
+            clock.note(options.prefer)
         if not any(known.assignment is outcome.partition for known in verified):
             job.progress("verifying by definition")
             job.check(outcome.partition)

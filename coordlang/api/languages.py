@@ -179,8 +179,9 @@ def build(
     alpha_only
         With ``"separating"``: part plans where they differ first, never where they differ last.
     prefer
-        ``"flexible"``: of the languages with the fewest words, one whose sentences leave many
-        plans open; with ``"minimal"`` or ``"exhaustive"``.
+        What the language should be like, of those with the fewest words, with ``"minimal"`` or
+        ``"exhaustive"``.  ``"flexible"``: its sentences leave many plans open; ``"simple"``: its
+        words have short formulas; ``"early"``: its sentences differ early.
     overlap
         Whether states get further words while that leaves more plans open.
     start

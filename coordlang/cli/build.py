@@ -69,8 +69,9 @@ _FOR_CERTIFICATE = 0.25
 @click.option(
     "--prefer",
     type=click.Choice(BUILD_PREFERENCES),
-    help="flexible: of the languages with the fewest words, one "
-    "whose sentences leave many plans open (with --method minimal or exhaustive).",
+    help="Of the languages with the fewest words (--method minimal or exhaustive) one whose .. "
+    "flexible: sentences leave many plans open.  simple: words have short formulas.  early: "
+    "sentences differ early.",
 )
 @click.option(
     "--overlap",
@@ -303,7 +304,7 @@ def _summary(built: BuiltLanguage, figures: dict[str, Any], output: str) -> str:
         f"{figures['states_on_plans']:,} states on optimal plans, "
         f"{figures['divergences']:,} divergences, "
         f"{figures['walk_nodes']:,} nodes of plans, {total:.2f} s\n"
-        f"{_flexibility(figures)}{_repair(built, err=output == '-')}"
+        f"{_flexibility(figures)}{_readability(figures)}{_repair(built, err=output == '-')}"
         f"written to {'stdout' if output == '-' else visible(output)}"
     )
 
@@ -315,6 +316,26 @@ def _repair(built: BuiltLanguage, *, err: bool) -> str:
     from coordlang.api.repair import repair_text
 
     return f"{repair_text(built.repaired, line_width(err=err))}\n"
+
+
+def _readability(figures: dict[str, Any]) -> str:
+    """How short formulas are, or how early sentences differ, where that was optimised."""
+    if "terms" in figures:
+        terms, limits = figures["terms"], figures["limits"]
+        proved = (terms, limits) == (figures["terms_lower_bound"], figures["limits_lower_bound"])
+        proof = "proved the shortest" if proved else f"at least {figures['terms_lower_bound']}"
+        before = f"{counted(figures['terms_before'], 'term')}, {figures['limits_before']} limits"
+        return (
+            f"formulas of {counted(terms, 'term')} with {counted(limits, 'limit')} on variables "
+            f"({before} before; {proof})\n"
+        )
+    if "words_heard" in figures:
+        return (
+            f"{figures['words_heard']:,.2f} words are heard on average until the sentence is known "
+            f"({figures['words_heard_before']:,.2f} before, "
+            f"{figures['words_heard_lower_bound']:,.2f} at least)\n"
+        )
+    return ""
 
 
 def _flexibility(figures: dict[str, Any]) -> str:

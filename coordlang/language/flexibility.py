@@ -103,7 +103,7 @@ def edge_shares(space: PlanSpace, counted: Sequence[int]) -> Floats:
     return np.array([counted[t] / counted[s] for t, s in pairs], np.float64)
 
 
-class _Sentences:
+class Sentences:
     """Sentences as numbers: a word in front of a shorter sentence.  Number 0 is the empty one."""
 
     def __init__(self) -> None:
@@ -125,14 +125,21 @@ class _Sentences:
         return number
 
     @property
+    def parts(self) -> tuple[Ints, Ints]:
+        """Each sentence's first word and the sentence that follows; -1 and 0 of the empty one."""
+        pairs = np.array([(-1, 0), *self._number], np.int64)
+        return pairs[:, 0], pairs[:, 1]
+
+    @property
     def lengths(self) -> Ints:
+        """The number of words of each sentence."""
         return np.array(self._length, np.int64)
 
 
 def _measure(space: PlanSpace, word: Ints) -> Flexibility:
     counted = counts(space)
     share_of_edge = edge_shares(space, counted)
-    sentences = _Sentences()
+    sentences = Sentences()
     first_sentence = np.zeros(len(space), np.int64)
     # Of the layer below: sorted by node, bounds of each node's entries, sentence and share of each
     # entry.
@@ -151,12 +158,14 @@ def _measure(space: PlanSpace, word: Ints) -> Flexibility:
             low, high = np.searchsorted(node, target), np.searchsorted(node, target, "right")
             _check_memory(int((high - low).sum()))
             entry, of = ranges(low, high - low), np.repeat(np.arange(len(source)), high - low)
-            new = _said(sentences, word, source[of], target[of], said[entry])
+            new = said_from(sentences, word, source[of], target[of], said[entry])
             weight = share[entry] * share_of_edge[above.edges][of]
             here = np.arange(span.start, span.stop)
             follows = space.targets(space.first_edges(here))
-            first_sentence[here] = _said(sentences, word, here, follows, first_sentence[follows])
-            node, said, share = _summed(source[of], new, weight)
+            first_sentence[here] = said_from(
+                sentences, word, here, follows, first_sentence[follows]
+            )
+            node, said, share = summed(source[of], new, weight)
         mine = starts[(starts >= span.start) & (starts < span.stop)]
         if len(mine):
             kept = np.isin(node, mine)
@@ -179,7 +188,7 @@ def _measure(space: PlanSpace, word: Ints) -> Flexibility:
     )
 
 
-def _said(sentences: _Sentences, word: Ints, source: Ints, target: Ints, rest: Ints) -> Ints:
+def said_from(sentences: Sentences, word: Ints, source: Ints, target: Ints, rest: Ints) -> Ints:
     """The sentences from ``source``, given those from ``target`` on.
 
     A word more where it is a new one.
@@ -191,7 +200,7 @@ def _said(sentences: _Sentences, word: Ints, source: Ints, target: Ints, rest: I
     return result
 
 
-def _summed(node: Ints, said: Ints, share: Floats) -> tuple[Ints, Ints, Floats]:
+def summed(node: Ints, said: Ints, share: Floats) -> tuple[Ints, Ints, Floats]:
     """Entries of one node and sentence added up, sorted by node."""
     size = int(said.max(initial=0)) + 1
     code, inverse = np.unique(node * size + said, return_inverse=True)

@@ -23,6 +23,9 @@ from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
 from planners.tables import Bools, Ints, ranges
 
+#: Numbers that tell sentences apart.
+Hashes = NDArray[np.uint64]
+
 #: An odd constant by which hashes of sentences are multiplied (2^64 divided by the golden ratio).
 _MIX = np.uint64(0x9E3779B97F4A7C15)
 #: Edges kept in parts of plan graphs, one part for each state; beyond, parts are cut out anew each
@@ -31,7 +34,7 @@ _KEPT_EDGES = 20_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class _Layer:
+class Layer:
     """Nodes ``low:high`` of a part.
 
     Its edges go from ``source`` to ``target``, both counted from their layers' first node.
@@ -51,20 +54,21 @@ class _Layer:
 
 
 @dataclass(frozen=True, slots=True)
-class _Part:
+class Part:
     """Some tasks of a plan space.
 
-    The layers of their plan graph, the node of each task and its number of plans.
+    The layers of their plan graph, the node of each task, its number of plans and of joint steps.
     """
 
     tasks: Ints
-    layers: tuple[_Layer, ...]
+    layers: tuple[Layer, ...]
     nodes: int
     edges: int
     start: Ints
     plans: Floats
+    steps: Ints
 
-    def expected(self, word: Ints, code: NDArray[np.uint64]) -> Floats:
+    def expected(self, word: Ints, code: Hashes) -> Floats:
         """E of each task; ``word`` of every state, ``code`` a random number for every word."""
         open_share = np.zeros(self.nodes)
         node = first = np.zeros(0, np.int64)
@@ -75,7 +79,8 @@ class _Part:
                 sentence, share = code[word[layer.state]], np.ones(len(layer.state))
                 node = np.arange(len(sentence))
             else:
-                node, sentence, share = _sentences_above(layer, first, sentence, share, word, code)
+                above = sentences_above(layer, first, sentence, share, word, code)
+                node, sentence, share = above.node, above.sentence, above.share
             first = np.searchsorted(node, np.arange(layer.high - layer.low + 1))
             open_share[layer.low : layer.high] = np.bincount(
                 node, share * share, layer.high - layer.low
@@ -83,18 +88,31 @@ class _Part:
         return self.plans * open_share[self.start]
 
 
-def _sentences_above(
-    layer: _Layer,
+@dataclass(frozen=True, slots=True)
+class Said:
+    """The sentences of the nodes of a layer, sorted by node.
+
+    Of each entry the ``node``, the ``sentence``, the ``share`` of the node's plans that have it,
+    the word of the node as ``head``, and as ``rest`` what is said from the next node on: the same
+    sentence where that goes on in its word.
+    """
+
+    node: Ints
+    sentence: Hashes
+    share: Floats
+    head: Ints
+    rest: Hashes
+
+
+def sentences_above(
+    layer: Layer,
     first: Ints,
-    sentence: NDArray[np.uint64],
+    sentence: Hashes,
     share: Floats,
     word: Ints,
-    code: NDArray[np.uint64],
-) -> tuple[Ints, NDArray[np.uint64], Floats]:
-    """Entries (node, sentence, share of its plans) of a layer from those of the layer below.
-
-    Sorted by node.
-    """
+    code: Hashes,
+) -> Said:
+    """The sentences of a layer from those of the layer below."""
     leaving, entering = word[layer.leaving], word[layer.entering]
     source, weight = layer.source, layer.share
     if len(first) - 1 == len(sentence):  # one sentence for every node below
@@ -113,7 +131,14 @@ def _sentences_above(
     fresh = np.ones(len(order), np.bool_)
     fresh[1:] = (source[1:] != source[:-1]) | (new[1:] != new[:-1])
     at = np.flatnonzero(fresh)
-    return source[at], new[at], np.add.reduceat((share[entry] * weight)[order], at)
+    chosen = order[at]
+    return Said(
+        source[at],
+        new[at],
+        np.add.reduceat((share[entry] * weight)[order], at),
+        leaving[chosen],
+        rest[chosen],
+    )
 
 
 class Objective:
@@ -127,11 +152,12 @@ class Objective:
             _Measured(space, sum(len(s.starts) for s in spaces[:k]))
             for k, space in enumerate(spaces)
         ]
-        self._code = np.random.default_rng(0).integers(1, 2**63, words, np.uint64)
+        #: (words) the number by which each word enters hashes.
+        self.code: Hashes = np.random.default_rng(0).integers(1, 2**63, words, np.uint64)
         self._all = [
             space.part(np.ones(len(space.space.starts), np.bool_)) for space in self._spaces
         ]
-        self._of_state: dict[int, list[_Part]] = {}
+        self._of_state: dict[int, list[Part]] = {}
         self._kept = 0
         #: Edges over which was summed so far: the work done.
         self.edges = 0
@@ -167,11 +193,15 @@ class Objective:
         affected = np.unique(np.concatenate(list(tasks.values())))
         return float((bound[affected] - expected[affected]).sum()) / len(bound)
 
-    def _one(self, part: _Part, word: Ints) -> Floats:
+    def _one(self, part: Part, word: Ints) -> Floats:
         self.edges += part.edges
-        return part.expected(word, self._code)
+        return self.measured(part, word)
 
-    def _through(self, state: int) -> list[_Part]:
+    def measured(self, part: Part, word: Ints) -> Floats:
+        """E of each task of a part; ``word`` of every state number."""
+        return part.expected(word, self.code)
+
+    def _through(self, state: int) -> list[Part]:
         """The tasks with plans through a state."""
         if state not in self._of_state:
             parts = [
@@ -210,12 +240,12 @@ class _Measured:
         passing: Bools = nodes_above(self.space, state)[self.space.starts]
         return passing
 
-    def part(self, wanted: Bools) -> _Part:
+    def part(self, wanted: Bools) -> Part:
         """The part of the graph on the plans of the wanted tasks."""
         space = self.space
         alive = space.descendants(space.starts[wanted])
         number = np.cumsum(alive) - 1
-        layers: list[_Layer] = []
+        layers: list[Layer] = []
         low = high = 0
         for span, below in zip(space.layers, self._edges_of_layers, strict=True):
             nodes = np.flatnonzero(alive[span]) + span.start
@@ -225,7 +255,7 @@ class _Measured:
             source, target = below.source[kept], below.target[kept]
             first_below, low, high = low, high, high + len(nodes)
             layers.append(
-                _Layer(
+                Layer(
                     low,
                     high,
                     space.state[nodes],
@@ -237,11 +267,12 @@ class _Measured:
                 )
             )
         tasks = np.flatnonzero(wanted)
-        return _Part(
+        return Part(
             tasks + self._before,
             tuple(layers),
             int(alive.sum()),
             sum(len(layer.source) for layer in layers),
             number[space.starts[tasks]],
             self._plans[tasks],
+            space.layer[space.starts[tasks]],
         )

@@ -14,21 +14,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 
-import numpy as np
-
 from coordlang.language.warping import Clause
-from coordlang.required.divergences import required_nodes
-from coordlang.symmetry.group import symmetry_group
+from coordlang.vocabulary.candidate_languages import CandidateLanguages
 from coordlang.vocabulary.clauses import most_constrained_first, without_implied
 from coordlang.vocabulary.hitting import LeastHitting, StateSet, greedy_hitting
 from coordlang.vocabulary.job import Assignment, Job
-from coordlang.vocabulary.necessary_clauses import NecessaryClauses, TaskPart, task_parts
 from coordlang.vocabulary.problems_by_size import ProblemsBySize, SolverBudget, close_bounds
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from planners.limits import run_until_stopped
 
-#: Tasks that are searched for counterexamples together, about so many.
-_TASKS_OF_A_PART = 1_500
 #: Comparisons of clauses to find which are implied, a second's work: the solver finds the others.
 _COMPARISONS = 5_000_000
 
@@ -96,13 +90,10 @@ class _Repair:
         self._job, self._old_words, self._default = job, old_words, default
         self._kept = {state: kept[state] for state in job.states if state in kept}
         self.best: dict[int, int] | None = None
-        self._known = NecessaryClauses(symmetry_group(job.candidates))
-        self._parts: list[TaskPart] = []
-        self._current = 0
+        self._languages = CandidateLanguages.of(job)
         self._hitting = LeastHitting(list(self._kept))
         self._seen = 0
         self._new_words_bound = 0
-        self._rounds = 0
         self._anchors = [-1 - word for word in range(old_words)]
         self._problems: ProblemsBySize[Clause] = ProblemsBySize(
             self._start, PartitionProblem.separate_one
@@ -125,19 +116,15 @@ class _Repair:
             self._hitting.bound,
             self._new_words_bound if proved else 0,
             {
-                "rounds": self._rounds,
-                "clauses": len(self._known.clauses),
-                "symmetries": len(self._known.group.symmetries),
+                "rounds": self._languages.rounds,
+                "clauses": len(self._languages.clauses),
+                "symmetries": len(self._languages.known.group.symmetries),
             },
             stopped,
         )
 
     def run(self) -> None:
         """A language soon, then the fewest changes, then the fewest new words."""
-        spaces = self._job.candidates.spaces
-        self._parts = task_parts(
-            spaces, [required_nodes(space) for space in spaces], _TASKS_OF_A_PART
-        )
         self._join_words(self._hit_greedily())
         self._join_words(self._hit_least())
         close_bounds(lambda: (self._new_words_bound, self._upper), self._decide)
@@ -163,7 +150,7 @@ class _Repair:
         """As few states as suffice to change."""
         while True:
             self._hitting.add(self._violated_sets(self._seen))
-            self._seen = len(self._known.clauses)
+            self._seen = len(self._languages.clauses)
             changed = self._hitting.find()
             if self._holds(self._apart(changed)):
                 return changed
@@ -171,7 +158,7 @@ class _Repair:
     def _violated_sets(self, first: int = 0) -> Iterable[StateSet]:
         """The states of every clause, from number ``first`` on, that the old words violate."""
         kept = self._kept
-        for clause in self._known.clauses[first:]:
+        for clause in self._languages.clauses[first:]:
             if all(a in kept and b in kept and kept[a] == kept[b] for a, b in clause):
                 yield frozenset(state for states in clause for state in states)
 
@@ -211,7 +198,7 @@ class _Repair:
 
     def _first_fit(self, changed: set[int]) -> dict[int, int]:
         partition = self._apart(changed)
-        clauses = without_implied(self._known.clauses, _COMPARISONS)
+        clauses = without_implied(self._languages.clauses, _COMPARISONS)
         of_state: dict[int, list[Clause]] = {}
         for clause in clauses:
             for state in {state for states in clause for state in states}:
@@ -234,21 +221,13 @@ class _Repair:
 
     def _holds(self, partition: Assignment) -> bool:
         """Whether there is no counterexample; those that are found are added to the clauses."""
-        self._rounds += 1
-        word = np.zeros(len(self._job.candidates.rows), np.int64)
-        word[list(partition)] = list(partition.values())
         changes, new_words = self._distance(partition)
         self._job.progress(
             f"at least {self._hitting.bound} states change their word; trying {changes}, and "
-            f"{new_words} new words: round {self._rounds}, {len(self._known.clauses):,} clauses"
+            f"{new_words} new words: round {self._languages.rounds}, "
+            f"{len(self._languages.clauses):,} clauses"
         )
-        for _ in self._parts:
-            part = self._parts[self._current]
-            if found := part.violated(word):
-                self._known.add(found, part.space)
-                return False
-            self._current = (self._current + 1) % len(self._parts)
-        return True
+        return self._languages.holds(partition)
 
     def _decide(self, new_words: int, budget: SolverBudget) -> bool:
         """Find a language with so many new words or prove that there is none.
@@ -258,7 +237,7 @@ class _Repair:
         size = self._old_words + new_words
         for _ in range(budget.rounds):
             try:
-                found = self._problems.under(size, self._known.clauses).solve(budget.conflicts)
+                found = self._problems.under(size, self._languages.clauses).solve(budget.conflicts)
             except Undecided:
                 return False
             if found is None:

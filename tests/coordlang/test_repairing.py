@@ -12,6 +12,7 @@ import pytest
 
 import coordlang
 from coordlang.building import build_language
+from coordlang.language.words import Language
 from coordlang.repairing import repair_language
 from planners.errors import OutOfTime
 from tests.support.command import Command
@@ -215,6 +216,24 @@ def test_stopped_repairs_are_written(
     assert "the best language so far is written, without proof" in outcome.err
     assert "1 state changes its word, not proved the fewest; 20 new states; 3 new w" in outcome.out
     assert coordlang("verify", new, *SMALL).code == 0
+
+
+def test_states_on_no_plan_keep_their_words() -> None:
+    """One word for the states of a task, which does not do, and another one for all others."""
+    candidates = all_tasks("grid", "gw2-2x3")
+    keys = candidates.model.codec.key
+    task = own_task("grid", "gw2-2x3")
+    on_plans = {keys(task.rows[s]) for s in build_language(task).job.states}
+    words = {keys(row): "go" if keys(row) in on_plans else "away" for row in candidates.rows}
+    old = Language(("away", "go"), words, "away")
+    built, repaired = repair_language(task, old)
+    assert repaired.changed
+    changed = {change.state for change in repaired.changed}
+    assert changed < on_plans
+    assert {key for key, word in words.items() if built.language.states[key] != word} == changed
+    assert len(built.language.states) == 30
+    assert built.language.default == "away"
+    assert built.verdict.holds
 
 
 def test_the_certificate_of_a_repaired_language(coordlang: Command, tmp_path: Path) -> None:

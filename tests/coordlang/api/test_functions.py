@@ -297,7 +297,7 @@ def test_robots_by_type_of_a_loaded_domain() -> None:
         ({"robots": ","}, "--robots"),
         ({"robots": "r1", "robot_type": "robot"}, "both say who the robots are"),
         ({"method": "best"}, "no method 'best'"),
-        ({"prefer": "simple", "method": "minimal"}, "no preference 'simple'"),
+        ({"prefer": "short", "method": "minimal"}, "no preference 'short'"),
         ({"prefer": "flexible"}, "--prefer flexible belongs to"),
         ({"alpha_only": True}, "--alpha-only belongs to"),
         ({"unsolvable": "ignore"}, "--unsolvable ignore"),

@@ -66,6 +66,32 @@ def test_the_summary_says_what_is_left_open(tmp_path: Path, coordlang: Command) 
     assert "0 further words of states" in outcome.out
 
 
+def test_prefer_simple(tmp_path: Path, coordlang: Command) -> None:
+    """The formulas are those that `explain` then shows, and proved the shortest."""
+    path = tmp_path / "l.json"
+    ring = GRID / "domain.pddl", GRID / "gw2-2x3.pddl"
+    chosen = ("--tasks", "all", "--method", "minimal", "--prefer", "simple")
+    outcome = coordlang("build", *ring, *chosen, "-o", path)
+    assert outcome.code == 0
+    assert "formulas of 4 terms with 6 limits on variables (8 terms, 16 limits" in outcome.out
+    assert "proved the shortest)" in outcome.out
+    shown = json.loads(coordlang("explain", path, *ring, "--json").out)["formulas"]
+    terms = sorted(len(formula["terms"]) for formula in shown.values())
+    assert sum(terms[:-1]) == 4
+    assert coordlang("verify", path, *ring).code == 0
+
+
+def test_prefer_early(tmp_path: Path, coordlang: Command) -> None:
+    path = tmp_path / "l.json"
+    chosen = ("--tasks", "all", "--method", "minimal", "--prefer", "early")
+    outcome = coordlang("build", *SQUARE, *chosen, "-o", path)
+    assert outcome.code == 0
+    assert "0.30 words are heard on average until the sentence is known (0.47 before, " in (
+        outcome.out
+    )
+    assert coordlang("verify", path, *SQUARE).code == 0
+
+
 def test_prefer_belongs_to_the_exact_methods(tmp_path: Path, coordlang: Command) -> None:
     outcome = coordlang("build", *SQUARE, "--prefer", "flexible", "-o", tmp_path / "l.json")
     assert outcome.code == 2

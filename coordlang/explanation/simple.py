@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Among languages with equally many words, one whose words have short formulas.
+
+One word is "every other state"; the formulas of the others have as few terms as possible, and these
+limit as few variables as possible (`coordlang.explanation.formula_problem`).  Exact: numbers of
+terms are decided as numbers of words are by `coordlang.vocabulary.minimal`, with the clauses of
+counterexamples.  Where that takes too long, the best so far is verified, and the bound says how
+much shorter it might be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import replace
+
+import numpy as np
+
+from coordlang.explanation.formula_problem import FormulaProblem
+from coordlang.explanation.variables import Valuation, valuation
+from coordlang.explanation.words import MappedStates, all_covers
+from coordlang.language.warping import Clause
+from coordlang.vocabulary.candidate_languages import CandidateLanguages
+from coordlang.vocabulary.clauses import most_constrained_first, without_implied
+from coordlang.vocabulary.job import Assignment, Job, Outcome
+from coordlang.vocabulary.problems_by_size import ProblemsBySize, SolverBudget, close_bounds
+from coordlang.vocabulary.sat import PartitionProblem, Undecided
+from planners.limits import run_until_stopped
+
+#: The terms of all formulas, and the variables that these limit.
+Lengths = tuple[int, int]
+
+#: Comparisons of clauses to find which are implied, a second's work: the solver finds the others.
+_COMPARISONS = 5_000_000
+#: Conflicts of the solver for one question after which the search gives up.
+_CONFLICTS = 120_000
+#: Places of states in terms up to which formulas are looked for by SAT.
+_PLACES = 400_000
+
+
+def simple(job: Job, found: Outcome, conflicts: int = _CONFLICTS) -> Outcome:
+    """A language with as many words as ``found`` has, with formulas that are as short or shorter.
+
+    Anytime: out of time or memory, or interrupted, the best verified language so far is returned,
+    with the error in ``stopped``.
+
+    Parameters
+    ----------
+    job
+        What the language is for.
+    found
+        A language with the least number of words.
+    conflicts
+        Of the solver for one question; after so many the search gives up.
+
+    Returns
+    -------
+    Outcome
+        With the bound on the number of words that ``found`` has.  ``figures`` also hold ``terms``
+        and ``limits`` of the formulas, ``terms_before`` and ``limits_before`` of those of
+        ``found``, ``terms_lower_bound`` and ``limits_lower_bound``, the latter for languages with
+        so few terms.  Where bounds are met, no language with so many words has shorter formulas.
+    """
+    with closing(_Search(job, found, conflicts)) as search:
+        stopped = run_until_stopped(search.run)
+    return search.outcome(stopped)
+
+
+def formula_lengths(mapped: MappedStates) -> Lengths:
+    """The terms of the words' formulas, as `explain` finds them, and the variables limited.
+
+    Without those of the word with the longest formula, which is "every other state".
+    """
+    formulas = all_covers(mapped).values()
+    lengths = [(len(f.terms), sum(map(len, f.terms))) for f in formulas]
+    longest = max(lengths)
+    return (
+        sum(terms for terms, _ in lengths) - longest[0],
+        sum(limits for _, limits in lengths) - longest[1],
+    )
+
+
+class _GaveUp(Exception):
+    """A question is too hard."""
+
+
+class _Search:
+    """``best`` is the language with the shortest formulas, of ``lengths``, that was verified.
+
+    ``bound``: no language with so many words has fewer terms, nor as few terms with fewer limits.
+    """
+
+    def __init__(self, job: Job, found: Outcome, conflicts: int) -> None:
+        self._job, self._found, self._conflicts = job, found, conflicts
+        self.best: Assignment = found.partition
+        values = valuation(job.candidates.model, job.candidates.rows[list(job.states)])
+        self._values = values
+        self._value = dict(zip(job.states, values.value, strict=True))
+        self._sizes = [len(variable.values) for variable in values.variables]
+        self._before = self.lengths = formula_lengths(_mapped(job, values, found.partition))
+        self.bound: Lengths = (found.size - 1, found.size - 1)  # each term limits a variable
+        self._languages: CandidateLanguages | None = None
+        self._problems: ProblemsBySize[Clause] = ProblemsBySize(
+            self._start, PartitionProblem.separate_one
+        )
+
+    def close(self) -> None:
+        """Give back what the solvers hold."""
+        self._problems.close()
+
+    def outcome(self, stopped: BaseException | None) -> Outcome:
+        """The best language, with what is known of it."""
+        figures = {
+            **self._found.figures,
+            "terms": self.lengths[0],
+            "limits": self.lengths[1],
+            "terms_before": self._before[0],
+            "limits_before": self._before[1],
+            "terms_lower_bound": self.bound[0],
+            "limits_lower_bound": self.bound[1],
+        }
+        return replace(self._found, partition=self.best, figures=figures, stopped=stopped)
+
+    def run(self) -> None:
+        """Fewer terms, and then fewer variables in them, until none can be."""
+        if self._found.size < 2 or len(self._job.states) * self.lengths[0] > _PLACES:
+            return
+        self._languages = CandidateLanguages.of(self._job, self._found.evidence)
+        try:
+            close_bounds(lambda: (self.bound[0], self.lengths[0]), self._decide)
+            while self.bound[1] < self.lengths[1]:
+                self._limit_fewer()
+        except _GaveUp:
+            return
+
+    def _decide(self, terms: int, budget: SolverBudget) -> bool:
+        """Find a language with so many terms or prove that there is none.
+
+        False if the budget was not enough.
+        """
+        if budget.conflicts > self._conflicts:
+            raise _GaveUp
+        assert self._languages is not None
+        for _ in range(budget.rounds):
+            problem = self._problems.under(terms, self._languages.clauses)
+            try:
+                partition = problem.solve(budget.conflicts)
+            except Undecided:
+                return False
+            if partition is None:
+                self._problems.drop(terms)
+                self.bound = (terms + 1, terms + 1)
+                return True
+            if self._is_accepted(partition, problem):
+                self._problems.drop(terms)
+                return True
+        return False
+
+    def _limit_fewer(self) -> None:
+        """Find a language with as many terms that limit fewer variables, or prove there is none."""
+        assert self._languages is not None
+        terms, limits = self.lengths
+        problem = self._problem(terms, self._languages.clauses, limits - 1)
+        with closing(problem):
+            seen = len(self._languages.clauses)
+            while True:
+                try:
+                    partition = problem.solve(self._conflicts)
+                except Undecided:
+                    raise _GaveUp from None
+                if partition is None:
+                    self.bound = self.lengths
+                    return
+                if self._is_accepted(partition, problem):
+                    return
+                for clause in self._languages.clauses[seen:]:
+                    problem.separate_one(clause)
+                seen = len(self._languages.clauses)
+
+    def _is_accepted(self, partition: dict[int, int], problem: PartitionProblem) -> bool:
+        """Whether a partition is a language; then it is the best."""
+        assert self._languages is not None
+        assert isinstance(problem, FormulaProblem)
+        lengths = problem.lengths()
+        self._job.progress(
+            f"{self._found.size} words with formulas of {self.bound[0]} to {self.lengths[0]} "
+            f"terms: trying {lengths[0]} over {lengths[1]} variables, "
+            f"{len(self._languages.clauses):,} clauses"
+        )
+        if not self._languages.holds(partition):
+            return False
+        self._job.check(partition)
+        self.best, self.lengths = partition, lengths
+        return True
+
+    def _start(self, terms: int, known: Sequence[Clause]) -> PartitionProblem:
+        return self._problem(terms, known, None)
+
+    def _problem(self, terms: int, known: Sequence[Clause], limits: int | None) -> FormulaProblem:
+        clauses = without_implied(known, _COMPARISONS)
+        order = most_constrained_first(self._job.states, clauses)
+        problem = FormulaProblem(order, self._found.size, self._value, self._sizes, terms, limits)
+        for clause in clauses:
+            problem.separate_one(clause)
+        return problem
+
+
+def _mapped(job: Job, values: Valuation, partition: Assignment) -> MappedStates:
+    """The states with their words as `explain` has them."""
+    words = sorted(set(partition.values()))
+    word = np.array([words.index(partition[state]) for state in job.states], np.int64)
+    return MappedStates(tuple(f"w{n}" for n in range(len(words))), values, word)

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``--prefer simple`` against all languages and all formulas."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coordlang.building import build_language
+from coordlang.explanation.formula_problem import FormulaProblem
+from coordlang.explanation.simple import _Search, simple
+from coordlang.explanation.variables import valuation
+from coordlang.explanation.words import mapped_states, word_formulas
+from coordlang.vocabulary.job import Assignment, Outcome
+from planners.errors import OutOfTime
+from tests.support.candidates import failing, is_language, partitions, small_worlds
+from tests.support.domains import all_tasks
+
+Lengths = tuple[int, int]
+Box = tuple[frozenset[int], ...]
+
+
+def boxes(sizes: Sequence[int]) -> list[Box]:
+    """All terms: for each variable a set of values, not empty."""
+    sets = [
+        [frozenset(v for v in range(size) if chosen >> v & 1) for chosen in range(1, 2**size)]
+        for size in sizes
+    ]
+    return list(product(*sets))
+
+
+def shortest_formulas(values: list[tuple[int, ...]], sizes: Sequence[int]) -> dict[int, Lengths]:
+    """For every set of the states (bits): the fewest terms that hold just these, and then the
+    fewest limits; all terms are tried.
+    """
+    of_set: dict[int, int] = {}
+    for box in boxes(sizes):
+        held = sum(
+            1 << n
+            for n, value in enumerate(values)
+            if all(v in allowed for v, allowed in zip(value, box, strict=True))
+        )
+        limits = sum(len(own) < size for own, size in zip(box, sizes, strict=True))
+        of_set[held] = min(limits, of_set.get(held, limits))
+    best: dict[int, Lengths] = {0: (0, 0)}
+    for target in range(1, 2 ** len(values)):
+        inside = {held: limits for held, limits in of_set.items() if held and not held & ~target}
+        # The fewest terms for each part of the target, a term at a time.
+        covered: dict[int, Lengths] = {0: (0, 0)}
+        layer = {0: (0, 0)}
+        while layer and target not in covered:
+            following: dict[int, Lengths] = {}
+            for part, (terms, limits) in layer.items():
+                for held, more in inside.items():
+                    both, length = part | held, (terms + 1, limits + more)
+                    if both not in covered and length < following.get(both, (99, 99)):
+                        following[both] = length
+            covered |= following
+            layer = following
+        best[target] = covered[target]
+    return best
+
+
+def length(word: Assignment, states: list[int], shortest: dict[int, Lengths]) -> Lengths:
+    """The formulas of all words but one, whichever is best."""
+    lengths = [
+        shortest[sum(1 << n for n, state in enumerate(states) if word[state] == name)]
+        for name in set(word.values())
+    ]
+    terms, limits = (sum(own) for own in zip(*lengths, strict=True))
+    return min((terms - own[0], limits - own[1]) for own in lengths)
+
+
+@cache
+def by_trying_all(number: int) -> tuple[Lengths, list[int], dict[int, Lengths]]:
+    """The shortest formulas of any smallest language of a small world."""
+    candidates = small_worlds(6)[number]
+    job = build_language(candidates, "minimal").job
+    size = build_language(candidates, "minimal").language.guarantee.size
+    states = list(job.states)
+    found = valuation(candidates.model, candidates.rows[states])
+    sizes = [len(variable.values) for variable in found.variables]
+    shortest = shortest_formulas([tuple(row) for row in found.value.tolist()], sizes)
+    bad = failing(candidates)
+    languages = [w for w in partitions(states, size) if is_language(w, bad)]
+    return min(length(word, states, shortest) for word in languages), states, shortest
+
+
+@settings(max_examples=16, deadline=None)
+@given(st.integers(0, 9))
+def test_shortest_by_trying_all(number: int) -> None:
+    candidates = small_worlds(6)[number]
+    best, states, shortest = by_trying_all(number)
+    built = build_language(candidates, "minimal", prefer="simple")
+    figures = built.figures
+    assert (figures["terms"], figures["limits"]) == best
+    assert (figures["terms_lower_bound"], figures["limits_lower_bound"]) == best
+    assert (figures["terms_before"], figures["limits_before"]) >= best
+    word = built.language.partition(candidates.model).word_of(candidates.rows).tolist()
+    assert length({s: word[s] for s in states}, states, shortest) == best
+    assert built.verdict.holds
+    assert built.language.guarantee.proved_minimal
+
+
+def test_explain_shows_them() -> None:
+    """On the open 2x3 grid four of five words have one term each, as `explain` finds them."""
+    candidates = all_tasks("grid", "gw2-2x3")
+    built = build_language(candidates, "minimal", prefer="simple")
+    terms = sorted(len(f.terms) for f in word_formulas(built.language, candidates.model).values())
+    assert sum(terms[:-1]) == 4 == built.figures["terms"] == built.figures["terms_lower_bound"]
+    assert built.figures["terms_before"] > 4
+    assert built.figures["limits"] == built.figures["limits_lower_bound"] == 6
+    assert built.verdict.holds
+
+
+def test_formulas_of_a_partition() -> None:
+    """Four states of two variables: two words in a chessboard need two terms, with two limits each;
+    one term is not enough.
+    """
+    value = {n: np.array(divmod(n, 2)) for n in range(4)}
+    for terms, solvable in ((1, False), (2, True)):
+        problem = FormulaProblem(range(4), 2, value, (2, 2), terms)
+        for pair in ((0, 1), (0, 2), (1, 3), (2, 3)):
+            problem.separate_one([pair])
+        found = problem.solve()
+        assert (found is not None) == solvable
+        if found is not None:
+            assert found[0] == found[3] != found[1] == found[2]
+            assert problem.lengths() == (2, 4)
+        problem.close()
+    problem = FormulaProblem(range(4), 2, value, (2, 2), 1, limits=1)
+    problem.separate_one([(0, 1)])
+    assert problem.solve() in ({0: 0, 1: 1, 2: 0, 3: 1}, {0: 0, 1: 1, 2: 0, 3: 1})
+    problem.close()
+
+
+@pytest.mark.parametrize("phase", ["_decide", "_limit_fewer"])
+def test_stopped_searches_return_languages(phase: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    candidates = all_tasks("grid", "gw2-2x3")
+    built = build_language(candidates, "minimal")
+    word = built.language.partition(candidates.model).word_of(candidates.rows).tolist()
+    found = Outcome({s: word[s] for s in built.job.states}, 5, evidence=built.evidence)
+    checked: list[Assignment] = []
+
+    def late(*_: object) -> None:
+        raise OutOfTime("late")
+
+    monkeypatch.setattr(_Search, phase, late)
+    outcome = simple(replace(built.job, check=checked.append), found)
+    assert isinstance(outcome.stopped, OutOfTime)
+    assert outcome.partition is (checked[-1] if checked else found.partition)
+    assert outcome.figures["terms_lower_bound"] <= 4 <= outcome.figures["terms"]
+    assert (phase == "_limit_fewer") == bool(checked)
+
+
+def test_a_search_gives_up() -> None:
+    """With no conflicts to spend: the formulas that there were, and a bound that is true."""
+    candidates = all_tasks("grid", "gw2-2x3")
+    built = build_language(candidates, "minimal")
+    mapped = mapped_states(built.language, candidates.model)
+    found = Outcome(dict(zip(built.job.states, mapped.word.tolist(), strict=True)), 5)
+    outcome = simple(built.job, found, conflicts=0)
+    assert outcome.stopped is None
+    assert outcome.partition is found.partition
+    assert outcome.figures["terms"] == outcome.figures["terms_before"]
+    assert outcome.figures["terms_lower_bound"] == 4
