@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from random import Random
 
 import numpy as np
 
@@ -50,6 +49,41 @@ class Counterexample:
 
 
 @dataclass(frozen=True, slots=True)
+class Counterexamples:
+    """Many failing tuples of plans, all with equally many steps.
+
+    Attributes
+    ----------
+    start
+        (tuples) the node that the plans of each share.
+    edges
+        (tuples, steps, robots) step by step the edge of each plan.
+    states
+        (tuples, robots, steps + 1) the state numbers of each plan.
+    """
+
+    start: Ints
+    edges: Ints
+    states: Ints
+
+    def __len__(self) -> int:
+        """Count the tuples."""
+        return len(self.start)
+
+    def one(self, row: int) -> Counterexample:
+        """One of them."""
+        return Counterexample(
+            int(self.start[row]),
+            tuple(map(tuple, self.edges[row].tolist())),
+            tuple(map(tuple, self.states[row].tolist())),
+        )
+
+    def some(self, rows: Ints) -> Counterexamples:
+        """Those of these rows."""
+        return Counterexamples(self.start[rows], self.edges[rows], self.states[rows])
+
+
+@dataclass(frozen=True, slots=True)
 class _OpenMoves:
     """The moves of a layer that lead to a violation; ``first`` (nodes + 1) delimits each node's."""
 
@@ -61,9 +95,11 @@ class _OpenMoves:
         moves = np.flatnonzero(leads)
         return cls(moves, np.searchsorted(layer.source[moves], np.arange(len(layer.nodes) + 1)))
 
-    def of(self, row: int) -> tuple[int, int]:
-        """Where those of a node begin and end."""
-        return int(self.first[row]), int(self.first[row + 1])
+    def drawn(self, rows: Ints, random: np.random.Generator) -> Ints:
+        """One of those of each of these nodes."""
+        low, high = self.first[rows], self.first[rows + 1]
+        drawn: Ints = self.moves[random.integers(low, high)]
+        return drawn
 
 
 @dataclass(slots=True)
@@ -89,10 +125,10 @@ class _Layer:
 def counterexamples(
     choices: Choices, index: EdgeIndex, word: Ints, most: int
 ) -> Iterator[Counterexample]:
-    """Failing tuples of plans with one sentence, those that differ least first.
+    """Failing tuples of plans with one sentence.
 
     For each node that all plans and their mixture share, the rest of plans that begin alike: those
-    that differ at the fewest steps, and then others.
+    that differ at the fewest steps, and others; those with fewer steps to go first.
 
     Parameters
     ----------
@@ -103,11 +139,20 @@ def counterexamples(
     most
         About how many are wanted.  If there is none at all, ``word`` is a language for the tasks.
     """
+    for found in many_counterexamples(choices, index, word, most):
+        for row in range(len(found)):
+            yield found.one(row)
+
+
+def many_counterexamples(
+    choices: Choices, index: EdgeIndex, word: Ints, most: int
+) -> list[Counterexamples]:
+    """`counterexamples` as tables, one for each number of steps and way of drawing."""
     if not choices.requires[choices.space.starts].any():
-        return
+        return []
     layers = _Walk(choices, index, word).layers()
     _backward(choices.space, layers)
-    yield from _retrace(choices.space, layers, most)
+    return _retrace(choices.space, layers, most)
 
 
 class _Walk:
@@ -216,45 +261,50 @@ def _backward(space: PlanSpace, layers: list[_Layer]) -> None:
         layer.best = np.where(best < _FAR, best + differs, _FAR)
 
 
-def _retrace(space: PlanSpace, layers: list[_Layer], most: int) -> Iterator[Counterexample]:
+def _retrace(space: PlanSpace, layers: list[_Layer], most: int) -> list[Counterexamples]:
     """Ways from the nodes at which the plans and their mixture are one, and no sentence leads."""
     robots = space.robots
-    starts: list[tuple[int, int, int]] = []
-    for number, layer in enumerate(layers):
+    # Columns: fewest steps at which the plans differ, layer, row of the layer.
+    starts = [np.zeros((0, 3), np.int64)]
+    for number, layer in enumerate(layers[1:], 1):
         x = layer.nodes[:, : robots + 1]
         diagonal = (x == x[:, :1]).all(axis=1) & (layer.nodes[:, robots + 1 :] == NO_LEAD).all(
             axis=1
         )
-        hit = np.flatnonzero(diagonal & (layer.best < _FAR)) if number else np.zeros(0, np.int64)
-        starts += [(int(layer.best[row]), number, int(row)) for row in hit]
-    chosen = sorted(starts)[:most]
-    for _, number, row in chosen:
-        yield _follow(space, layers, number, row, None)
-    if not chosen:
-        return
+        hit = np.flatnonzero(diagonal & (layer.best < _FAR))
+        starts.append(np.column_stack((layer.best[hit], np.full(len(hit), number), hit)))
+    table = np.concatenate(starts)
+    table = table[np.lexsort(table.T[::-1])][:most]
+    if not len(table):
+        return []
     # Few starts: more ways to a violation from each, drawn at random (always the same ones).
-    random = Random(0)
-    for _ in range(min(_RANDOM_WAYS, most // len(chosen) - 1)):
-        for _, number, row in chosen:
-            yield _follow(space, layers, number, row, random)
+    random = np.random.default_rng(0)
+    repeated = min(_RANDOM_WAYS, most // len(table) - 1)
+    found = []
+    for number in np.unique(table[:, 1]).tolist():
+        rows = table[table[:, 1] == number, 2]
+        found.append(_follow(space, layers, number, rows, None))
+        if repeated > 0:
+            rows = np.repeat(rows, repeated)
+            found.append(_follow(space, layers, number, rows, random))
+    return found
 
 
 def _follow(
-    space: PlanSpace, layers: list[_Layer], number: int, row: int, random: Random | None
-) -> Counterexample:
-    """A way from a node to a violation: the best, or at each node any move that leads to one."""
-    robots = space.robots
-    start = int(layers[number].nodes[row, 0])
-    edges = []
-    for layer in layers[number:0:-1]:
-        move = int(layer.choice[row])
-        if random is not None:
-            low, high = layer.open_moves.of(row)
-            move = int(layer.open_moves.moves[random.randrange(low, high)])
-        edges.append(tuple(layer.edges[move].tolist()))
-        row = int(layer.child[move])
-    states = tuple(
-        tuple(space.state[space.nodes_on(start, [step[robot] for step in edges])].tolist())
-        for robot in range(robots)
-    )
-    return Counterexample(start, tuple(edges), states)
+    space: PlanSpace,
+    layers: list[_Layer],
+    number: int,
+    rows: Ints,
+    random: np.random.Generator | None,
+) -> Counterexamples:
+    """Ways from nodes of a layer to violations: the best, or at each node any that leads to one."""
+    start = layers[number].nodes[rows, 0]
+    edges = np.empty((len(rows), number, space.robots), np.int64)
+    for step, layer in enumerate(layers[number:0:-1]):
+        move = layer.choice[rows] if random is None else layer.open_moves.drawn(rows, random)
+        edges[:, step] = layer.edges[move]
+        rows = layer.child[move]
+    states = np.empty((len(start), space.robots, number + 1), np.int64)
+    states[:, :, 0] = space.state[start][:, None]
+    states[:, :, 1:] = space.state[space.targets(edges)].transpose(0, 2, 1)
+    return Counterexamples(start, edges, states)

@@ -14,8 +14,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import closing, suppress
-from dataclasses import replace
-from random import Random
+from dataclasses import dataclass, replace
+from math import isqrt
 
 import numpy as np
 
@@ -26,28 +26,26 @@ from coordlang.vocabulary.clauses import (
     most_frequent_pairs,
     without_implied,
 )
+from coordlang.vocabulary.equivariant import EquivariantSearch
 from coordlang.vocabulary.job import Assignment, Evidence, Job, Outcome
-from coordlang.vocabulary.necessary_clauses import NecessaryClauses, TaskPart
-from coordlang.vocabulary.problems_by_size import ProblemsBySize, SolverBudget, close_bounds
+from coordlang.vocabulary.necessary_clauses import NecessaryClauses
+from coordlang.vocabulary.problems_by_size import ProblemsBySize, SolverBudget
+from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from coordlang.vocabulary.separating import short_separating_search
 from planners.errors import OutOfMemory
 from planners.limits import run_until_stopped
 from planners.search.plan_space import PlanSpace
 
-#: Tasks are searched for counterexamples in parts, one after another: at least so many parts ..
-_LEAST_PARTS = 8
-#: .. of about so many tasks at most.
-_TASKS_OF_A_PART = 1_500
 #: Combinations of plans' next steps up to which separating words are looked for first.
 _SEPARATING_COMBINATIONS = 4_000_000
 #: Conflicts within which most partitions are found; after so many the solver is likely on the way
 #: to a proof.
-_EASY = 5_000
+_EASY = 1_000
 #: Comparisons of clauses to find which are implied, a second's work: the solver finds the others.
-_COMPARISONS = 5_000_000
+_COMPARISONS = 1_000_000
 #: Pairs of states by which symmetric partitions are compared: enough to tell most apart.
-_COMPARED_PAIRS = 20
+_COMPARED_PAIRS = 100
 
 
 def minimal(job: Job) -> Outcome:
@@ -87,6 +85,17 @@ def refuting_clauses(job: Job, size: int) -> Mapping[Clause, Evidence]:
     return search.known.evidence
 
 
+@dataclass(frozen=True, slots=True)
+class Refutation:
+    """Among all partitions into ``size`` words none satisfies the first so many known clauses.
+
+    Nothing but this raises a lower bound.  Searches of some partitions only have none to give.
+    """
+
+    size: int
+    clauses: int
+
+
 class _Search:
     """Closes in on the least number of words.
 
@@ -101,9 +110,9 @@ class _Search:
         self.best: Assignment | None = job.incumbent
         self.known = NecessaryClauses(SymmetryGroup(()))
         self._partitions = _Partitions(job.states, self.known)
-        self._parts: list[TaskPart] = []
+        self._refuter: Refuter | None = None
+        self._equivariant: EquivariantSearch | None = None
         self._rounds = 0
-        self._found = 0
 
     @property
     def _upper(self) -> int:
@@ -118,7 +127,7 @@ class _Search:
         self._prepare()
         self._look_for_separating_words()
         separating = self.best
-        close_bounds(lambda: (self.lower, self._upper), self._decide)
+        self._close_bounds()
         if self.best is separating:
             # It separates more than a language must: one that does not leaves more plans open.
             self._decide(self.lower, SolverBudget())
@@ -130,25 +139,72 @@ class _Search:
 
     def figures(self) -> dict[str, float]:
         """The work done."""
-        return {
+        figures: dict[str, float] = {
             "rounds": self._rounds,
-            "counterexamples": self._found,
             "clauses": len(self.known.clauses),
             "symmetries": len(self.known.group.symmetries),
         }
+        if self._refuter is not None:
+            figures |= {"counterexamples": len(self._refuter.pool), "walks": self._refuter.walks}
+        if self._equivariant is not None:
+            figures |= {"equivariant_rounds": self._equivariant.rounds}
+        return figures
 
     def close(self) -> None:
         """Give back what the solvers hold."""
         self._partitions.close()
 
-    def _prepare(self) -> None:
-        self.known.group = symmetry_group(self._job.candidates)
-        self._parts = _parts(self._job.candidates.spaces, Random(self._job.seed))
+    def _prepare(self) -> Refuter:
+        if self._refuter is None:
+            candidates, job = self._job.candidates, self._job
+            self.known.group = symmetry_group(candidates)
+            self._refuter = Refuter(
+                candidates.spaces, self.known.group, len(candidates.rows), job.seed, job.progress
+            )
+        return self._refuter
+
+    def _close_bounds(self) -> None:
+        """Decide numbers of words until the bounds meet: from below, and from above by symmetry."""
+        equivariant = self._equivariant = EquivariantSearch(self._job.states, self._prepare())
+        budget = SolverBudget()
+        while self.lower < self._upper:
+            if self._decide(self.lower, budget):
+                continue
+            if self._upper > self.lower + 1 and self._descend(equivariant, self.lower + 1):
+                continue
+            budget = budget.doubled()
+            if not self._decide(self.lower, budget):
+                self._descend(equivariant, self.lower)
+
+    def _descend(self, equivariant: EquivariantSearch, least: int) -> bool:
+        """Look for fewer words among equivariant partitions; whether a language was found.
+
+        Numbers of words from ``least`` up are tried.
+
+        What is not found is no bound: only `Refutation` is.
+        """
+        before = self._upper
+        size = isqrt(least * self._upper)
+        while size < self._upper:
+            self._job.progress(
+                f"symmetric words: trying {size}, {self.lower} to {self._upper} needed"
+            )
+            found = equivariant.find(size)
+            if found is None:
+                size = (size + self._upper + 1) // 2
+            else:
+                self._take(found)
+                size = isqrt(least * self._upper)
+        return self._upper < before
 
     def _look_for_separating_words(self) -> None:
-        """Take a separating partition with fewer words, if a short search finds one."""
+        """Take a separating partition with fewer words, if a short search finds one.
+
+        Not where it takes long and there are symmetries: equivariant words are fewer.
+        """
         spaces = self._job.candidates.spaces
-        if sum(map(_combinations, spaces)) > _SEPARATING_COMBINATIONS:
+        most = _SEPARATING_COMBINATIONS // (1 + len(self.known.group.symmetries))
+        if sum(map(_combinations, spaces)) > most:
             return
         found = short_separating_search(replace(self._job, incumbent=self.best))
         self.best = found.partition
@@ -162,45 +218,43 @@ class _Search:
         False if the budget was not enough.
         """
         try:
-            partition = self._refine(size, budget)
+            found = self._refine(size, budget)
         except Undecided:
             return False
         self._partitions.drop(size)
-        if partition is None:
+        if isinstance(found, Refutation):
             # In this order: a signal in between leaves more clauses than the bound needs.
-            self.refuting = len(self.known.clauses)
-            self.lower = size + 1
+            self.refuting = found.clauses
+            self.lower = found.size + 1
         else:
-            self._job.check(partition)
-            self.best = partition
+            self._take(found)
         return True
 
-    def _refine(self, size: int, budget: SolverBudget) -> Assignment | None:
-        """The loop for one number of words: a language, or None if there is none."""
-        partition = self._partitions.find(size, budget.conflicts)
-        without_violation = number = refuted = 0
-        word = np.zeros(len(self._job.candidates.rows), np.int64)
-        while partition is not None and without_violation < len(self._parts):
+    def _take(self, partition: Assignment) -> None:
+        """A language with fewer words, once it is verified by definition."""
+        self._job.check(partition)
+        self.best = partition
+
+    def _refine(self, size: int, budget: SolverBudget) -> Assignment | Refutation:
+        """The loop for one number of words: a language, or that there is none."""
+        refuter, rows = self._prepare(), len(self._job.candidates.rows)
+        refuted = 0
+        while (partition := self._partitions.find(size, budget.conflicts)) is not None:
             if refuted >= budget.rounds:
                 raise Undecided
-            self._rounds += 1
+            word = np.zeros(rows, np.int64)
             word[list(partition)] = list(partition.values())
-            part = self._parts[number]
-            violated = part.violated(word)
-            number = (number + 1) % len(self._parts)
+            violated = refuter.violated(word)
+            if not violated:
+                return partition
+            refuted += 1
+            self._rounds += 1
+            self.known.add_all(violated)
             self._job.progress(
                 f"trying {size} words, {self.lower} to {self._upper} needed: "
                 f"round {self._rounds}, {len(self.known.clauses):,} clauses"
             )
-            if not violated:
-                without_violation += 1
-                continue
-            without_violation = 0
-            refuted += 1
-            self._found += len(violated)
-            self.known.add(violated, part.space)
-            partition = self._partitions.find(size, budget.conflicts)
-        return partition
+        return Refutation(size, len(self.known.clauses))
 
 
 class _Partitions:
@@ -256,17 +310,3 @@ def _combinations(space: PlanSpace) -> float:
     """At most so many links has the walk to last differences: one edge for each plan, in step."""
     of_goals = (np.bincount(space.goal[layer.source]) for layer in space.edges_by_layer())
     return sum(float((edges.astype(np.float64) ** space.robots).sum()) for edges in of_goals)
-
-
-def _parts(spaces: Sequence[PlanSpace], random: Random) -> list[TaskPart]:
-    """The tasks in parts, each with a random choice of the goals."""
-    parts = []
-    for space in spaces:
-        goals = list(range(len(space.goals)))
-        random.shuffle(goals)
-        goal_of_start = space.goal[space.starts]
-        count = min(len(goals), max(_LEAST_PARTS, len(space.starts) // _TASKS_OF_A_PART))
-        for number in range(count):
-            mine = np.isin(goal_of_start, goals[number::count])
-            parts.append(TaskPart.of(space, mine))
-    return parts

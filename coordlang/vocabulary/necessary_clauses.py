@@ -12,7 +12,12 @@ from coordlang.language.warping import Clause, separation_clause
 from coordlang.required.choices import Choices
 from coordlang.symmetry.group import SymmetryGroup
 from coordlang.vocabulary.clauses import without_implied
-from coordlang.vocabulary.counterexamples import Counterexample, counterexamples
+from coordlang.vocabulary.counterexamples import (
+    Counterexample,
+    Counterexamples,
+    counterexamples,
+    many_counterexamples,
+)
 from coordlang.vocabulary.job import Evidence
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
@@ -20,6 +25,8 @@ from planners.tables import Bools, Ints
 
 #: Counterexamples taken at a time.
 _AT_A_TIME = 200
+#: Counterexamples taken at a time where they are kept as tables.
+_MANY = 20_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +54,20 @@ class TaskPart:
     def space(self) -> PlanSpace:
         """The plan space of the tasks."""
         return self.choices.space
+
+    def failing(self, word: Ints, most: int = _MANY) -> list[Counterexamples]:
+        """Failing tuples of plans with one sentence, as tables.
+
+        None only if the partition is a language for these tasks.
+
+        Parameters
+        ----------
+        word
+            (states) the word of each state number.
+        most
+            About how many are wanted.
+        """
+        return many_counterexamples(self.choices, self.index, word[self.space.state], most)
 
     def violated(self, word: Ints) -> dict[Clause, Counterexample]:
         """Clauses that a partition violates, each with the plans that it comes from.
@@ -115,9 +136,13 @@ class NecessaryClauses:
         self.evidence: dict[Clause, Evidence] = {}
 
     def add(self, found: Mapping[Clause, Counterexample], space: PlanSpace) -> None:
-        """Add clauses that plans of a space give; those that others of them imply are left out."""
+        """`add_all`, of clauses that plans of a space give."""
+        self.add_all({clause: Evidence(space, example, None) for clause, example in found.items()})
+
+    def add_all(self, found: Mapping[Clause, Evidence]) -> None:
+        """Add clauses with their images; those that others of them imply are left out."""
         for clause in without_implied(found):
-            evidence = Evidence(space, found[clause], None)
+            evidence = found[clause]
             self._add([(clause, evidence)])
             self._add(
                 (image, replace(evidence, symmetry=symmetry))

@@ -19,7 +19,8 @@ def walked(space: PlanSpace, word: Ints, most: int) -> Iterator[Counterexample]:
     """What `counterexamples` gives, for a plan space and the word of each of its nodes."""
     layers = _forward(space, EdgeIndex.of(space), word, np.unique(space.starts))
     _backward(space, layers)
-    yield from _retrace(space, layers, most)
+    for found in _retrace(space, layers, most):
+        yield from map(found.one, range(len(found)))
 
 
 def _forward(space: PlanSpace, index: EdgeIndex, word: Ints, starts: Ints) -> list[_Layer]:

@@ -1,0 +1,275 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Equivariant languages: words that go to words under some symmetries.
+
+For a subgroup ``H`` of the symmetries and a map ``rho`` of it to permutations of the words, only
+partitions with ``f(h s) = rho(h) f(s)`` are looked at: one state of an orbit decides the others.
+That finds languages where the search among all partitions does not end.  **It proves nothing about
+numbers of words**: that no partition of a kind is a language says nothing of the others.  So what
+is not found here is `None`, whatever the reason, and no bound can be made of it (Proposition 18 of
+docs/concepts.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import islice
+
+import numpy as np
+
+from coordlang.symmetry.subgroups import GroupTable, WordAction, cycle_type, group_table
+from coordlang.vocabulary.failing_tuples import Agreeing
+from coordlang.vocabulary.job import Assignment
+from coordlang.vocabulary.refuter import Refuter
+from coordlang.vocabulary.sat import Undecided, satisfiable
+from planners.sat import sat_solver
+
+#: Subgroups that are looked at, and maps to permutations of words for each of them.
+_SUBGROUPS, _ACTIONS = 60, 60
+#: Maps for which it is tried whether the single symmetries allow them, for each subgroup.
+_TRIED = 600
+#: Failing tuples that are told apart when the first partition of a kind is refuted, and at most:
+#: most kinds are refuted by few.
+_FIRST, _AT_ONCE = 10, 100
+#: A solver that is quick on many easy problems with many solutions.
+_SOLVER = "minisat22"
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """What may be spent on each kind of partition: refuted partitions, conflicts for each."""
+
+    rounds: int = 40
+    conflicts: int = 1_000
+
+    def doubled(self) -> Effort:
+        """Twice as much of both."""
+        return Effort(2 * self.rounds, 2 * self.conflicts)
+
+
+#: What is spent to see that one symmetry cannot act on words in some way.
+_PROBE = Effort(rounds=5, conflicts=200)
+
+
+@dataclass(slots=True)
+class _Kinds:
+    """The kinds of partitions into some number of words that may still hold a language."""
+
+    open: list[WordAction]
+    effort: Effort = field(default_factory=Effort)
+
+
+class EquivariantSearch:
+    """Looks for languages among equivariant partitions.
+
+    Parameters
+    ----------
+    states
+        Numbers of the states that need words.
+    refuter
+        Tells what is wrong with a partition.
+    """
+
+    def __init__(self, states: Sequence[int], refuter: Refuter) -> None:
+        self._states, self._refuter = states, refuter
+        self._group = group_table(refuter.pool.images)
+        every = frozenset(range(len(self._group.elements)))
+        subgroups = self._group.subgroups(every, _SUBGROUPS)
+        some = self._group.up_to_conjugation(subgroups, every)
+        # Large ones first: they are quick.  All partitions are what the others look at.
+        self._subgroups = some[:0:-1] or some
+        self._kinds: dict[int, _Kinds] = {}
+        self.rounds = self.pairs = self.conflicts = 0
+
+    def find(self, size: int) -> Assignment | None:
+        """A language with at most ``size`` words, None if none was found with some effort.
+
+        The next call with this size spends twice as much.
+        """
+        kinds = self._kinds.get(size)
+        if kinds is None:
+            kinds = self._kinds[size] = _Kinds(self._actions(size))
+        undecided = []
+        for number, action in enumerate(kinds.open):
+            try:
+                found = self._of_kind(action, size, kinds.effort)
+            except Undecided:
+                undecided.append(action)
+                continue
+            if found is not None:
+                kinds.open = [*undecided, *kinds.open[number:]]
+                return found
+        kinds.open, kinds.effort = undecided, kinds.effort.doubled()
+        return None
+
+    def _actions(self, size: int) -> list[WordAction]:
+        """The kinds of partitions, without those that some single symmetry rules out.
+
+        Where a subgroup acts, each of its elements acts by itself: if no language has words on
+        which one element acts in some way, then no larger kind with it has.
+        """
+        ruled_out: dict[tuple[int, tuple[int, ...]], bool] = {}
+
+        def possible(action: WordAction) -> bool:
+            for element in action.subgroup[1:]:
+                words = action.words[element]
+                key = (self._group.conjugate[element], cycle_type(words))
+                if key not in ruled_out:
+                    ruled_out[key] = self._is_ruled_out(element, words)
+                if ruled_out[key]:
+                    return False
+            return True
+
+        chosen = []
+        for subgroup in self._subgroups:
+            found = islice(self._group.word_actions(subgroup, size, _SUBGROUPS), _TRIED)
+            chosen += list(islice(filter(possible, found), _ACTIONS))
+        return chosen
+
+    def _is_ruled_out(self, element: int, words: tuple[int, ...]) -> bool:
+        """Whether it is soon seen that no language has words on which an element acts so."""
+        action = self._group.cyclic_action(element, words)
+        try:
+            return self._of_kind(action, len(words), _PROBE) is None
+        except Undecided:
+            return False
+
+    def _of_kind(self, action: WordAction, size: int, effort: Effort) -> Assignment | None:
+        """A language of one kind; None if there is none.  Raises `Undecided`."""
+        problem = _Orbits.of(self._states, self._group, action, size)
+        if problem is None:
+            return None
+        word = np.zeros(len(self._group.elements[0]), np.int64)
+        images = self._group.right_cosets(frozenset(action.words))
+        try:
+            for turn in range(effort.rounds):
+                most = min(_AT_ONCE, _FIRST * 2**turn)
+                partition = problem.solve(effort.conflicts)
+                if partition is None:
+                    return None
+                word[list(partition)] = list(partition.values())
+                agreeing = self._refuter.agreeing(word, images, most)
+                if not agreeing:
+                    return partition
+                self.rounds += 1
+                for sequences in self._chosen(agreeing, most):
+                    problem.tell_apart(sequences)
+                    self.pairs += 1
+        finally:
+            self.conflicts += problem.conflicts
+            problem.close()
+        raise Undecided
+
+    def _chosen(self, agreeing: Sequence[Agreeing], most: int) -> list[list[list[int]]]:
+        """State sequences of some of the tuples: short ones, evenly over symmetries."""
+        share = -(-most // max(1, len({id(found.to) for found in agreeing})))
+        chosen: list[list[list[int]]] = []
+        for found in agreeing:
+            if len(chosen) >= most:
+                break
+            rows = found.rows[:: -(-len(found.rows) // share)]
+            chosen += self._refuter.pool.sequences(found, rows).tolist()
+        return chosen
+
+
+class _Orbits:
+    """The SAT problem of one kind of partition: a word for each orbit of states.
+
+    A state's variable for a word is that of its orbit's first state for the word that goes there.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+        self._solver = sat_solver(_SOLVER)
+        self._last = 0
+        self._word: dict[int, dict[int, int]] = {}
+        self._orbit_of_pair: dict[tuple[int, int], int] = {}
+        self._elements: list[list[int]] = []
+
+    @classmethod
+    def of(
+        cls, states: Sequence[int], group: GroupTable, action: WordAction, size: int
+    ) -> _Orbits | None:
+        """The problem; None if some state, which symmetries fix, could have no word."""
+        problem = cls(size)
+        elements = {h: group.elements[h].tolist() for h in action.subgroup}
+        problem._elements = list(elements.values())
+        for state in states:
+            if state in problem._word:
+                continue
+            fixing = [action.words[h] for h, to in elements.items() if to[state] == state]
+            words = [w for w in range(size) if all(to[w] == w for to in fixing)]
+            if not words:
+                problem.close()
+                return None
+            own = {word: problem._new() for word in words}
+            for h, to in elements.items():
+                problem._word[to[state]] = {action.words[h][w]: v for w, v in own.items()}
+            problem._one_of(list(own.values()))
+        return problem
+
+    @property
+    def conflicts(self) -> int:
+        """Conflicts of the solver so far."""
+        return int(self._solver.accum_stats()["conflicts"])
+
+    def solve(self, conflicts: int) -> dict[int, int] | None:
+        """A partition of this kind, None if none is left.  Raises `Undecided`."""
+        if not satisfiable(self._solver, conflicts=conflicts):
+            return None
+        true = {v for v in self._solver.get_model() if v > 0}
+        return {s: next(w for w, v in own.items() if v in true) for s, own in self._word.items()}
+
+    def close(self) -> None:
+        """Give back what the solver holds."""
+        self._solver.delete()
+
+    def tell_apart(self, sequences: Sequence[Sequence[int]]) -> None:
+        """Require that not all of these sequences of states have one sentence.
+
+        A variable for each cell that a warping path reaches, and one of the last cells unreached.
+        """
+        ends = [self._end_reached(sequences[0], other) for other in sequences[1:]]
+        self._solver.add_clause([-end for end in ends])
+
+    def _end_reached(self, u: Sequence[int], v: Sequence[int]) -> int:
+        """A variable that is true if a warping path joins two sequences."""
+        reached: dict[tuple[int, int], list[int]] = {(-1, -1): []}
+        for i, a in enumerate(u):
+            for j, b in enumerate(v):
+                before = [c for c in ((i - 1, j - 1), (i - 1, j), (i, j - 1)) if c in reached]
+                if not before:
+                    continue
+                if (a == b and reached[before[0]] == []) and (i, j) != (len(u) - 1, len(v) - 1):
+                    reached[i, j] = []
+                    continue
+                variable = self._new()
+                reached[i, j] = [-variable]
+                apart = [] if a == b else [self._separated(a, b)]
+                for cell in before:
+                    self._solver.add_clause([*reached[cell], *apart, variable])
+        return -reached[len(u) - 1, len(v) - 1][0]
+
+    def _separated(self, a: int, b: int) -> int:
+        """A variable that is true only where two states, and their images, have different words."""
+        known = self._orbit_of_pair.get((a, b))
+        if known is not None:
+            return known
+        variable = self._new()
+        for to in self._elements:
+            x, y = to[a], to[b]
+            self._orbit_of_pair[x, y] = self._orbit_of_pair[y, x] = variable
+        first, second = self._word[a], self._word[b]
+        for word in first.keys() & second.keys():
+            self._solver.add_clause([-variable, *{-first[word], -second[word]}])
+        return variable
+
+    def _one_of(self, variables: Sequence[int]) -> None:
+        self._solver.add_clause(list(variables))
+        for n, b in enumerate(variables):
+            for a in variables[:n]:
+                self._solver.add_clause([-a, -b])
+
+    def _new(self) -> int:
+        self._last += 1
+        return self._last

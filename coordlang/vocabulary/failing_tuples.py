@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Failing tuples of state sequences met so far: those that a partition does not tell apart.
+
+They are asked before any walk: a partition under which all sequences of a failing tuple have one
+sentence is no language.  The steps that all plans of a tuple share at its ends are left out: they
+say the same there (Proposition 17 of docs/concepts.md).  Of tuples that are images of each other
+under a symmetry one is kept, and all images are tested.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from coordlang.language.warping import Clause
+from coordlang.symmetry.group import SymmetryGroup
+from coordlang.vocabulary.counterexamples import Counterexamples
+from coordlang.vocabulary.job import Evidence
+from planners.search.plan_space import PlanSpace
+from planners.tables import Bools, Ints
+
+#: Tuples whose warping paths are looked for at a time, and images of clauses returned, at most.
+_WARPED, _RETURNED = 2_000, 800
+#: Clauses that are returned though their images are more: at least so many.
+_LEAST = 20
+#: An odd multiplier: sentences that are equal have equal codes, others nearly never.
+_MULTIPLIER = 0x9E3779B97F4A7C15
+#: Cost of a cell that no warping path of equal words passes.
+_NO_PATH = 10**6
+
+
+@dataclass(frozen=True, slots=True)
+class Agreeing:
+    """Tuples of one length whose images under a symmetry all have one sentence.
+
+    ``to`` (states) is the symmetry, ``rows`` are the tuples' rows in the table of that length.
+    """
+
+    length: int
+    to: Ints
+    rows: Ints
+
+
+@dataclass(slots=True)
+class _Table:
+    """Tuples of one length: ``states`` (tuples, robots, length), and where each comes from.
+
+    ``source`` (tuples, 2): the number of a batch and the row in it.
+    """
+
+    states: Ints
+    source: Ints
+
+
+@dataclass(slots=True)
+class FailingTuples:
+    """A pool of failing tuples, closed under a group of symmetries.
+
+    Attributes
+    ----------
+    group
+        The symmetries of the tasks.
+    states
+        The number of states in the table of states.
+    """
+
+    group: SymmetryGroup
+    states: int
+    _tables: dict[int, _Table] = field(default_factory=dict)
+    _batches: list[tuple[PlanSpace, Counterexamples]] = field(default_factory=list)
+    _keys: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    _images: list[Ints] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._images = [np.arange(self.states), *(s.states for s in self.group.symmetries)]
+
+    def __len__(self) -> int:
+        """Count the tuples, one for all their images."""
+        return sum(len(table.states) for table in self._tables.values())
+
+    @property
+    def images(self) -> Sequence[Ints]:
+        """Where the identity and each symmetry take every state."""
+        return self._images
+
+    def add(self, found: Counterexamples, space: PlanSpace) -> int:
+        """Add failing tuples of plans; how many of them are new."""
+        low, high = _different_part(found.states)
+        batch: list[Ints] = []
+        kept = 0
+        for length in np.unique(high - low).tolist():
+            rows = np.flatnonzero(high - low == length)
+            cells = low[rows, None] + np.arange(length)
+            states = np.take_along_axis(found.states[rows], cells[:, None, :], axis=2)
+            fresh = self._new(states)
+            here = np.arange(kept, kept + len(fresh))
+            kept += len(fresh)
+            batch.append(rows[fresh])
+            source = np.column_stack((np.full(len(fresh), len(self._batches)), here))
+            self._append(length, states[fresh], source)
+        if kept:
+            self._batches.append((space, found.some(np.concatenate(batch))))
+        return kept
+
+    def agreeing(
+        self, word: Ints, images: Sequence[Ints] | None = None, enough: int = sys.maxsize
+    ) -> list[Agreeing]:
+        """The tuples, shortest first, of which a partition gives some image one sentence.
+
+        Parameters
+        ----------
+        word
+            (states) the word of each state number.
+        images
+            The symmetries under which images are looked at: by default all.
+        enough
+            Longer tuples are left out once there are so many.
+        """
+        found: list[Agreeing] = []
+        for length, table in sorted(self._tables.items()):
+            if sum(len(shorter.rows) for shorter in found) >= enough:
+                break
+            for to in self._images if images is None else images:
+                rows = np.flatnonzero(_agree(word[to][table.states]))
+                if len(rows):
+                    found.append(Agreeing(length, to, rows))
+        return found
+
+    def sequences(self, agreeing: Agreeing, rows: Ints) -> Ints:
+        """The state sequences (rows, robots, length) of images of tuples."""
+        found: Ints = agreeing.to[self._tables[agreeing.length].states[rows]]
+        return found
+
+    def clauses(
+        self, word: Ints, agreeing: Sequence[Agreeing], random: np.random.Generator
+    ) -> dict[Clause, Evidence]:
+        """Clauses of agreeing tuples, short ones first.
+
+        They are those of the tuples that are kept; the images of each are necessary as well, and
+        it is one of these images that the partition violates.
+        """
+        total = sum(len(found.rows) for found in agreeing)
+        clauses: dict[Clause, tuple[int, int]] = {}
+        for found in agreeing:
+            rows = found.rows
+            share = max(1, len(rows) * _WARPED // max(total, _WARPED))
+            if share < len(rows):
+                rows = random.permutation(rows)[:share]
+            table = self._tables[found.length]
+            for row, clause in _clauses(table.states[rows], word[found.to]):
+                batch, number = table.source[rows[row]].tolist()
+                clauses.setdefault(clause, (batch, number))
+        chosen = sorted(clauses, key=lambda c: (len(c), sorted(c)))
+        chosen = chosen[: max(_LEAST, _RETURNED // len(self._images))]
+        return {clause: self._evidence(*clauses[clause]) for clause in chosen}
+
+    def _evidence(self, batch: int, row: int) -> Evidence:
+        space, found = self._batches[batch]
+        return Evidence(space, found.one(row), None)
+
+    def _new(self, states: Ints) -> Ints:
+        """The rows that no earlier row, and no tuple that is kept, is an image of."""
+        keys = np.full(len(states), np.iinfo(np.int64).max)
+        for to in self._images:
+            np.minimum(keys, _keys(to[states]), out=keys)
+        keys, first = np.unique(keys, return_index=True)
+        fresh = ~np.isin(keys, self._keys, assume_unique=True)
+        self._keys = np.concatenate((self._keys, keys[fresh]))
+        return np.sort(first[fresh])
+
+    def _append(self, length: int, states: Ints, source: Ints) -> None:
+        if not len(states):
+            return
+        if length in self._tables:
+            known = self._tables[length]
+            states = np.concatenate((known.states, states))
+            source = np.concatenate((known.source, source))
+        self._tables[length] = _Table(states, source)
+
+
+def _different_part(states: Ints) -> tuple[Ints, Ints]:
+    """Where the part of each tuple in which plans differ begins and ends, a shared state around it.
+
+    Plans that end in different states have none at the end.
+    """
+    same = (states == states[:, :1]).all(axis=1)
+    steps = same.shape[1]
+    after = np.argmin(same[:, ::-1], axis=1)
+    return np.argmin(same, axis=1) - 1, np.where(after > 0, steps - after + 1, steps)
+
+
+def _keys(states: Ints) -> Ints:
+    """A number for each tuple that does not depend on the order of its sequences."""
+    code = np.zeros(states.shape[:2], np.uint64)
+    multiplier = np.uint64(_MULTIPLIER)
+    for step in range(states.shape[2]):
+        code = (code ^ (states[:, :, step].astype(np.uint64) + np.uint64(1))) * multiplier
+        code ^= code >> np.uint64(29)
+    key: Ints = (code.sum(axis=1, dtype=np.uint64) * multiplier).view(np.int64)
+    return key
+
+
+def _agree(words: Ints) -> Bools:
+    """Whether all sequences of words (tuples, robots, length) are one sentence; rarely wrong.
+
+    If they are, the answer is always true.
+    """
+    code = words[:, :, 0].astype(np.uint64)
+    multiplier = np.uint64(_MULTIPLIER)
+    for step in range(1, words.shape[2]):
+        entered = words[:, :, step] != words[:, :, step - 1]
+        longer = code * multiplier + (words[:, :, step].astype(np.uint64) + np.uint64(1))
+        code = np.where(entered, longer, code)
+    agree: Bools = (code == code[:, :1]).all(axis=1)
+    return agree
+
+
+def _clauses(sequences: Ints, word: Ints) -> Iterator[tuple[int, Clause]]:
+    """`separation_clause` of each tuple (tuples, robots, length) that has one, with its row."""
+    robots = sequences.shape[1]
+    cells = [_cells(sequences[:, 0], sequences[:, other], word) for other in range(1, robots)]
+    pairs = np.concatenate(cells, axis=1)
+    whole = np.logical_and.reduce([(own[:, 0] >= -1) for own in cells])
+    for row in np.flatnonzero(whole).tolist():
+        codes = set(pairs[row].tolist()) - {-1}
+        yield row, frozenset(divmod(code, len(word)) for code in codes)
+
+
+def _cells(u: Ints, v: Ints, word: Ints) -> Ints:
+    """The pairs of different states on warping paths with the fewest such cells.
+
+    One row for each pair of sequences: codes ``a * states + b`` with ``a < b``, -1 for other cells,
+    and -2 first where there is no path.
+    """
+    best = _fewest_cells(u, v, word)
+    steps, every = u.shape[1], np.arange(len(u))
+    i, j = (np.full(len(u), steps) for _ in range(2))
+    live = best[steps, steps] < _NO_PATH
+    found = [np.where(live, -1, -2)]
+    while live.any():
+        a, b = u[every, i - 1], v[every, j - 1]
+        code = np.minimum(a, b) * len(word) + np.maximum(a, b)
+        found.append(np.where(live & (a != b), code, -1))
+        live &= (i > 1) | (j > 1)
+        before = np.stack((best[i - 1, j - 1, every], best[i - 1, j, every], best[i, j - 1, every]))
+        step = before.argmin(axis=0)
+        i, j = i - (live & (step != 2)), j - (live & (step != 1))
+    return np.stack(found, axis=1)
+
+
+def _fewest_cells(u: Ints, v: Ints, word: Ints) -> Ints:
+    """(steps + 1, steps + 1, pairs): different cells of a best path to each cell, from 1."""
+    steps = u.shape[1]
+    first, second = word[u], word[v]
+    best = np.full((steps + 1, steps + 1, len(u)), _NO_PATH)
+    best[0, 0] = 0
+    for i in range(steps):
+        for j in range(steps):
+            before = np.minimum(np.minimum(best[i, j], best[i, j + 1]), best[i + 1, j])
+            here = before + (u[:, i] != v[:, j])
+            best[i + 1, j + 1] = np.where(first[:, i] == second[:, j], here, _NO_PATH)
+            best[0, 0] = _NO_PATH
+    return best

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Equivariant words: languages are found, and nothing is ever proved by not finding one."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+
+from coordlang.building import build_language
+from coordlang.language.partition import Partition
+from coordlang.symmetry.group import SymmetryGroup, symmetry_group
+from coordlang.tasks.candidates import Candidates
+from coordlang.verification.by_definition import verify
+from coordlang.vocabulary.equivariant import EquivariantSearch
+from coordlang.vocabulary.job import Assignment
+from coordlang.vocabulary.refuter import Refuter
+from tests.support.domains import all_tasks
+
+
+def searching(candidates: Candidates, group: SymmetryGroup | None = None) -> EquivariantSearch:
+    group = symmetry_group(candidates) if group is None else group
+    rows = len(candidates.rows)
+    refuter = Refuter(candidates.spaces, group, rows, 0)
+    states = sorted({s for space in candidates.spaces for s in space.state.tolist()})
+    return EquivariantSearch(states, refuter)
+
+
+def is_language(found: Assignment, candidates: Candidates) -> bool:
+    return verify(Partition.of_states(candidates.rows, found), candidates.spaces).holds
+
+
+@pytest.mark.parametrize(
+    ("folder", "stem", "words"),
+    [
+        ("three-cells", "problem", 3),
+        ("t-map", "problem", 3),
+        ("grid", "gw1-2x2", 3),
+        ("grid", "gw2-2x3", 5),
+    ],
+)
+def test_languages_are_found_and_fewer_words_are_not(folder: str, stem: str, words: int) -> None:
+    """With the numbers of words that brute force and proofs give."""
+    candidates = all_tasks(folder, stem)
+    search = searching(candidates)
+    assert search.find(words - 1) is None
+    for size in (words + 2, words + 1, words):
+        found = next((f for _ in range(6) if (f := search.find(size)) is not None), None)
+        if found is not None:
+            assert len(set(found.values())) <= size
+            assert is_language(found, candidates)
+    assert found is not None or words == 5
+
+
+def test_what_is_found_is_equivariant() -> None:
+    """Some symmetry other than the identity takes words to words."""
+    candidates = all_tasks("grid", "gw1-2x2")
+    group = symmetry_group(candidates)
+    found = searching(candidates).find(4)
+    assert found is not None
+
+    def keeps_words(to: list[int]) -> bool:
+        return len({(found[s], found[to[s]]) for s in found}) == len(set(found.values()))
+
+    assert any(map(keeps_words, group.permutations))
+
+
+def test_without_symmetries_all_partitions_are_looked_at() -> None:
+    candidates = all_tasks("grid", "gw1-2x2")
+    search = searching(candidates, SymmetryGroup(()))
+    assert search.find(2) is None
+    found = search.find(3)
+    assert found is not None
+    assert is_language(found, candidates)
+
+
+@pytest.mark.parametrize("finds", ["nothing", "all words"])
+def test_what_is_not_found_raises_no_bound(monkeypatch: pytest.MonkeyPatch, finds: str) -> None:
+    """Whatever the search of equivariant words says, least numbers and bounds stay the same."""
+    asked: list[int] = []
+    find = EquivariantSearch.find
+
+    def told(search: EquivariantSearch, size: int) -> Assignment | None:
+        asked.append(size)
+        return None if finds == "nothing" else find(search, size)
+
+    monkeypatch.setattr(
+        sys.modules["coordlang.vocabulary.equivariant"].EquivariantSearch, "find", told
+    )
+    built = build_language(all_tasks("grid", "gw2-2x3"), "minimal")
+    guarantee = built.language.guarantee
+    assert (guarantee.size, guarantee.lower_bound) == (5, 5)
+    assert built.verdict.holds
+
+
+def test_kinds_without_a_language_are_no_bound() -> None:
+    """Under the whole group there is no language of three words for GW1, though there is one."""
+    candidates = all_tasks("grid", "gw1-2x2")
+    search = searching(candidates)
+    search._subgroups = search._subgroups[:1]
+    sizes = [size for size in range(3, 13) if search.find(size) is None]
+    assert sizes, "some kind has none"
+    assert build_language(candidates, "minimal").language.guarantee.lower_bound == 3
+    assert np.all(np.array(sizes) >= 3)
