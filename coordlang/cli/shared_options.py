@@ -99,6 +99,9 @@ def kept_plans(function: CommandFunction) -> CommandFunction:
     )
     @functools.wraps(function)
     def wrapped(no_cache: bool, **arguments: object) -> int | None:
+        from planners.limits import require_libraries
+
+        require_libraries()  # before what imports them
         from planners.cache import Folder, default_folder, keeping_plans
 
         place = None if no_cache else default_folder()

@@ -25,7 +25,8 @@ from planners.tables import Bools, Ints, Rows
 _SAMPLE, _MOST = 50, 0.5
 #: Conflicts for the first tries to find the least cost.
 _FIRST, _SECOND = 50_000, 300_000
-#: What a makespan that is refuted at once costs for each of its steps, in conflicts.
+#: What a makespan that is refuted at once costs for each of its steps, in conflicts; the clauses of
+#: one step more are counted, too: of a task without plan there would be ever more.
 _EASY = 20
 #: The robots' labels, step by step.
 Plan = list[tuple[int, ...]]
@@ -114,7 +115,7 @@ def _bound(formula: PlanFormula, task: PlanningTask, plan: Plan) -> ExactBound:
 def _shortest(formula: PlanFormula, task: PlanningTask, at_least: int) -> tuple[int, Plan]:
     makespan = at_least
     while not formula.solvable(task.init, makespan):
-        formula.spend(_EASY * makespan)
+        formula.spend(_EASY * makespan + formula.clauses_of_step)
         makespan += 1
     return makespan, formula.labels_chosen(makespan)
 

@@ -114,6 +114,11 @@ class PlanFormula:
         self._active.append(active)
         self._steps += 1
 
+    @property
+    def clauses_of_step(self) -> int:
+        """How many clauses one step more has."""
+        return len(self._template.clauses)
+
     def count_costs(self, most: int) -> None:
         """Let costs up to ``most`` be bounded, in all steps that there are.
 

@@ -29,7 +29,7 @@ def with_remedies(coordlang: Command) -> Command:
 
     def call(*arguments: object) -> Outcome:
         outcome = coordlang(*arguments)
-        lines = outcome.err.splitlines()
+        lines = [x for x in outcome.err.splitlines() if not x.startswith("coordlang: note:")]
         if outcome.code in (1, 11, 22, 23, 31, 32, 34) and lines and ": warning:" not in lines[0]:
             assert lines[0].startswith("coordlang: ")
             assert lines[1].startswith("  "), outcome.err
