@@ -35,6 +35,7 @@ from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from coordlang.vocabulary.separating import short_separating_search
 from planners.errors import OutOfMemory
 from planners.limits import run_until_stopped
+from planners.sat import SolverName
 from planners.search.plan_space import PlanSpace
 
 #: Combinations of plans' next steps up to which separating words are looked for first.
@@ -291,7 +292,7 @@ class _Partitions:
         self._up_to_symmetry.close()
 
     def _start(
-        self, size: int, known: Sequence[Clause], solver: str = "cadical153"
+        self, size: int, known: Sequence[Clause], solver: SolverName = "cadical153"
     ) -> PartitionProblem:
         clauses = without_implied(known, _COMPARISONS)
         problem = PartitionProblem(most_constrained_first(self._states, clauses), size, solver)
