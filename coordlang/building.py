@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
 from time import perf_counter
 from typing import Literal
 
@@ -208,7 +207,7 @@ def build_language(
         seconds=clock.seconds,
         stopped=outcome.stopped,
         job=job,
-        evidence=dict(islice(outcome.evidence.items(), outcome.refuting)),
+        evidence=outcome.refuting,
     )
 
 

@@ -22,7 +22,7 @@ from coordlang.vocabulary.failing_tuples import Agreeing
 from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import Undecided, satisfiable
-from planners.sat import SolverName, sat_solver
+from planners.sat import sat_solver
 
 #: Subgroups that are looked at, and maps to permutations of words for each of them.
 _SUBGROUPS, _ACTIONS = 60, 60
@@ -31,15 +31,17 @@ _TRIED = 600
 #: Failing tuples that are told apart when the first partition of a kind is refuted, and at most:
 #: most kinds are refuted by few.
 _FIRST, _AT_ONCE = 10, 100
+#: Refuted partitions after which a search is given up for now.
+_PASS = 1_000
 #: A solver that is quick on many easy problems with many solutions.
-_SOLVER: SolverName = "minisat22"
+_SOLVER = "minisat22"
 
 
 @dataclass(frozen=True, slots=True)
 class Effort:
     """What may be spent on each kind of partition: refuted partitions, conflicts for each."""
 
-    rounds: int = 40
+    rounds: int = 25
     conflicts: int = 1_000
 
     def doubled(self) -> Effort:
@@ -53,9 +55,13 @@ _PROBE = Effort(rounds=5, conflicts=200)
 
 @dataclass(slots=True)
 class _Kinds:
-    """The kinds of partitions into some number of words that may still hold a language."""
+    """The kinds of partitions into some number of words that may still hold a language.
+
+    Those that are ``open`` are looked at next, those that are ``undecided`` with more effort.
+    """
 
     open: list[WordAction]
+    undecided: list[WordAction] = field(default_factory=list)
     effort: Effort = field(default_factory=Effort)
 
 
@@ -84,22 +90,25 @@ class EquivariantSearch:
     def find(self, size: int) -> Assignment | None:
         """A language with at most ``size`` words, None if none was found with some effort.
 
-        The next call with this size spends twice as much.
+        The next call with this size goes on, and spends more on what was looked at before.
         """
         kinds = self._kinds.get(size)
         if kinds is None:
             kinds = self._kinds[size] = _Kinds(self._actions(size))
-        undecided = []
-        for number, action in enumerate(kinds.open):
+        until = self.rounds + _PASS
+        while kinds.open and self.rounds < until:
+            action = kinds.open.pop(0)
             try:
                 found = self._of_kind(action, size, kinds.effort)
             except Undecided:
-                undecided.append(action)
+                kinds.undecided.append(action)
                 continue
             if found is not None:
-                kinds.open = [*undecided, *kinds.open[number:]]
+                kinds.open.insert(0, action)
                 return found
-        kinds.open, kinds.effort = undecided, kinds.effort.doubled()
+        if not kinds.open:
+            kinds.open, kinds.undecided = kinds.undecided, []
+            kinds.effort = kinds.effort.doubled()
         return None
 
     def _actions(self, size: int) -> list[WordAction]:

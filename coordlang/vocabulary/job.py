@@ -94,8 +94,8 @@ class Outcome:
     evidence
         The necessary clauses that were met, in their order; empty for methods that meet none.
     refuting
-        The first so many of them are those that were known when the bound was proved: no partition
-        into ``lower_bound - 1`` words satisfies them all.
+        Those by which the bound was proved, of the whole or of a part: no partition into
+        ``lower_bound - 1`` words satisfies them all.
     """
 
     partition: Assignment
@@ -103,7 +103,7 @@ class Outcome:
     figures: Mapping[str, float] = field(default_factory=dict)
     stopped: BaseException | None = None
     evidence: Mapping[Clause, Evidence] = field(default_factory=dict)
-    refuting: int = 0
+    refuting: Mapping[Clause, Evidence] = field(default_factory=dict)
 
     @property
     def size(self) -> int:

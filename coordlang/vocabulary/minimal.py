@@ -12,41 +12,30 @@ Proposition 8 of docs/concepts.md allows for symmetries.
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
-from contextlib import closing, suppress
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from contextlib import closing
+from dataclasses import replace
 from math import isqrt
 
 import numpy as np
 
 from coordlang.language.warping import Clause
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
-from coordlang.vocabulary.clauses import (
-    most_constrained_first,
-    most_frequent_pairs,
-    without_implied,
-)
+from coordlang.vocabulary.contained import ContainedInstance, parts
 from coordlang.vocabulary.equivariant import EquivariantSearch
 from coordlang.vocabulary.job import Assignment, Evidence, Job, Outcome
 from coordlang.vocabulary.necessary_clauses import NecessaryClauses
-from coordlang.vocabulary.problems_by_size import ProblemsBySize, SolverBudget
+from coordlang.vocabulary.partitions import Partitions, Refutation
+from coordlang.vocabulary.problems_by_size import SolverBudget
 from coordlang.vocabulary.refuter import Refuter
-from coordlang.vocabulary.sat import PartitionProblem, Undecided
+from coordlang.vocabulary.sat import Undecided
 from coordlang.vocabulary.separating import short_separating_search
 from planners.errors import OutOfMemory
 from planners.limits import run_until_stopped
-from planners.sat import SolverName
 from planners.search.plan_space import PlanSpace
 
 #: Combinations of plans' next steps up to which separating words are looked for first.
 _SEPARATING_COMBINATIONS = 4_000_000
-#: Conflicts within which most partitions are found; after so many the solver is likely on the way
-#: to a proof.
-_EASY = 1_000
-#: Comparisons of clauses to find which are implied, a second's work: the solver finds the others.
-_COMPARISONS = 1_000_000
-#: Pairs of states by which symmetric partitions are compared: enough to tell most apart.
-_COMPARED_PAIRS = 100
 
 
 def minimal(job: Job) -> Outcome:
@@ -66,7 +55,7 @@ def minimal(job: Job) -> Outcome:
         search.figures(),
         stopped,
         search.known.evidence,
-        search.refuting,
+        search.refuting.clauses,
     )
 
 
@@ -83,36 +72,25 @@ def refuting_clauses(job: Job, size: int) -> Mapping[Clause, Evidence]:
     with closing(_Search(replace(job, incumbent=None))) as search:
         if not search.refutes(size):
             raise ValueError(f"there is a language with {size} words")
-    return search.known.evidence
-
-
-@dataclass(frozen=True, slots=True)
-class Refutation:
-    """Among all partitions into ``size`` words none satisfies the first so many known clauses.
-
-    Nothing but this raises a lower bound.  Searches of some partitions only have none to give.
-    """
-
-    size: int
-    clauses: int
+    return search.refuting.clauses
 
 
 class _Search:
     """Closes in on the least number of words.
 
-    ``lower`` words are proved to be needed, by the first ``refuting`` of the ``known`` clauses;
-    ``best`` is a language.
+    ``lower`` words are proved to be needed, as ``refuting`` says; ``best`` is a language.
     """
 
     def __init__(self, job: Job) -> None:
         self._job = job
         self.lower = job.lower_bound
-        self.refuting = 1  # any clause refutes one word
         self.best: Assignment | None = job.incumbent
         self.known = NecessaryClauses(SymmetryGroup(()))
-        self._partitions = _Partitions(job.states, self.known)
+        self.refuting = Refutation(1, self.known.evidence, 1)  # any clause refutes one word
+        self._partitions: Partitions | None = None
         self._refuter: Refuter | None = None
         self._equivariant: EquivariantSearch | None = None
+        self._contained: list[ContainedInstance] = []
         self._rounds = 0
 
     @property
@@ -153,7 +131,9 @@ class _Search:
 
     def close(self) -> None:
         """Give back what the solvers hold."""
-        self._partitions.close()
+        for part in (self._partitions, *self._contained):
+            if part is not None:
+                part.close()
 
     def _prepare(self) -> Refuter:
         if self._refuter is None:
@@ -162,6 +142,9 @@ class _Search:
             self._refuter = Refuter(
                 candidates.spaces, self.known.group, len(candidates.rows), job.seed, job.progress
             )
+            self._contained = [
+                ContainedInstance(part, job.seed) for part in parts(candidates, self.known.group)
+            ]
         return self._refuter
 
     def _close_bounds(self) -> None:
@@ -169,34 +152,27 @@ class _Search:
         equivariant = self._equivariant = EquivariantSearch(self._job.states, self._prepare())
         budget = SolverBudget()
         while self.lower < self._upper:
-            if self._decide(self.lower, budget):
-                continue
-            if self._upper > self.lower + 1 and self._descend(equivariant, self.lower + 1):
-                continue
-            budget = budget.doubled()
             if not self._decide(self.lower, budget):
-                self._descend(equivariant, self.lower)
+                self._descend(equivariant)
+                budget = budget.doubled()
 
-    def _descend(self, equivariant: EquivariantSearch, least: int) -> bool:
-        """Look for fewer words among equivariant partitions; whether a language was found.
-
-        Numbers of words from ``least`` up are tried.
+    def _descend(self, equivariant: EquivariantSearch) -> None:
+        """Look for a language with fewer words among equivariant partitions.
 
         What is not found is no bound: only `Refutation` is.
         """
-        before = self._upper
+        # The number that is not refuted yet is tried last: mostly there is no such language.
+        least = min(self.lower + 1, self._upper - 1)
         size = isqrt(least * self._upper)
         while size < self._upper:
             self._job.progress(
                 f"symmetric words: trying {size}, {self.lower} to {self._upper} needed"
             )
             found = equivariant.find(size)
-            if found is None:
-                size = (size + self._upper + 1) // 2
-            else:
+            if found is not None:
                 self._take(found)
-                size = isqrt(least * self._upper)
-        return self._upper < before
+                return
+            size = (size + self._upper + 1) // 2
 
     def _look_for_separating_words(self) -> None:
         """Take a separating partition with fewer words, if a short search finds one.
@@ -219,17 +195,34 @@ class _Search:
         False if the budget was not enough.
         """
         try:
-            found = self._refine(size, budget)
+            found = self._refuted_within(size, budget) or self._refine(size, budget)
         except Undecided:
             return False
-        self._partitions.drop(size)
         if isinstance(found, Refutation):
-            # In this order: a signal in between leaves more clauses than the bound needs.
-            self.refuting = found.clauses
+            # In this order: a signal in between leaves clauses that refute too much.
+            self.refuting = found
             self.lower = found.size + 1
         else:
             self._take(found)
         return True
+
+    def _refuted_within(self, size: int, budget: SolverBudget) -> Refutation | None:
+        """A proof by an instance that this one contains, the smallest that has one."""
+        self._prepare()
+        while self._contained:
+            instance = self._contained[0]
+            self._job.progress(
+                f"trying {size} words for {len(instance.states):,} of the states, "
+                f"{self.lower} to {self._upper} needed: {len(instance.known.clauses):,} clauses"
+            )
+            refutation = instance.refute(size, budget)
+            self._rounds += instance.rounds
+            instance.rounds = 0
+            if refutation is not None:
+                return refutation
+            # So many words suffice for it, and more will.
+            self._contained.pop(0).close()
+        return None
 
     def _take(self, partition: Assignment) -> None:
         """A language with fewer words, once it is verified by definition."""
@@ -239,6 +232,9 @@ class _Search:
     def _refine(self, size: int, budget: SolverBudget) -> Assignment | Refutation:
         """The loop for one number of words: a language, or that there is none."""
         refuter, rows = self._prepare(), len(self._job.candidates.rows)
+        if self._partitions is None:
+            permutations = self.known.group.permutations
+            self._partitions = Partitions(self._job.states, self.known.clauses, permutations)
         refuted = 0
         while (partition := self._partitions.find(size, budget.conflicts)) is not None:
             if refuted >= budget.rounds:
@@ -247,6 +243,7 @@ class _Search:
             word[list(partition)] = list(partition.values())
             violated = refuter.violated(word)
             if not violated:
+                self._partitions.drop(size)
                 return partition
             refuted += 1
             self._rounds += 1
@@ -255,56 +252,8 @@ class _Search:
                 f"trying {size} words, {self.lower} to {self._upper} needed: "
                 f"round {self._rounds}, {len(self.known.clauses):,} clauses"
             )
-        return Refutation(size, len(self.known.clauses))
-
-
-class _Partitions:
-    """Partitions that satisfy all known clauses, by two solvers.
-
-    The second one is allowed only one of symmetric partitions: proofs are ten times shorter, but
-    partitions harder to find.
-    """
-
-    def __init__(self, states: Sequence[int], known: NecessaryClauses) -> None:
-        self._states, self._known = states, known
-        require = PartitionProblem.separate_one
-        self._all = ProblemsBySize(self._start, require)
-        self._up_to_symmetry = ProblemsBySize(self._start_up_to_symmetry, require)
-
-    def find(self, size: int, conflicts: int) -> dict[int, int] | None:
-        """A partition into ``size`` words, or None if there is none.
-
-        Raises `Undecided` after so many conflicts.
-        """
-        clauses = self._known.clauses
-        with suppress(Undecided):
-            return self._all.under(size, clauses).solve(_EASY)
-        return self._up_to_symmetry.under(size, clauses).solve(conflicts)
-
-    def drop(self, size: int) -> None:
-        """Forget a number of words that is decided."""
-        self._all.drop(size)
-        self._up_to_symmetry.drop(size)
-
-    def close(self) -> None:
-        """Give back what the solvers hold."""
-        self._all.close()
-        self._up_to_symmetry.close()
-
-    def _start(
-        self, size: int, known: Sequence[Clause], solver: SolverName = "cadical153"
-    ) -> PartitionProblem:
-        clauses = without_implied(known, _COMPARISONS)
-        problem = PartitionProblem(most_constrained_first(self._states, clauses), size, solver)
-        for clause in clauses:
-            problem.separate_one(clause)
-        return problem
-
-    def _start_up_to_symmetry(self, size: int, known: Sequence[Clause]) -> PartitionProblem:
-        problem = self._start(size, known, "glucose4")
-        pairs = most_frequent_pairs(known, _COMPARED_PAIRS)
-        problem.add_lex_leaders(self._known.group.permutations, pairs)
-        return problem
+        self._partitions.drop(size)
+        return Refutation(size, self.known.evidence, len(self.known.clauses))
 
 
 def _combinations(space: PlanSpace) -> float:

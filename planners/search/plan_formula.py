@@ -24,12 +24,12 @@ from planners.joint.model import FullState, Goal, JointModel
 from planners.joint.step_clauses import Clause, clauses
 from planners.pddl.formula_tree import negated
 from planners.pddl.lifted import TRUE, Formula
-from planners.sat import SolverName, sat_solver, solve_slice
+from planners.sat import sat_solver, solve_slice
 from planners.search.state_variables import StateVariable
 from planners.tables import Ints, Rows
 
 #: Many easy questions and some hard ones: MiniSat answers both as fast as any.
-SOLVER: SolverName = "minisat22"
+SOLVER = "minisat22"
 #: Conflicts between two looks at the limits.
 _SLICE = 2_000
 #: The largest cost of one action that is counted.
@@ -88,18 +88,8 @@ class PlanFormula:
         self._active: Literals = []
         self._counted: list[Literals] = []
         self.calls = 0
-        self._asked: tuple[int, int | None] = (0, None)
         for clause in _goal_clauses(model, goal):
             self._solver.add_clause(clause)
-
-    def so_far(self) -> str:
-        """What is asked just now, for messages."""
-        steps, cost = self._asked
-        paid = "" if cost is None else f" at a cost of {cost:,}"
-        return (
-            f"question {self.calls:,} to the SAT solver: a plan of {steps} joint steps{paid}? "
-            f"{self._variables:,} variables"
-        )
 
     def close(self) -> None:
         """Give the solver back."""
@@ -185,7 +175,6 @@ class PlanFormula:
         if cost is not None and cost < len(self._counted[steps]):
             assumptions.append(-self._counted[steps][cost])
         self.calls += 1
-        self._asked = steps, cost
         while (answer := solve_slice(self._solver, _SLICE, assumptions)) is None:
             self.spend(_SLICE)
         return answer

@@ -263,23 +263,35 @@ class PlanSpace:
         """The same graph with other tasks, cut down to what their plans pass through."""
         return replace(self, starts=starts, second=second).reduced()
 
+    def within(self, nodes: Bools) -> PlanSpace:
+        """The plans that pass through these nodes (a mask) alone, of the tasks that have any."""
+        kept = nodes & (self.layer == 0)
+        for edges in self.edges_by_layer():
+            kept[edges.source[kept[edges.target] & nodes[edges.source]]] = True
+        tasks = kept[self.starts]
+        fewer = replace(self, starts=self.starts[tasks], second=self.second[tasks])
+        return fewer._cut(kept).reduced()
+
     def reduced(self) -> PlanSpace:
         """The part of the graph that the tasks' plans pass through."""
-        alive = self.descendants(self.starts)
-        if alive.all():
+        return self._cut(self.descendants(self.starts))
+
+    def _cut(self, kept: Bools) -> PlanSpace:
+        """The nodes of a mask with the edges between them; all starts are among them."""
+        if kept.all():
             return self
-        number = np.cumsum(alive) - 1
+        number = np.cumsum(kept) - 1
         source = self.sources
-        kept = alive[source]
+        edges = kept[source] & kept[self.target]
         return replace(
             self,
-            state=self.state[alive],
-            goal=self.goal[alive],
-            layer=self.layer[alive],
-            first=np.searchsorted(number[source[kept]], np.arange(int(alive.sum()) + 1)),
-            target=number[self.target[kept]],
-            labels=self.labels[kept],
-            cost=self.cost[kept],
+            state=self.state[kept],
+            goal=self.goal[kept],
+            layer=self.layer[kept],
+            first=np.searchsorted(number[source[edges]], np.arange(int(kept.sum()) + 1)),
+            target=number[self.target[edges]],
+            labels=self.labels[edges],
+            cost=self.cost[edges],
             starts=number[self.starts],
         )
 

@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lower bounds from contained instances: those with fewer objects, as a part of a map.
+
+A contained instance is the optimal plans of the candidate tasks that never leave some states.  Its
+clauses are clauses of the whole one (Proposition 19 of docs/concepts.md), so where it needs K words
+the whole one does.  It is small, and may have symmetries that the whole has not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations, islice
+
+import networkx as nx
+import numpy as np
+from networkx.algorithms.isomorphism import GraphMatcher
+
+from coordlang.symmetry.graph import Renaming, joined_order
+from coordlang.symmetry.group import SymmetryGroup
+from coordlang.symmetry.of_part import symmetries_of_part
+from coordlang.tasks.candidates import Candidates
+from coordlang.vocabulary.necessary_clauses import NecessaryClauses
+from coordlang.vocabulary.partitions import Partitions, Refutation
+from coordlang.vocabulary.problems_by_size import SolverBudget
+from coordlang.vocabulary.refuter import Refuter
+from coordlang.vocabulary.sat import Undecided
+from planners.search.plan_space import PlanSpace
+from planners.tables import Bools, Ints
+
+#: Sets of objects and contained instances that are looked at, at most.
+_SETS, _INSTANCES = 400, 40
+#: Renamings of a part's objects that are tried.
+_RENAMINGS = 64
+#: Objects of a model beyond which no contained instances are looked for.
+_OBJECTS = 100
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A contained instance.
+
+    Attributes
+    ----------
+    space
+        The optimal plans of the candidate tasks that stay in it.
+    group
+        Its own symmetries: there may be more of them than of the whole.
+    """
+
+    space: PlanSpace
+    group: SymmetryGroup
+
+
+class ContainedInstance:
+    """The loop of the exact method for a part alone, as far as it is a matter of lower bounds.
+
+    Parameters
+    ----------
+    part
+        The contained instance.
+    seed
+        Of what is drawn at random.
+    """
+
+    def __init__(self, part: Part, seed: int) -> None:
+        self.states: list[int] = np.unique(part.space.state).tolist()
+        self.rounds = 0
+        self.known = NecessaryClauses(part.group)
+        self._part, self._seed = part, seed
+        self._refuter: Refuter | None = None
+        self._partitions = Partitions(self.states, self.known.clauses, part.group.permutations)
+
+    def refute(self, size: int, budget: SolverBudget) -> Refutation | None:
+        """That so many words do not suffice; None if they do for this part.
+
+        Raises
+        ------
+        Undecided
+            The budget was not enough.
+        """
+        space = self._part.space
+        if self._refuter is None:
+            self._refuter = Refuter([space], self._part.group, len(space.rows), self._seed)
+        word = np.zeros(len(space.rows), np.int64)
+        for _ in range(budget.rounds):
+            partition = self._partitions.find(size, budget.conflicts)
+            if partition is None:
+                self._partitions.drop(size)
+                return Refutation(size, self.known.evidence, len(self.known.clauses))
+            word[list(partition)] = list(partition.values())
+            violated = self._refuter.violated(word)
+            if not violated:
+                return None
+            self.rounds += 1
+            self.known.add_all(violated)
+        raise Undecided
+
+    def close(self) -> None:
+        """Give back what the solvers hold."""
+        self._partitions.close()
+
+
+def parts(candidates: Candidates, group: SymmetryGroup) -> list[Part]:
+    """The contained instances, of those that look alike one, small ones first.
+
+    Objects that are named together by a ground action, robots apart, are neighbours.  For two
+    neighbours the objects that are nearer to the one than to the other are a half; what is left of
+    intersections of halves keeps shortest ways, and is a part of the map.  A state belongs to a
+    part if what is true in it names no object outside.
+
+    Only for all pairs of states as tasks, few enough for one plan space.
+    """
+    if candidates.kind != "all" or candidates.model.remembers or len(candidates.spaces) != 1:
+        return []
+    space = candidates.spaces[0]
+    graph, named = _neighbours(candidates), _named(candidates)
+    end = _ends(space)
+    nowhere = np.zeros(len(space.rows), np.bool_)
+    found: dict[tuple[int, ...], tuple[frozenset[str], PlanSpace]] = {}
+    for objects in _convex(graph):
+        outside = [named[name] for name in sorted(named.keys() - objects)]
+        inside = ~np.logical_or.reduce([nowhere, *outside], axis=0)
+        part = part_of(space, inside, end)
+        if part is not None and len(part) < len(space):
+            sizes = np.bincount(part.layer).tolist()
+            alike = (len(np.unique(part.state)), len(part), len(part.target), *sizes)
+            found.setdefault(alike, (objects, part))
+    chosen = [found[alike] for alike in sorted(found)[:_INSTANCES]]
+    names = joined_order(candidates)
+    return [
+        Part(part, symmetries_of_part(part, end, _renamings(graph.subgraph(objects), names, group)))
+        for objects, part in chosen
+    ]
+
+
+def part_of(space: PlanSpace, inside: Bools, end: Ints) -> PlanSpace | None:
+    """The plans that never leave some states; None if there are none, or it is no part.
+
+    It is one if a step out of it has a label that no robot has on steps in it: then mixtures of its
+    plans that are optimal plans never leave it either.
+
+    Parameters
+    ----------
+    inside
+        (states) the states.
+    end
+        (goals) the state that each goal is.
+    """
+    nodes = inside[space.state] & inside[end[space.goal]]
+    part = space.within(nodes)
+    if not len(part.starts):
+        return None
+    own = nodes[space.sources]
+    for robot in range(space.robots):
+        labels, used = space.robot_labels(robot), part.robot_labels(robot)
+        own &= np.bincount(used, minlength=int(labels.max(initial=0)) + 1)[labels] > 0
+    return part if nodes[space.target[own]].all() else None
+
+
+def _ends(space: PlanSpace) -> Ints:
+    """The state that each goal is."""
+    goals = np.flatnonzero(space.layer == 0)
+    end = np.full(len(space.goals), -1)
+    end[space.goal[goals]] = space.state[goals]
+    return end
+
+
+def _renamings(
+    graph: nx.Graph[str], names: Sequence[str], group: SymmetryGroup
+) -> Iterator[Renaming]:
+    """Renamings that may be symmetries of a part: those of the whole, and of its own objects."""
+    stay = {name: name for name in (*names, *graph.nodes)}
+    for symmetry in group.symmetries:
+        yield {**stay, **symmetry.renaming}
+    for renaming in islice(GraphMatcher(graph, graph).isomorphisms_iter(), _RENAMINGS):
+        yield {**stay, **renaming}
+
+
+def _neighbours(candidates: Candidates) -> nx.Graph[str]:
+    graph: nx.Graph[str] = nx.Graph()
+    robots = set(candidates.model.robots)
+    for action in candidates.model.actions:
+        graph.add_edges_from(combinations(sorted(set(action.args) - robots), 2))
+    return graph
+
+
+def _named(candidates: Candidates) -> dict[str, Bools]:
+    """By object, robots apart, in which states something true names it (states)."""
+    codec, robots = candidates.model.codec, set(candidates.model.robots)
+    named: dict[str, Bools] = {}
+    for number, fact in enumerate(codec.facts):
+        true = codec.column(candidates.rows, number)
+        for name in set(fact.args) - robots:
+            named[name] = named[name] | true if name in named else true
+    return named
+
+
+def _convex(graph: nx.Graph[str]) -> list[frozenset[str]]:
+    """Intersections of halves of a graph, without the whole."""
+    if len(graph) > _OBJECTS:
+        return []
+    away = dict(nx.all_pairs_shortest_path_length(graph))
+    far = len(graph)
+
+    def nearer(one: str, other: str) -> frozenset[str]:
+        return frozenset(x for x in graph if away[x].get(one, far) < away[x].get(other, far))
+
+    edges = sorted(tuple(sorted(edge)) for edge in graph.edges)
+    halves = _in_order({nearer(a, b) for a, b in edges} | {nearer(b, a) for a, b in edges})
+    found, front = set(halves), halves
+    while front and len(found) < _SETS:
+        grown = {one & half for one in front for half in halves} - found - {frozenset()}
+        front = _in_order(grown)[: _SETS - len(found)]
+        found |= set(front)
+    return _in_order(found)
+
+
+def _in_order(sets: Iterable[frozenset[str]]) -> list[frozenset[str]]:
+    return sorted(sets, key=lambda s: (-len(s), sorted(s)))

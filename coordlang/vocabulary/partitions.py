@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Partitions under all clauses known so far, and the proof that there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import islice
+
+from coordlang.language.warping import Clause
+from coordlang.vocabulary.clauses import (
+    most_constrained_first,
+    most_frequent_pairs,
+    without_implied,
+)
+from coordlang.vocabulary.job import Evidence
+from coordlang.vocabulary.problems_by_size import ProblemsBySize
+from coordlang.vocabulary.sat import PartitionProblem, Undecided
+
+#: Conflicts within which most partitions are found; after so many the solver is likely on the way
+#: to a proof.
+_EASY = 1_000
+#: Comparisons of clauses to find which are implied, a second's work: the solver finds the others.
+_COMPARISONS = 1_000_000
+#: Pairs of states by which symmetric partitions are compared: enough to tell most apart.
+_COMPARED_PAIRS = 100
+
+
+@dataclass(frozen=True, slots=True)
+class Refutation:
+    """Among all partitions into ``size`` words none satisfies the first ``known`` clauses.
+
+    ``evidence`` are necessary clauses in their order, to which more are added later.  Nothing but
+    this raises a lower bound.  Searches of some partitions only have none to give.
+    """
+
+    size: int
+    evidence: Mapping[Clause, Evidence]
+    known: int
+
+    @property
+    def clauses(self) -> dict[Clause, Evidence]:
+        """The clauses, and why each of them is necessary."""
+        return dict(islice(self.evidence.items(), self.known))
+
+
+class Partitions:
+    """Partitions that satisfy all known clauses, by two solvers.
+
+    The second one is allowed only one of symmetric partitions: proofs are ten times shorter, but
+    partitions harder to find.
+
+    Parameters
+    ----------
+    states
+        The states that need words.
+    clauses
+        The known clauses about these states, a list that only grows.
+    permutations
+        Where symmetries take each state; the images of every clause must be clauses.
+    """
+
+    def __init__(
+        self,
+        states: Sequence[int],
+        clauses: Sequence[Clause],
+        permutations: Sequence[Sequence[int]],
+    ) -> None:
+        self._states, self._clauses, self._permutations = states, clauses, permutations
+        require = PartitionProblem.separate_one
+        self._all = ProblemsBySize(self._start, require)
+        self._up_to_symmetry = ProblemsBySize(self._start_up_to_symmetry, require)
+
+    def find(self, size: int, conflicts: int) -> dict[int, int] | None:
+        """A partition into ``size`` words, or None if there is none.
+
+        Raises `Undecided` after so many conflicts.
+        """
+        with suppress(Undecided):
+            return self._all.under(size, self._clauses).solve(_EASY)
+        return self._up_to_symmetry.under(size, self._clauses).solve(conflicts)
+
+    def drop(self, size: int) -> None:
+        """Forget a number of words that is decided."""
+        self._all.drop(size)
+        self._up_to_symmetry.drop(size)
+
+    def close(self) -> None:
+        """Give back what the solvers hold."""
+        self._all.close()
+        self._up_to_symmetry.close()
+
+    def _start(
+        self, size: int, known: Sequence[Clause], solver: str = "cadical153"
+    ) -> PartitionProblem:
+        clauses = without_implied(known, _COMPARISONS)
+        problem = PartitionProblem(most_constrained_first(self._states, clauses), size, solver)
+        for clause in clauses:
+            problem.separate_one(clause)
+        return problem
+
+    def _start_up_to_symmetry(self, size: int, known: Sequence[Clause]) -> PartitionProblem:
+        problem = self._start(size, known, "glucose4")
+        pairs = most_frequent_pairs(known, _COMPARED_PAIRS)
+        problem.add_lex_leaders(self._permutations, pairs)
+        return problem

@@ -1,0 +1,297 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bounds from contained instances: what is said of a part is checked by definition in the whole."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import combinations, permutations, product
+from random import Random
+
+import numpy as np
+import pytest
+
+from coordlang.building import build_language, certificate_of
+from coordlang.certificate import Certificate, Reason, check
+from coordlang.certificate.make import _reason
+from coordlang.language.warping import pair
+from coordlang.symmetry.group import Symmetry, symmetry_group
+from coordlang.symmetry.of_part import symmetries_of_part
+from coordlang.tasks.candidates import Candidates, all_pairs
+from coordlang.vocabulary.contained import ContainedInstance, _ends, part_of, parts
+from coordlang.vocabulary.problems_by_size import SolverBudget
+from planners.errors import Refuted
+from planners.pddl import parse_domain, parse_problem
+from planners.pddl.sexpr import Source
+from planners.search.plan_space import PlanSpace
+from planners.search.plans import Plan
+from planners.tables import Bools
+from tests.support import naive
+from tests.support.domains import all_tasks
+from tests.support.random_models import random_model
+from tests.support.symmetric_worlds import GRID, world
+
+MOST = 25
+
+
+def on_graph(cells: int, edges: list[tuple[int, int]], robots: int = 2) -> Candidates:
+    """All tasks of robots on a graph of cells."""
+    return all_pairs(GRID, [parse_problem(Source("p", world(cells, edges, robots)), GRID)])
+
+
+def without(candidates: Candidates, *names: str) -> Bools:
+    """The states in which nothing true names one of these objects."""
+    keys = [candidates.model.codec.key(row) for row in candidates.rows]
+    return np.array([not set(names) & set(re.findall(r"[^ ()]+", key)) for key in keys])
+
+
+def plans_by_task(space: PlanSpace) -> Iterator[tuple[int, int, int, list[Plan]]]:
+    """Each task: its number, the states at its two ends, and its plans."""
+    end = _ends(space)
+    for task, node in enumerate(space.starts.tolist()):
+        plans = naive.listed(space, task, MOST)
+        yield task, int(space.state[node]), int(end[space.goal[node]]), plans
+
+
+def small_models(seeds: range) -> Iterator[tuple[int, Candidates]]:
+    """Random models with few states, all pairs of them as tasks."""
+    for seed in seeds:
+        domain, problem, options = random_model(seed, 2 + seed % 2)
+        candidates = all_pairs(domain, [problem], options)
+        if 3 <= len(candidates.rows) <= 40 and candidates.count <= 400:
+            yield seed, candidates
+
+
+@pytest.mark.parametrize(
+    "seeds", [range(40), pytest.param(range(40, 400), marks=pytest.mark.thorough)]
+)
+def test_mixtures_of_plans_in_a_part_fail_in_the_part_iff_in_the_whole(seeds: range) -> None:
+    """Any set of states: its plans are those that stay in it, or it is said to be no part."""
+    good = bad = failing = 0
+    for seed, candidates in small_models(seeds):
+        space, random = candidates.spaces[0], Random(seed)
+        try:
+            tasks = [(start, end, task, plans) for task, start, end, plans in plans_by_task(space)]
+        except naive.TooLarge:
+            continue
+        for share in (0.6, 0.8, 0.9, 0.9):
+            inside = np.array([random.random() < share for _ in candidates.rows])
+            part = part_of(space, inside, _ends(space))
+            escapes = wrong = 0
+            staying = {}
+            for start, end, task, plans in tasks:
+                own = [p for p in plans if inside[list(naive.states(space, task, p))].all()]
+                if own:
+                    staying[start, end] = sorted(own)
+                    made = {naive.mixture(some) for some in product(own, repeat=space.robots)}
+                    escapes += len(made & set(plans) - set(own))
+                    wrong += len(made - set(plans))
+            if part is None:
+                bad += escapes > 0
+                continue
+            found = {(start, end): sorted(plans) for _, start, end, plans in plans_by_task(part)}
+            assert found == staying
+            assert not escapes
+            good += 1
+            failing += wrong
+    assert good > 10
+    assert bad > 0
+    assert failing > 20
+
+
+def renamed(text: str, renaming: dict[str, str]) -> str:
+    return re.sub(r"[^ ()]+", lambda found: renaming.get(found[0], found[0]), text)
+
+
+def edges_of(space: PlanSpace, renaming: dict[str, str]) -> set[object]:
+    """The edges as texts, under a renaming of objects."""
+    codec, robots, end = space.model.codec, space.model.robots, _ends(space)
+    order = sorted(range(len(robots)), key=lambda n: renaming.get(robots[n], robots[n]))
+    keys = [frozenset(renamed(a, renaming) for a in codec.decode(row)) for row in space.rows]
+    found: set[object] = set()
+    for edge, source in enumerate(space.sources.tolist()):
+        texts = space.model.texts(space.labels_of(edge))
+        labels = tuple([texts[n] and renamed(str(texts[n]), renaming) for n in order])
+        target = space.state[space.target[edge]]
+        goal = end[space.goal[source]]
+        found.add((keys[space.state[source]], labels, keys[target], keys[goal]))
+    return found
+
+
+def states_under(space: PlanSpace, renaming: dict[str, str]) -> list[int]:
+    """Where a renaming takes the states of a table, by their texts; all of them must go somewhere."""
+    codec = space.model.codec
+    number = {frozenset(codec.decode(row)): n for n, row in enumerate(space.rows)}
+    return [number[frozenset(renamed(a, renaming) for a in atoms)] for atoms in number]
+
+
+def test_symmetries_of_a_part_are_the_renamings_that_keep_its_edges() -> None:
+    """All renamings of the objects of random maps, on what is left without one of their cells."""
+    more = fewer = 0
+    for seed in range(16):
+        random = Random(seed)
+        cells = random.choice([4, 5])
+        edges = [e for e in combinations(range(cells), 2) if random.random() < 0.7]
+        candidates = on_graph(cells, edges)
+        space = candidates.spaces[0]
+        last = f"c{cells - 1}"
+        if len(candidates.rows) < cells * (cells - 1):
+            continue
+        part = part_of(space, without(candidates, last), _ends(space))
+        assert part is not None, "who enters the last cell leaves the part"
+        if not len(part.target):
+            continue
+        names = [f"c{n}" for n in range(cells - 1)]
+        proposed = [
+            dict(zip([*names, "r1", "r2", last], [*to, *robots, last], strict=True))
+            for to in permutations(names)
+            for robots in permutations(["r1", "r2"])
+        ]
+        for renaming in proposed[1:]:
+            accepted = symmetries_of_part(space, _ends(space), [renaming]).symmetries
+            assert (len(accepted) > 0) == (edges_of(space, renaming) == edges_of(space, {}))
+        here = np.unique(part.state).tolist()
+        plain, found = edges_of(part, {}), set()
+        for renaming in proposed[1:]:
+            accepted = symmetries_of_part(part, _ends(space), [renaming]).symmetries
+            assert (len(accepted) > 0) == (edges_of(part, renaming) == plain)
+            if accepted:
+                to = states_under(space, renaming)
+                first = next(s for s in accepted if s.renaming == renaming)
+                assert [first.states[s] for s in here] == [to[s] for s in here]
+                found.add(tuple(first.states.tolist()))
+        group = symmetries_of_part(part, _ends(space), proposed)
+        assert {tuple(s.states.tolist()) for s in group.symmetries} == found
+        more += len(found) > len(symmetry_group(candidates).symmetries)
+        fewer += len(found) < len(proposed) - 1
+    assert more > 0
+    assert fewer > 0
+
+
+def test_two_labels_must_not_become_one() -> None:
+    """A robot turns its switch slowly or fast: both are plans, and not one plan."""
+    domain = parse_domain(
+        Source(
+            "d",
+            """(define (domain switches) (:types robot way) (:predicates (on ?r - robot))
+            (:action turn :agent ?r - robot :parameters (?w - way)
+             :precondition (and (not (on ?r))) :effect (and (on ?r))))""",
+        )
+    )
+    problem = """(define (problem p) (:domain switches) (:objects r1 r2 - robot slow fast - way)
+      (:init) (:goal (and (on r1) (on r2))))"""
+    space = all_pairs(domain, [parse_problem(Source("p", problem), domain)]).spaces[0]
+    turned = {"r1": "r2", "r2": "r1"}
+    for ways, holds in (
+        ({}, True),
+        ({"slow": "fast", "fast": "slow"}, True),
+        ({"slow": "fast"}, False),
+        ({"slow": "slower"}, False),
+    ):
+        found = symmetries_of_part(space, _ends(space), [turned | ways]).symmetries
+        assert bool(found) == holds
+
+
+def all_needed(space: PlanSpace) -> set[int]:
+    return set(space.state.tolist())
+
+
+def test_parts_of_a_grid_are_its_rectangles() -> None:
+    """One of those that look alike, without the whole and single cells, which hold no two robots."""
+    candidates = all_tasks("grid", "gw2-2x3")
+    found = parts(candidates, symmetry_group(candidates))
+    assert [len(all_needed(part.space)) for part in found] == [6, 12]
+    row, square = found
+    assert len(row.group.symmetries) == 3
+    assert len(square.group.symmetries) == 15, "all of those of a square with two robots"
+    assert len(symmetry_group(candidates).symmetries) == 7
+
+
+def reasons_of(candidates: Candidates, instance: ContainedInstance) -> list[Reason]:
+    return [_reason(candidates, *known) for known in instance.known.evidence.items()]
+
+
+def test_a_bound_of_a_part_holds_with_every_clause_checked_in_the_whole() -> None:
+    """The square in the 2x3 grid needs three words; all that is said about it holds in the grid."""
+    candidates = all_tasks("grid", "gw2-2x3")
+    row, square = [ContainedInstance(p, 0) for p in parts(candidates, symmetry_group(candidates))]
+    assert row.refute(1, SolverBudget()) is None
+    refuted = square.refute(2, SolverBudget())
+    assert refuted is not None
+    reasons = reasons_of(candidates, square)
+    assert len(reasons) == len(refuted.clauses)
+    whole = symmetry_group(candidates).symmetries
+    own = [e.symmetry for e in refuted.clauses.values() if e.symmetry is not None]
+    assert any(all((s.states != w.states).any() for w in whole) for s in own)
+    domain, robots = candidates.loaded.domain.name, list(candidates.model.robots)
+    answer = check(Certificate(domain, robots, 2, reasons), candidates)
+    assert (answer.lower_bound, answer.reasons) == (3, len(reasons))
+    assert square.refute(3, SolverBudget()) is None
+    for instance in (row, square):
+        instance.close()
+
+
+ROW = [(0, 1), (1, 2), (2, 3), (3, 4)]
+
+
+@pytest.mark.parametrize(("around", "holds"), [([], True), ([(0, 5), (5, 3)], False)])
+def test_a_row_is_not_turned_round_where_a_way_round_is_shorter_at_one_end(
+    around: list[tuple[int, int]], holds: bool
+) -> None:
+    """From the first cell to the fourth the row is no shortest way, from the last to the second it is."""
+    candidates = on_graph(5 + bool(around), ROW + around)
+    space = candidates.spaces[0]
+    part = part_of(space, without(candidates, "c5"), _ends(space))
+    assert part is not None
+    turned = {"r1": "r2", "r2": "r1", **{f"c{n}": f"c{4 - n}" for n in range(5)}}
+    assert bool(symmetries_of_part(part, _ends(space), [turned]).symmetries) == holds
+
+
+def test_a_forged_symmetry_of_a_part_is_refused() -> None:
+    """The clause of what would be the image: its plans are no optimal plans of the whole."""
+    candidates = all_tasks("grid", "gw2-2x3")
+    square = parts(candidates, symmetry_group(candidates))[-1]
+    instance = ContainedInstance(square, 0)
+    instance.refute(2, SolverBudget())
+    instance.close()
+    domain, robots = candidates.loaded.domain.name, list(candidates.model.robots)
+    cells = sorted(
+        {name for s in square.group.symmetries for name, to in s.renaming.items() if name != to}
+        - set(robots)
+    )
+    space = candidates.spaces[0]
+    refused = 0
+    for clause, evidence in list(instance.known.evidence.items())[:20]:
+        if evidence.symmetry is not None:
+            continue
+        # Two neighbours change names, and all others stay: no symmetry of any part with them.
+        forged = {
+            **{name: name for name in (*robots, *cells)},
+            cells[0]: cells[1],
+            cells[1]: cells[0],
+        }
+        to = np.array(states_under(space, forged))
+        image = frozenset(pair(int(to[a]), int(to[b])) for a, b in clause)
+        reason = _reason(candidates, image, replace(evidence, symmetry=Symmetry(forged, to)))
+        with pytest.raises(Refuted, match="reason 1 of the certificate is wrong"):
+            check(Certificate(domain, robots, 1, [reason]), candidates)
+        refused += 1
+    assert refused > 0
+
+
+def test_other_tasks_have_no_parts() -> None:
+    candidates = all_tasks("grid", "gw2-2x3")
+    assert parts(candidates, symmetry_group(candidates))
+    listed = replace(candidates, kind="problems")
+    assert parts(listed, symmetry_group(candidates)) == []
+
+
+@pytest.mark.parametrize(
+    ("folder", "stem", "words"), [("grid", "gw2-2x3", 5), ("t-map", "problem", 3)]
+)
+def test_certificates_rest_on_parts(folder: str, stem: str, words: int) -> None:
+    candidates = all_tasks(folder, stem)
+    built = build_language(candidates, "minimal")
+    assert built.language.guarantee.lower_bound == words
+    assert check(certificate_of(built), candidates).lower_bound == words
