@@ -15,7 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planners.joint.model import PlanningTask
+from planners.joint.model import JointModel, PlanningTask
+from planners.search.goals import goal_facts
 from planners.search.plan_formula import Literals, PlanFormula
 
 
@@ -35,15 +36,25 @@ class _Sums:
         self.open: dict[int, tuple[_Sum | None, int]] = {}
         self._times: dict[int, Literals] = {}
 
-    def add_actions(self) -> None:
-        """Assume of every label that costs something that it is not chosen at all."""
-        formula = self._formula
+    def add_actions(self, task: PlanningTask) -> None:
+        """Assume of every action that costs something that it is not chosen at all.
+
+        By none of the robots that are alike: which one of them does it does not matter.
+        """
+        formula, model = self._formula, self._formula.model
+        kinds = _kinds(model, task)
+        alike: dict[tuple[str, ...], Literals] = {}
         for robot, costs in enumerate(formula.costs):
+            own = model.robots[robot]
             for label in np.flatnonzero(costs).tolist():
+                words = model.labels[robot][label].strip("()").split()
+                action = tuple(kinds[robot] if word == own else word for word in words)
                 times = [formula.label(step, robot, label) for step in range(1, self._steps + 1)]
-                done = formula.any_of(times)
-                self._times[done] = times
-                self.open[done] = (None, 0)
+                alike.setdefault(action, []).extend(times)
+        for times in alike.values():
+            done = formula.any_of(times)
+            self._times[done] = times
+            self.open[done] = (None, 0)
 
     def relax(self, core: Literals) -> None:
         """Let one of the literals of a core hold; more of them, or one more often, is paid anew."""
@@ -58,19 +69,38 @@ class _Sums:
             self.open[together.at_least[1]] = (together, 1)
 
 
-def least_cost(formula: PlanFormula, task: PlanningTask, steps: int) -> int:
-    """The least cost of plans of so many steps, of which there are some; costs are 0 or 1.
+def least_cost(formula: PlanFormula, task: PlanningTask, steps: int) -> Literals:
+    """Literals that all hold in the cheapest plans of so many steps, and in no other plans.
+
+    There are plans of so many steps, and costs are 0 or 1.  The last answer of the solver is one of
+    the cheapest.  The cost of a plan is the number of cores and the number of these literals that
+    do not hold (if a sum is said to be larger only where it is), so the literals say the same as a
+    bound on the cost, but each of few actions: much follows from them at once.
 
     Raises `planners.search.plan_formula.OutOfEffort`.
     """
     sums = _Sums(formula, steps)
-    sums.add_actions()
-    bound = 0
+    sums.add_actions(task)
     while not formula.solvable(task.init, steps, extra=[-literal for literal in sums.open]):
         core = _smaller(formula, task, steps, formula.core(sums.open))
         sums.relax(core)
-        bound += 1
-    return bound
+    return [-literal for literal in sums.open]
+
+
+def _kinds(model: JointModel, task: PlanningTask) -> list[str]:
+    """For each robot the first one that is like it: start and goal are the same without names."""
+
+    def about(robot: str) -> list[set[tuple[str, ...]]]:
+        wanted = goal_facts(model, task.goal)
+        true = model.codec.true_facts(model.codec.facts_part(task.init))
+        atoms = [[model.codec.facts.atoms[fact] for fact in facts] for facts in (true, wanted)]
+        return [
+            {(a.predicate, *("" if arg == robot else arg for arg in a.args)) for a in own}
+            for own in ([atom for atom in part if robot in atom.args] for part in atoms)
+        ]
+
+    known = [about(robot) for robot in model.robots]
+    return [model.robots[known.index(own)] for own in known]
 
 
 def _smaller(formula: PlanFormula, task: PlanningTask, steps: int, core: Literals) -> Literals:

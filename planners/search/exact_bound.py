@@ -4,6 +4,7 @@
 First the least makespan, then the least second component, then the labels that some optimal plan
 has in each step; then, state by state, whether an optimal plan passes through it.  The solver's
 models are only hints (states and costs come from the joint model); its refutations are trusted.
+A question that is not decided with some effort is answered with yes: more is searched then.
 """
 
 from __future__ import annotations
@@ -14,17 +15,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, PlanningTask
 from planners.search.cheapest import least_cost
-from planners.search.plan_formula import OutOfEffort, PlanFormula, TooManyClauses, countable
+from planners.search.mutexes import mutexes
+from planners.search.plan_formula import (
+    Literals,
+    OutOfEffort,
+    PlanFormula,
+    TooManyClauses,
+    countable,
+)
+from planners.search.reachable import PieceSizes
 from planners.search.state_variables import StateVariable
-from planners.tables import Bools, Ints, Rows
+from planners.tables import Bools, Rows
 
 #: States that are asked for to see whether exact bounds pay, and the share on optimal plans above
 #: which they do not.
 _SAMPLE, _MOST = 50, 0.5
-#: Conflicts for the first tries to find the least cost.
-_FIRST, _SECOND = 50_000, 300_000
+#: Conflicts for the first try to find the least cost.
+_FIRST = 300_000
 #: What a makespan that is refuted at once costs for each of its steps, in conflicts; the clauses of
 #: one step more are counted, too: of a task without plan there would be ever more.
 _EASY = 20
@@ -41,15 +51,22 @@ class ExactBound:
 
     formula: PlanFormula
     makespan: int
-    cost: int | None
     used: list[list[Bools]]
+    #: Conflicts for one question.
+    effort: int
 
-    def may_pass(self, rows: Rows, steps: int, paid: Ints) -> Bools:
-        """Through which states optimal plans pass, ``steps`` before the end, ``paid`` so far."""
-        answers = [
-            self.formula.solvable(row, steps, None if self.cost is None else self.cost - own)
-            for row, own in zip(rows, paid.tolist(), strict=True)
+    def may_pass(self, ways: Labels) -> Bools:
+        """Which beginnings of plans, as labels (ways, steps, robots), some optimal plan has.
+
+        An optimal plan passes through a state iff one begins with a cheapest way to it.
+        """
+        depth, robots = ways.shape[1:]
+        first = [
+            [self.formula.label(self.makespan - k, robot, 0) for robot in range(robots)]
+            for k in range(depth)
         ]
+        asked = (ways + np.array(first, np.int64).reshape(depth, robots)).reshape(len(ways), -1)
+        answers = [_unless_refuted(self.formula, own, self.effort) for own in asked.tolist()]
         return np.array(answers, np.bool_)
 
     def only(self, depth: int, rows: Rows, options: Options) -> Options:
@@ -67,18 +84,20 @@ def exact_bound(
     task: PlanningTask,
     variables: Sequence[StateVariable],
     at_least: int,
-    effort: int,
+    pieces: PieceSizes,
     some: tuple[Rows, int],
 ) -> ExactBound | None:
     """The bound of a task; None where it is not found with the effort that is spent, or not needed.
 
-    ``at_least`` is a lower bound on the makespan, ``effort`` are the solver's conflicts to be
-    spent.  Of a task without plan none is found.  ``some`` are states that a search met within the
-    bound ``at_least``, and how many steps they are from the start: if the bound is the makespan,
-    costs do not count, and optimal plans pass through most of them, the search does as well alone.
+    ``at_least`` is a lower bound on the makespan; ``pieces`` say how many conflicts of the solver
+    are spent.  Of a task without plan none is found.  ``some`` are states that a search met within
+    the bound ``at_least``, and how many steps they are from the start: if the bound is the
+    makespan, costs do not count, and optimal plans pass through most of them, the search does as
+    well alone.
     """
     try:
-        formula = PlanFormula(model, task.goal, variables, effort)
+        pairs = mutexes(model, task.init)
+        formula = PlanFormula(model, task.goal, variables, pairs, pieces.effort)
     except TooManyClauses:
         return None
     try:
@@ -86,7 +105,7 @@ def exact_bound(
         if model.cost == "makespan" and makespan == at_least and _mostly_pass(formula, plan, some):
             formula.close()
             return None
-        return _bound(formula, task, plan)
+        return _bound(formula, task, plan, pieces.question)
     except OutOfEffort:
         formula.close()
         return None
@@ -103,13 +122,21 @@ def _mostly_pass(formula: PlanFormula, plan: Plan, some: tuple[Rows, int]) -> bo
     return passing > _MOST * len(sample)
 
 
-def _bound(formula: PlanFormula, task: PlanningTask, plan: Plan) -> ExactBound:
-    cost = None
+def _bound(formula: PlanFormula, task: PlanningTask, plan: Plan, effort: int) -> ExactBound:
+    cheap: Literals = []
     if formula.model.cost != "makespan" and countable(formula.model):
-        with suppress(OutOfEffort):
-            cost, plan = _cheapest(formula, task, plan)
+        plan, cheap = _cheapest(formula, task, plan)
     formula.without_limit()
-    return ExactBound(formula, len(plan), cost, _used(formula, task, cost, plan))
+    formula.fix(task.init, len(plan), cheap)
+    return ExactBound(formula, len(plan), _used(formula, plan, effort), effort)
+
+
+def _unless_refuted(formula: PlanFormula, literals: Literals, effort: int) -> bool:
+    try:
+        with formula.at_most(effort):
+            return formula.holds(literals)
+    except OutOfEffort:
+        return True
 
 
 def _shortest(formula: PlanFormula, task: PlanningTask, at_least: int) -> tuple[int, Plan]:
@@ -120,39 +147,23 @@ def _shortest(formula: PlanFormula, task: PlanningTask, at_least: int) -> tuple[
     return makespan, formula.labels_chosen(makespan)
 
 
-def _cheapest(formula: PlanFormula, task: PlanningTask, plan: Plan) -> tuple[int, Plan]:
-    """The least cost, and a plan that has it.
+def _cheapest(formula: PlanFormula, task: PlanningTask, plan: Plan) -> tuple[Plan, Literals]:
+    """A cheapest plan, and literals that the cheapest ones have and no others.
 
-    From above, and from below by cores: neither is always the faster one, so both are tried.
+    From below by cores where actions cost 1; if that takes long, from above.  If that does, too,
+    then what is found are plans that cost no more than some plan.
     """
-    best = plan
+    if all(int(own.max(initial=0)) <= 1 for own in formula.costs):
+        with suppress(OutOfEffort), formula.at_most(_FIRST):
+            cheap = least_cost(formula, task, len(plan))
+            return formula.labels_chosen(len(plan)), cheap
     formula.count_costs(_cost_of(formula, plan))
-
-    def from_above() -> Plan:
-        nonlocal best
-        while (cost := _cost_of(formula, best)) and formula.solvable(
-            task.init, len(best), cost - 1
+    with suppress(OutOfEffort):
+        while (cost := _cost_of(formula, plan)) and formula.solvable(
+            task.init, len(plan), cost - 1
         ):
-            best = formula.labels_chosen(len(best))
-        return best
-
-    def from_below() -> Plan:
-        least_cost(formula, task, len(plan))
-        return formula.labels_chosen(len(plan))
-
-    ways = [(from_above, _FIRST), (from_below, _SECOND), (from_above, formula.left)]
-    if any(int(own.max(initial=0)) > 1 for own in formula.costs):
-        ways = ways[-1:]
-    for number, (way, effort) in enumerate(ways):
-        try:
-            with formula.at_most(effort):
-                cheapest = way()
-        except OutOfEffort:
-            if number == len(ways) - 1:
-                raise
-        else:
-            return _cost_of(formula, cheapest), cheapest
-    raise AssertionError("the last way ended or raised")
+            plan = formula.labels_chosen(len(plan))
+    return plan, formula.costs_at_most(len(plan), _cost_of(formula, plan))
 
 
 def _cost_of(formula: PlanFormula, plan: Plan) -> int:
@@ -160,9 +171,7 @@ def _cost_of(formula: PlanFormula, plan: Plan) -> int:
     return sum(int(costs[robot][label]) for step in plan for robot, label in enumerate(step))
 
 
-def _used(
-    formula: PlanFormula, task: PlanningTask, cost: int | None, plan: Plan
-) -> list[list[Bools]]:
+def _used(formula: PlanFormula, plan: Plan, effort: int) -> list[list[Bools]]:
     """Which labels occur where in optimal plans: each that is found shows one a robot and step."""
     makespan = len(plan)
     sizes = [len(own) for own in formula.model.labels]
@@ -179,7 +188,14 @@ def _used(
             while not (own := used[depth][robot]).all():
                 step = makespan - depth
                 others = [formula.label(step, robot, k) for k in np.flatnonzero(~own).tolist()]
-                if not formula.solvable(task.init, makespan, cost, [formula.some_of(others)]):
+                try:
+                    with formula.at_most(effort):
+                        found = formula.holds([formula.some_of(others)])
+                except OutOfEffort:
+                    own[:] = True
+                    break
+                if not found:
+                    formula.require([-literal for literal in others])
                     break
                 enter(formula.labels_chosen(makespan))
     return used

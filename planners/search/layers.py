@@ -114,8 +114,8 @@ class BoundedSearch:
         #: Per state the lower bound, and the layer that it was met in, in this round.
         self._h: NDArray[np.int32] = np.zeros(0, np.int32)
         self._depth: NDArray[np.int32] = np.zeros(0, np.int32)
-        #: The least second cost component of the way to each state; kept with exact bounds only.
-        self._paid: Ints = np.zeros(0, np.int64)
+        #: A cheapest way to each state; kept with exact bounds only.
+        self._ways = _Ways(len(model.robots))
         self._exact: ExactBound | None = None
         self._probing = guide.exact
         self.layers = Layers(model, self.table, guide)
@@ -159,7 +159,7 @@ class BoundedSearch:
             self._task,
             self._variables,
             at_least,
-            self._pieces.effort,
+            self._pieces,
             (self._last(), depth),
         )
         return self.bound if self._exact is None else self._exact.makespan
@@ -170,7 +170,6 @@ class BoundedSearch:
         self._depth[start] = 0
         layers = self.layers
         layers.states, layers.edges = [start], []
-        self._paid = np.zeros(len(self._depth), np.int64)
         kept = 0
         beyond = FAR
         while not self._model.holds(self._task.goal, self._last()).any():
@@ -202,22 +201,15 @@ class BoundedSearch:
 
         Of large layers a sample is asked for first, and all if enough of it is left out.
         """
-        new, number = np.unique(edges.target, return_inverse=True)
-        paid = np.full(len(new), FAR)
-        np.minimum.at(paid, number, self._paid[edges.source] + edges.cost)
-        if len(self._paid) < len(self._depth):
-            more = np.zeros(len(self._depth) - len(self._paid), np.int64)
-            self._paid = np.concatenate((self._paid, more))
-        self._paid[new] = paid
-        left = exact.makespan - depth
+        new, number = self._ways.enter(edges, len(self.table))
         some = np.arange(0, len(new), -(-len(new) // _SAMPLE) or 1)
-        passes = exact.may_pass(self.table.rows(new[some]), left, paid[some])
+        passes = exact.may_pass(self._ways.to(new[some], depth))
         if len(some) == len(new):
             good = passes
         elif passes.mean() > _MOSTLY:
             return edges
         else:
-            good = exact.may_pass(self.table.rows(new), left, paid)
+            good = exact.may_pass(self._ways.to(new, depth))
         self._depth[new[~good]] = _LEFT_OUT
         kept = good[number]
         return Edges(edges.source[kept], edges.target[kept], edges.labels[kept], edges.cost[kept])
@@ -312,6 +304,47 @@ class BoundedSearch:
         new = np.flatnonzero(fresh)
         self._h[numbers[new]] = self._guide.bound(rows[new]) if self._guide.bound else 0
         return numbers
+
+
+class _Ways:
+    """A cheapest way to each state, as the step before it.
+
+    ``paid`` is its second cost component, ``source`` the state before, ``labels`` (states, robots)
+    what the robots do there.
+    """
+
+    def __init__(self, robots: int) -> None:
+        self._paid: Ints = np.zeros(0, np.int64)
+        self._source: Ints = np.zeros(0, np.int64)
+        self._labels: Labels = np.zeros((0, robots), np.int32)
+
+    def enter(self, edges: Edges, states: int) -> tuple[Ints, Ints]:
+        """The different states that edges lead to, and for each edge the number among them.
+
+        ``states`` is how many there are in the table.
+        """
+        more = states - len(self._paid)
+        if more > 0:
+            more = max(more, len(self._paid))
+            self._paid = np.concatenate((self._paid, np.zeros(more, np.int64)))
+            self._source = np.concatenate((self._source, np.zeros(more, np.int64)))
+            empty = np.zeros((more, self._labels.shape[1]), np.int32)
+            self._labels = np.concatenate((self._labels, empty))
+        new, number = np.unique(edges.target, return_inverse=True)
+        paid = self._paid[edges.source] + edges.cost
+        order = np.lexsort((paid, number))
+        best = order[np.searchsorted(number[order], np.arange(len(new)))]
+        self._paid[new], self._source[new] = paid[best], edges.source[best]
+        self._labels[new] = edges.labels[best]
+        return new, number
+
+    def to(self, states: Ints, depth: int) -> Labels:
+        """The ways to some states of a layer, as labels: (states, depth, robots)."""
+        found = np.zeros((len(states), depth, self._labels.shape[1]), np.int32)
+        for step in range(depth - 1, -1, -1):
+            found[:, step] = self._labels[states]
+            states = self._source[states]
+        return found
 
 
 def _combinations(options: Options) -> float:

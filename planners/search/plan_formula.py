@@ -25,6 +25,7 @@ from planners.joint.step_clauses import Clause, clauses
 from planners.pddl.formula_tree import negated
 from planners.pddl.lifted import TRUE, Formula
 from planners.sat import sat_solver, solve_slice
+from planners.search.mutexes import Pair
 from planners.search.state_variables import StateVariable
 from planners.tables import Ints, Rows
 
@@ -62,7 +63,8 @@ class _Template:
 class PlanFormula:
     """Whether a state has a plan of at most some steps and some cost; exact.
 
-    ``effort`` are the solver's conflicts that may be spent.
+    ``variables`` and ``pairs`` of facts that are never true together hold in the states that are
+    asked for and in all that follow; ``effort`` are the solver's conflicts that may be spent.
 
     Raises
     ------
@@ -73,13 +75,18 @@ class PlanFormula:
     """
 
     def __init__(
-        self, model: JointModel, goal: Goal, variables: Sequence[StateVariable], effort: int
+        self,
+        model: JointModel,
+        goal: Goal,
+        variables: Sequence[StateVariable],
+        pairs: Sequence[Pair],
+        effort: int,
     ) -> None:
         self.model = model
         #: The effort that is left.
         self.left = effort
         self.costs = label_costs(model)
-        self._template = _TemplateBuilder(model).build(variables)
+        self._template = _TemplateBuilder(model).build(variables, pairs)
         self._solver = sat_solver(SOLVER)
         self._steps = 0
         self._variables = self._template.size
@@ -167,17 +174,44 @@ class PlanFormula:
         """
         if cost is not None and cost < 0:
             return False
+        return self.holds([*self._begun(row, steps), *self.costs_at_most(steps, cost), *extra])
+
+    def _begun(self, row: Rows, steps: int) -> Literals:
+        """Literals that say: so many steps are taken, from this state on."""
         self._require_steps(steps)
         facts = np.full(len(self.model.codec.facts), -1)
         facts[self.model.codec.true_facts(row)] = 1
         numbers = self._base[steps] + 1 + np.arange(len(facts))
-        assumptions = [*self._active[:steps], *(facts * numbers).tolist(), *extra]
-        if cost is not None and cost < len(self._counted[steps]):
-            assumptions.append(-self._counted[steps][cost])
+        return [*self._active[:steps], *(facts * numbers).tolist()]
+
+    def costs_at_most(self, steps: int, cost: int | None) -> Literals:
+        """A literal that says so of these steps, after `count_costs`; none where it is no bound."""
+        if cost is None or cost >= len(self._counted[steps]):
+            return []
+        return [-self._counted[steps][cost]]
+
+    def fix(self, row: Rows, steps: int, extra: Sequence[int]) -> None:
+        """Ask from now on, by `holds`, only about plans of so many steps from this state.
+
+        With the literals ``extra``.  What is fixed is simplified away; what is assumed is part of
+        every clause that the solver learns from it.
+        """
+        self.require([*self._begun(row, steps), *extra])
+
+    def require(self, literals: Sequence[int]) -> None:
+        """Let literals be true from now on."""
+        for literal in literals:
+            self._solver.add_clause([literal])
+
+    def holds(self, literals: Sequence[int]) -> bool:
+        """Whether the formula holds with these literals."""
         self.calls += 1
-        while (answer := solve_slice(self._solver, _SLICE, assumptions)) is None:
-            self.spend(_SLICE)
-        return answer
+        while True:
+            effort = max(1, min(_SLICE, self.left))
+            answer = solve_slice(self._solver, effort, literals)
+            if answer is not None:
+                return answer
+            self.spend(effort)
 
     def spend(self, effort: int) -> None:
         """Take some of the effort away; raises `OutOfEffort` where it is used up."""
@@ -304,9 +338,15 @@ class _TemplateBuilder:
         self._adders: list[Literals] = [[] for _ in range(self._facts)]
         self._deleters: list[Literals] = [[] for _ in range(self._facts)]
 
-    def build(self, variables: Sequence[StateVariable]) -> _Template:
+    def build(self, variables: Sequence[StateVariable], pairs: Sequence[Pair]) -> _Template:
         for variable in variables:
             self._exactly_one([fact + 1 for fact in variable.facts])
+        known = {fact: number for number, own in enumerate(variables) for fact in own.facts}
+        for one, other in pairs:
+            if one == other:
+                self.clauses.append((-(one + 1),))
+            elif one not in known or known[one] != known.get(other):
+                self.clauses.append((-(one + 1), -(other + 1)))
         for robot, own in enumerate(self._stepper.labelled):
             self._one_label(robot, len(own))
             for label, action in enumerate(own):

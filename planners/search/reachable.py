@@ -30,6 +30,8 @@ class PieceSizes:
         Joint steps of a forward search that may be bounded exactly, before it is.
     effort
         Conflicts that a SAT solver may spend on these bounds.
+    question
+        Conflicts that it may spend on one question about what optimal plans do.
     """
 
     states: int = 20_000
@@ -38,6 +40,7 @@ class PieceSizes:
     pairs: int = 2_000_000
     probe: int = 100_000
     effort: int = 5_000_000
+    question: int = 20_000
 
 
 PIECES = PieceSizes()

@@ -25,12 +25,15 @@ from tests.support import blind_search
 from tests.support.random_models import random_model
 from tests.support.random_pddl import random_model as random_pddl
 
-#: A search that asks the solver at once, and one that composes steps again on the way back.
+#: Searches that ask the solver at once, with effort for all or some of its answers, and one that
+#: composes steps again on the way back.
 PIECE_SIZES = (
     PIECES,
     replace(PIECES, probe=0, effort=3_000),
     replace(PIECES, probe=0, effort=100_000, kept=0, states=3),
     replace(PIECES, kept=0, states=2, steps=5),
+    replace(PIECES, probe=0, question=0),
+    replace(PIECES, probe=0, effort=300, question=0),
 )
 COSTS: tuple[Cost, ...] = ("makespan", "makespan+actions", "makespan+cost")
 

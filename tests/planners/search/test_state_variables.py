@@ -6,17 +6,12 @@ back; the table of states numbers each state once.
 from __future__ import annotations
 
 from collections import Counter
-from random import Random
 
 import numpy as np
 import pytest
 
-from planners.errors import BadInput
 from planners.joint.states import TrueFacts
-from planners.loading import ModelOptions, PlanningInstance, build, load
-from planners.pddl import parse_domain, parse_problem
-from planners.pddl.robots import RobotSelection
-from planners.pddl.sexpr import Source
+from planners.loading import PlanningInstance, load
 from planners.search.bounds import FAR, relaxed
 from planners.search.goals import goal_facts
 from planners.search.optimal_plans import distances
@@ -25,32 +20,7 @@ from planners.search.reachable import Space, explore
 from planners.search.state_table import Packing, StateTable
 from planners.search.state_variables import StateVariable, state_variables
 from tests.support.domains import DOMAINS
-from tests.support.random_models import random_model
-from tests.support.random_pddl import random_model as random_pddl
-
-
-def random_instance(seed: int) -> PlanningInstance | None:
-    random = Random(seed)
-    try:
-        if seed % 2:
-            domain, problem, options = random_model(seed, random.choice((2, 3)))
-        else:
-            text = random_pddl(seed, random.choice(["agent", "plain", "joint"]))
-            domain = parse_domain(Source("domain", text.domain))
-            problem = parse_problem(Source("problem", text.problem), domain)
-            options = ModelOptions(
-                RobotSelection(unowned=text.unowned), remember_actions=random.random() < 0.3
-            )
-        return build(domain, [problem], options)
-    except BadInput:
-        return None
-
-
-def explored(loaded: PlanningInstance) -> Space | None:
-    try:
-        return explore(loaded.model, loaded.tasks[0].init[None, :])
-    except BadInput:  # joint actions that no robot can tell apart
-        return None
+from tests.support.random_instances import explored, random_instance
 
 
 def checked(loaded: PlanningInstance, space: Space) -> list[StateVariable]:
