@@ -27,8 +27,9 @@ def guide_for(
     if name == "blind":
         return Guide("blind")
     projections = Projections(model, task.goal, variables)
+    cost_left = None if model.cost == "makespan" else projections.cost_left
     if name == "projections":
-        return Guide(name, projections.value, projections.in_time)
+        return Guide(name, projections.value, projections.in_time, cost_left=cost_left)
     if name not in GUIDES:
         raise UsageError(f"there is no heuristic {name}", remedy=f"One of {', '.join(GUIDES)}.")
     hmax = relaxed(model, task.goal)
@@ -37,13 +38,14 @@ def guide_for(
         return Guide("blind", exact=may_be_exact(model))
     if name == "auto" and _as_good(model, task, projections):
         return Guide(
-            "projections", projections.value, projections.in_time, exact=may_be_exact(model)
+            "projections", projections.value, projections.in_time, may_be_exact(model), cost_left
         )
 
     def both(rows: Rows) -> Ints:
         return np.maximum(projections.value(rows), hmax(rows))
 
-    return Guide("relaxed", both, projections.in_time, exact=name == "auto" and may_be_exact(model))
+    exact = name == "auto" and may_be_exact(model)
+    return Guide("relaxed", both, projections.in_time, exact, cost_left)
 
 
 def _as_good(model: JointModel, task: PlanningTask, projections: Projections) -> bool:

@@ -18,6 +18,7 @@ from planners.errors import ProvedImpossible
 from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, PlanningTask, Steps
 from planners.search.bounds import FAR
+from planners.search.cost_limit import CostLimit
 from planners.search.exact_bound import ExactBound, exact_bound
 from planners.search.reachable import PieceSizes
 from planners.search.state_table import Packing, StateTable
@@ -44,6 +45,11 @@ _TOO_MANY = 10
 #: How a round ended: the goal was met, or more joint steps were composed than are tried without
 #: exact bounds.
 _MET, _GROWN = -1, -2
+#: As many times more joint steps are composed where plans of the least cost that may suffice are
+#: looked for, or of not much more: mostly only they are met.
+_CHEAP = 5
+#: Limits of the cost that are tried.
+_LIMITS = 10
 #: States of a layer that are asked for first, and the share of them on optimal plans above which
 #: the others are not asked for.
 _SAMPLE, _MOSTLY = 64, 0.9
@@ -56,13 +62,15 @@ class Guide:
     """What a search is bounded by; ``name`` is what messages call it.
 
     Where nothing is known (``bound`` None) all states are searched, in one round.  ``exact``: once
-    the search has grown, a SAT solver finds the optimal cost and what leads to it.
+    the search has grown, a SAT solver finds the optimal cost and what leads to it.  ``cost_left``
+    is a lower bound on the second cost component that is left.
     """
 
     name: str
     bound: Bound | None = None
     in_time: InTime | None = None
     exact: bool = False
+    cost_left: Bound | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +126,10 @@ class BoundedSearch:
         self._ways = _Ways(len(model.robots))
         self._exact: ExactBound | None = None
         self._probing = guide.exact
+        #: Whether the least cost is tried, and the joint steps composed before all is.
+        self._trying_cheap = False
+        self._before = 0
+        self._costs = CostLimit(guide.cost_left) if guide.cost_left and guide.bound else None
         self.layers = Layers(model, self.table, guide)
         self.bound = 0
         self.rounds = 0
@@ -126,6 +138,8 @@ class BoundedSearch:
         """Search, in as many rounds as it takes."""
         start = self._numbers(self._task.init[None, :])
         following = int(self._h[start[0]]) if self._guide.bound else FAR - 1
+        if self._costs is not None and following < FAR and self._cheap(self._costs, start):
+            return self.layers
         work = 0
         slow = 1
         while following < FAR:
@@ -148,6 +162,29 @@ class BoundedSearch:
             position=self._task.position,
             remedy=searched(self._model, self.table.rows(seen), len(self.table) - len(seen)),
         )
+
+    def _cheap(self, costs: CostLimit, start: Ints) -> bool:
+        """Whether the least makespan that may suffice does, at the least cost or not much more.
+
+        Every cost is tried from the least one that may suffice: where the goal is met, nothing is
+        shorter, and of the plans of that length none is cheaper.
+        """
+        self.bound, most = int(self._h[start[0]]), None
+        self._trying_cheap = True
+        found = FAR
+        for _ in range(_LIMITS):
+            costs.begin(start, most)
+            if not costs.most:
+                break  # nothing is known of costs
+            self.rounds += 1
+            found = self._round(start)
+            if found in (_MET, _GROWN) or costs.beyond >= FAR:
+                break
+            most = costs.beyond
+        self._trying_cheap, self._before = False, self.layers.composed
+        if found != _MET:
+            self._costs = None
+        return found == _MET
 
     def _bounded_exactly(self) -> int:
         """Ask the solver for the optimal cost; what the next round is bounded by."""
@@ -191,10 +228,16 @@ class BoundedSearch:
         return _MET
 
     @property
+    def _limited(self) -> bool:
+        """Whether joint steps are composed up to a number of them only."""
+        return self._probing or self._trying_cheap
+
+    @property
     def _probe(self) -> int:
         """Joint steps that are composed before exact bounds: more where their formula is large."""
         size = sum(map(len, self._model.labels)) * (self.bound if self.bound < FAR - 1 else _STEPS)
-        return self._pieces.probe * (1 + size // _FORMULA)
+        probe = self._pieces.probe * (1 + size // _FORMULA)
+        return _CHEAP * probe if self._trying_cheap else probe
 
     def _on_optimal_plans(self, exact: ExactBound, edges: Edges, depth: int) -> Edges:
         """Leave out what leads to states through which no optimal plan passes.
@@ -251,14 +294,15 @@ class BoundedSearch:
             h = self._h[target].astype(np.int64)
             late = h > self.bound - depth
             beyond = min(beyond, low + depth, int(h[late].min(initial=FAR)) + depth)
+            source = numbers[steps.source]
+            if self._costs is not None:
+                late |= ~self._costs.within(source, target, steps.cost)
             into = target[~late]
             self._depth[into] = np.minimum(self._depth[into], depth)
             kept = np.flatnonzero(~late & (self._depth[target] == depth))
-            parts.append(
-                Edges(
-                    numbers[steps.source[kept]], target[kept], steps.labels[kept], steps.cost[kept]
-                )
-            )
+            parts.append(Edges(source[kept], target[kept], steps.labels[kept], steps.cost[kept]))
+            if self._costs is not None:
+                self._costs.pay(source[kept], target[kept], steps.cost[kept])
         return _joined(parts, self._model), beyond
 
     def _steps(self, states: Ints, depth: int) -> Iterator[tuple[Ints, Steps, int]]:
@@ -270,7 +314,7 @@ class BoundedSearch:
 
         def only(rows: Rows, options: Options) -> Options:
             nonlocal low
-            if self._probing and _combinations(options) > _TOO_MANY * self._probe:
+            if self._limited and _combinations(options) > _TOO_MANY * self._probe:
                 raise _GrownError
             if self._exact is not None:
                 options = self._exact.only(depth - 1, rows, options)
@@ -278,12 +322,12 @@ class BoundedSearch:
                 options, low = self._guide.in_time(rows, options, self.bound - depth)
             return options
 
-        start, size = 0, _FIRST_PROBED if self._probing else _FIRST
+        start, size = 0, _FIRST_PROBED if self._limited else _FIRST
         most = max(1, min(self._pieces.steps, _BYTES // (8 * self._model.codec.width)))
-        if self._probing:
+        if self._limited:
             most = min(most, self._probe)
         while start < len(states):
-            if self._probing and self.layers.composed > self._probe:
+            if self._limited and self.layers.composed - self._before > self._probe:
                 raise _GrownError
             numbers = states[start : start + size]
             rows = self.table.rows(numbers)
@@ -303,6 +347,8 @@ class BoundedSearch:
             self._depth = np.concatenate((self._depth, more))
         new = np.flatnonzero(fresh)
         self._h[numbers[new]] = self._guide.bound(rows[new]) if self._guide.bound else 0
+        if self._costs is not None:
+            self._costs.enter(numbers[new], rows[new])
         return numbers
 
 

@@ -10,11 +10,13 @@ and consistent, and so is the largest one of all variables.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from heapq import heappop, heappush
 
 import numpy as np
 
+from planners.joint.composition import ComposingStepper
 from planners.joint.model import Goal, JointModel, Options
 from planners.joint.states import TrueFacts
 from planners.search.bounds import FAR
@@ -45,8 +47,10 @@ class Projections:
         #: Per fact the distance of the variable with this value, 0 where it has none.
         self._of_fact: Ints = np.zeros(facts, np.int64)
         self._own: list[list[_OwnVariable]] = [[] for _ in model.robots]
+        #: Per robot and fact what the robot pays at least for its own variables.
+        self._costs: Ints = np.zeros((len(model.robots), facts), np.int64)
         for variable in variables:
-            distance = _distances(variable, wanted)
+            distance = _distances(variable, wanted, lambda _: 1)
             if not any(distance.values()):
                 continue
             table = np.zeros(facts, np.int64)
@@ -55,6 +59,21 @@ class Projections:
             owner = _owner(model, variable)
             if owner is not None:
                 self._own[owner].append(_OwnVariable(table, _after(model, owner, variable, table)))
+                paid = _distances(variable, wanted, _cost_of(model, owner))
+                own = self._costs[owner]
+                own[list(paid)] = np.maximum(own[list(paid)], list(paid.values()))
+
+    def cost_left(self, rows: Rows) -> Ints:
+        """A lower bound on the second cost component of each state's plans.
+
+        Of every robot what the most expensive one of its own variables needs, added up: no action
+        that another robot chooses changes them.
+        """
+        true = TrueFacts.of(self._codec.facts_part(rows))
+        total = np.zeros(len(rows), np.int64)
+        for table in self._costs:
+            total += true.reduced(np.maximum, table, 0)
+        return total
 
     @property
     def informative(self) -> bool:
@@ -89,22 +108,38 @@ class Projections:
         return kept, beyond
 
 
-def _distances(variable: StateVariable, wanted: frozenset[int]) -> dict[int, int]:
-    """Breadth first from the wanted values, backward."""
+def _distances(
+    variable: StateVariable, wanted: frozenset[int], cost: Callable[[int], int]
+) -> dict[int, int]:
+    """Least costs from all values to the wanted ones; of actions, by number, ``cost`` says it."""
     goals = [fact for fact in variable.facts if fact in wanted]
     if not goals:
         return dict.fromkeys(variable.facts, 0)
-    before: dict[int, set[int]] = defaultdict(set)
-    for needs, value in variable.changes.values():
+    found = dict.fromkeys(variable.facts, FAR)
+    if len(goals) > 1:
+        return found
+    before: dict[int, list[tuple[int, int]]] = defaultdict(list)
+    for number, (needs, value) in variable.changes.items():
         if len(needs) == 1:  # with more it is never applicable
-            before[value].add(needs[0])
-    found = dict.fromkeys(goals if len(goals) == 1 else (), 0)
-    layer, steps = list(found), 0
-    while layer:
-        steps += 1
-        layer = sorted({v for value in layer for v in before[value]} - found.keys())
-        found.update(dict.fromkeys(layer, steps))
-    return {fact: found.get(fact, FAR) for fact in variable.facts}
+            before[value].append((needs[0], cost(number)))
+    found[goals[0]] = 0
+    queue = [(0, goals[0])]
+    while queue:
+        far, value = heappop(queue)
+        for other, step in before[value]:
+            if far + step < found[other]:
+                found[other] = far + step
+                heappush(queue, (far + step, other))
+    return found
+
+
+def _cost_of(model: JointModel, robot: int) -> Callable[[int], int]:
+    """The second cost component of a robot's own actions, by number; 0 where it is not known."""
+    if not isinstance(model.stepper, ComposingStepper):
+        return lambda _: 0
+    number_of = {text: number for number, text in enumerate(model.labels[robot])}
+    costs = model.stepper.costs[robot]
+    return lambda number: int(costs[number_of[model.actions[number].label]])
 
 
 def _owner(model: JointModel, variable: StateVariable) -> int | None:

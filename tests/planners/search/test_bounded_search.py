@@ -12,16 +12,20 @@ import numpy as np
 import pytest
 
 from planners.errors import BadInput, ProvedImpossible
-from planners.joint.model import Cost, JointModel, PlanningTask
-from planners.loading import ModelOptions, PlanningInstance, build
+from planners.joint.model import Cost, FullState, JointModel, PlanningTask
+from planners.loading import ModelOptions, PlanningInstance, build, load
 from planners.pddl import parse_domain, parse_problem
+from planners.pddl.lifted import Atom
 from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
 from planners.search.guides import GUIDES
-from planners.search.optimal_plans import search
+from planners.search.optimal_plans import search, search_with_effort
 from planners.search.plan_space import PlanSpace
+from planners.search.projections import Projections
 from planners.search.reachable import PIECES
+from planners.search.state_variables import state_variables
 from tests.support import blind_search
+from tests.support.domains import DOMAINS
 from tests.support.random_models import random_model
 from tests.support.random_pddl import random_model as random_pddl
 
@@ -105,3 +109,56 @@ def test_bounds_lose_no_optimal_plan_of_many_models(robots: int | None) -> None:
     met = compared(range(10_000, 10_800), robots)
     print(robots or "any", "robots:", dict(met))
     assert min(met["solved"], met["unsolvable"]) >= 20
+
+
+# The cost that is left
+
+
+def test_the_cost_that_is_left_is_a_lower_bound() -> None:
+    checked = tight = 0
+    for loaded in [*instances(range(60), 2), *instances(range(110), None)]:
+        model, task = loaded.model, loaded.tasks[0]
+        try:
+            space = expected(model, task)
+        except BadInput:  # joint actions that no robot can tell apart, somewhere
+            continue
+        if space is None or model.cost == "makespan":
+            continue
+        left = np.zeros(len(space), np.int64)
+        for layer in space.edges_by_layer():
+            left[layer.source] = space.cost[layer.edges] + left[layer.target]
+        projections = Projections(model, task.goal, state_variables(model, task.init))
+        bound = projections.cost_left(space.rows[space.state])
+        assert (bound <= left).all()
+        checked += len(space)
+        tight += int((bound[left > 0] == left[left > 0]).sum())
+    assert tight > 5
+    assert checked > 50
+
+
+@pytest.mark.parametrize(
+    ("init", "goal", "cost", "rounds"),
+    [
+        # Each goes its own way, and nobody pays for more.
+        (("c0-0", "c2-0"), ("c0-2", "c2-2"), (2, 4), (1, 1)),
+        # r2 is at its goal, and makes way: two actions more.
+        (("c0-0", "c0-1"), ("c0-2", "c0-1"), (2, 4), (2, 2)),
+        # They trade places, and one goes round: the least makespan is not what bounds say.
+        (("c0-0", "c0-2"), ("c0-2", "c0-0"), (4, 6), (3, 99)),
+    ],
+)
+def test_cheap_plans_first(
+    init: tuple[str, str], goal: tuple[str, str], cost: tuple[int, int], rounds: tuple[int, int]
+) -> None:
+    files = DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "gw4-3x3.pddl"]
+    model = load(*files, ModelOptions(cost="makespan+actions")).model
+
+    def state(cells: tuple[str, str]) -> frozenset[Atom]:
+        return frozenset(Atom("at", (f"r{k}", cell)) for k, cell in enumerate(cells, 1))
+
+    goals = FullState(tuple(model.codec.true_facts(model.state(state(goal)))))
+    task = PlanningTask("by hand", model.state(state(init)), goals)
+    found, effort = search_with_effort(model, task, heuristic="projections")
+    assert found.cost_of(0) == cost
+    assert rounds[0] <= effort.rounds <= rounds[1]
+    equal(found, blind_search.search(model, task))

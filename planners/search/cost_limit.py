@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Least makespan and second cost component at once: a limit on what ways to a state may cost.
+
+With a lower bound on the cost that is left, as each robot's own part of the goal gives it, a joint
+step into a state is left out if its way costs more than the limit together with what is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from planners.search.bounds import FAR
+from planners.tables import Bools, Ints, Rows
+
+
+class CostLimit:
+    """What the ways to states have cost, in one round of a search, and what is left at least.
+
+    ``left`` says for a table of states a lower bound on the second cost component of their plans.
+    """
+
+    def __init__(self, left: Callable[[Rows], Ints]) -> None:
+        self._bound = left
+        #: Ways cost at most so much; the least cost of one that was left out.
+        self.most = self.beyond = FAR
+        #: Per state what is left at least, and what the cheapest way to it has cost in this round.
+        self._left: Ints = np.zeros(0, np.int64)
+        self._paid: Ints = np.zeros(0, np.int64)
+
+    def enter(self, states: Ints, rows: Rows) -> None:
+        """Know new states, by their numbers."""
+        grown = int(states.max(initial=-1)) + 1 - len(self._left)
+        if grown > 0:
+            more = np.full(max(grown, len(self._left)), FAR)
+            self._left = np.concatenate((self._left, more))
+            self._paid = np.concatenate((self._paid, more))
+        self._left[states] = self._bound(rows)
+
+    def begin(self, start: Ints, most: int | None = None) -> None:
+        """A new round from a state; without ``most`` with the least cost that may suffice."""
+        self.most = int(self._left[start].min()) if most is None else most
+        self.beyond = FAR
+        self._paid[:] = FAR
+        self._paid[start] = 0
+
+    def within(self, source: Ints, target: Ints, cost: Ints) -> Bools:
+        """Which joint steps lead on within the limit."""
+        least = self._paid[source] + cost + self._left[target]
+        good: Bools = least <= self.most
+        self.beyond = min(self.beyond, int(least[~good].min(initial=FAR)))
+        return good
+
+    def pay(self, source: Ints, target: Ints, cost: Ints) -> None:
+        """Take these joint steps."""
+        np.minimum.at(self._paid, target, self._paid[source] + cost)
