@@ -11,13 +11,17 @@ other, and a bound on the sum of all costs says nothing for long.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from planners.joint.model import JointModel, PlanningTask
 from planners.search.goals import goal_facts
-from planners.search.plan_formula import Literals, PlanFormula
+from planners.search.plan_formula import Literals, OutOfEffort, PlanFormula
+
+#: Conflicts for the question whether a core needs a second action, too.
+_EASY = 1_000
 
 
 @dataclass(slots=True)
@@ -57,34 +61,59 @@ class _Sums:
             self.open[done] = (None, 0)
 
     def relax(self, core: Literals) -> None:
-        """Let one of the literals of a core hold; more of them, or one more often, is paid anew."""
+        """Let as many of a core's literals hold as must; more, or one more often, is paid anew."""
         for literal in core:
             own, place = self.open.pop(literal)
             if own is None:
                 own = _Sum(self._formula.counter(self._times.pop(literal)))
-            if place + 1 < len(own.at_least):
-                self.open[own.at_least[place + 1]] = (own, place + 1)
+            self._assume(own, place + 1)
         if len(core) > 1:
             together = _Sum(self._formula.counter(core))
-            self.open[together.at_least[1]] = (together, 1)
+            place = 1
+            while place < len(together.at_least) and self._must(together.at_least[place]):
+                place += 1
+            self._assume(together, place)
+
+    def _assume(self, total: _Sum, place: int) -> None:
+        """Assume that a sum is no larger than this."""
+        if place < len(total.at_least):
+            self.open[total.at_least[place]] = (total, place)
+
+    def _must(self, larger: int) -> bool:
+        """Whether a sum must be larger, where that is seen at once."""
+        try:
+            with self._formula.at_most(_EASY):
+                return not self._formula.holds([-larger])
+        except OutOfEffort:
+            return False
 
 
 def least_cost(formula: PlanFormula, task: PlanningTask, steps: int) -> Literals:
     """Literals that all hold in the cheapest plans of so many steps, and in no other plans.
 
-    There are plans of so many steps, and costs are 0 or 1.  The last answer of the solver is one of
-    the cheapest.  The cost of a plan is the number of cores and the number of these literals that
-    do not hold (if a sum is said to be larger only where it is), so the literals say the same as a
-    bound on the cost, but each of few actions: much follows from them at once.
+    There are plans of so many steps, the formula is fixed to them, and costs are 0 or 1.  The last
+    answer of the solver is one of the cheapest.  The cost of a plan is the number of refuted
+    assumptions and the number of these literals that do not hold (if a sum is said to be larger
+    only where it is), so the literals say the same as a bound on the cost, but each of few actions:
+    much follows from them at once.  Cores that have nothing in common are looked for first, for
+    these are small.
 
     Raises `planners.search.plan_formula.OutOfEffort`.
     """
     sums = _Sums(formula, steps)
     sums.add_actions(task)
-    while not formula.solvable(task.init, steps, extra=[-literal for literal in sums.open]):
-        core = _smaller(formula, task, steps, formula.core(sums.open))
-        sums.relax(core)
-    return [-literal for literal in sums.open]
+    while cores := list(_disjoint(formula, set(sums.open))):
+        for core in cores:
+            sums.relax(core)
+    return [-literal for literal in sorted(sums.open)]
+
+
+def _disjoint(formula: PlanFormula, assumed: set[int]) -> Iterator[Literals]:
+    """Cores without a common literal, until what is assumed besides holds."""
+    while not formula.holds([-literal for literal in sorted(assumed)]):
+        core = _smaller(formula, formula.core(assumed))
+        assumed -= set(core)
+        yield core
 
 
 def _kinds(model: JointModel, task: PlanningTask) -> list[str]:
@@ -103,10 +132,10 @@ def _kinds(model: JointModel, task: PlanningTask) -> list[str]:
     return [model.robots[known.index(own)] for own in known]
 
 
-def _smaller(formula: PlanFormula, task: PlanningTask, steps: int, core: Literals) -> Literals:
+def _smaller(formula: PlanFormula, core: Literals) -> Literals:
     """A core that is no larger: what is needed of it, asked again while that helps."""
     while len(core) > 1:
-        answer = formula.solvable(task.init, steps, extra=[-literal for literal in core])
+        answer = formula.holds([-literal for literal in core])
         assert not answer, "a core was refuted"
         again = formula.core(core)
         if len(again) >= len(core):

@@ -66,8 +66,13 @@ class ExactBound:
             for k in range(depth)
         ]
         asked = (ways + np.array(first, np.int64).reshape(depth, robots)).reshape(len(ways), -1)
-        answers = [_unless_refuted(self.formula, own, self.effort) for own in asked.tolist()]
-        return np.array(answers, np.bool_)
+        passes = np.ones(len(ways), np.bool_)
+        for way, literals in enumerate(asked.tolist()):
+            if passes[way] and not _unless_refuted(self.formula, literals, self.effort):
+                # What is refuted is part of other ways, too.
+                column = np.flatnonzero(np.isin(asked[way], self.formula.core_of(literals)))
+                passes &= (asked[:, column] != asked[way, column]).any(axis=1)
+        return passes
 
     def only(self, depth: int, rows: Rows, options: Options) -> Options:
         """The robots' options in states after ``depth`` steps, without labels that are not used."""
@@ -124,10 +129,11 @@ def _mostly_pass(formula: PlanFormula, plan: Plan, some: tuple[Rows, int]) -> bo
 
 def _bound(formula: PlanFormula, task: PlanningTask, plan: Plan, effort: int) -> ExactBound:
     cheap: Literals = []
+    formula.fix(task.init, len(plan))
     if formula.model.cost != "makespan" and countable(formula.model):
         plan, cheap = _cheapest(formula, task, plan)
     formula.without_limit()
-    formula.fix(task.init, len(plan), cheap)
+    formula.require(cheap)
     return ExactBound(formula, len(plan), _used(formula, plan, effort), effort)
 
 
@@ -159,8 +165,8 @@ def _cheapest(formula: PlanFormula, task: PlanningTask, plan: Plan) -> tuple[Pla
             return formula.labels_chosen(len(plan)), cheap
     formula.count_costs(_cost_of(formula, plan))
     with suppress(OutOfEffort):
-        while (cost := _cost_of(formula, plan)) and formula.solvable(
-            task.init, len(plan), cost - 1
+        while (cost := _cost_of(formula, plan)) and formula.holds(
+            formula.costs_at_most(len(plan), cost - 1)
         ):
             plan = formula.labels_chosen(len(plan))
     return plan, formula.costs_at_most(len(plan), _cost_of(formula, plan))

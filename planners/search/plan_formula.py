@@ -165,16 +165,9 @@ class PlanFormula:
 
     # ---- questions
 
-    def solvable(
-        self, row: Rows, steps: int, cost: int | None = None, extra: Sequence[int] = ()
-    ) -> bool:
-        """Whether a plan of exactly so many steps leads from a state to the goal.
-
-        At most of ``cost`` (after `count_costs`), with the literals ``extra``.
-        """
-        if cost is not None and cost < 0:
-            return False
-        return self.holds([*self._begun(row, steps), *self.costs_at_most(steps, cost), *extra])
+    def solvable(self, row: Rows, steps: int) -> bool:
+        """Whether a plan of exactly so many steps leads from a state to the goal."""
+        return self.holds(self._begun(row, steps))
 
     def _begun(self, row: Rows, steps: int) -> Literals:
         """Literals that say: so many steps are taken, from this state on."""
@@ -184,19 +177,17 @@ class PlanFormula:
         numbers = self._base[steps] + 1 + np.arange(len(facts))
         return [*self._active[:steps], *(facts * numbers).tolist()]
 
-    def costs_at_most(self, steps: int, cost: int | None) -> Literals:
+    def costs_at_most(self, steps: int, cost: int) -> Literals:
         """A literal that says so of these steps, after `count_costs`; none where it is no bound."""
-        if cost is None or cost >= len(self._counted[steps]):
-            return []
-        return [-self._counted[steps][cost]]
+        counted = self._counted[steps]
+        return [-counted[cost]] if cost < len(counted) else []
 
-    def fix(self, row: Rows, steps: int, extra: Sequence[int]) -> None:
+    def fix(self, row: Rows, steps: int) -> None:
         """Ask from now on, by `holds`, only about plans of so many steps from this state.
 
-        With the literals ``extra``.  What is fixed is simplified away; what is assumed is part of
-        every clause that the solver learns from it.
+        What is fixed is simplified away; what is assumed may be part of every clause learnt.
         """
-        self.require([*self._begun(row, steps), *extra])
+        self.require(self._begun(row, steps))
 
     def require(self, literals: Sequence[int]) -> None:
         """Let literals be true from now on."""
@@ -238,6 +229,10 @@ class PlanFormula:
         """Of literals whose negations were assumed in the last question: those that refuted it."""
         refuted = {-literal for literal in self._solver.get_core() or ()}
         return sorted(refuted & set(literals))
+
+    def core_of(self, literals: Iterable[int]) -> Literals:
+        """Of literals that were assumed in the last question: those that were refuted together."""
+        return sorted(set(self._solver.get_core() or ()) & set(literals))
 
     def any_of(self, literals: Literals) -> int:
         """A literal that is implied by each of these."""

@@ -137,8 +137,8 @@ def cheapest_compared(seeds: range) -> Counter[str]:
                 for plan in every
             ]
             assert formula.solvable(task.init, steps)
+            formula.fix(task.init, steps)
             cheap = least_cost(formula, task, steps)
-            formula.fix(task.init, steps, ())
             for plan, cost in zip(every, costs, strict=True):
                 chosen = [
                     formula.label(steps - k, robot, label)
