@@ -111,6 +111,13 @@ class EquivariantSearch:
             kinds.effort = kinds.effort.doubled()
         return None
 
+    def undecided(self, size: int) -> list[WordAction]:
+        """The kinds of partitions into so many words that may still hold a language."""
+        kinds = self._kinds.get(size)
+        if kinds is None:
+            kinds = self._kinds[size] = _Kinds(self._actions(size))
+        return [*kinds.open, *kinds.undecided]
+
     def _actions(self, size: int) -> list[WordAction]:
         """The kinds of partitions, without those that some single symmetry rules out.
 

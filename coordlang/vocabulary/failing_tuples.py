@@ -129,6 +129,42 @@ class FailingTuples:
                     found.append(Agreeing(length, to, rows))
         return found
 
+    def still_agreeing(self, word: Ints, some: Sequence[Agreeing]) -> list[Agreeing]:
+        """Those of some images of tuples to which a partition gives one sentence."""
+        found = []
+        for known in some:
+            states = self._tables[known.length].states[known.rows]
+            rows = known.rows[_agree(word[known.to][states])]
+            if len(rows):
+                found.append(Agreeing(known.length, known.to, rows))
+        return found
+
+    def codes(
+        self, word: Ints, agreeing: Sequence[Agreeing], most: int, random: np.random.Generator
+    ) -> Ints:
+        """Clauses of images of agreeing tuples, about so many at most: a row for each.
+
+        Returns
+        -------
+        Ints
+            (clauses, pairs) codes ``a * states + b`` with ``a < b``; -1 where there are fewer.
+        """
+        total = sum(len(found.rows) for found in agreeing)
+        tables = []
+        for found in agreeing:
+            rows = found.rows
+            share = max(1, len(rows) * most // max(total, most))
+            if share < len(rows):
+                rows = random.permutation(rows)[:share]
+            sequences = self.sequences(found, rows)
+            pairs = _pairs(sequences, word)
+            tables.append(pairs[(pairs != -2).all(axis=1)])
+        width = max(table.shape[1] for table in tables)
+        wide = [((0, 0), (0, width - table.shape[1])) for table in tables]
+        return np.concatenate(
+            [np.pad(table, by, constant_values=-1) for table, by in zip(tables, wide, strict=True)]
+        )
+
     def sequences(self, agreeing: Agreeing, rows: Ints) -> Ints:
         """The state sequences (rows, robots, length) of images of tuples."""
         found: Ints = agreeing.to[self._tables[agreeing.length].states[rows]]
@@ -218,13 +254,17 @@ def _agree(words: Ints) -> Bools:
     return agree
 
 
-def _clauses(sequences: Ints, word: Ints) -> Iterator[tuple[int, Clause]]:
-    """`separation_clause` of each tuple (tuples, robots, length) that has one, with its row."""
+def _pairs(sequences: Ints, word: Ints) -> Ints:
+    """The codes of the pairs in the clause of each tuple (tuples, robots, length); see `_cells`."""
     robots = sequences.shape[1]
     cells = [_cells(sequences[:, 0], sequences[:, other], word) for other in range(1, robots)]
-    pairs = np.concatenate(cells, axis=1)
-    whole = np.logical_and.reduce([(own[:, 0] >= -1) for own in cells])
-    for row in np.flatnonzero(whole).tolist():
+    return np.concatenate(cells, axis=1)
+
+
+def _clauses(sequences: Ints, word: Ints) -> Iterator[tuple[int, Clause]]:
+    """`separation_clause` of each tuple (tuples, robots, length) that has one, with its row."""
+    pairs = _pairs(sequences, word)
+    for row in np.flatnonzero((pairs != -2).all(axis=1)).tolist():
         codes = set(pairs[row].tolist()) - {-1}
         yield row, frozenset(divmod(code, len(word)) for code in codes)
 

@@ -24,6 +24,8 @@ from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.vocabulary.contained import ContainedInstance, parts
 from coordlang.vocabulary.equivariant import EquivariantSearch
 from coordlang.vocabulary.job import Assignment, Evidence, Job, Outcome
+from coordlang.vocabulary.local_search import LocalSearch
+from coordlang.vocabulary.merging import merged
 from coordlang.vocabulary.necessary_clauses import NecessaryClauses
 from coordlang.vocabulary.partitions import Partitions, Refutation
 from coordlang.vocabulary.problems_by_size import SolverBudget
@@ -36,6 +38,8 @@ from planners.search.plan_space import PlanSpace
 
 #: Combinations of plans' next steps up to which separating words are looked for first.
 _SEPARATING_COMBINATIONS = 4_000_000
+#: States from which on words are also looked for by local search and by merging.
+_LOCAL_FROM = 200
 
 
 def minimal(job: Job) -> Outcome:
@@ -90,6 +94,7 @@ class _Search:
         self._partitions: Partitions | None = None
         self._refuter: Refuter | None = None
         self._equivariant: EquivariantSearch | None = None
+        self._local: LocalSearch | None = None
         self._contained: list[ContainedInstance] = []
         self._rounds = 0
 
@@ -127,6 +132,8 @@ class _Search:
             figures |= {"counterexamples": len(self._refuter.pool), "walks": self._refuter.walks}
         if self._equivariant is not None:
             figures |= {"equivariant_rounds": self._equivariant.rounds}
+        if self._local is not None:
+            figures |= {"local_rounds": self._local.rounds, "local_moves": self._local.moves}
         return figures
 
     def close(self) -> None:
@@ -149,7 +156,10 @@ class _Search:
 
     def _close_bounds(self) -> None:
         """Decide numbers of words until the bounds meet: from below, and from above by symmetry."""
-        equivariant = self._equivariant = EquivariantSearch(self._job.states, self._prepare())
+        states, refuter = self._job.states, self._prepare()
+        equivariant = self._equivariant = EquivariantSearch(states, refuter)
+        if len(states) > _LOCAL_FROM:
+            self._local = LocalSearch(states, refuter, self._job.seed)
         budget = SolverBudget()
         while self.lower < self._upper:
             if not self._decide(self.lower, budget):
@@ -157,7 +167,7 @@ class _Search:
                 budget = budget.doubled()
 
     def _descend(self, equivariant: EquivariantSearch) -> None:
-        """Look for a language with fewer words among equivariant partitions.
+        """Look for a language with fewer words: equivariant ones by SAT, and by local search.
 
         What is not found is no bound: only `Refutation` is.
         """
@@ -169,10 +179,23 @@ class _Search:
                 f"symmetric words: trying {size}, {self.lower} to {self._upper} needed"
             )
             found = equivariant.find(size)
+            if found is None and self._local is not None:
+                self._job.progress(
+                    f"local search: trying {size}, {self.lower} to {self._upper} needed"
+                )
+                found = self._local.find(size, equivariant.undecided(size))
             if found is not None:
-                self._take(found)
+                self._take(self._merged(found))
                 return
             size = (size + self._upper + 1) // 2
+
+    def _merged(self, language: Assignment) -> Assignment:
+        """A language of which no two words can be merged; small ones have few to spare."""
+        states = self._job.states
+        if len(states) > _LOCAL_FROM:
+            for fewer in merged(language, states, self._prepare(), self._job.seed):
+                language = fewer
+        return language
 
     def _look_for_separating_words(self) -> None:
         """Take a separating partition with fewer words, if a short search finds one.
