@@ -22,6 +22,7 @@ from planners.pddl.lifted import (
     StepAtom,
 )
 from planners.search.growth import Growth, first_layers
+from planners.search.outlook import Outlook, outlook
 from planners.tables import Rows
 
 #: States in which an example of interference is looked for.
@@ -38,7 +39,8 @@ class Inspection:
     its subactions asks of the others.  ``interfering`` counts pairs of subactions of different
     robots that cannot share a step; the ``example`` is one that meets in a reachable state, None if
     no state near the start has one.  ``start`` counts the fluents that are true at first, ``never``
-    are the predicates that no state can make true.  ``growth`` says how large a search will be.
+    are the predicates that no state can make true.  ``growth`` says how large a search would be
+    without bounds, ``outlook`` what it is bounded by.
     """
 
     domain: str
@@ -65,6 +67,7 @@ class Inspection:
     facts: int
     goal: str
     growth: Growth
+    outlook: Outlook
 
 
 def inspect(loaded: PlanningInstance) -> Inspection:
@@ -102,6 +105,7 @@ def inspect(loaded: PlanningInstance) -> Inspection:
         facts=len(model.codec.facts),
         goal=formula_text(loaded.problems[0].goal),
         growth=growth,
+        outlook=outlook(model, loaded.tasks[0], layers),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from planners.notebook import counted
 from planners.search.growth import Growth
+from planners.search.outlook import Outlook
 
 #: States, and joint steps out of one layer, beyond which a search is not likely to end.
 _MOST_STATES, _MOST_STEPS = 20_000_000, 50_000_000
@@ -16,12 +17,13 @@ _ALL_TASKS = 1_000
 _SHOWN = 8
 
 
-def feasibility(growth: Growth) -> list[tuple[str, str]]:
-    """Return lines (name, text): labels, layers, what they mean for commands, what to try."""
+def feasibility(growth: Growth, outlook: Outlook) -> list[tuple[str, str]]:
+    """Return lines (name, text): labels, layers, bound, what these mean, what to try."""
     lines = [
         ("labels", _labels(growth)),
         ("first layers", _layers(growth)),
-        ("this task", _this_task(growth)),
+        ("bound", _bound(growth, outlook)),
+        ("this task", _this_task(growth, outlook)),
         ("--tasks all", _all_tasks(growth)),
     ]
     if growth.solvable is None and _is_too_large(growth):
@@ -46,19 +48,39 @@ def _layers(growth: Growth) -> str:
     return f"{states}; not looked at: the next, with at most about {steps} into it"
 
 
-def _this_task(growth: Growth) -> str:
+def _bound(growth: Growth, outlook: Outlook) -> str:
+    if outlook.at_least is None:
+        return f"{outlook.heuristic}: no plan is possible"
+    text = f"{outlook.heuristic}: makespan {outlook.at_least:,} at least"
+    if outlook.within:
+        sizes = [f"{size:,}" for size in outlook.within]
+        if len(sizes) > _SHOWN:
+            sizes = [*sizes[: _SHOWN - 2], "..", sizes[-1]]
+        text += f", by which {', '.join(sizes)} of these states are left"
+    if outlook.solver_after is not None and growth.next_steps is not None:
+        text += f"; a SAT solver is asked after {counted(outlook.solver_after, 'joint step')}"
+    return text
+
+
+def _this_task(growth: Growth, outlook: Outlook) -> str:
     if growth.solvable is False:
         return "no plan: the goal cannot be reached"
     if growth.makespan is not None:
         return f"makespan {growth.makespan:,}: plans, coordination and build are feasible"
-    least = f"makespan {growth.at_least:,} at least"
+    at_least = max(growth.at_least or 0, outlook.at_least or 0)
+    least = f"makespan {at_least:,} at least"
     if growth.expected is not None:
         by = f"{growth.factor:.1f} times the one before"
         least += f": about {_rounded(growth.expected)} states if each layer is {by}"
-    return f"{least}; {_outlook(growth)}"
+    return f"{least}; {_outlook(growth, outlook)}"
 
 
-def _outlook(growth: Growth) -> str:
+def _outlook(growth: Growth, outlook: Outlook) -> str:
+    if _is_too_large(growth) and outlook.solver_after is not None:
+        return (
+            "too many to search them all; whether the bounds suffice is not known: "
+            "set a --time-limit"
+        )
     if _is_too_large(growth):
         return "plans, and all that needs them, are not likely to end"
     if growth.expected is None:

@@ -137,7 +137,7 @@ class Inspected(Presented):
             ("statics", _counts(found.statics) or "none"),
             ("never true", ", ".join(found.never) or "none"),
             ("goal", found.goal),
-            *feasibility(found.growth),
+            *feasibility(found.growth, found.outlook),
         ]
         if self.reachable:
             states = counted(self.reachable.states, "joint state")

@@ -13,8 +13,9 @@ from planners.loading import ModelOptions, PlanningInstance, build, load
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
-from planners.search.growth import Growth, first_layers
+from planners.search.growth import first_layers
 from planners.search.optimal_plans import search
+from planners.search.outlook import outlook
 from planners.search.reachable import explore
 from planners.tables import Rows, find_rows, unique_rows
 from tests.support.domains import DOMAINS
@@ -102,34 +103,44 @@ def test_no_layer_is_begun_that_exceeds_the_work() -> None:
     assert growth.layers == (1, 2**12 - 1)
 
 
-def said(growth: Growth) -> dict[str, str]:
-    return dict(feasibility(growth))
-
-
-def seen(robots: int, places: int, goal: str) -> Growth:
+def said(robots: int, places: int, goal: str) -> dict[str, str]:
     loaded = walking(robots, places, goal)
-    return first_layers(loaded.model, loaded.tasks[0])[0]
+    growth, layers = first_layers(loaded.model, loaded.tasks[0])
+    return dict(feasibility(growth, outlook(loaded.model, loaded.tasks[0], layers)))
 
 
 def test_what_is_said() -> None:
-    small = said(seen(2, 3, "(at r0 p2)"))
+    small = said(2, 3, "(at r0 p2)")
     assert small["labels"] == "r0 2 of 3, r1 2 of 3 possible at the start, idling included"
     assert small["first layers"] == "1, 3, 5 states, and no other can be reached"
     assert small["this task"] == "makespan 2: plans, coordination and build are feasible"
     assert small["--tasks all"] == "9 states, at most 72 tasks: every method is feasible"
+    assert small["bound"] == (
+        "projections: makespan 2 at least, by which 1, 2, 3 of these states are left"
+    )
     assert "try" not in small
-    assert said(seen(2, 3, "(next p2 p0)"))["this task"] == "no plan: the goal cannot be reached"
-    large = said(seen(7, 60, "(and (at r0 p59) (at r1 p59))"))
+    assert said(2, 3, "(next p2 p0)")["this task"] == "no plan: the goal cannot be reached"
+    large = said(7, 60, "(and (at r0 p59) (at r1 p59))")
     assert large["this task"].startswith("makespan 59 at least: about ")
-    assert large["this task"].endswith("; plans, and all that needs them, are not likely to end")
+    assert large["this task"].endswith(
+        "; too many to search them all; whether the bounds suffice is not known: set a --time-limit"
+    )
+    assert large["bound"] == (
+        "projections: makespan 59 at least, by which 1, 32 of these states are left; "
+        "a SAT solver is asked after 100,000 joint steps"
+    )
     assert large["try"] == (
         "fewer robots (r0 has most choices), fewer objects, only a part of the goal"
     )
-    wide = said(seen(30, 3, "(at r0 p2)"))
+    wide = said(30, 3, "(at r0 p2)")
     assert wide["first layers"] == (
         "1 state; not looked at: the next, with at most about 1,073,741,824 joint steps into it"
     )
-    unknown = said(seen(17, 3, "(at r0 p2)"))
+    assert wide["bound"] == (
+        "relaxed: makespan 2 at least, by which 1 of these states are left; "
+        "a SAT solver is asked after 100,000 joint steps"
+    )
+    unknown = said(17, 3, "(at r0 p2)")
     assert unknown["this task"] == (
         "makespan 2 at least; whether plans ends is not known: set a --time-limit"
     )
