@@ -36,11 +36,11 @@ class Effort:
     """What a kind may spend: moves without a partition that violates no clause, refutations."""
 
     moves: int = 200
-    rounds: int = 25
+    rounds: int = 10
 
-    def doubled(self) -> Effort:
-        """Twice as much of both."""
-        return Effort(2 * self.moves, 2 * self.rounds)
+    def raised(self) -> Effort:
+        """What a kind that got far may spend next."""
+        return Effort(2 * self.moves, 4 * self.rounds)
 
 
 class _Race:
@@ -51,11 +51,10 @@ class _Race:
         self.effort = Effort()
 
     def next_heat(self) -> None:
-        """Those that got far go on, with twice the effort."""
-        self.runners.sort(key=lambda runner: -runner.depth)
-        left = max(_LEAST_KINDS, len(self.runners) // 2)
-        self.runners = self.runners[:left]
-        self.effort = self.effort.doubled()
+        """A quarter, those that got farthest with the fewest moves, go on with more effort."""
+        self.runners.sort(key=_Runner.lag)
+        self.runners = self.runners[: max(_LEAST_KINDS, len(self.runners) // 4)]
+        self.effort = self.effort.raised()
 
 
 class LocalSearch:
@@ -118,7 +117,7 @@ class LocalSearch:
 
 def _keep_the_farthest(runners: list[_Runner]) -> list[_Runner]:
     """Only so many runners go on where they are: the others will begin again."""
-    runners.sort(key=lambda runner: -runner.depth)
+    runners.sort(key=_Runner.lag)
     for runner in runners[_KEPT:]:
         runner.forget()
     return runners[:_KEPT]
@@ -162,6 +161,10 @@ class _Runner:
         self._search: TabuSearch | None = None
         self._table, self._recent = ClauseTable(kind, images), _Recent()
         self.depth = self.rounds = self.moves = 0
+
+    def lag(self) -> tuple[int, int]:
+        """By which runners are compared: the least is that of the one that got farthest."""
+        return -self.depth, self.moves
 
     def forget(self) -> None:
         """Give back what the search holds: it will begin again."""
