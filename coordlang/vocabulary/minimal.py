@@ -185,17 +185,24 @@ class _Search:
                 )
                 found = self._local.find(size, equivariant.undecided(size))
             if found is not None:
-                self._take(self._merged(found))
+                self._take(found)
+                self._merge_words()
                 return
             size = (size + self._upper + 1) // 2
 
-    def _merged(self, language: Assignment) -> Assignment:
-        """A language of which no two words can be merged; small ones have few to spare."""
-        states = self._job.states
-        if len(states) > _LOCAL_FROM:
-            for fewer in merged(language, states, self._prepare(), self._job.seed):
-                language = fewer
-        return language
+    def _merge_words(self) -> None:
+        """Merge words of the best language as long as it stays one; small ones have none to spare.
+
+        What is known is verified before: time may be over.
+        """
+        states, best = self._job.states, self.best
+        if best is None or len(states) <= _LOCAL_FROM:
+            return
+        fewer = None
+        for fewer in merged(best, states, self._prepare(), self._job.seed):
+            self._job.progress(f"merging words: {len(set(fewer.values()))}")
+        if fewer is not None:
+            self._take(fewer)
 
     def _look_for_separating_words(self) -> None:
         """Take a separating partition with fewer words, if a short search finds one.

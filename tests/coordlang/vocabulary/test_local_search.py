@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from random import Random
@@ -23,6 +24,7 @@ from coordlang.vocabulary.clause_table import ClauseTable
 from coordlang.vocabulary.equivariant import EquivariantSearch
 from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.local_search import LocalSearch
+from coordlang.vocabulary.minimal import minimal
 from coordlang.vocabulary.orbit_words import OrbitWords
 from coordlang.vocabulary.problems_by_size import SolverBudget
 from coordlang.vocabulary.refuter import Refuter
@@ -270,3 +272,18 @@ def test_what_is_not_found_raises_no_bound(monkeypatch: pytest.MonkeyPatch, find
     assert built.verdict.holds
     assert asked
     assert built.figures["local_moves"] == 0 or finds == "all words"
+
+
+def test_words_of_what_is_found_are_merged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After it is verified as it was found, for time may be over."""
+    job = build_language(all_tasks("grid", "gw2-2x3"), "greedy").job
+    apart = {state: number for number, state in enumerate(job.states)}
+    module = sys.modules["coordlang.vocabulary.minimal"]
+    monkeypatch.setattr(module, "_LOCAL_FROM", 0)
+    monkeypatch.setattr(module, "SolverBudget", partial(SolverBudget, rounds=1))
+    monkeypatch.setattr(EquivariantSearch, "find", lambda self, size: apart)
+    verified: list[Assignment] = []
+    assert minimal(replace(job, check=verified.append)).lower_bound == 5
+    first = verified.index(apart)
+    assert len(set(verified[first + 1].values())) < 12
+    assert len({(apart[s], w) for s, w in verified[first + 1].items()}) == len(apart)
