@@ -145,14 +145,17 @@ def counterexamples(
 
 
 def many_counterexamples(
-    choices: Choices, index: EdgeIndex, word: Ints, most: int
+    choices: Choices, index: EdgeIndex, word: Ints, most: int, ways: int = 1
 ) -> list[Counterexamples]:
-    """`counterexamples` as tables, one for each number of steps and way of drawing."""
+    """`counterexamples` as tables, one for each number of steps and way of drawing.
+
+    ``ways`` times as many random ones are wanted from each start: it stands for so many images.
+    """
     if not choices.requires[choices.space.starts].any():
         return []
     layers = _Walk(choices, index, word).layers()
     _backward(choices.space, layers)
-    return _retrace(choices.space, layers, most)
+    return _retrace(choices.space, layers, most, ways * _RANDOM_WAYS)
 
 
 class _Walk:
@@ -261,7 +264,9 @@ def _backward(space: PlanSpace, layers: list[_Layer]) -> None:
         layer.best = np.where(best < _FAR, best + differs, _FAR)
 
 
-def _retrace(space: PlanSpace, layers: list[_Layer], most: int) -> list[Counterexamples]:
+def _retrace(
+    space: PlanSpace, layers: list[_Layer], most: int, ways: int = _RANDOM_WAYS
+) -> list[Counterexamples]:
     """Ways from the nodes at which the plans and their mixture are one, and no sentence leads."""
     robots = space.robots
     # Columns: fewest steps at which the plans differ, layer, row of the layer.
@@ -279,7 +284,7 @@ def _retrace(space: PlanSpace, layers: list[_Layer], most: int) -> list[Countere
         return []
     # Few starts: more ways to a violation from each, drawn at random (always the same ones).
     random = np.random.default_rng(0)
-    repeated = min(_RANDOM_WAYS, most // len(table) - 1)
+    repeated = min(ways, most // len(table) - 1)
     found = []
     for number in np.unique(table[:, 1]).tolist():
         rows = table[table[:, 1] == number, 2]

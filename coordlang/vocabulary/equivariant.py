@@ -54,14 +54,29 @@ _PROBE = Effort(rounds=5, conflicts=200)
 
 
 @dataclass(slots=True)
+class _Kind:
+    """One kind of partitions, with its problem once that was looked at, and the rounds so far."""
+
+    action: WordAction
+    problem: _Orbits | None = None
+    rounds: int = 0
+
+    def close(self) -> None:
+        """Give back what the solver holds."""
+        if self.problem is not None:
+            self.problem.close()
+            self.problem = None
+
+
+@dataclass(slots=True)
 class _Kinds:
     """The kinds of partitions into some number of words that may still hold a language.
 
     Those that are ``open`` are looked at next, those that are ``undecided`` with more effort.
     """
 
-    open: list[WordAction]
-    undecided: list[WordAction] = field(default_factory=list)
+    open: list[_Kind]
+    undecided: list[_Kind] = field(default_factory=list)
     effort: Effort = field(default_factory=Effort)
 
 
@@ -92,19 +107,18 @@ class EquivariantSearch:
 
         The next call with this size goes on, and spends more on what was looked at before.
         """
-        kinds = self._kinds.get(size)
-        if kinds is None:
-            kinds = self._kinds[size] = _Kinds(self._actions(size))
+        kinds = self._of_size(size)
         until = self.rounds + _PASS
         while kinds.open and self.rounds < until:
-            action = kinds.open.pop(0)
+            kind = kinds.open.pop(0)
             try:
-                found = self._of_kind(action, size, kinds.effort)
+                found = self._of_kind(kind, size, kinds.effort)
             except Undecided:
-                kinds.undecided.append(action)
+                kinds.undecided.append(kind)
                 continue
+            kind.close()
             if found is not None:
-                kinds.open.insert(0, action)
+                self.drop(size)
                 return found
         if not kinds.open:
             kinds.open, kinds.undecided = kinds.undecided, []
@@ -113,10 +127,25 @@ class EquivariantSearch:
 
     def undecided(self, size: int) -> list[WordAction]:
         """The kinds of partitions into so many words that may still hold a language."""
+        kinds = self._of_size(size)
+        return [kind.action for kind in (*kinds.open, *kinds.undecided)]
+
+    def drop(self, size: int) -> None:
+        """Forget a number of words that is decided."""
+        kinds = self._kinds.pop(size, None)
+        for kind in (*kinds.open, *kinds.undecided) if kinds else ():
+            kind.close()
+
+    def close(self) -> None:
+        """Give back what the solvers hold."""
+        for size in list(self._kinds):
+            self.drop(size)
+
+    def _of_size(self, size: int) -> _Kinds:
         kinds = self._kinds.get(size)
         if kinds is None:
-            kinds = self._kinds[size] = _Kinds(self._actions(size))
-        return [*kinds.open, *kinds.undecided]
+            kinds = self._kinds[size] = _Kinds([_Kind(action) for action in self._actions(size)])
+        return kinds
 
     def _actions(self, size: int) -> list[WordAction]:
         """The kinds of partitions, without those that some single symmetry rules out.
@@ -144,22 +173,27 @@ class EquivariantSearch:
 
     def _is_ruled_out(self, element: int, words: tuple[int, ...]) -> bool:
         """Whether it is soon seen that no language has words on which an element acts so."""
-        action = self._group.cyclic_action(element, words)
+        kind = _Kind(self._group.cyclic_action(element, words))
         try:
-            return self._of_kind(action, len(words), _PROBE) is None
+            return self._of_kind(kind, len(words), _PROBE) is None
         except Undecided:
             return False
+        finally:
+            kind.close()
 
-    def _of_kind(self, action: WordAction, size: int, effort: Effort) -> Assignment | None:
-        """A language of one kind; None if there is none.  Raises `Undecided`."""
-        problem = _Orbits.of(self._states, self._group, action, size)
-        if problem is None:
-            return None
+    def _of_kind(self, kind: _Kind, size: int, effort: Effort) -> Assignment | None:
+        """A language of one kind; None if there is none.  Raises `Undecided`, and can go on."""
+        if kind.problem is None:
+            kind.problem = _Orbits.of(self._states, self._group, kind.action, size)
+            if kind.problem is None:
+                return None
+        problem = kind.problem
+        before = problem.conflicts
         word = np.zeros(len(self._group.elements[0]), np.int64)
-        images = self._group.right_cosets(frozenset(action.words))
+        images = self._group.right_cosets(frozenset(kind.action.words))
         try:
-            for turn in range(effort.rounds):
-                most = min(_AT_ONCE, _FIRST * 2**turn)
+            while kind.rounds < effort.rounds:
+                most = min(_AT_ONCE, _FIRST * 2**kind.rounds)
                 partition = problem.solve(effort.conflicts)
                 if partition is None:
                     return None
@@ -167,13 +201,13 @@ class EquivariantSearch:
                 agreeing = self._refuter.agreeing(word, images, most)
                 if not agreeing:
                     return partition
+                kind.rounds += 1
                 self.rounds += 1
                 for sequences in self._chosen(agreeing, most):
                     problem.tell_apart(sequences)
                     self.pairs += 1
         finally:
-            self.conflicts += problem.conflicts
-            problem.close()
+            self.conflicts += problem.conflicts - before
         raise Undecided
 
     def _chosen(self, agreeing: Sequence[Agreeing], most: int) -> list[list[list[int]]]:
@@ -197,7 +231,7 @@ class _Orbits:
     def __init__(self, size: int) -> None:
         self.size = size
         self._solver = sat_solver(_SOLVER)
-        self._last = 0
+        self._last = self._last_word = 0
         self._word: dict[int, dict[int, int]] = {}
         self._orbit_of_pair: dict[tuple[int, int], int] = {}
         self._elements: list[list[int]] = []
@@ -222,6 +256,7 @@ class _Orbits:
             for h, to in elements.items():
                 problem._word[to[state]] = {action.words[h][w]: v for w, v in own.items()}
             problem._one_of(list(own.values()))
+        problem._last_word = problem._last
         return problem
 
     @property
@@ -233,7 +268,8 @@ class _Orbits:
         """A partition of this kind, None if none is left.  Raises `Undecided`."""
         if not satisfiable(self._solver, conflicts=conflicts):
             return None
-        true = {v for v in self._solver.get_model() if v > 0}
+        # The variables of words were made first, and are few among those of told sequences.
+        true = {v for v in self._solver.get_model()[: self._last_word] if v > 0}
         return {s: next(w for w, v in own.items() if v in true) for s, own in self._word.items()}
 
     def close(self) -> None:

@@ -12,8 +12,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coordlang.language.warping import Clause
 from coordlang.symmetry.group import SymmetryGroup
@@ -22,14 +24,16 @@ from coordlang.vocabulary.job import Evidence
 from planners.search.plan_space import PlanSpace
 from planners.tables import Bools, Ints
 
-#: Tuples whose warping paths are looked for at a time, and images of clauses returned, at most.
-_WARPED, _RETURNED = 2_000, 800
+#: Images of clauses returned at a time, at most.
+_RETURNED = 800
 #: Clauses that are returned though their images are more: at least so many.
 _LEAST = 20
+#: Tuples whose warping paths are looked for, for each clause that is returned.
+_WARPED = 10
 #: An odd multiplier: sentences that are equal have equal codes, others nearly never.
 _MULTIPLIER = 0x9E3779B97F4A7C15
 #: Cost of a cell that no warping path of equal words passes.
-_NO_PATH = 10**6
+_NO_PATH = 10**4
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +57,11 @@ class _Table:
 
     states: Ints
     source: Ints
+    by_step: Ints = field(init=False)
+
+    def __post_init__(self) -> None:
+        #: (length, robots, tuples): what is looked at together lies together.
+        self.by_step = np.ascontiguousarray(self.states.transpose(2, 1, 0))
 
 
 @dataclass(slots=True)
@@ -124,7 +133,7 @@ class FailingTuples:
             if sum(len(shorter.rows) for shorter in found) >= enough:
                 break
             for to in self._images if images is None else images:
-                rows = np.flatnonzero(_agree(word[to][table.states]))
+                rows = np.flatnonzero(_agree(word[to], table.by_step))
                 if len(rows):
                     found.append(Agreeing(length, to, rows))
         return found
@@ -133,8 +142,8 @@ class FailingTuples:
         """Those of some images of tuples to which a partition gives one sentence."""
         found = []
         for known in some:
-            states = self._tables[known.length].states[known.rows]
-            rows = known.rows[_agree(word[known.to][states])]
+            by_step = self._tables[known.length].by_step[:, :, known.rows]
+            rows = known.rows[_agree(word[known.to], by_step)]
             if len(rows):
                 found.append(Agreeing(known.length, known.to, rows))
         return found
@@ -157,7 +166,7 @@ class FailingTuples:
             if share < len(rows):
                 rows = random.permutation(rows)[:share]
             sequences = self.sequences(found, rows)
-            pairs = _pairs(sequences, word)
+            pairs = _pairs(sequences, word[sequences], self.states)
             tables.append(pairs[(pairs != -2).all(axis=1)])
         width = max(table.shape[1] for table in tables)
         wide = [((0, 0), (0, width - table.shape[1])) for table in tables]
@@ -178,19 +187,25 @@ class FailingTuples:
         They are those of the tuples that are kept; the images of each are necessary as well, and
         it is one of these images that the partition violates.
         """
+        returned = max(_LEAST, _RETURNED // len(self._images))
+        most = _WARPED * returned
         total = sum(len(found.rows) for found in agreeing)
         clauses: dict[Clause, tuple[int, int]] = {}
-        for found in agreeing:
-            rows = found.rows
-            share = max(1, len(rows) * _WARPED // max(total, _WARPED))
+        for length, together in groupby(agreeing, key=lambda found: found.length):
+            groups = list(together)
+            rows = np.concatenate([found.rows for found in groups])
+            image = np.repeat(np.arange(len(groups)), [len(found.rows) for found in groups])
+            share = max(1, len(rows) * most // max(total, most))
             if share < len(rows):
-                rows = random.permutation(rows)[:share]
-            table = self._tables[found.length]
-            for row, clause in _clauses(table.states[rows], word[found.to]):
+                drawn = random.permutation(len(rows))[:share]
+                rows, image = rows[drawn], image[drawn]
+            table = self._tables[length]
+            words = np.stack([word[found.to] for found in groups])
+            states = table.states[rows]
+            for row, clause in _clauses(states, words[image[:, None, None], states], self.states):
                 batch, number = table.source[rows[row]].tolist()
                 clauses.setdefault(clause, (batch, number))
-        chosen = sorted(clauses, key=lambda c: (len(c), sorted(c)))
-        chosen = chosen[: max(_LEAST, _RETURNED // len(self._images))]
+        chosen = sorted(clauses, key=lambda c: (len(c), sorted(c)))[:returned]
         return {clause: self._evidence(*clauses[clause]) for clause in chosen}
 
     def _evidence(self, batch: int, row: int) -> Evidence:
@@ -239,50 +254,62 @@ def _keys(states: Ints) -> Ints:
     return key
 
 
-def _agree(words: Ints) -> Bools:
-    """Whether all sequences of words (tuples, robots, length) are one sentence; rarely wrong.
+def _agree(word: Ints, by_step: Ints) -> Bools:
+    """Whether the words of all sequences (length, robots, tuples) are one sentence; rarely wrong.
 
     If they are, the answer is always true.
     """
-    code = words[:, :, 0].astype(np.uint64)
-    multiplier = np.uint64(_MULTIPLIER)
-    for step in range(1, words.shape[2]):
-        entered = words[:, :, step] != words[:, :, step - 1]
-        longer = code * multiplier + (words[:, :, step].astype(np.uint64) + np.uint64(1))
-        code = np.where(entered, longer, code)
-    agree: Bools = (code == code[:, :1]).all(axis=1)
+    named = word.astype(np.uint64) + np.uint64(1)
+    before = named[by_step[0]]
+    code = before.copy()
+    for states in by_step[1:]:
+        here = named[states]
+        np.copyto(code, code * np.uint64(_MULTIPLIER) + here, where=here != before)
+        before = here
+    agree: Bools = (code == code[:1]).all(axis=0)
     return agree
 
 
-def _pairs(sequences: Ints, word: Ints) -> Ints:
-    """The codes of the pairs in the clause of each tuple (tuples, robots, length); see `_cells`."""
+def _pairs(sequences: Ints, words: Ints, states: int) -> Ints:
+    """The codes of the pairs in the clause of each tuple (tuples, robots, length); see `_cells`.
+
+    Parameters
+    ----------
+    sequences, words
+        The states of the tuples' plans, and their words.
+    states
+        More than every state number.
+    """
     robots = sequences.shape[1]
-    cells = [_cells(sequences[:, 0], sequences[:, other], word) for other in range(1, robots)]
+    cells = [
+        _cells(sequences[:, [0, other]], words[:, [0, other]], states) for other in range(1, robots)
+    ]
     return np.concatenate(cells, axis=1)
 
 
-def _clauses(sequences: Ints, word: Ints) -> Iterator[tuple[int, Clause]]:
-    """`separation_clause` of each tuple (tuples, robots, length) that has one, with its row."""
-    pairs = _pairs(sequences, word)
+def _clauses(sequences: Ints, words: Ints, states: int) -> Iterator[tuple[int, Clause]]:
+    """`separation_clause` of each tuple that has one, with its row; see `_pairs`."""
+    pairs = _pairs(sequences, words, states)
     for row in np.flatnonzero((pairs != -2).all(axis=1)).tolist():
         codes = set(pairs[row].tolist()) - {-1}
-        yield row, frozenset(divmod(code, len(word)) for code in codes)
+        yield row, frozenset(divmod(code, states) for code in codes)
 
 
-def _cells(u: Ints, v: Ints, word: Ints) -> Ints:
+def _cells(two: Ints, words: Ints, states: int) -> Ints:
     """The pairs of different states on warping paths with the fewest such cells.
 
-    One row for each pair of sequences: codes ``a * states + b`` with ``a < b``, -1 for other cells,
-    and -2 first where there is no path.
+    One row for each pair of sequences (pairs, 2, length): codes ``a * states + b`` with ``a < b``,
+    -1 for other cells, and -2 first where there is no path.
     """
-    best = _fewest_cells(u, v, word)
+    u, v = two[:, 0], two[:, 1]
+    best = _fewest_cells(u, v, words[:, 0], words[:, 1])
     steps, every = u.shape[1], np.arange(len(u))
     i, j = (np.full(len(u), steps) for _ in range(2))
     live = best[steps, steps] < _NO_PATH
     found = [np.where(live, -1, -2)]
     while live.any():
         a, b = u[every, i - 1], v[every, j - 1]
-        code = np.minimum(a, b) * len(word) + np.maximum(a, b)
+        code = np.minimum(a, b) * states + np.maximum(a, b)
         found.append(np.where(live & (a != b), code, -1))
         live &= (i > 1) | (j > 1)
         before = np.stack((best[i - 1, j - 1, every], best[i - 1, j, every], best[i, j - 1, every]))
@@ -291,16 +318,18 @@ def _cells(u: Ints, v: Ints, word: Ints) -> Ints:
     return np.stack(found, axis=1)
 
 
-def _fewest_cells(u: Ints, v: Ints, word: Ints) -> Ints:
+def _fewest_cells(u: Ints, v: Ints, first: Ints, second: Ints) -> NDArray[np.int16]:
     """(steps + 1, steps + 1, pairs): different cells of a best path to each cell, from 1."""
     steps = u.shape[1]
-    first, second = word[u], word[v]
-    best = np.full((steps + 1, steps + 1, len(u)), _NO_PATH)
+    best = np.full((steps + 1, steps + 1, len(u)), _NO_PATH, np.int16)
     best[0, 0] = 0
+    differ = u.T[:, None] != v.T[None]
+    apart = first.T[:, None] != second.T[None]
     for i in range(steps):
         for j in range(steps):
-            before = np.minimum(np.minimum(best[i, j], best[i, j + 1]), best[i + 1, j])
-            here = before + (u[:, i] != v[:, j])
-            best[i + 1, j + 1] = np.where(first[:, i] == second[:, j], here, _NO_PATH)
+            here = np.minimum(np.minimum(best[i, j], best[i, j + 1]), best[i + 1, j])
+            here += differ[i, j]
+            here[apart[i, j]] = _NO_PATH
+            best[i + 1, j + 1] = np.minimum(here, _NO_PATH)
             best[0, 0] = _NO_PATH
     return best

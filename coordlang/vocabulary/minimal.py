@@ -138,7 +138,7 @@ class _Search:
 
     def close(self) -> None:
         """Give back what the solvers hold."""
-        for part in (self._partitions, *self._contained):
+        for part in (self._partitions, self._equivariant, *self._contained):
             if part is not None:
                 part.close()
 

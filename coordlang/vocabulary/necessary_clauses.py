@@ -55,7 +55,7 @@ class TaskPart:
         """The plan space of the tasks."""
         return self.choices.space
 
-    def failing(self, word: Ints, most: int = _MANY) -> list[Counterexamples]:
+    def failing(self, word: Ints, most: int = _MANY, ways: int = 1) -> list[Counterexamples]:
         """Failing tuples of plans with one sentence, as tables.
 
         None only if the partition is a language for these tasks.
@@ -66,8 +66,10 @@ class TaskPart:
             (states) the word of each state number.
         most
             About how many are wanted.
+        ways
+            For how many images each task stands.
         """
-        return many_counterexamples(self.choices, self.index, word[self.space.state], most)
+        return many_counterexamples(self.choices, self.index, word[self.space.state], most, ways)
 
     def violated(self, word: Ints) -> dict[Clause, Counterexample]:
         """Clauses that a partition violates, each with the plans that it comes from.

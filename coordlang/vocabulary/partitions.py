@@ -69,6 +69,8 @@ class Partitions:
     ) -> None:
         self._states, self._clauses, self._permutations = states, clauses, permutations
         require = PartitionProblem.separate_one
+        #: Numbers of words with which partitions are so few that the first solver finds none.
+        self._hard: set[int] = set()
         self._all = ProblemsBySize(self._start, require)
         self._up_to_symmetry = ProblemsBySize(self._start_up_to_symmetry, require)
 
@@ -77,8 +79,11 @@ class Partitions:
 
         Raises `Undecided` after so many conflicts.
         """
-        with suppress(Undecided):
-            return self._all.under(size, self._clauses).solve(_EASY)
+        if size not in self._hard:
+            with suppress(Undecided):
+                return self._all.under(size, self._clauses).solve(_EASY)
+            self._hard.add(size)
+            self._all.drop(size)
         return self._up_to_symmetry.under(size, self._clauses).solve(conflicts)
 
     def drop(self, size: int) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from random import Random
 
 import numpy as np
@@ -17,6 +18,7 @@ from coordlang.symmetry.group import SymmetryGroup
 from coordlang.vocabulary.failing_tuples import Agreeing, FailingTuples
 from coordlang.vocabulary.job import Evidence
 from coordlang.vocabulary.necessary_clauses import TaskPart
+from planners.joint.model import FullState
 from planners.search.plan_space import PlanSpace
 from planners.tables import Ints
 
@@ -24,10 +26,28 @@ from planners.tables import Ints
 _LEAST_PARTS = 8
 #: .. of about so many tasks at most.
 _TASKS_OF_A_PART = 1_500
+#: Longer tuples are left out of what is looked at once there are so many.
+_ENOUGH = 2_000
+
+
+@dataclass(frozen=True, slots=True)
+class _Walked:
+    """Tasks that are walked together, for themselves and for their images.
+
+    ``images`` are symmetries: those by their positions in the pool's that take the tasks to all of
+    their images, each once.
+    """
+
+    part: TaskPart
+    images: tuple[int, ...]
 
 
 class Refuter:
     """Decides whether partitions are languages, and keeps what refutes them.
+
+    Of goals that are images of each other under a symmetry one is walked: a partition is refuted
+    by plans of the tasks to an image iff its image under the symmetry is refuted by plans of the
+    tasks to the goal itself.
 
     Attributes
     ----------
@@ -48,11 +68,11 @@ class Refuter:
         self.pool = FailingTuples(group, states)
         self.walks = 0
         self._random = np.random.default_rng(seed)
-        self._parts = _parts(spaces, Random(seed))
+        self._parts = _parts(spaces, self.pool.images, Random(seed))
         silence = np.zeros(states, np.int64)
-        for part in self._parts:
+        for walked in self._parts:
             progress(f"collecting plans whose mixture fails: {len(self.pool):,}")
-            self._walk(part, silence)
+            self._walk(walked, silence)
 
     def agreeing(
         self, word: Ints, images: Sequence[Ints] | None = None, enough: int = sys.maxsize
@@ -66,16 +86,17 @@ class Refuter:
         word
             (states) the word of each state number.
         images
-            The symmetries under which images of known tuples are looked at: by default all.
+            The symmetries under which images of tuples are looked at: by default all.
         enough
             Longer tuples are left out once there are so many.
         """
         known = self.pool.agreeing(word, images, enough)
-        for number, part in enumerate(self._parts):
+        for number, walked in enumerate(self._parts):
             if known:
                 break
-            if self._walk(part, word):
-                known = self.pool.agreeing(word)
+            mine = images or [self.pool.images[image] for image in walked.images]
+            if any(self._walk(walked, word[to]) for to in mine):
+                known = self.pool.agreeing(word, images, enough)
                 assert known, "plans that a walk has found are known"
                 self._parts.insert(0, self._parts.pop(number))
         return known
@@ -85,26 +106,49 @@ class Refuter:
 
         None if it is a language.
         """
-        return self.pool.clauses(word, self.agreeing(word), self._random)
+        return self.pool.clauses(word, self.agreeing(word, enough=_ENOUGH), self._random)
 
-    def _walk(self, part: TaskPart, word: Ints) -> bool:
+    def _walk(self, walked: _Walked, word: Ints) -> bool:
         """Add failing plans with one sentence to the pool; whether there are any."""
         self.walks += 1
-        found = part.failing(word)
+        found = walked.part.failing(word, ways=len(walked.images))
         for table in found:
-            self.pool.add(table, part.space)
+            self.pool.add(table, walked.part.space)
         return bool(found)
 
 
-def _parts(spaces: Sequence[PlanSpace], random: Random) -> list[TaskPart]:
-    """The tasks in parts, each with a random choice of the goals."""
+def _parts(spaces: Sequence[PlanSpace], images: Sequence[Ints], random: Random) -> list[_Walked]:
+    """The tasks in parts, each with a random choice of the goals; goals up to symmetry."""
     parts = []
     for space in spaces:
-        goals = list(range(len(space.goals)))
-        random.shuffle(goals)
-        goal_of_start = space.goal[space.starts]
-        count = min(len(goals), max(_LEAST_PARTS, len(space.starts) // _TASKS_OF_A_PART))
-        for number in range(count):
-            mine = np.isin(goal_of_start, goals[number::count])
-            parts.append(TaskPart.of(space, mine))
+        for own, goals in sorted(_goals_by_images(space, images).items()):
+            random.shuffle(goals)
+            goal_of_start = space.goal[space.starts]
+            tasks = int(np.isin(goal_of_start, goals).sum())
+            least = -(-_LEAST_PARTS // len(own))
+            count = min(len(goals), max(least, tasks // _TASKS_OF_A_PART))
+            for number in range(count):
+                mine = np.isin(goal_of_start, goals[number::count])
+                if mine.any():
+                    parts.append(_Walked(TaskPart.of(space, mine), own))
     return parts
+
+
+def _goals_by_images(space: PlanSpace, images: Sequence[Ints]) -> dict[tuple[int, ...], list[int]]:
+    """Goals by the symmetries that take them to their images, each image once; one of each orbit.
+
+    A goal that is not a single state is one of its own, and only the identity is needed.
+    """
+    chosen: dict[tuple[int, ...], list[int]] = {}
+    if not all(isinstance(goal, FullState) for goal in space.goals):
+        chosen[0,] = list(range(len(space.goals)))
+        return chosen
+    nodes = np.flatnonzero(space.layer == 0)
+    end = np.zeros(len(space.goals), np.int64)
+    end[space.goal[nodes]] = space.state[nodes]
+    for goal, state in enumerate(end.tolist()):
+        reached = np.array([to[state] for to in images])
+        if reached.min() == state:
+            _, first = np.unique(reached, return_index=True)
+            chosen.setdefault(tuple(sorted(first.tolist())), []).append(goal)
+    return chosen
