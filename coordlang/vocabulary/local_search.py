@@ -9,7 +9,7 @@ gets far go on with more moves.  **What is not found proves nothing about number
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -23,6 +23,8 @@ from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.tabu import TabuSearch
 from planners.tables import Ints
 
+#: Kinds that race at most, evenly over those that there are: the first heat must not take long.
+_KINDS = 64
 #: Kinds that are left when the others have been outrun, and searches that are kept in memory.
 _LEAST_KINDS, _KEPT = 3, 24
 #: The share of the orbits that are changed where the search is stuck.
@@ -80,7 +82,7 @@ class LocalSearch:
         self._races: dict[int, _Race] = {}
         self.rounds = self.moves = 0
 
-    def find(self, size: int, actions: Iterable[WordAction]) -> Assignment | None:
+    def find(self, size: int, actions: Sequence[WordAction]) -> Assignment | None:
         """A language with at most ``size`` words, None if none was found with some effort.
 
         The next call with this size goes on with the kinds that got farthest.
@@ -90,7 +92,7 @@ class LocalSearch:
         size
             The number of words.
         actions
-            The kinds of partitions that are looked at, besides all partitions.
+            The kinds of partitions that are looked at, besides all partitions; some of many.
         """
         race = self._races.get(size)
         if race is None:
@@ -106,9 +108,10 @@ class LocalSearch:
         race.next_heat()
         return None
 
-    def _runners(self, size: int, actions: Iterable[WordAction]) -> Iterator[_Runner]:
+    def _runners(self, size: int, actions: Sequence[WordAction]) -> Iterator[_Runner]:
         group = group_table(self._refuter.pool.images)
-        for action in (*actions, WordAction({0: tuple(range(size))})):
+        some = actions[:: -(-len(actions) // _KINDS) or 1]
+        for action in (*some, WordAction({0: tuple(range(size))})):
             kind = OrbitWords.of(self._states, group, action, size)
             if kind is not None:
                 images = group.right_cosets(frozenset(action.words))

@@ -287,3 +287,13 @@ def test_words_of_what_is_found_are_merged(monkeypatch: pytest.MonkeyPatch) -> N
     first = verified.index(apart)
     assert len(set(verified[first + 1].values())) < 12
     assert len({(apart[s], w) for s, w in verified[first + 1].items()}) == len(apart)
+
+
+def test_of_many_kinds_some_race() -> None:
+    """Evenly over all, and all partitions always."""
+    candidates = all_tasks("grid", "gw1-2x2")
+    refuter, states = searching(candidates, symmetry_group(candidates), 0)
+    everything = WordAction({0: tuple(range(3))})
+    for number, racing in ((0, 1), (5, 6), (64, 65), (65, 34), (1_000, 64)):
+        runners = list(LocalSearch(states, refuter, 0)._runners(3, [everything] * number))
+        assert len(runners) == racing
