@@ -11,16 +11,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csr_array
 
+from planners.errors import OutOfMemory
+from planners.graphs import csgraph
 from planners.grounding import GroundAction
 from planners.joint.composition import ComposingStepper
 from planners.joint.conditions import split_condition
 from planners.joint.model import JointModel
 from planners.pddl.lifted import TRUE, Formula
 from planners.tables import Bools, Ints, Rows
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 #: Ways to make facts true, beyond which nothing is looked for.
 _MOST = 8_000
@@ -34,9 +39,13 @@ def mutexes(model: JointModel, init: Rows, most: int = _MOST, block: int = _BLOC
     """Pairs (p, q), p < q, of which no state that is reachable from ``init`` has both; sorted.
 
     (p, p) where fact p is never true; such facts are in no other pair.  The joint steps must be
-    composed.  None are found where labels make facts true in more than ``most`` ways; ``block`` of
-    them are compared with the others at a time.
+    composed.  None are found where labels make facts true in more than ``most`` ways, or where the
+    memory has no room for scipy; ``block`` ways are compared with the others at a time.
     """
+    try:
+        csgraph()  # scipy is loaded only where it fits
+    except OutOfMemory:
+        return []
     ways = _Ways.of(model)
     facts = len(model.codec.facts)
     if len(ways.robot) > most or not facts:
@@ -147,6 +156,8 @@ def _together(model: JointModel, ways: _Ways) -> Bools:
 
 
 def _table(listed: list[list[int]], width: int) -> csr_array:
+    from scipy.sparse import csr_array
+
     first = np.cumsum([0, *map(len, listed)])
     entries = np.array([entry for own in listed for entry in own], np.int64)
     ones = np.ones(len(entries), np.float32)
