@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lower bounds by two encodings: states that name their words, and states that are the same.
 
-    python benchmarks/encodings.py ROW:K .. [--limit SECONDS]
+    python benchmarks/partition_encodings.py ROW:K .. [--limit SECONDS]
 
 The clauses are those with which the exact loop refutes K - 1 words (or that it has met when the
 limit is over).  *naming* has a variable for each state and word, *naming, leaders* allows one of
