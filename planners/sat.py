@@ -5,12 +5,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import cache
-from typing import Any
+from typing import Any, Literal
 
 from planners.signals import postponed_signals
 
+#: The solvers in use.  None of MapleChrono and MapleCM: they take SIGALRM for themselves, below
+#: Python, so that no time limit would be heard any more.
+SolverName = Literal["cadical153", "glucose4", "maplesat", "minisat22"]
 
-def sat_solver(name: str, clauses: Iterable[Sequence[int]] = ()) -> Any:
+
+def sat_solver(name: SolverName, clauses: Iterable[Sequence[int]] = ()) -> Any:
     """A solver of python-sat that a signal at any moment leaves whole.
 
     Parameters

@@ -14,7 +14,7 @@ from coordlang.vocabulary.clauses import most_constrained_first, without_implied
 from coordlang.vocabulary.sat import PartitionProblem, Undecided, satisfiable
 from planners.errors import OutOfMemory
 from planners.limits import memory_left, more_memory
-from planners.sat import sat_solver, solve_slice
+from planners.sat import SolverName, sat_solver, solve_slice
 
 #: Conflicts after which the checking solver comes back.
 _SLICE = 10_000
@@ -82,7 +82,7 @@ class Cnf:
         for reason, clause in enumerate(range(first, len(self.clauses) + 1), 1):
             yield f"c clause {clause}: reason {reason}"
 
-    def refuted(self, solver: str = "maplechrono") -> bool:
+    def refuted(self, solver: SolverName = "maplesat") -> bool:
         """Whether the formula is unsatisfiable.
 
         Decided by a solver and a loop that the builders do not use.

@@ -22,7 +22,7 @@ from coordlang.vocabulary.failing_tuples import Agreeing
 from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import Undecided, satisfiable
-from planners.sat import sat_solver
+from planners.sat import SolverName, sat_solver
 
 #: Subgroups that are looked at, and maps to permutations of words for each of them.
 _SUBGROUPS, _ACTIONS = 60, 60
@@ -34,7 +34,7 @@ _FIRST, _AT_ONCE = 10, 100
 #: Refuted partitions after which a search is given up for now.
 _PASS = 1_000
 #: A solver that is quick on many easy problems with many solutions.
-_SOLVER = "minisat22"
+_SOLVER: SolverName = "minisat22"
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ from coordlang.vocabulary.clauses import (
 from coordlang.vocabulary.job import Evidence
 from coordlang.vocabulary.problems_by_size import ProblemsBySize
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
+from planners.sat import SolverName
 
 #: Conflicts within which most partitions are found; after so many the solver is likely on the way
 #: to a proof.
@@ -97,7 +98,7 @@ class Partitions:
         self._up_to_symmetry.close()
 
     def _start(
-        self, size: int, known: Sequence[Clause], solver: str = "cadical153"
+        self, size: int, known: Sequence[Clause], solver: SolverName = "cadical153"
     ) -> PartitionProblem:
         clauses = without_implied(known, _COMPARISONS)
         problem = PartitionProblem(most_constrained_first(self._states, clauses), size, solver)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from coordlang.language.warping import Clause, Pair, pair
-from planners.sat import sat_solver, solve_slice
+from planners.sat import SolverName, sat_solver, solve_slice
 
 #: Conflicts after which the solver comes back, to let signals (time limit, Ctrl-C) be heard.
 _SLICE = 2_000
@@ -29,7 +29,7 @@ class PartitionProblem:
         A solver of python-sat, by name.
     """
 
-    def __init__(self, states: Sequence[int], size: int, solver: str = "cadical153") -> None:
+    def __init__(self, states: Sequence[int], size: int, solver: SolverName = "cadical153") -> None:
         self.size = size
         self._last = 0
         self._solver = sat_solver(solver)

@@ -24,13 +24,13 @@ from planners.joint.model import FullState, Goal, JointModel
 from planners.joint.step_clauses import Clause, clauses
 from planners.pddl.formula_tree import negated
 from planners.pddl.lifted import TRUE, Formula
-from planners.sat import sat_solver, solve_slice
+from planners.sat import SolverName, sat_solver, solve_slice
 from planners.search.mutexes import Pair
 from planners.search.state_variables import StateVariable
 from planners.tables import Ints, Rows
 
 #: Many easy questions and some hard ones: MiniSat answers both as fast as any.
-SOLVER = "minisat22"
+SOLVER: SolverName = "minisat22"
 #: Conflicts between two looks at the limits.
 _SLICE = 2_000
 #: The largest cost of one action that is counted.

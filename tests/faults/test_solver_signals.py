@@ -7,15 +7,18 @@ import signal
 import time
 from collections import Counter
 from contextlib import suppress
+from itertools import combinations
 from pathlib import Path
 from random import Random
+from typing import get_args
 
 import pytest
 
 from coordlang.building import build_language
 from coordlang.vocabulary.sat import PartitionProblem
-from planners.limits import time_limit
-from planners.sat import sat_solver, solve_slice
+from planners.errors import OutOfTime
+from planners.limits import time_left, time_limit
+from planners.sat import SolverName, sat_solver, solve_slice
 from planners.signals import Interruptions
 from tests.support.command import Outcome
 from tests.support.domains import DOMAINS, all_tasks
@@ -24,7 +27,7 @@ from tests.support.forks import fork, fork_command
 HANDOVER = [str(DOMAINS / "handover" / name) for name in ("domain.pddl", "exchange.pddl")]
 
 
-def colouring(size: int, solver: str) -> PartitionProblem:
+def colouring(size: int, solver: SolverName) -> PartitionProblem:
     """Nearly half of all pairs of 60 states lie in different words: seconds with 12 words."""
     choice = Random(5)
     problem = PartitionProblem(range(60), size, solver)
@@ -35,7 +38,7 @@ def colouring(size: int, solver: str) -> PartitionProblem:
     return problem
 
 
-def solve_until_interrupted(solver: str) -> None:
+def solve_until_interrupted(solver: SolverName) -> None:
     """Solve again and again; after an interrupt the memory is used as before."""
     Interruptions()
     with suppress(KeyboardInterrupt):
@@ -59,7 +62,7 @@ def _all_is_loaded() -> None:
     build_language(all_tasks("grid", "gw1-2x2"), "minimal")
 
 
-def interrupted(solver: str, wait: float, again: float | None) -> Outcome:
+def interrupted(solver: SolverName, wait: float, again: float | None) -> Outcome:
     process = fork(lambda: solve_until_interrupted(solver))
     time.sleep(wait)
     process.send(signal.SIGINT)
@@ -70,7 +73,7 @@ def interrupted(solver: str, wait: float, again: float | None) -> Outcome:
     return process.join(30)
 
 
-def interrupt_often(solver: str, times: int) -> None:
+def interrupt_often(solver: SolverName, times: int) -> None:
     choice, codes = Random(solver), Counter[int]()
     for turn in range(times):
         again = choice.uniform(0.0, 0.05) if turn % 2 else None
@@ -81,20 +84,39 @@ def interrupt_often(solver: str, times: int) -> None:
 
 
 @pytest.mark.parametrize("solver", ["cadical153", "glucose4"])
-def test_interrupts_while_solvers_work(solver: str) -> None:
+def test_interrupts_while_solvers_work(solver: SolverName) -> None:
     interrupt_often(solver, 5)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("solver", ["cadical153", "glucose4", "maplechrono"])
-def test_many_interrupts_while_solvers_work(solver: str) -> None:
+@pytest.mark.parametrize("solver", ["cadical153", "glucose4", "maplesat"])
+def test_many_interrupts_while_solvers_work(solver: SolverName) -> None:
     interrupt_often(solver, 400)
 
 
+@pytest.mark.parametrize("solver", get_args(SolverName))
+def test_a_time_limit_is_heard_after_a_solver(solver: SolverName) -> None:
+    """MapleChrono, which is not in use, sets an alarm and a handler below Python's."""
+
+    php = [[6 * p + h + 1 for h in range(6)] for p in range(7)]
+    php += [[-a, -b] for h in zip(*php, strict=True) for a, b in combinations(h, 2)]
+
+    def work() -> None:
+        with time_limit(100), sat_solver(solver, php) as sat:
+            assert solve_slice(sat, 10_000_000) is False
+            assert 50 < time_left() <= 100
+            with pytest.raises(OutOfTime):
+                signal.raise_signal(signal.SIGALRM)
+        assert time_left() == float("inf")
+
+    ended = fork(work).join()
+    assert ended.code == 0, ended
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGALRM])
-@pytest.mark.parametrize("solver", ["cadical153", "glucose4", "maplechrono"])
+@pytest.mark.parametrize("solver", ["cadical153", "glucose4", "maplesat"])
 def test_a_solver_is_freed_once(
-    solver: str, number: signal.Signals, monkeypatch: pytest.MonkeyPatch
+    solver: SolverName, number: signal.Signals, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The signal comes when the solver has been freed, and python-sat has not noted it yet."""
     import pysolvers
@@ -120,8 +142,8 @@ def test_a_solver_is_freed_once(
     assert said[number] in ended.err
 
 
-@pytest.mark.parametrize("solver", ["cadical153", "glucose4", "maplechrono"])
-def test_no_solver_is_left_by_longjmp(solver: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("solver", ["cadical153", "glucose4", "maplesat"])
+def test_no_solver_is_left_by_longjmp(solver: SolverName, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its third argument says whether it takes SIGINT."""
     import pysolvers
 

@@ -68,7 +68,9 @@ def test_memory_is_divided_among_processes() -> None:
 
 def test_a_worker_that_is_asked_to_end_removes_what_it_writes(tmp_path: Path) -> None:
     script = (
-        "import sys; from tests.support import pieces; from planners.pieces.processes import *\n"
+        "import signal, sys\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in the background\n"
+        "from tests.support import pieces; from planners.pieces.processes import *\n"
         "list(Processes(2).run(pieces.work(pieces.removes, sys.argv[1], [0, 1])))"
     )
     process = subprocess.Popen([sys.executable, "-c", script, tmp_path], stderr=subprocess.PIPE)
