@@ -7,8 +7,8 @@ import shutil
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from threading import Timer
+from contextlib import contextmanager, suppress
+from time import monotonic
 from typing import TYPE_CHECKING
 
 from coordlang.cli.echo import echo
@@ -17,9 +17,12 @@ from planners.messages import visible
 
 if TYPE_CHECKING:
     from coordlang.api.languages import Progress
+    from planners.limits import Underway
 
 #: Seconds of work before progress is shown: short commands neither flicker nor load rich.
 _DELAY = 0.4
+#: Seconds between two looks at how far the work got.
+_INTERVAL = 0.5
 #: Narrower terminals break lines themselves.
 _LEAST_WIDTH = 60
 
@@ -43,48 +46,77 @@ def working(message: str) -> Iterator[Progress]:
     if sys.stderr is None or not sys.stderr.isatty():
         yield lambda _: None
         return
-    spinner = _Spinner(visible(message))
+    spinner = _Spinner(message)
     try:
-        yield lambda text: spinner.say(visible(text))
+        yield spinner.say
     finally:
         spinner.stop()
 
 
 class _Spinner:
-    """A spinner with a message, which appears after a while."""
+    """A spinner with a message and how far the work got, which appears after a while."""
 
     def __init__(self, message: str) -> None:
         self._message = message
-        self._lock = threading.Lock()
-        self._ended = False
-        self._update: Callable[[str], None] = lambda _: None
-        self._stop: Callable[[], None] = lambda: None
-        self._timer = Timer(_DELAY, self._start)
-        self._timer.daemon = True
-        self._timer.start()
+        self._begin = monotonic()
+        self._rate = _Rate()
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
 
     def say(self, message: str) -> None:
-        with self._lock:
-            self._message = message
-            self._update(message)
+        self._message = message
 
     def stop(self) -> None:
-        self._timer.cancel()
-        with self._lock:
-            self._ended = True
-            self._stop()
+        self._ended.set()
+        self._thread.join()
 
-    def _start(self) -> None:
+    def _run(self) -> None:
+        if self._ended.wait(_DELAY):
+            return
         from rich.console import Console
         from rich.text import Text
 
-        with self._lock:
-            if self._ended:
-                return
-            status = Console(stderr=True).status(Text(f"{self._message} .."))
-            self._update = lambda message: status.update(Text(f"{message} .."))
-            self._stop = status.stop
-            status.start()
+        with Console(stderr=True).status(Text(self._text())) as status:
+            while not self._ended.wait(_INTERVAL):
+                status.update(Text(self._text()))
+
+    def _text(self) -> str:
+        parts = [self._message, *self._so_far()]
+        seconds = monotonic() - self._begin
+        return f"{visible(': '.join(parts))} .. {seconds:.0f} s"
+
+    def _so_far(self) -> list[str]:
+        """How far the work got, and how fast it goes; nothing if it changed while it was read."""
+        from planners.limits import underway
+
+        part = underway()
+        if part is None:
+            return []
+        with suppress(ValueError, IndexError, KeyError, RuntimeError, StopIteration):
+            text = part.so_far()
+            if text not in self._message:
+                return [text + self._rate.of(part)]
+        return []
+
+
+class _Rate:
+    """How fast the work of a block goes, from one look to the next."""
+
+    def __init__(self) -> None:
+        self._part: Underway | None = None
+        self._seen = (0.0, 0)
+
+    def of(self, part: Underway) -> str:
+        """Its work in a second since the last look; empty at the first one."""
+        if part.work is None:
+            return ""
+        before, self._seen = self._seen, (monotonic(), part.work())
+        known, self._part = self._part is part, part
+        if not known or self._seen[0] <= before[0]:
+            return ""
+        rate = (self._seen[1] - before[1]) / (self._seen[0] - before[0])
+        return f", {rate:,.0f} {part.unit} a second"
 
 
 @contextmanager

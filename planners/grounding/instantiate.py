@@ -69,7 +69,10 @@ def ground_actions(
     total = sum(map(len, reachable.values()))
     actions: list[GroundAction] = []
     with reaching(
-        lambda: f"{len(actions):,} of at most {total:,} ground actions, of {world}", FEWER
+        lambda: f"{len(actions):,} of at most {total:,} ground actions, of {world}",
+        FEWER,
+        lambda: len(actions),
+        "ground actions",
     ):
         for schema in domain.schemas:
             for args in reachable[schema.name]:

@@ -17,6 +17,7 @@ import numpy as np
 
 from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, PlanningTask
+from planners.limits import reaching
 from planners.search.cheapest import least_cost
 from planners.search.mutexes import mutexes
 from planners.search.plan_formula import (
@@ -38,6 +39,8 @@ _FIRST = 300_000
 #: What a makespan that is refuted at once costs for each of its steps, in conflicts; the clauses of
 #: one step more are counted, too: of a task without plan there would be ever more.
 _EASY = 20
+#: What to try besides a larger limit.
+SMALLER = "a task with a shorter plan, fewer objects or fewer robots"
 #: The robots' labels, step by step.
 Plan = list[tuple[int, ...]]
 
@@ -106,17 +109,25 @@ def exact_bound(
     except TooManyClauses:
         return None
     try:
-        makespan, plan = _shortest(formula, task, at_least)
-        if model.cost == "makespan" and makespan == at_least and _mostly_pass(formula, plan, some):
-            formula.close()
-            return None
-        return _bound(formula, task, plan, pieces.question)
+        with reaching(formula.so_far, SMALLER):
+            return _within_effort(formula, task, at_least, pieces.question, some)
     except OutOfEffort:
         formula.close()
         return None
     except BaseException:
         formula.close()
         raise
+
+
+def _within_effort(
+    formula: PlanFormula, task: PlanningTask, at_least: int, question: int, some: tuple[Rows, int]
+) -> ExactBound | None:
+    makespan, plan = _shortest(formula, task, at_least)
+    only_time = formula.model.cost == "makespan"
+    if only_time and makespan == at_least and _mostly_pass(formula, plan, some):
+        formula.close()
+        return None
+    return _bound(formula, task, plan, question)
 
 
 def _mostly_pass(formula: PlanFormula, plan: Plan, some: tuple[Rows, int]) -> bool:

@@ -17,6 +17,7 @@ from planners.errors import ProvedImpossible
 from planners.joint.conditions import Labels
 from planners.joint.model import Goal, JointModel, PlanningTask
 from planners.limits import reaching
+from planners.search.exact_bound import SMALLER
 from planners.search.guides import guide_for
 from planners.search.layers import BoundedSearch, Layers
 from planners.search.plan_space import PlanSpace
@@ -74,12 +75,13 @@ def search_with_effort(
     model: JointModel, task: PlanningTask, pieces: PieceSizes = PIECES, heuristic: str = "auto"
 ) -> tuple[PlanSpace, SearchEffort]:
     """The plans as `search` finds them, and the work that it took."""
-    variables = state_variables(model, task.init)
-    guide = guide_for(heuristic, model, task, variables)
+    with reaching(lambda: f"looking for bounds of {task.name}", SMALLER):
+        variables = state_variables(model, task.init)
+        guide = guide_for(heuristic, model, task, variables)
     forward = BoundedSearch(model, task, guide, variables, pieces)
     with (
         closing(forward),
-        reaching(forward.so_far, "a task with a shorter plan, fewer objects or fewer robots"),
+        reaching(forward.so_far, SMALLER, lambda: forward.layers.composed, "joint steps"),
     ):
         layers = forward.run()
         found = _backward(model, task, layers, forward)

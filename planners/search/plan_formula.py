@@ -98,6 +98,13 @@ class PlanFormula:
         for clause in _goal_clauses(model, goal):
             self._solver.add_clause(clause)
 
+    def so_far(self) -> str:
+        """What is asked just now, for messages."""
+        return (
+            f"question {self.calls:,} to the SAT solver, about plans of {self._steps} joint steps; "
+            f"{self._variables:,} variables"
+        )
+
     def close(self) -> None:
         """Give the solver back."""
         self._solver.delete()

@@ -13,6 +13,9 @@ from planners.joint.model import JointModel, Steps
 from planners.limits import reaching
 from planners.tables import Ints, Rows, find_rows, ranges, unique_rows
 
+#: What to try besides a larger limit.
+FEWER = "fewer objects or robots"
+
 
 @dataclass(frozen=True, slots=True)
 class PieceSizes:
@@ -120,7 +123,7 @@ def explore(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> Spac
             f"{len(layer):,} states are new in the last step"
         )
 
-    with reaching(so_far, "fewer objects or robots"):
+    with reaching(so_far, FEWER, lambda: sum(map(len, found)), "joint steps"):
         while len(layer):
             fresh: list[Rows] = []
             for start, steps in blocks(model, layer, pieces):
@@ -149,7 +152,7 @@ def count(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> tuple[
             f"states, {steps_counted:,} joint steps"
         )
 
-    with reaching(so_far, "fewer objects or robots"):
+    with reaching(so_far, FEWER, lambda: steps_counted, "joint steps"):
         while len(layer):
             fresh = seen[:0]
             for _, steps in blocks(model, layer, pieces):

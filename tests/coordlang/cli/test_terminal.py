@@ -6,13 +6,14 @@ from __future__ import annotations
 import io
 import os
 import pty
+import re
 import subprocess
 import sys
 
 import pytest
 
 from coordlang.cli import terminal
-from tests.support.domains import ROOT
+from tests.support.domains import DOMAINS, ROOT
 
 CODE = """
 import sys, time
@@ -59,6 +60,43 @@ def test_progress_on_a_terminal() -> None:
     assert "[second] thing .." in shown
     assert "1/3" in shown
     assert "piece" in shown
+
+
+def test_how_far_the_work_got() -> None:
+    """That of the innermost block, with its rate; what cannot be read just now is left out."""
+    code = CODE.split("with terminal.working")[0] + (
+        "from planners.limits import reaching\n"
+        "terminal._INTERVAL = 0.05\n"
+        "done, layers = 0, []\n"
+        "with terminal.working('searching'), reaching(lambda: 'the whole', 'less'):\n"
+        "    time.sleep(0.5)\n"
+        "    with reaching(lambda: f'{done} states', 'less', lambda: done, 'joint steps'):\n"
+        "        for done in range(50):\n"
+        "            time.sleep(0.02)\n"
+        "    with reaching(lambda: f'{layers[-1]} states', 'less'):\n"
+        "        time.sleep(0.5)\n"
+    )
+    _, shown = on_a_terminal(code)
+    assert "searching: the whole .. 0 s" in shown
+    rates = re.findall(r"searching: (\d+) states, (\d+) joint steps a second .. \d s", shown)
+    assert any(int(done) > 10 and 5 < int(rate) < 51 for done, rate in rates)
+    assert "searching .. 1 s" in shown or "searching .. 2 s" in shown
+
+
+def test_how_far_a_search_got() -> None:
+    files = [str(DOMAINS / "grid" / name) for name in ("domain.pddl", "corners-8x8.pddl")]
+    arguments = ["plans", *files, "--count", "--no-cache", "--heuristic", "blind"]
+    code = CODE.split("with terminal.working")[0] + (
+        "from coordlang.__main__ import main\n"
+        "import planners.search.optimal_plans\n"
+        "terminal._INTERVAL = 0.01\n"
+        f"sys.argv[1:] = {arguments}\n"
+        "main()\n"
+    )
+    out, shown = on_a_terminal(code)
+    assert out.strip().isdigit()
+    assert re.search(r"finding all optimal plans: [\d,]+ states within \d+ steps", shown)
+    assert "joint steps a second" in shown
 
 
 @pytest.mark.thorough
