@@ -76,3 +76,12 @@ def test_no_test_file_imports_another() -> None:
     files = sorted((ROOT / "tests").rglob("*.py"))
     assert len(files) > 100
     assert [str(path) for path in files if importing.search(path.read_text("utf-8"))] == []
+
+
+def test_no_script_hides_a_module_of_python() -> None:
+    """Folders of scripts are in the path of what they start."""
+    scripts = [
+        path.stem for name in ("benchmarks", "domains") for path in (ROOT / name).glob("*.py")
+    ]
+    assert len(scripts) > 10
+    assert not {*scripts} & sys.stdlib_module_names

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -73,7 +74,9 @@ def test_prefer_simple(tmp_path: Path, coordlang: Command) -> None:
     chosen = ("--tasks", "all", "--method", "minimal", "--prefer", "simple")
     outcome = coordlang("build", *ring, *chosen, "-o", path)
     assert outcome.code == 0
-    assert "formulas of 4 terms with 6 limits on variables (9 terms, 17 limits" in outcome.out
+    # What it had before depends on which of the smallest languages was found first.
+    said = r"formulas of 4 terms with 6 limits on variables \(\d+ terms, \d+ limits before"
+    assert re.search(said, outcome.out)
     assert "proved the shortest)" in outcome.out
     shown = json.loads(coordlang("explain", path, *ring, "--json").out)["formulas"]
     terms = sorted(len(formula["terms"]) for formula in shown.values())
