@@ -125,9 +125,8 @@ class BoundedSearch:
         #: A cheapest way to each state; kept with exact bounds only.
         self._ways = _Ways(len(model.robots))
         self._exact: ExactBound | None = None
-        self._probing = guide.exact
-        #: Whether the least cost is tried, and the joint steps composed before all is.
-        self._trying_cheap = False
+        #: How many times the probe may be composed, after what was composed before; 0: no limit.
+        self._share = int(guide.exact)
         self._before = 0
         self._costs = CostLimit(guide.cost_left) if guide.cost_left and guide.bound else None
         self.layers = Layers(model, self.table, guide)
@@ -170,7 +169,7 @@ class BoundedSearch:
         shorter, and of the plans of that length none is cheaper.
         """
         self.bound, most = int(self._h[start[0]]), None
-        self._trying_cheap = True
+        self._share = _CHEAP
         found = FAR
         for _ in range(_LIMITS):
             costs.begin(start, most)
@@ -181,14 +180,14 @@ class BoundedSearch:
             if found in (_MET, _GROWN) or costs.beyond >= FAR:
                 break
             most = costs.beyond
-        self._trying_cheap, self._before = False, self.layers.composed
+        self._share, self._before = int(self._guide.exact), self.layers.composed
         if found != _MET:
             self._costs = None
         return found == _MET
 
     def _bounded_exactly(self) -> int:
         """Ask the solver for the optimal cost; what the next round is bounded by."""
-        self._probing = False
+        self._share = 0
         at_least = self.bound if self.bound < FAR - 1 else 0
         depth = len(self.layers.states) - 1
         self._exact = exact_bound(
@@ -228,16 +227,13 @@ class BoundedSearch:
         return _MET
 
     @property
-    def _limited(self) -> bool:
-        """Whether joint steps are composed up to a number of them only."""
-        return self._probing or self._trying_cheap
-
-    @property
     def _probe(self) -> int:
-        """Joint steps that are composed before exact bounds: more where their formula is large."""
+        """Joint steps that may be composed, where they are limited.
+
+        Before exact bounds they are more where the formula for these is large.
+        """
         size = sum(map(len, self._model.labels)) * (self.bound if self.bound < FAR - 1 else _STEPS)
-        probe = self._pieces.probe * (1 + size // _FORMULA)
-        return _CHEAP * probe if self._trying_cheap else probe
+        return self._share * self._pieces.probe * (1 + size // _FORMULA)
 
     def _on_optimal_plans(self, exact: ExactBound, edges: Edges, depth: int) -> Edges:
         """Leave out what leads to states through which no optimal plan passes.
@@ -268,7 +264,8 @@ class BoundedSearch:
             self._exact.formula.close()
 
     def edges_into(self, depth: int) -> Edges:
-        """The joint steps into a layer of the last round, composed again."""
+        """The joint steps into a layer of the last round, composed again, however many they are."""
+        self._share = 0
         return self._expand(self.layers.states[depth - 1], depth)[0]
 
     def so_far(self) -> str:
@@ -314,7 +311,7 @@ class BoundedSearch:
 
         def only(rows: Rows, options: Options) -> Options:
             nonlocal low
-            if self._limited and _combinations(options) > _TOO_MANY * self._probe:
+            if self._share and _combinations(options) > _TOO_MANY * self._probe:
                 raise _GrownError
             if self._exact is not None:
                 options = self._exact.only(depth - 1, rows, options)
@@ -322,12 +319,12 @@ class BoundedSearch:
                 options, low = self._guide.in_time(rows, options, self.bound - depth)
             return options
 
-        start, size = 0, _FIRST_PROBED if self._limited else _FIRST
+        start, size = 0, _FIRST_PROBED if self._share else _FIRST
         most = max(1, min(self._pieces.steps, _BYTES // (8 * self._model.codec.width)))
-        if self._limited:
+        if self._share:
             most = min(most, self._probe)
         while start < len(states):
-            if self._limited and self.layers.composed - self._before > self._probe:
+            if self._share and self.layers.composed - self._before > self._probe:
                 raise _GrownError
             numbers = states[start : start + size]
             rows = self.table.rows(numbers)

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import fields, replace
+from itertools import product
 from random import Random
 
 import numpy as np
@@ -134,6 +135,19 @@ def test_the_cost_that_is_left_is_a_lower_bound() -> None:
         tight += int((bound[left > 0] == left[left > 0]).sum())
     assert tight > 5
     assert checked > 50
+
+
+def test_steps_are_composed_again_however_many_there_were() -> None:
+    """Those on the way back count for no limit of the way there."""
+    files = DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "corners-6x6.pddl"]
+    again = 0
+    for cost, probe in product(COSTS, (100, 200, 300)):
+        loaded = load(*files, ModelOptions(cost=cost))
+        pieces = replace(PIECES, probe=probe, kept=0)
+        found, effort = search_with_effort(loaded.model, loaded.tasks[0], pieces)
+        again += effort.steps > probe and "SAT" not in effort.heuristic
+        equal(found, blind_search.search(loaded.model, loaded.tasks[0]))
+    assert again
 
 
 @pytest.mark.parametrize(
