@@ -22,11 +22,13 @@ import resource
 import sys
 import tempfile
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from time import process_time
 from typing import TYPE_CHECKING, Any
 
 from foreign_rows import SHARED
+from kept_rows import KeptRows
 from printed_table import PrintedTable
 from processes import run_python
 from scale import Grid
@@ -183,19 +185,11 @@ def main() -> None:
     if given.list:
         print(*names, sep="\n")
         return
-    known: dict[str, dict[str, Any]] = {}
-    if given.kept is not None and given.kept.exists():
-        lines = map(json.loads, given.kept.read_text().splitlines())
-        known = {figures["row"]: figures for figures in lines}
-    table, solved = PrintedTable(*COLUMNS), 0
+    known, table, solved = KeptRows(given.kept), PrintedTable(*COLUMNS), 0
     for name in names:
-        if name not in known:
-            known[name] = measured(name, given.limit, given.cost)
-            if given.kept is not None:
-                with given.kept.open("a") as file:
-                    file.write(json.dumps(known[name]) + "\n")
-        solved += "plans" in known[name]
-        table.print(*cells(known[name]))
+        figures = known.get(name, partial(measured, name, given.limit, given.cost))
+        solved += "plans" in figures
+        table.print(*cells(figures))
     print(f"{solved} of {len(names)} solved")
 
 

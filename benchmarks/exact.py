@@ -14,11 +14,12 @@ in a file, so that a run that was killed goes on; the time limit is for each row
 from __future__ import annotations
 
 import argparse
-import json
 import os
+from functools import partial
 from pathlib import Path
 from time import perf_counter, process_time
 
+from kept_rows import Figures, KeptRows
 from minimal import inputs
 from printed_table import PrintedTable
 
@@ -53,45 +54,29 @@ def main() -> None:
     parser.add_argument("--kept", type=Path, help="a file with the rows that are done")
     arguments = parser.parse_args()
     wanted = arguments.rows or [*(row.name for row in ROWS), *FURTHER]
-    done = kept_rows(arguments.kept)
-    table = PrintedTable(*COLUMNS)
+    done, table = KeptRows(arguments.kept), PrintedTable(*COLUMNS)
     for name, _, candidates in inputs(wanted):
         for seed in range(arguments.seeds):
             key = f"{name}/{seed}/{arguments.time_limit:g}"
-            if key not in done:
-                done[key] = measured(candidates, seed, arguments.time_limit)
-                keep(arguments.kept, key, done[key])
-            table.print(name, seed, *done[key])
+            row = done.get(key, partial(measured, key, candidates, seed, arguments.time_limit))
+            table.print(name, seed, *row["cells"])
 
 
-def kept_rows(path: Path | None) -> dict[str, list[object]]:
-    """The rows of a file, one a line; none if there is no file."""
-    if path is None or not path.exists():
-        return {}
-    return dict(json.loads(line) for line in path.read_text().splitlines())
-
-
-def keep(path: Path | None, key: str, cells: list[object]) -> None:
-    """Add a row to the file."""
-    if path is not None:
-        with path.open("a") as file:
-            file.write(json.dumps([key, cells]) + "\n")
-
-
-def measured(candidates: Candidates, seed: int, seconds: float) -> list[object]:
+def measured(key: str, candidates: Candidates, seed: int, seconds: float) -> Figures:
     """The columns of a row after its seed."""
     wall, cpu = perf_counter(), process_time()
     with time_limit(seconds):
         built = build_language(candidates, "minimal", seed=seed)
     guarantee = built.language.guarantee
     low, high = guarantee.lower_bound, guarantee.size
-    return [
+    cells = [
         str(high) if low == high else f"{low}..{high}",
         *(int(built.figures.get(name, 0)) for name in FIGURES),
         f"{perf_counter() - wall:.1f}",
         f"{process_time() - cpu:.1f}",
         f"{os.getloadavg()[0]:.1f}",
     ]
+    return {"row": key, "cells": cells}
 
 
 if __name__ == "__main__":

@@ -16,7 +16,6 @@ for the same by bidirectional symbolic search (``symq_bd``, quality 1).
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import re
 import resource
@@ -28,6 +27,7 @@ from pathlib import Path
 from typing import Any
 
 import coverage
+from kept_rows import KeptRows
 from printed_table import PrintedTable
 
 KSTAR = """
@@ -106,10 +106,7 @@ def main() -> None:
     parser.add_argument("--kept", type=Path, metavar="FILE", help="where lines are kept")
     parser.add_argument("--python", default=sys.executable, help="a Python that has the planners")
     given = parser.parse_args()
-    known: dict[str, dict[str, Any]] = {}
-    if given.kept is not None and given.kept.exists():
-        lines = map(json.loads, given.kept.read_text().splitlines())
-        known = {figures["row"]: figures for figures in lines}
+    known = KeptRows(given.kept)
     columns = [("row", -38), ("form", -17), ("actions", 8)]
     for planner in PLANNERS:
         columns += [(planner, 7), ("MB", 5), ("plans", 9)]
@@ -117,18 +114,13 @@ def main() -> None:
     for name in coverage.rows(given.first):
         if given.rows and not name.startswith(tuple(given.rows)):
             continue
-        if name not in known:
-            known[name] = measured(name, given)
-            if given.kept is not None:
-                with given.kept.open("a") as file:
-                    file.write(json.dumps(known[name]) + "\n")
-        found = known[name]
+        found = known.get(name, partial(measured, name, given))
         cells = [found["row"], found["form"], found["actions"]]
         for planner in PLANNERS:
             cells += [found[planner][key] for key in ("seconds", "memory", "plans")]
         table.print(*cells)
     for planner in PLANNERS:
-        print(planner, sum(found[planner]["plans"] is not None for found in known.values()))
+        print(planner, sum(found[planner]["plans"] is not None for found in known.rows.values()))
 
 
 if __name__ == "__main__":

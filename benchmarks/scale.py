@@ -25,11 +25,13 @@ import resource
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from time import process_time
 from typing import TYPE_CHECKING, Any
 
 from foreign_rows import ROWS, SHARED, load
+from kept_rows import KeptRows
 from printed_table import PrintedTable
 from processes import MOST, run_python
 
@@ -255,18 +257,9 @@ def cells(figures: dict[str, Any]) -> Iterator[object]:
 
 def print_rows(names: Sequence[str], kept: Path | None, limit: float, old: float | None) -> None:
     """Print a line for each row; rows in the file ``kept`` are not measured again."""
-    known: dict[str, dict[str, Any]] = {}
-    if kept is not None and kept.exists():
-        lines = map(json.loads, kept.read_text().splitlines())
-        known = {figures["row"]: figures for figures in lines}
-    table = PrintedTable(*COLUMNS)
+    known, table = KeptRows(kept), PrintedTable(*COLUMNS)
     for name in names:
-        if name not in known:
-            known[name] = measured(name, limit, old)
-            if kept is not None:
-                with kept.open("a") as file:
-                    file.write(json.dumps(known[name]) + "\n")
-        table.print(*cells(known[name]))
+        table.print(*cells(known.get(name, partial(measured, name, limit, old))))
 
 
 def main() -> None:
