@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from typing import Any, Literal
 
@@ -52,6 +53,39 @@ def solve_slice(solver: Any, conflicts: int, assumptions: Sequence[int] = ()) ->
     finally:
         MainThread.check = staticmethod(own)
     return None if answer is None else bool(answer)
+
+
+def simplified(clauses: array[int], kept: Sequence[int]) -> list[list[int]]:
+    """Clauses that allow the same values of the kept variables, mostly over far fewer variables.
+
+    Parameters
+    ----------
+    clauses
+        Each followed by 0; they can be satisfied.
+    kept
+        Variables; others may be eliminated, and every one of them may be left without a clause.
+    """
+    from pysat.process import Processor
+
+    listed = list(_split(clauses))
+    with postponed_signals():
+        processor = Processor(bootstrap_with=listed)
+        try:
+            found = processor.process(freeze=list(kept))
+        finally:
+            processor.delete()
+    assert found.status, "clauses that a model was found of were refuted"
+    return list(found.clauses)
+
+
+def _split(clauses: array[int]) -> Iterator[list[int]]:
+    clause: list[int] = []
+    for literal in clauses:
+        if literal:
+            clause.append(literal)
+        else:
+            yield clause
+            clause = []
 
 
 @cache

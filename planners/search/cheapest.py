@@ -18,7 +18,8 @@ import numpy as np
 
 from planners.joint.model import JointModel, PlanningTask
 from planners.search.goals import goal_facts
-from planners.search.plan_formula import Literals, OutOfEffort, PlanFormula
+from planners.search.plan_formula import PlanFormula
+from planners.search.questions import Literals, OutOfEffort
 
 #: Conflicts for the question whether a core needs a second action, too.
 _EASY = 1_000
@@ -98,7 +99,7 @@ def least_cost(formula: PlanFormula, task: PlanningTask, steps: int) -> Literals
     much follows from them at once.  Cores that have nothing in common are looked for first, for
     these are small.
 
-    Raises `planners.search.plan_formula.OutOfEffort`.
+    Raises `planners.search.questions.OutOfEffort`.
     """
     sums = _Sums(formula, steps)
     sums.add_actions(task)

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -19,16 +20,13 @@ from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, PlanningTask
 from planners.limits import reaching
 from planners.search.cheapest import least_cost
+from planners.search.fixed_plans import FixedPlans, Plan
 from planners.search.mutexes import mutexes
-from planners.search.plan_formula import (
-    Literals,
-    OutOfEffort,
-    PlanFormula,
-    TooManyClauses,
-    countable,
-)
+from planners.search.plan_formula import PlanFormula, countable
+from planners.search.questions import Literals, OutOfEffort
 from planners.search.reachable import PieceSizes
 from planners.search.state_variables import StateVariable
+from planners.search.step_formula import TooManyClauses
 from planners.tables import Bools, Rows
 
 #: States that are asked for to see whether exact bounds pay, and the share on optimal plans above
@@ -41,8 +39,6 @@ _FIRST = 300_000
 _EASY = 20
 #: What to try besides a larger limit.
 SMALLER = "a task with a shorter plan, fewer objects or fewer robots"
-#: The robots' labels, step by step.
-Plan = list[tuple[int, ...]]
 
 
 @dataclass(slots=True)
@@ -52,7 +48,7 @@ class ExactBound:
     ``used[k][robot]`` (labels) says which labels occur in step k of some optimal plan.
     """
 
-    formula: PlanFormula
+    plans: FixedPlans
     makespan: int
     used: list[list[Bools]]
     #: Conflicts for one question.
@@ -63,18 +59,18 @@ class ExactBound:
 
         An optimal plan passes through a state iff one begins with a cheapest way to it.
         """
-        depth, robots = ways.shape[1:]
-        first = [
-            [self.formula.label(self.makespan - k, robot, 0) for robot in range(robots)]
-            for k in range(depth)
-        ]
-        asked = (ways + np.array(first, np.int64).reshape(depth, robots)).reshape(len(ways), -1)
+        asked = (ways + self.plans.firsts(ways.shape[1])).reshape(len(ways), -1)
+        columns = np.ascontiguousarray(asked.T)
         passes = np.ones(len(ways), np.bool_)
         for way, literals in enumerate(asked.tolist()):
-            if passes[way] and not _unless_refuted(self.formula, literals, self.effort):
+            if passes[way] and not _unless_refuted(self.plans, literals, self.effort):
                 # What is refuted is part of other ways, too.
-                column = np.flatnonzero(np.isin(asked[way], self.formula.core_of(literals)))
-                passes &= (asked[:, column] != asked[way, column]).any(axis=1)
+                core = np.flatnonzero(np.isin(asked[way], self.plans.core_of(literals)))
+                same = passes & (columns[core[-1]] == asked[way, core[-1]])
+                alike = np.flatnonzero(same)
+                for column in core[:-1]:
+                    alike = alike[columns[column, alike] == asked[way, column]]
+                passes[alike] = False
         return passes
 
     def only(self, depth: int, rows: Rows, options: Options) -> Options:
@@ -143,15 +139,23 @@ def _bound(formula: PlanFormula, task: PlanningTask, plan: Plan, effort: int) ->
     formula.fix(task.init, len(plan))
     if formula.model.cost != "makespan" and countable(formula.model):
         plan, cheap = _cheapest(formula, task, plan)
-    formula.without_limit()
     formula.require(cheap)
-    return ExactBound(formula, len(plan), _used(formula, plan, effort), effort)
-
-
-def _unless_refuted(formula: PlanFormula, literals: Literals, effort: int) -> bool:
+    plans = formula.fixed(len(plan))
     try:
-        with formula.at_most(effort):
-            return formula.holds(literals)
+        with reaching(plans.so_far, SMALLER):
+            used = _used(plans, formula.model, plan, effort)
+            plans = plans.smaller()
+    except BaseException:
+        plans.close()
+        raise
+    formula.close()
+    return ExactBound(plans, len(plan), used, effort)
+
+
+def _unless_refuted(plans: FixedPlans, literals: Literals, effort: int) -> bool:
+    try:
+        with plans.at_most(effort):
+            return plans.holds(literals)
     except OutOfEffort:
         return True
 
@@ -188,11 +192,10 @@ def _cost_of(formula: PlanFormula, plan: Plan) -> int:
     return sum(int(costs[robot][label]) for step in plan for robot, label in enumerate(step))
 
 
-def _used(formula: PlanFormula, plan: Plan, effort: int) -> list[list[Bools]]:
+def _used(plans: FixedPlans, model: JointModel, plan: Plan, effort: int) -> list[list[Bools]]:
     """Which labels occur where in optimal plans: each that is found shows one a robot and step."""
-    makespan = len(plan)
-    sizes = [len(own) for own in formula.model.labels]
-    used = [[np.zeros(size, np.bool_) for size in sizes] for _ in range(makespan)]
+    sizes = [len(own) for own in model.labels]
+    used = [[np.zeros(size, np.bool_) for size in sizes] for _ in plan]
 
     def enter(found: Plan) -> None:
         for depth, labels in enumerate(found):
@@ -200,19 +203,17 @@ def _used(formula: PlanFormula, plan: Plan, effort: int) -> list[list[Bools]]:
                 used[depth][robot][label] = True
 
     enter(plan)
-    for depth in range(makespan):
-        for robot in range(len(sizes)):
-            while not (own := used[depth][robot]).all():
-                step = makespan - depth
-                others = [formula.label(step, robot, k) for k in np.flatnonzero(~own).tolist()]
-                try:
-                    with formula.at_most(effort):
-                        found = formula.holds([formula.some_of(others)])
-                except OutOfEffort:
-                    own[:] = True
-                    break
-                if not found:
-                    formula.require([-literal for literal in others])
-                    break
-                enter(formula.labels_chosen(makespan))
+    for depth, robot in product(range(len(plan)), range(len(sizes))):
+        while not (own := used[depth][robot]).all():
+            others = [plans.label(depth, robot, k) for k in np.flatnonzero(~own).tolist()]
+            try:
+                with plans.at_most(effort):
+                    found = plans.holds([plans.some_of(others)])
+            except OutOfEffort:
+                own[:] = True
+                break
+            if not found:
+                plans.require([-literal for literal in others])
+                break
+            enter(plans.labels_chosen())
     return used

@@ -261,7 +261,7 @@ class BoundedSearch:
     def close(self) -> None:
         """Give the solver back."""
         if self._exact is not None:
-            self._exact.formula.close()
+            self._exact.plans.close()
 
     def edges_into(self, depth: int) -> Edges:
         """The joint steps into a layer of the last round, composed again, however many they are."""
@@ -330,6 +330,8 @@ class BoundedSearch:
             rows = self.table.rows(numbers)
             steps = self._model.successors(rows, only)
             self.layers.composed += len(steps)
+            if self._share and len(steps) > self._probe:
+                raise _GrownError  # bounds of so many states take long
             yield numbers, steps, low
             start += size
             size = max(1, min(self._pieces.states, int(most * size / max(1, len(steps)))))

@@ -16,9 +16,10 @@ from planners.loading import PlanningInstance
 from planners.search.cheapest import least_cost
 from planners.search.exact_bound import ExactBound, exact_bound
 from planners.search.mutexes import mutexes
-from planners.search.plan_formula import PlanFormula, TooManyClauses
+from planners.search.plan_formula import PlanFormula
 from planners.search.reachable import PIECES
 from planners.search.state_variables import state_variables
+from planners.search.step_formula import TooManyClauses
 from tests.support import blind_search
 from tests.support.random_instances import random_instance
 
@@ -84,7 +85,7 @@ def compared(seeds: range) -> Counter[str]:
         bound = bound_of(model, task)
         if bound is None:  # a condition with too many clauses
             continue
-        with closing(bound.formula):
+        with closing(bound.plans):
             assert bound.makespan == len(expected[0])
             for step, robot in product(range(bound.makespan), range(len(model.robots))):
                 labels = np.flatnonzero(bound.used[step][robot]).tolist()

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Questions to a SAT solver about a formula that grows, with a limit on the effort they take."""
+
+from __future__ import annotations
+
+import sys
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+
+from planners.sat import SolverName, sat_solver, solve_slice
+from planners.tables import Bools
+
+#: Hard questions and many easy ones: Glucose takes about half as long as MiniSat for the hard ones.
+SOLVER: SolverName = "glucose4"
+#: Conflicts between two looks at the limits.
+_SLICE = 2_000
+
+Literals = list[int]
+
+
+class OutOfEffort(Exception):
+    """The solver did not decide a question with the effort that was left."""
+
+
+class Questions:
+    """A formula in clauses, and whether it holds.
+
+    ``effort`` are the solver's conflicts that may be spent; ``variables`` is how many there are.
+    """
+
+    def __init__(self, effort: int, variables: int) -> None:
+        #: The effort that is left.
+        self.left = effort
+        #: Questions that were asked.
+        self.calls = 0
+        self.variables = variables
+        #: All clauses, each followed by 0.
+        self.clauses = array("i")
+        self._solver = sat_solver(SOLVER)
+
+    def close(self) -> None:
+        """Give the solver back."""
+        self._solver.delete()
+
+    # ---- the formula
+
+    def add(self, clause: Sequence[int]) -> None:
+        """Let one of these literals be true."""
+        self.clauses.extend(clause)
+        self.clauses.append(0)
+        self._solver.add_clause(clause)
+
+    def fresh(self) -> int:
+        """A new variable."""
+        self.variables += 1
+        return self.variables
+
+    def require(self, literals: Sequence[int]) -> None:
+        """Let literals be true from now on."""
+        for literal in literals:
+            self.add([literal])
+
+    def any_of(self, literals: Literals) -> int:
+        """A literal that is implied by each of these."""
+        implied = self.fresh()
+        for literal in literals:
+            self.add([-literal, implied])
+        return implied
+
+    def some_of(self, literals: Literals) -> int:
+        """A literal that says: one of these holds."""
+        asked = self.fresh()
+        self.add([-asked, *literals])
+        return asked
+
+    def counter(self, literals: Literals) -> Literals:
+        """Literals, the k-th of which is implied where more than k of these hold: a totalizer."""
+        if len(literals) == 1:
+            return literals
+        half = len(literals) // 2
+        left, right = self.counter(literals[:half]), self.counter(literals[half:])
+        sums = [self.fresh() for _ in literals]
+        for k, literal in enumerate(sums):
+            for mine in range(max(0, k + 1 - len(right)), min(len(left), k + 1) + 1):
+                holding = [left[mine - 1]] if mine else []
+                holding += [right[k - mine]] if k + 1 - mine else []
+                self.add([*(-one for one in holding), literal])
+        return sums
+
+    # ---- the questions
+
+    def holds(self, literals: Sequence[int]) -> bool:
+        """Whether the formula holds with these literals."""
+        self.calls += 1
+        while True:
+            effort = max(1, min(_SLICE, self.left))
+            answer = solve_slice(self._solver, effort, literals)
+            if answer is not None:
+                return answer
+            self.spend(effort)
+
+    def true(self) -> Bools:
+        """Which variables are true, the first one first, in the model of the last answer."""
+        found: Bools = np.array(self._solver.get_model()) > 0
+        return found
+
+    def core_of(self, literals: Iterable[int]) -> Literals:
+        """Of literals that were assumed in the last question: those that were refuted together."""
+        return sorted(set(self._solver.get_core() or ()) & set(literals))
+
+    def core(self, literals: Iterable[int]) -> Literals:
+        """Of literals whose negations were assumed in the last question: those that refuted it."""
+        refuted = {-literal for literal in self._solver.get_core() or ()}
+        return sorted(refuted & set(literals))
+
+    # ---- the effort
+
+    def spend(self, effort: int) -> None:
+        """Take some of the effort away; raises `OutOfEffort` where it is used up."""
+        self.left -= effort
+        if self.left < 0:
+            raise OutOfEffort
+
+    def without_limit(self) -> None:
+        """Answer every question from now on, however long it takes."""
+        self.left = sys.maxsize
+
+    @contextmanager
+    def at_most(self, effort: int) -> Iterator[None]:
+        """Spend no more than this inside, of what is left."""
+        before = self.left
+        self.left = min(effort, before)
+        given = self.left
+        try:
+            yield
+        finally:
+            self.left = before - (given - self.left)
