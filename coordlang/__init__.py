@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from coordlang.api.languages import build as build
     from coordlang.api.languages import load_language as load_language
     from coordlang.api.languages import verify as verify
+    from coordlang.api.lifting import ground as ground
+    from coordlang.api.lifting import lift as lift
     from coordlang.api.planning import inspect as inspect
     from coordlang.api.planning import load as load
     from coordlang.api.planning import plans as plans
@@ -66,6 +68,7 @@ _DEFINED_IN = {
     "coordlang.api.cross_check": ("check",),
     "coordlang.api.coordination_tasks": ("coordination",),
     "coordlang.api.languages": ("build", "verify", "load_language"),
+    "coordlang.api.lifting": ("lift", "ground"),
     "coordlang.api.speaking": ("say", "understand", "plan"),
     "coordlang.api.robot_choices": ("choices",),
     "coordlang.api.explaining": ("explain",),
@@ -114,7 +117,9 @@ __all__ = [
     "coordination",
     "explain",
     "export",
+    "ground",
     "inspect",
+    "lift",
     "load",
     "load_language",
     "plan",

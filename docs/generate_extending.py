@@ -37,6 +37,7 @@ ROOMS = (
     "coordlang/language",
     "coordlang/verification",
     "coordlang/certificate",
+    "coordlang/lifted",
     "coordlang/use",
     "coordlang/use/sentence",
     "coordlang/use/choices",

@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from random import Random
 
 from coordlang import movingai
 from coordlang.movingai import cell_name
@@ -58,6 +60,40 @@ def ring(rows: int, columns: int) -> GridMap:
     tour = _clockwise(rows, columns)
     edges = {(min(a, b), max(a, b)) for a, b in pairwise([*tour, tour[0]])}
     return _of(set(tour), edges)
+
+
+def path(length: int, bays: Sequence[int]) -> GridMap:
+    """Cells in a row, with a bay below those in the columns ``bays``."""
+    return _of({(0, col) for col in range(length)} | {(1, col) for col in bays})
+
+
+def two_rooms(rows: int, columns: int, corridor: int) -> GridMap:
+    """Two rooms of equal size, joined by a corridor of so many cells along their first rows."""
+    cells = {(row, col) for row in range(rows) for col in range(columns)}
+    cells |= {(0, columns + k) for k in range(corridor)}
+    return _of(cells | {(row, col + columns + corridor) for row, col in cells if col < columns})
+
+
+def rooms_and_corridors(random: Random, most: int = 12) -> GridMap:
+    """Two or three rooms of up to 2x3 cells in a row, joined by corridors of one or two cells.
+
+    Each room stands up or down by at most a cell.  At most ``most`` cells; maps that would have
+    more are drawn again.
+    """
+    while True:
+        cells: set[Cell] = set()
+        column = 0
+        for number in range(random.choice((2, 2, 3))):
+            if number:
+                length = random.randint(1, 2)
+                cells |= {(1, column + k) for k in range(length)}
+                column += length
+            top, width = random.randint(0, 1), random.randint(1, 3)
+            rows = range(top, top + 2) if random.random() < 0.7 else (1,)
+            cells |= {(row, column + k) for row in rows for k in range(width)}
+            column += width
+        if 5 <= len(cells) <= most:
+            return _of(cells)
 
 
 def three_cells() -> GridMap:

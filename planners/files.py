@@ -199,6 +199,19 @@ def read_stored_bytes(path: str | Path, *, most: int = MAX_TEXT) -> bytes:
     return data
 
 
+def names_format(data: bytes, name: str) -> bool:
+    """Whether a JSON text says that it is of a format; what is no JSON says nothing."""
+    if name.encode() not in data:
+        return False
+    try:
+        check_utf8(data, Position("a file"))
+        _require_shallow(data, Position("a file"))
+        found = msgspec.json.decode(data.removeprefix(_BYTE_ORDER_MARK), type=_Head)
+    except (BadInput, msgspec.DecodeError, RecursionError):
+        return False
+    return bool(found.format == name)
+
+
 def read_text(path: str | Path) -> str:
     """Read a text in UTF-8, or standard input for ``-``.
 

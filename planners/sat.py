@@ -67,7 +67,7 @@ def simplified(clauses: array[int], kept: Sequence[int]) -> list[list[int]]:
     """
     from pysat.process import Processor
 
-    listed = list(split_clauses(clauses))
+    listed = list(_split(clauses))
     with postponed_signals():
         processor = Processor(bootstrap_with=listed)
         try:
@@ -78,8 +78,7 @@ def simplified(clauses: array[int], kept: Sequence[int]) -> list[list[int]]:
     return list(found.clauses)
 
 
-def split_clauses(clauses: Iterable[int]) -> Iterator[list[int]]:
-    """The clauses of a formula in which 0 follows each."""
+def _split(clauses: array[int]) -> Iterator[list[int]]:
     clause: list[int] = []
     for literal in clauses:
         if literal:

@@ -8,14 +8,16 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Unpack
 
-from coordlang.api.inputs import DomainSource, File, ProblemSource
-from coordlang.api.language_inputs import LanguageSource, read_task_language
+from coordlang.api.grounding import coordinates_of
+from coordlang.api.inputs import DomainSource, File, ProblemSource, read_planning
+from coordlang.api.language_inputs import LanguageSource, language_for
 from coordlang.api.options import GivenOptions, ModelKeywords
 from coordlang.api.presenting import Presented
 from coordlang.api.speaking import SentenceSource
 from coordlang.explanation.cover import Cover
 from coordlang.explanation.demands import SentenceDemands, sentence_demands
 from coordlang.explanation.descriptions import WordDescriptions, describe_words
+from coordlang.explanation.lifted_words import LiftedWords, lifted_words
 from coordlang.explanation.text import (
     cover_data,
     demands_data,
@@ -27,7 +29,7 @@ from coordlang.explanation.text import (
 from coordlang.explanation.words import MappedStates, all_covers, mapped_states
 from coordlang.language.sentences import TaskSentence, task_sentences
 from coordlang.tasks.candidates import describe
-from coordlang.use.sentence.task_language import TaskLanguage
+from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
 from planners.errors import UsageError
 from planners.notebook import counted, html_table
 from planners.search.plan_file import json_count
@@ -39,12 +41,16 @@ SENTENCES_SHOWN = 10
 
 @dataclass(frozen=True, slots=True, repr=False)
 class WordsExplained(Presented):
-    """Each word as a short formula, exact in every state that the language maps."""
+    """Each word as a short formula, exact in every state that the language maps.
+
+    ``lifted``: formulas over features, if the words are functions of features; else None.
+    """
 
     used: TaskLanguage
     mapped: MappedStates
     covers: Mapping[str, Cover]
     descriptions: WordDescriptions
+    lifted: LiftedWords | None = None
 
     @property
     def formulas(self) -> dict[str, str]:
@@ -80,6 +86,7 @@ class WordsExplained(Presented):
                     for word, cover in self.descriptions.rules
                 ],
             },
+            **({"lifted": self.lifted.data()} if self.lifted else {}),
         }
 
     def __str__(self) -> str:
@@ -87,7 +94,7 @@ class WordsExplained(Presented):
 
     def formulas_text(self) -> str:
         """Return the formulas as text, without what the language is."""
-        lines = []
+        lines = [self.lifted.text(), "In this problem:"] if self.lifted else []
         if self.descriptions.in_order:
             lines.append("The first formula that is true in a state gives its word:")
         lines.append(descriptions_text(self.descriptions, self.mapped))
@@ -260,14 +267,19 @@ def explain(
     """
     if sentence is not None and not task:
         raise UsageError("--sentence: only with --task", remedy="Add --task.")
-    used = read_task_language(language, domain, problem, factored, GivenOptions.of(**model))
+    files = read_planning(domain, [problem], factored, GivenOptions.of(**model), most=1)
+    read, position = language_for(language, files)
+    first = files.problems[0]
+    used = language_in_task(read, files.domain, first, files.options_of(read), position)
     only = None if sentence is None else used.words_of(sentence)
     if only is not None:
         used.plans_with(only)
     mapped = mapped_states(used.language, used.model)
     covers = all_covers(mapped)
     descriptions = describe_words(mapped, covers, formula_per_word)
-    return Explanation(WordsExplained(used, mapped, covers, descriptions), only, task)
+    points = coordinates_of(None, first)
+    lifted = lifted_words(read, files.domain, first, used.model, points, position)
+    return Explanation(WordsExplained(used, mapped, covers, descriptions, lifted), only, task)
 
 
 def _sentence_data(sentence: TaskSentence) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from coordlang.api.inputs import (
     TasksSource,
     read_planning,
 )
-from coordlang.api.language_inputs import LanguageSource, read_language_source
+from coordlang.api.language_inputs import LanguageSource, language_for, read_language_source
 from coordlang.api.options import (
     UNSOLVABLE,
     BuildPreference,
@@ -329,7 +329,7 @@ def verify(
     Parameters
     ----------
     language
-        A language file or a language.
+        A language file or a language; or a lifted one, for ``tasks`` or the problems' own.
     domain, problems, factored, **model
         As in `load`; they must be those that the language was built for.
     tasks
@@ -348,9 +348,9 @@ def verify(
     Refuted
         If a reason of the certificate is none.
     """
-    read, position = read_language_source(language)
     proof = _certificate(certificate)
     files = read_planning(domain, problems, factored, GivenOptions.of(**model))
+    read, position = language_for(language, files, tasks, is_verified=False)
     check_source(read, files.domain, files.problems, position)
     options = files.options_of(read)
     if tasks is None:

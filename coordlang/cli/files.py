@@ -69,6 +69,11 @@ class PlanningFiles:
         return list(self.files)
 
 
+def beside(problem: str) -> str:
+    """Where coordinates of a problem's places are read from, if there is such a file."""
+    return str(Path(problem).parent / "coordinates.json")
+
+
 def planning_files(
     metavar: str, most: int | None = None, *, then: str | None = None, optional: bool = False
 ) -> Callable[[CommandFunction], CommandFunction]:

@@ -22,6 +22,8 @@ COMMANDS = {
     "tasks": "Write a task file: a problem with other starts and goals.",
     "build": "Build a coordination language and verify it.",
     "verify": "Check by definition that a file holds a coordination language.",
+    "lift": "Learn words as functions of features, for all problems of a domain.",
+    "ground": "Write the language file of one problem from a lifted language.",
     "say": "Print the sentence of an optimal plan.",
     "understand": "Count, list, sample or draw the plans that a sentence leaves open.",
     "plan": "Find one optimal plan under a sentence, or under the best sentence.",

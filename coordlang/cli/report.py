@@ -22,7 +22,7 @@ from planners.messages import visible
 from planners.notebook import counted
 
 if TYPE_CHECKING:
-    from coordlang.report.places import Point
+    from coordlang.coordinates import Point
 
 
 @click.command(name="report")
@@ -72,7 +72,7 @@ def command(
     candidate tasks.
     """
     from coordlang.api.inputs import read_planning
-    from coordlang.api.language_inputs import read_language_source
+    from coordlang.api.language_inputs import language_for
     from coordlang.api.options import GivenOptions
     from coordlang.language.recorded import check_source
     from coordlang.report.page import make_report
@@ -83,10 +83,10 @@ def command(
     inputs = [language, *pddl.paths, places]
     beside = _planviz_paths(output) if with_planviz else []
     check_outputs([("-o", output), *(("--planviz", path) for path in beside)], inputs)
-    read, position = read_language_source(language)
     files = read_planning(pddl.domain, pddl.problems, pddl.factored, GivenOptions.of(**model))
-    check_source(read, files.domain, files.problems, position)
     known = _coordinates(coordinates, pddl)
+    read, position = language_for(language, files, coordinates=known)
+    check_source(read, files.domain, files.problems, position)
     with working("drawing the page"):
         report = make_report(
             read,
@@ -124,7 +124,7 @@ def _beside(pddl: PlanningFiles) -> Path:
 
 
 def _coordinates(given: str | None, pddl: PlanningFiles) -> dict[str, Point] | None:
-    from coordlang.report.places import read_coordinates
+    from coordlang.coordinates import read_coordinates
 
     if given is not None:
         return read_coordinates(given)

@@ -15,9 +15,10 @@ SCHEMAS = {
     "language": "coordlang.language.record",
     "tasks": "coordlang.tasks.task_file",
     "certificate": "coordlang.certificate.file",
+    "lifted": "coordlang.lifted.file",
     "choices": "coordlang.use.choices.record",
     "plans": "planners.search.plan_file",
-    "coordinates": "coordlang.report.places",
+    "coordinates": "coordlang.coordinates",
     "error": "coordlang.cli.error_object",
 }
 

@@ -42,6 +42,8 @@ def to_bytes(language: Language) -> bytes:
     }
     if language.also:
         data["also"] = {state: list(words) for state, words in language.also.items()}
+    if provenance.lifted:
+        data["lifted"] = dict(provenance.lifted)
     return msgspec.json.format(msgspec.json.encode(data), indent=1) + b"\n"
 
 
@@ -100,6 +102,7 @@ def language_from_bytes(data: bytes, position: Position) -> Language:
             model=_present(record.model),
             tasks=_present(TasksRecord("problems", 0) if record.tasks is UNSET else record.tasks),
             producer=record.producer,
+            lifted={} if record.lifted is UNSET else msgspec.to_builtins(record.lifted),
         ),
     )
 

@@ -51,6 +51,8 @@ class Provenance:
         What is known of the number of words; None where nothing is claimed.
     domain, model, tasks, producer
         The entries of these names in a language file.
+    lifted
+        The features of which the words are functions, if they are; empty otherwise.
     """
 
     robots: tuple[str, ...] = ()
@@ -59,6 +61,7 @@ class Provenance:
     model: Mapping[str, Any] = field(default_factory=dict)
     tasks: Mapping[str, Any] = field(default_factory=dict)
     producer: Mapping[str, Any] = field(default_factory=dict)
+    lifted: Mapping[str, Any] = field(default_factory=dict)
 
 
 def provenance_of(

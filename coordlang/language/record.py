@@ -94,6 +94,22 @@ class GuaranteeRecord(msgspec.Struct):
     proved_minimal: Annotated[bool, Meta(description="Whether the size equals that bound.")]
 
 
+class LiftedFromRecord(msgspec.Struct):
+    """The lifted language whose words these are, in one problem."""
+
+    features: Annotated[list[str], Meta(description="Features of states, as s-expressions.")]
+    values: Annotated[
+        dict[str, str],
+        Meta(
+            description="The features' values, in their order, joined by blanks -> word. States "
+            "with other values have words of their own."
+        ),
+    ]
+    verified: Annotated[
+        list[str], Meta(description="The names of the problems on which it was verified.")
+    ]
+
+
 Word = Annotated[str, Meta(extra_json_schema=_WORD)]
 
 
@@ -137,6 +153,10 @@ class LanguageRecord(msgspec.Struct):
             "language all the same."
         ),
     ] = {}
+    lifted: Annotated[
+        LiftedFromRecord | UnsetType,
+        Meta(description="The features of which the words are functions, if they are lifted."),
+    ] = UNSET
 
 
 LANGUAGE = FileFormat("language", "language file", LanguageRecord, "coordlang/language")

@@ -14,13 +14,15 @@ from typing import Any
 
 import numpy as np
 
+from coordlang.coordinates import Point
 from coordlang.explanation.cover import Cover
 from coordlang.explanation.descriptions import WordDescriptions, describe_words
+from coordlang.explanation.lifted_words import LiftedWords
 from coordlang.explanation.text import term_text
 from coordlang.explanation.words import all_covers, mapped_states
 from coordlang.language.words import Language
 from coordlang.report.layout import graph_layout, spread
-from coordlang.report.places import Point, place_layout
+from coordlang.report.places import place_layout
 from coordlang.report.shown import Selection
 from coordlang.report.task import Tables, TaskPart, task_data, task_summary
 from coordlang.report.world import World, find_world
@@ -50,10 +52,12 @@ def page_data(
     parts: Sequence[TaskPart],
     known: Mapping[str, Point] | None = None,
     most_places: int = MOST_PLACES,
+    lifted: LiftedWords | None = None,
 ) -> dict[str, Any]:
     """Return the page's data for a language and the tasks to be shown.
 
     ``known`` are coordinates of places from a file; with more than ``most_places`` no map is drawn.
+    ``lifted`` has the formulas of words that are functions of features.
     """
     first = parts[0].shown.language
     model = first.model
@@ -68,7 +72,7 @@ def page_data(
         task.update(task_summary(part, world))
     return {
         "robots": list(model.robots),
-        **_words(language, model),
+        **(_lifted_words(language, lifted) if lifted else _words(language, model)),
         "default": language.words.index(language.default),
         "things": list(world.things),
         **_map(world, known),
@@ -136,6 +140,27 @@ def _words(language: Language, model: JointModel) -> dict[str, Any]:
             "in_order": descriptions.in_order,
             "order": [language.words.index(word) for word, _ in descriptions.rules],
         },
+    }
+
+
+def _lifted_words(language: Language, lifted: LiftedWords) -> dict[str, Any]:
+    """The words with their formulas over features."""
+    sizes = language.sizes()
+    words = [
+        {
+            "name": word,
+            "size": sizes[word],
+            "rest": False,
+            "terms": list(lifted.terms.get(word, ())[:_TERMS]),
+            "more_terms": max(0, len(lifted.terms.get(word, ())) - _TERMS),
+            "examples": [],
+        }
+        for word in language.words
+    ]
+    return {
+        "words": words,
+        "told": {"in_order": False, "order": list(range(len(words)))},
+        "features": lifted.data()["features"],
     }
 
 

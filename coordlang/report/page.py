@@ -10,11 +10,12 @@ from importlib.metadata import version
 from importlib.resources import files
 from typing import Any
 
+from coordlang.coordinates import Point
+from coordlang.explanation.lifted_words import lifted_words
 from coordlang.explanation.text import counted
 from coordlang.language.provenance import domain_sha256
 from coordlang.language.words import Language
 from coordlang.report.data import MOST_PLACES, page_data
-from coordlang.report.places import Point
 from coordlang.report.shown import select_tasks
 from coordlang.report.task import task_part
 from coordlang.use.sentence.task_language import TaskLanguage
@@ -80,8 +81,16 @@ def make_report(
     """
     selection = select_tasks(language, domain, problems, tasks_shown, seed, options, position)
     parts = [task_part(shown, seed) for shown in selection.tasks]
+    lifted = lifted_words(
+        language,
+        domain,
+        problems[0],
+        parts[0].shown.language.model,
+        coordinates or {},
+        position or Position("the language file"),
+    )
     while True:
-        data = page_data(language, selection, parts, coordinates, most_places)
+        data = page_data(language, selection, parts, coordinates, most_places, lifted)
         html = _render(language, domain, problems, data, seed)
         if len(html) <= largest:
             candidates = int(language.provenance.tasks.get("count", 0))
@@ -117,6 +126,7 @@ def _render(
         robots=_listed(language.provenance.robots),
         words=words,
         in_order=data["told"]["in_order"],
+        features=data.get("features", ()),
         all_listed=language.provenance.tasks.get("kind") == "all",
         terms_open=_TERMS_OPEN if len(words) <= _FEW_WORDS else 1,
         figures=_figures(language),

@@ -11,7 +11,8 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from coordlang.report.places import Point, place_layout
+from coordlang.coordinates import Point
+from coordlang.report.places import place_layout
 from coordlang.report.world import World, find_world
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import UsageError

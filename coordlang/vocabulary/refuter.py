@@ -47,7 +47,8 @@ class Refuter:
 
     Of goals that are images of each other under a symmetry one is walked: a partition is refuted
     by plans of the tasks to an image iff its image under the symmetry is refuted by plans of the
-    tasks to the goal itself.
+    tasks to the goal itself.  At the beginning plans are collected that refute the partition
+    ``first``, by default a single word, where walks are longest.
 
     Attributes
     ----------
@@ -64,15 +65,16 @@ class Refuter:
         states: int,
         seed: int,
         progress: Callable[[str], None] = lambda _: None,
+        first: Ints | None = None,
     ) -> None:
         self.pool = FailingTuples(group, states)
         self.walks = 0
         self._random = np.random.default_rng(seed)
         self._parts = _parts(spaces, self.pool.images, Random(seed))
-        silence = np.zeros(states, np.int64)
+        word = np.zeros(states, np.int64) if first is None else first
         for walked in self._parts:
             progress(f"collecting plans whose mixture fails: {len(self.pool):,}")
-            self._walk(walked, silence)
+            self._walk(walked, word)
 
     def agreeing(
         self, word: Ints, images: Sequence[Ints] | None = None, enough: int = sys.maxsize

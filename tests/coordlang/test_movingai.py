@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from coordlang.coordinates import read_coordinates
 from coordlang.movingai import Agent, planning_files, read_agents, read_map
-from coordlang.report.places import read_coordinates
 from planners.errors import BadInput, UsageError
 from planners.loading import PlanningInstance, load
 from planners.search.optimal_plans import search

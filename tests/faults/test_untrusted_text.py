@@ -75,7 +75,7 @@ class World:
         self.domain, self.problem = folder / "d.pddl", folder / "p.pddl"
         self.language, self.plan = folder / "l.json", folder / "plan"
         self.tasks, self.certificate = folder / "tasks.json", folder / "c.json"
-        self.coordinates = folder / "coordinates.json"
+        self.coordinates, self.lifted = folder / "coordinates.json", folder / "lifted.json"
         self.domain.write_text(renamed(CORRIDOR, names))
         self.problem.write_text(renamed(CORRIDOR_TASK, names))
 
@@ -100,6 +100,8 @@ class World:
         assert built.code == 0, built.err
         self.plan.write_text(coordlang("plans", *self.pddl, "--max", 1).out)
         assert coordlang("tasks", *self.pddl, "-o", self.tasks).code == 0
+        lifted = coordlang("lift", *self.pddl, "--complexity", 5, "-o", self.lifted, "--jobs", 1)
+        assert lifted.code == 0, lifted.err
         places = {self.names.get(name, name): [x, x % 2] for x, name in enumerate("abcd")}
         self.coordinates.write_text(json.dumps({"coordinates": places}))
         return self
@@ -175,6 +177,10 @@ def commands(world: World, sentence: str) -> list[tuple[Any, ...]]:
         ("coordination", *world.pddl, "--robots", f"{robot},x"),
         ("plans", *world.pddl, "--robots", f"{robot},x", "--json"),
         ("report", *spoken, "-o", "-", "--coordinates", world.coordinates),
+        ("lift", *world.pddl, "--complexity", "5", "-o", "-"),
+        ("ground", world.lifted, *world.pddl, "--tasks", "own", "-o", "-"),
+        ("explain", world.lifted, *world.pddl),
+        ("report", world.lifted, *world.pddl, "-o", "-"),
     ]
 
 
@@ -534,6 +540,7 @@ def test_bad_utf8_is_bad_input_with_the_offset(
             ("report", *spoken, "-o", "-", "--coordinates", corridor.coordinates),
         ),
         (corridor.language, ("explain", *spoken)),
+        (corridor.lifted, ("explain", corridor.lifted, *corridor.pddl)),
     ]
     if not packed:
         readers += [(path, ("plans", *corridor.pddl)) for path in corridor.pddl]

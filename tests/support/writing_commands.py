@@ -43,6 +43,8 @@ WRITING = {
         ("tasks", *FILES, "--start", "(at r1 ?)", "--goal", "(at r1 ?)", "-o", "t.json"),
         ("t.json",),
     ),
+    "lift": Writing(("lift", *FILES, "--complexity", "5", "-o", "f.json.gz"), ("f.json.gz",)),
+    "ground": Writing(("ground", "LIFTED", *FILES, "-o", "l.json"), ("l.json",)),
     "understand": Writing(("understand", *SAID, "--max", "5", "-o", "p.txt"), ("p.txt",)),
     "choices": Writing(("choices", *SAID, "--json", "-o", "c.json"), ("c.json",)),
     "export": Writing(("export", *SAID, "-o", "."), ("domain.pddl", "problem.pddl")),
@@ -63,13 +65,16 @@ WRITING = {
 
 
 def given(folder: Path) -> dict[str, str]:
-    """A language file, its certificate and a sentence, by the names that `WRITING` has for them."""
+    """A language file, its certificate, a lifted file and a sentence, by the names that `WRITING` has for them."""
     language, proof = folder / "language.json", folder / "proof.json"
+    lifted = folder / "lifted.json"
     built = coordlang.build(*FILES, tasks="all", method="minimal")
     built.language.save(language)
     write_certificate(built.certificate(), proof)
+    coordlang.lift(*FILES, tasks="all", jobs=1).save(lifted)
     plan = coordlang.plan(built.language, *FILES, prefer=["shortest"])
-    return {"LANGUAGE": str(language), "PROOF": str(proof), "SENTENCE": plan.sentence}
+    files = {"LANGUAGE": str(language), "PROOF": str(proof), "LIFTED": str(lifted)}
+    return {**files, "SENTENCE": plan.sentence}
 
 
 def normal(name: str, data: bytes) -> bytes:

@@ -30,6 +30,8 @@ FUNCTIONS = {
     "explain",
     "export",
     "load_language",
+    "lift",
+    "ground",
 }
 
 
@@ -46,8 +48,8 @@ def test_every_name_is_there() -> None:
     assert set(coordlang.__all__) >= {*FUNCTIONS, "Language", "Monitor", "CoordlangError"}
     for name in coordlang.__all__:
         assert getattr(coordlang, name).__doc__, name
-    with pytest.raises(AttributeError, match="has no attribute 'lift'"):
-        coordlang.lift  # noqa: B018
+    with pytest.raises(AttributeError, match="has no attribute 'teach'"):
+        coordlang.teach  # noqa: B018
 
 
 def test_types_are_those_of_the_lazy_names() -> None:

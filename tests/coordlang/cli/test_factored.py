@@ -132,15 +132,20 @@ def test_every_command(
     folder, language, sentence, plan = loader
     before: dict[str, tuple[object, ...]] = {
         "say": (language, plan),
+        "ground": (tmp_path / "lifted.json",),
         "plan": (language, sentence),
         **dict.fromkeys(("understand", "choices", "export"), (language, sentence)),
         **dict.fromkeys(("verify", "explain", "report"), (language,)),
     }
     output = {
         "build": ("-o", tmp_path / "l.json"),
+        "lift": ("-o", tmp_path / "l.json"),
+        "ground": ("-o", tmp_path / "l.json", "--tasks", "own"),
         "report": ("-o", tmp_path / "page.html"),
         "tasks": ("--start", "(a_pos robot1 ?)", "-o", tmp_path / "tasks.json"),
     }
+    if name == "ground":
+        door.lift(factored=folder, jobs=1).save(tmp_path / "lifted.json")
     arguments = (*before.get(name, ()), "--factored", folder, *output.get(name, ()))
     outcome = coordlang(name, *arguments)
     assert outcome.code == 0, outcome.err

@@ -61,6 +61,8 @@ OVERWRITING = [
     *(("tasks", "d.pddl", "p.pddl", "-o", name) for name in ("d.pddl", "p.pddl")),
     *((*VERIFY, name) for name in (*ALL, "t.json", "proof.json")),
     *((*REPORT, name) for name in (*ALL, "coordinates.json")),
+    *(("lift", *ALL[1:], "-o", name) for name in (*ALL[1:], "coordinates.json")),
+    *(("ground", *ALL, "-o", name) for name in (*ALL, "coordinates.json")),
 ]
 
 

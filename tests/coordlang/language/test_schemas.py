@@ -13,11 +13,14 @@ from typing import Any
 import jsonschema
 import pytest
 
+import coordlang as api
 from coordlang.building import build_language, certificate_of
 from coordlang.certificate import read_certificate, write_certificate
 from coordlang.cli.schema import SCHEMAS
+from coordlang.coordinates import read_coordinates
 from coordlang.language.sentences import task_sentences
-from coordlang.report.places import read_coordinates
+from coordlang.lifted.file import read_lifted
+from coordlang.lifted.file import to_bytes as lifted_bytes
 from coordlang.tasks.listed import ListedTask
 from coordlang.tasks.task_file import read_task_file, tasks_text
 from coordlang.use.choices.choices import choices
@@ -28,7 +31,7 @@ from planners.errors import BadInput
 from planners.search.plan_file import read_plans, to_json
 from planners.search.plans import Plans
 from tests.support.command import Command
-from tests.support.domains import ROOT, all_tasks
+from tests.support.domains import DOMAINS, ROOT, all_tasks
 
 
 @cache
@@ -65,6 +68,13 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any
     texts = {
         "tasks": tasks_text([ListedTask(("(at r1 a)", "(at r2 b)"), ("(at r1 b)",))]),
         "certificate": certificate.read_text(),
+        "lifted": lifted_bytes(
+            api.lift(
+                *(DOMAINS / "grid" / f"{stem}.pddl" for stem in ("domain", "gw1-2x2")),
+                complexity=5,
+                jobs=1,
+            ).language
+        ).decode(),
         "choices": to_bytes(choices(task, words)).decode(),
         "plans": json.dumps(to_json(plans, [plans.unrank(0)])),
         "coordinates": json.dumps({"coordinates": {"a": [0, 0], "b": [1, 0.5]}}),
@@ -75,6 +85,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any
 READ: dict[str, Callable[[Path], object]] = {
     "tasks": read_task_file,
     "certificate": read_certificate,
+    "lifted": read_lifted,
     "choices": lambda path: Monitor.read(str(path), "r1"),
     "plans": lambda path: read_plans(path, all_tasks("three-cells").model),
     "coordinates": read_coordinates,
@@ -93,6 +104,12 @@ WRONG: list[tuple[str, Callable[[dict[str, Any]], object]]] = [
     ("certificate", lambda d: d.update(refuted="2")),
     ("certificate", lambda d: d["reasons"][0].pop("plans")),
     ("certificate", lambda d: d["reasons"][0]["paths"][0]["cells"].append([1])),
+    ("lifted", lambda d: d.update(version=2)),
+    ("lifted", lambda d: d.update(words="w0")),
+    ("lifted", lambda d: d["features"].append({"name": "f"})),
+    ("lifted", lambda d: d["verified"][0].pop("kind")),
+    ("lifted", lambda d: d["verified"][0].update(states=-1)),
+    ("lifted", lambda d: d.pop("robots")),
     ("choices", lambda d: d.update(version=2)),
     ("choices", lambda d: d.pop("choices")),
     ("choices", lambda d: d["choices"][0].pop("states")),

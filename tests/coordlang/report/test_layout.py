@@ -11,8 +11,9 @@ from random import Random
 import numpy as np
 import pytest
 
+from coordlang.coordinates import from_names, read_coordinates
 from coordlang.report.layout import graph_layout, layer_orders, spread
-from coordlang.report.places import from_names, place_layout, read_coordinates
+from coordlang.report.places import place_layout
 from planners.errors import BadInput
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from coordlang.language.partition import Partition
-from coordlang.symmetry.group import symmetry_group
+from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary.failing_tuples import FailingTuples
 from coordlang.vocabulary.refuter import Refuter
@@ -68,3 +68,21 @@ def test_goals_that_are_no_single_states_are_walked_themselves() -> None:
     candidates = own_task("t-map")
     refuter = Refuter(candidates.spaces, symmetry_group(candidates), len(candidates.rows), 0)
     assert [own.images for own in refuter._parts] == [(0,)]
+
+
+def test_what_is_collected_first_may_refute_other_words() -> None:
+    """Fewer plans are known then; what is decided of partitions is the same."""
+    candidates = all_tasks("t-map", "problem")
+    states = len(candidates.rows)
+    group = SymmetryGroup(())
+    words = np.arange(states) // 6
+    silent = Refuter(candidates.spaces, group, states, 0)
+    others = Refuter(candidates.spaces, group, states, 0, first=words)
+    assert 0 < len(others.pool) < len(silent.pool)
+    choice = np.random.default_rng(1)
+    answers = set()
+    for size in (1, 2, 3, 6, states):
+        word = choice.integers(0, size, states) if size < states else np.arange(states)
+        answers.add(bool(silent.violated(word)))
+        assert bool(silent.violated(word)) == bool(others.violated(word))
+    assert answers == {True, False}

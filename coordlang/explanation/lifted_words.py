@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Words that are functions of features, as formulas over these features."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from coordlang.coordinates import Point
+from coordlang.explanation.boxes import Points
+from coordlang.explanation.minimise import minimise
+from coordlang.language.words import Language
+from coordlang.lifted.features import Feature
+from coordlang.lifted.file import vector_of
+from coordlang.lifted.language import LiftedLanguage, Vector
+from coordlang.lifted.notation import feature_of
+from coordlang.lifted.wording import condition, english, formula
+from coordlang.lifted.world import States, World
+from planners.errors import Position, note
+from planners.joint.model import JointModel
+from planners.pddl.lifted import Domain, Problem
+
+
+@dataclass(frozen=True, slots=True)
+class LiftedWords:
+    """Words as formulas over features, the same in every problem of the domain.
+
+    Attributes
+    ----------
+    features
+        The features.
+    terms
+        Word -> the terms of its formula, a disjunction.  It is exact for all values that the lifted
+        language knows and those that states here have.
+    """
+
+    features: tuple[Feature, ...]
+    terms: Mapping[str, tuple[str, ...]]
+
+    def data(self) -> dict[str, Any]:
+        """Return features and formulas as JSON data."""
+        return {
+            "features": [
+                {"definition": str(one), "formula": formula(one), "text": english(one)}
+                for one in self.features
+            ],
+            "words": {word: list(terms) for word, terms in self.terms.items()},
+        }
+
+    def text(self) -> str:
+        """The formulas and what their features are, as text."""
+        lines = ["As functions of features, which other problems of the domain have, too:"]
+        for word, terms in self.terms.items():
+            lines.append(f"  {word}: {' or '.join(terms)}")
+        lines += [f"  {formula(one)} is {english(one)}." for one in self.features]
+        return "\n".join(lines)
+
+
+def lifted_words(
+    language: Language,
+    domain: Domain,
+    problem: Problem,
+    model: JointModel,
+    known: Mapping[str, Point],
+    position: Position,
+) -> LiftedWords | None:
+    """The formulas of a language's words over the features that it records.
+
+    None where it records none, and, with a note, where the features do not give the states the
+    words that the language gives them.  ``known`` are coordinates of places.
+
+    Raises `BadInput` for features or values that are none.
+    """
+    origin = language.provenance.lifted
+    if not origin:
+        return None
+    features = tuple(feature_of(text, position) for text in origin["features"])
+    values = {
+        vector_of(key, len(features), position): word for key, word in origin["values"].items()
+    }
+    table = language.partition(model)
+    states = States(World.of(domain, problem, model, known), table.rows)
+    lifted = LiftedLanguage(features, language.words, values, model.robots)
+    given = [language.words[number] for number in table.word.tolist()]
+    if lifted.words_of(states) != given:
+        note(
+            "the features that the language records do not give its states their words",
+            position=position,
+            remedy="If it was grounded with --coordinates, give them as coordinates.json beside "
+            "the problem.",
+        )
+        return None
+    occurring = dict(zip(map(tuple, lifted.vectors(states).tolist()), given, strict=True))
+    return LiftedWords(features, _terms(features, {**values, **occurring}, language.words))
+
+
+def _terms(
+    features: Sequence[Feature], values: Mapping[Vector, str], words: Sequence[str]
+) -> dict[str, tuple[str, ...]]:
+    """Word -> terms, of the words that have values."""
+    vectors = np.array(sorted(values), np.int64).reshape(len(values), len(features))
+    word = np.array([values[vector] for vector in map(tuple, vectors.tolist())], object)
+    domains = [sorted(set(column)) for column in vectors.T.tolist()]
+    number = np.array(
+        [np.searchsorted(own, column) for own, column in zip(domains, vectors.T, strict=True)],
+        np.int64,
+    ).reshape(len(features), len(values))
+    sizes = tuple(map(len, domains))
+    found = {}
+    for name in words:
+        mine = word == name
+        if mine.any():
+            boxes = minimise(Points(sizes, number.T[mine], number.T[~mine]))
+            found[name] = tuple(_term(features, domains, box) for box in boxes.prime)
+    return found
+
+
+def _term(
+    features: Sequence[Feature], domains: Sequence[Sequence[int]], box: np.ndarray[Any, Any]
+) -> str:
+    """A conjunction of limits on features; the empty one is ``true``."""
+    parts = []
+    first = 0
+    for feature, own in zip(features, domains, strict=True):
+        allowed = [value for value, inside in zip(own, box[first:], strict=False) if inside]
+        first += len(own)
+        if len(allowed) == len(own):
+            continue
+        limits = [condition(feature, value) for value in allowed]
+        parts.append(limits[0] if len(limits) == 1 else f"({' or '.join(limits)})")
+    return " and ".join(parts) or "true"

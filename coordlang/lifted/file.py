@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lifted files: JSON in and out (docs/formats.md)."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+from msgspec import Meta
+
+from coordlang.language.duplicate_keys import duplicate_key
+from coordlang.language.record import DomainRecord, ModelRecord
+from coordlang.lifted.language import LiftedLanguage, Vector, Verified
+from coordlang.lifted.notation import feature_of
+from coordlang.tasks.candidates import Kind
+from planners.errors import BadInput, Position
+from planners.files import FileFormat, read_bytes, require_seen
+from planners.messages import echoed
+from planners.writing import write_compressed
+
+#: What words of states are called whose values a language does not have.
+_OWN_WORD = re.compile(r"v-?[0-9]+([.]-?[0-9]+)*")
+_LIFT_AGAIN = "Copy the file again, or learn the language again: `coordlang lift`."
+
+
+class FeatureRecord(msgspec.Struct):
+    """A feature of states."""
+
+    name: Annotated[str, Meta(description="Its name, for people.")]
+    definition: Annotated[str, Meta(description="What it is, as an s-expression.")]
+    complexity: Annotated[int, Meta(description="How much there is to say.")]
+
+
+class VerifiedRecord(msgspec.Struct):
+    """A problem on which the language was verified by definition."""
+
+    problem: Annotated[str, Meta(description="The problem's name.")]
+    sha256: Annotated[str, Meta(description="The SHA-256 of its objects and static facts.")]
+    kind: Annotated[
+        Kind, Meta(description="All pairs of states, those of problems, or those of a task file.")
+    ]
+    states: Annotated[int, Meta(description="How many states there are on its plans.", ge=0)]
+    tasks: Annotated[int, Meta(description="How many candidate tasks it has.", ge=0)]
+    words: Annotated[int, Meta(description="How many words its states have.", ge=0)]
+
+
+class LiftedRecord(msgspec.Struct):
+    """A lifted file, version 1.  Keys that are not listed here are ignored by readers."""
+
+    format: Annotated[str, Meta(description="What kind of file this is.")]
+    version: Annotated[int, Meta(description="Readers refuse a version that they do not know.")]
+    domain: DomainRecord
+    robots: Annotated[list[str], Meta(description="The robots, in the order of joint actions.")]
+    features: Annotated[list[FeatureRecord], Meta(description="What is looked at.")]
+    words: Annotated[list[str], Meta(description="The words.")]
+    values: Annotated[
+        dict[str, str],
+        Meta(
+            description="The features' values, in their order, joined by blanks -> word. States "
+            "with other values have words of their own."
+        ),
+    ]
+    verified: Annotated[
+        list[VerifiedRecord],
+        Meta(description="The problems on which this was verified; of others nothing is claimed."),
+    ]
+    model: ModelRecord = msgspec.field(default_factory=ModelRecord)
+    names_robots: Annotated[
+        bool, Meta(description="Whether the robots were named, as in --robots.")
+    ] = False
+    producer: Annotated[
+        dict[str, Any], Meta(description="Version and arguments; may differ between two runs.")
+    ] = {}
+
+
+LIFTED = FileFormat("lifted", "lifted file", LiftedRecord, "coordlang/lifted")
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema of lifted files."""
+    return LIFTED.json_schema()
+
+
+def to_bytes(lifted: LiftedLanguage) -> bytes:
+    """The text of a lifted file: the same language gives the same bytes."""
+    data = {
+        "format": LIFTED.format,
+        "version": LIFTED.version,
+        "domain": dict(lifted.domain),
+        "robots": list(lifted.robots),
+        "model": dict(lifted.model),
+        "names_robots": lifted.names_robots,
+        "features": [
+            {"name": f"f{k}", "definition": str(feature), "complexity": feature.complexity}
+            for k, feature in enumerate(lifted.features)
+        ],
+        "words": list(lifted.words),
+        "values": {
+            " ".join(map(str, vector)): word for vector, word in sorted(lifted.values.items())
+        },
+        "verified": [asdict(known) for known in lifted.verified],
+        "producer": dict(lifted.producer),
+    }
+    return msgspec.json.format(msgspec.json.encode(data), indent=1) + b"\n"
+
+
+def write_lifted(lifted: LiftedLanguage, path: str | Path) -> None:
+    """Write a lifted file (gzip for ``.gz``); it is complete or not there at all."""
+    write_compressed(path, to_bytes(lifted), level=6)
+
+
+def read_lifted(path: str | Path) -> LiftedLanguage:
+    """Read a lifted file.
+
+    Raises `BadInput` for a file that is missing, cut off, of another format or version, or that
+    contradicts itself.
+    """
+    return lifted_from_bytes(read_bytes(path), Position(str(path)))
+
+
+def lifted_from_bytes(data: bytes, position: Position) -> LiftedLanguage:
+    """The language in the text of a lifted file; see `read_lifted`."""
+    record = LIFTED.decode(data, position)
+    twice = duplicate_key(data, b"", 0)
+    if twice is not None:
+        raise BadInput(
+            f"the key {echoed(twice)} occurs twice",
+            position=position,
+            remedy="Of two entries one would be lost.",
+        )
+    _check_names(record, position)
+    _check_words(record, position)
+    features = tuple(feature_of(own.definition, position) for own in record.features)
+    values = {vector_of(key, len(features), position): w for key, w in record.values.items()}
+    return LiftedLanguage(
+        features,
+        tuple(record.words),
+        values,
+        tuple(record.robots),
+        _present(record.domain),
+        _present(record.model),
+        record.names_robots,
+        tuple(Verified(**msgspec.to_builtins(known)) for known in record.verified),
+        record.producer,
+    )
+
+
+def _check_names(record: LiftedRecord, position: Position) -> None:
+    """Raise `BadInput` for what people cannot see, and for robots that are no team."""
+    names = [*record.words, *record.robots, record.domain.name]
+    names += [own.definition for own in record.features]
+    for name in (*names, *(known.problem for known in record.verified)):
+        require_seen(name, position)
+    if len(set(record.robots)) < len(record.robots) or not record.robots:
+        raise BadInput(
+            "the robots must be different, and at least one",
+            position=position,
+            remedy=_LIFT_AGAIN,
+        )
+
+
+def _check_words(record: LiftedRecord, position: Position) -> None:
+    words = set(record.words)
+    if len(words) < len(record.words) or not words or any(w.split() != [w] for w in words):
+        raise BadInput(
+            "the words must be different, without blanks, and at least one",
+            position=position,
+            remedy=_LIFT_AGAIN,
+        )
+    unknown = sorted({*record.values.values()} - words)
+    if unknown:
+        raise BadInput(
+            f"'values' has the word {echoed(unknown[0])}, which 'words' has not",
+            position=position,
+            remedy=_LIFT_AGAIN,
+        )
+    if own := sorted(filter(_OWN_WORD.fullmatch, words)):
+        raise BadInput(
+            f"{echoed(own[0])} is what states with unknown values are called",
+            position=position,
+            remedy="Give the word another name.",
+        )
+
+
+def vector_of(key: str, size: int, position: Position) -> Vector:
+    """The values in a key.  Raises `BadInput` for anything else than so many whole numbers."""
+    try:
+        vector = tuple(map(int, key.split()))
+    except ValueError:
+        vector = ()
+    if len(vector) != size or " ".join(map(str, vector)) != key:
+        raise BadInput(
+            f"{echoed(key)} are no values of {size} features",
+            position=position,
+            remedy=_LIFT_AGAIN,
+        )
+    return vector
+
+
+def _present(record: msgspec.Struct) -> dict[str, Any]:
+    return {key: value for key, value in msgspec.to_builtins(record).items() if value is not None}

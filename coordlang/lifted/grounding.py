@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A lifted language in one problem: an ordinary language, which says what is known of it there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+from coordlang.language.provenance import Guarantee, Provenance, provenance_of
+from coordlang.language.words import Language
+from coordlang.lifted.language import LiftedLanguage, Verified
+from coordlang.lifted.world import States
+from coordlang.tasks.candidates import Candidates
+from planners.errors import BadInput, Position
+
+#: Whether the words were verified in the problem, refuted there, or neither.
+Known = Literal["verified", "refuted", "unknown"]
+
+#: Problems that a guarantee names.
+_NAMED = 6
+
+
+def described(lifted: LiftedLanguage) -> Language:
+    """What a lifted language records of domain and model, as a language without states."""
+    robots = lifted.robots if lifted.names_robots else ()
+    provenance = Provenance(robots, None, lifted.domain, lifted.model)
+    return Language(lifted.words, {}, lifted.words[0], provenance=provenance)
+
+
+def require_robots(lifted: LiftedLanguage, robots: Sequence[str], position: Position) -> None:
+    """Raise `BadInput` for other robots than those that the words are about."""
+    if tuple(robots) != lifted.robots:
+        raise BadInput(
+            f"the words are about {', '.join(lifted.robots)}, and the robots here are "
+            f"{', '.join(robots)}",
+            position=position,
+            remedy="Use a problem with these robots, or name them with --robots.",
+        )
+
+
+def guarantee_text(known: Known, verified: Sequence[Verified]) -> str:
+    """What is known of a grounded language, and never more than that."""
+    if known != "unknown":
+        return f"lifted; {known} here"
+    names = list(dict.fromkeys(one.problem for one in verified))
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return f"lifted; verified on {', '.join(names[:_NAMED]) or 'no problem'}{more}"
+
+
+def grounded(
+    lifted: LiftedLanguage,
+    candidates: Candidates,
+    states: States,
+    known: Known,
+    producer: Mapping[str, Any],
+    *,
+    every_word: bool = False,
+) -> Language:
+    """The words of the states on plans of candidate tasks.
+
+    Parameters
+    ----------
+    lifted
+        The lifted language.
+    candidates, states
+        The tasks, and the states on their plans.
+    known
+        Unless the words were verified, the language covers no task: it guarantees nothing.
+    producer
+        Who made it, and how.
+    every_word
+        Whether it has the words that no state here has.
+    """
+    partition = lifted.partition(states, every_word=every_word)
+    size = len(partition.words)
+    method = guarantee_text(known, lifted.verified)
+    provenance = provenance_of(candidates, Guarantee(method, size, 1, size == 1), producer)
+    tasks = provenance.tasks if known == "verified" else {"kind": "problems", "count": 0}
+    origin = {
+        "features": [str(feature) for feature in lifted.features],
+        "values": {
+            " ".join(map(str, vector)): word for vector, word in sorted(lifted.values.items())
+        },
+        "verified": [one.problem for one in lifted.verified],
+    }
+    provenance = Provenance(
+        provenance.robots,
+        provenance.guarantee,
+        provenance.domain,
+        provenance.model,
+        tasks,
+        provenance.producer,
+        origin,
+    )
+    return Language.of(partition, candidates.model, provenance)

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A problem that words are learned from, or verified on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from coordlang.coordinates import Point
+from coordlang.language.partition import Partition
+from coordlang.lifted.features import Feature
+from coordlang.lifted.world import States, World
+from coordlang.tasks.candidates import Candidates
+from coordlang.verification.pieces import verify_candidates
+from planners.pieces.processes import Processes
+from planners.pieces.work import Runner
+from planners.tables import Ints
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Instance:
+    """A problem with its candidate tasks, and coordinates of its places where a file has them."""
+
+    candidates: Candidates
+    points: Mapping[str, Point] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """The problem's name."""
+        return self.candidates.loaded.problems[0].name
+
+    @cached_property
+    def states(self) -> States:
+        """The states on plans of the candidate tasks."""
+        return States(World.loaded(self.candidates.loaded, self.points), self.candidates.rows)
+
+    def vectors(self, chosen: Sequence[Feature]) -> Ints:
+        """The values of features: (states, features)."""
+        columns = [self.states.get(feature) for feature in chosen]
+        return np.array(columns, np.int64).reshape(len(columns), len(self.states)).T
+
+    def holds(
+        self, words: Ints, runner: Runner | None = None, progress: Progress | None = None
+    ) -> bool:
+        """Whether words of the states are a language for the candidate tasks, by definition."""
+        names = [f"w{k}" for k in range(int(words.max(initial=0)) + 1)]
+        partition = Partition.of_table(names, self.candidates.rows, words)
+        runner, progress = runner or Processes(jobs=1), progress or (lambda _: None)
+        return verify_candidates(partition, self.candidates, runner, progress).holds

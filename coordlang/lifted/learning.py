@@ -1,0 +1,320 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Problems of a domain -> features whose classes are words of a language for all of them.
+
+Clauses of failing plans say which states must be told apart; the simplest features that do are
+looked for; where some plans with equal features still fail, these are clauses, too, until there are
+none.  Then problems that were held back are verified by definition; one that is refuted is learned
+from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from coordlang.language.warping import Clause
+from coordlang.lifted.choosing import SimplestHitting
+from coordlang.lifted.features import Feature
+from coordlang.lifted.instance import Instance, Progress
+from coordlang.lifted.language import Vector
+from coordlang.lifted.merging import Merged, merge_classes
+from coordlang.lifted.pool import Pool, pool_of
+from coordlang.lifted.world import States
+from coordlang.symmetry.group import SymmetryGroup
+from coordlang.vocabulary.refuter import Refuter
+from planners.errors import ProvedImpossible
+from planners.limits import run_until_stopped
+from planners.pieces.processes import Processes
+from planners.pieces.work import Runner
+from planners.tables import Bools, Ints
+
+#: What comes first: simple features, then few words over them, or the other way round.  None:
+#: simple features, and a word for each of their combinations.
+Preference = Literal["features", "words"]
+
+#: Sets of features that are tried for fewer words.
+_TRIED = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Learned:
+    """Features of which the words of a language are functions.
+
+    Attributes
+    ----------
+    features
+        In the order of their complexity.
+    word
+        The number of the word for the features' values, for those that occur.
+    proved
+        Whether fewer words are proved not to suffice, as functions of these features.
+    sizes
+        For each problem, known ones first, the numbers of states, tasks and words.
+    tried, pool
+        How many features were looked at (with the concepts and numbers of which they are made), and
+        how many of them differ.
+    rounds
+        How often classes were refuted.
+    taken
+        How many problems were learned from: the known ones, and those held back that refuted what
+        had been learned.
+    stopped
+        What ended the search for fewer words, or None: the words are verified all the same.
+    """
+
+    features: tuple[Feature, ...]
+    word: Mapping[Vector, int]
+    proved: bool
+    sizes: tuple[tuple[int, int, int], ...]
+    tried: int
+    pool: int
+    rounds: int
+    taken: int
+    stopped: BaseException | None = None
+
+
+def learn(
+    known: Sequence[Instance],
+    held_back: Sequence[Instance] = (),
+    *,
+    complexity: int = 8,
+    prefer: Preference | None = None,
+    seed: int = 0,
+    progress: Progress = lambda _: None,
+    runner: Runner | None = None,
+) -> Learned:
+    """The simplest features that suffice for the candidate tasks of all these problems.
+
+    Each class of states with equal features has a word of its own; under ``prefer`` classes share
+    words, as far as that is found before a limit; then the words so far are returned, with
+    ``stopped`` set.  ``held_back`` are learned from only where they refute what was
+    learned from ``known``.  Places of different maps are named, as landmarks, only where no other
+    features suffice.
+
+    Raises
+    ------
+    ProvedImpossible
+        If no features up to this ``complexity`` suffice; the error has the states that must be told
+        apart.
+    """
+    runner = runner or Processes(jobs=1)
+    learner = _Learner(complexity, seed, progress)
+    every = [*known, *held_back]
+    for own in known:
+        learner.take(own)
+    learner.begin()
+    found = [_verified(learner, None, every, runner, progress)]
+    if prefer is None:
+        return found[0]
+    stopped = run_until_stopped(
+        lambda: found.append(_verified(learner, prefer, every, runner, progress))
+    )
+    return replace(found[-1], stopped=stopped)
+
+
+def _verified(
+    learner: _Learner,
+    prefer: Preference | None,
+    every: Sequence[Instance],
+    runner: Runner,
+    progress: Progress,
+) -> Learned:
+    """Words that are verified on every problem; those that refute some are learned from."""
+    while True:
+        try:
+            words = learner.best(prefer, every)
+        except ProvedImpossible:
+            if learner.landmarks:
+                raise
+            learner.begin(landmarks=True)
+            continue
+        refuted = _refuted(words, every, runner, progress)
+        if refuted is None:
+            return learner.learned(words, every)
+        own, of_states = refuted
+        assert own not in learner.taken, "what was learned from is a language there"
+        learner.take(own, of_states)
+        learner.begin(learner.landmarks)
+
+
+def _refuted(
+    words: _Words, every: Sequence[Instance], runner: Runner, progress: Progress
+) -> tuple[Instance, Ints] | None:
+    """The first problem that refutes words, and the words of its states; None if there is none."""
+    for own, of_states in zip(every, words.of_states, strict=True):
+        if not own.holds(of_states, runner, progress):
+            return own, of_states
+    return None
+
+
+def find_vectors(table: Ints, vectors: Ints) -> Ints:
+    """The number of each vector in a table of different ones, which has them all."""
+    number = {tuple(vector): k for k, vector in enumerate(table.tolist())}
+    return np.array([number[tuple(vector)] for vector in vectors.tolist()], np.int64)
+
+
+@dataclass(frozen=True, slots=True)
+class _Words:
+    """Words over features.
+
+    ``table`` has the values of the classes, ``merged`` their words, ``of_states`` the words of each
+    problem's states.
+    """
+
+    features: tuple[Feature, ...]
+    table: Ints
+    merged: Merged
+    of_states: tuple[Ints, ...]
+
+    @property
+    def size(self) -> int:
+        return len(set(self.merged.words))
+
+
+class _Learner:
+    """What was learned from, and the clauses that it gave."""
+
+    def __init__(self, complexity: int, seed: int, progress: Progress) -> None:
+        self.taken: list[Instance] = []
+        self.rounds = 0
+        self.landmarks = False
+        self._complexity, self._seed, self._progress = complexity, seed, progress
+        self._refuters: list[Refuter] = []
+        self._clauses: list[dict[Clause, None]] = []
+        self._pool = Pool((), np.zeros((0, 0), np.int64), 0)
+        self._tables: list[Ints] = []
+
+    def take(self, own: Instance, refuted: Ints | None = None) -> None:
+        """Learn from this problem, too; words of its states that it refutes give the first clauses.
+
+        With many robots plans fail in too many ways for all of them to be looked at.
+        """
+        group = SymmetryGroup(())  # features need not be symmetric
+        candidates = own.candidates
+        rows = len(candidates.rows)
+        self.taken.append(own)
+        self._refuters.append(
+            Refuter(candidates.spaces, group, rows, self._seed, self._progress, refuted)
+        )
+        self._clauses.append({})
+
+    def begin(self, landmarks: bool = False) -> None:
+        """Find the features that there are in the problems that were taken."""
+        self.landmarks = landmarks
+        states = [States(own.states.world, own.states.rows) for own in self.taken]
+        self._progress("finding features that tell states apart")
+        self._pool = pool_of(states, self._complexity, landmarks)
+        ends = np.cumsum([len(own) for own in states])
+        self._tables = np.split(self._pool.values, ends[:-1], axis=1)
+
+    def best(self, prefer: Preference | None, every: Sequence[Instance]) -> _Words:
+        """Words over the simplest features; if words come first, over those with fewest words."""
+        found: list[_Words] = []
+        excluded: list[int] = []
+        for _ in range(_TRIED if prefer == "words" else 1):
+            try:
+                chosen = self._choose(excluded)
+            except ProvedImpossible:
+                if not found:
+                    raise
+                break
+            found.append(self._words(chosen, prefer, every))
+            if found[-1].size == 1 or not chosen:
+                break
+            excluded.append(max(chosen, key=lambda k: self._pool.features[k].complexity))
+        return min(found, key=lambda words: words.size)
+
+    def learned(self, words: _Words, every: Sequence[Instance]) -> Learned:
+        """What was learned, with words numbered as they come."""
+        sizes = tuple(
+            (len(own.states), own.candidates.count, len(np.unique(of_states)))
+            for own, of_states in zip(every, words.of_states, strict=True)
+        )
+        number = {word: k for k, word in enumerate(dict.fromkeys(words.merged.words))}
+        word = {
+            tuple(vector): number[own]
+            for vector, own in zip(words.table.tolist(), words.merged.words, strict=True)
+        }
+        return Learned(
+            words.features,
+            word,
+            words.merged.proved,
+            sizes,
+            self._pool.tried,
+            len(self._pool.features),
+            self.rounds,
+            len(self.taken),
+        )
+
+    def _words(
+        self, chosen: Sequence[int], prefer: Preference | None, every: Sequence[Instance]
+    ) -> _Words:
+        features = tuple(self._pool.features[k] for k in chosen)
+        vectors = [own.vectors(features) for own in every]
+        table = np.unique(np.concatenate(vectors), axis=0)
+        classes = [find_vectors(table, own) for own in vectors]
+        merged = Merged(tuple(range(len(table))), len(table) == 1)
+        if prefer is not None:
+            known = [classes[every.index(own)] for own in self.taken]
+            merged = merge_classes(len(table), known, self._clauses, self._refuting, self._progress)
+        of_class = np.array(merged.words, np.int64)
+        return _Words(features, table, merged, tuple(of_class[own] for own in classes))
+
+    def _refuting(self, number: int, words: Ints) -> Mapping[Clause, object]:
+        found = self._refuters[number].violated(words)
+        self._clauses[number].update(dict.fromkeys(found))
+        return found
+
+    def _choose(self, excluded: Sequence[int]) -> list[int]:
+        """The simplest features that nothing refutes in the problems that were taken."""
+        hitting = SimplestHitting([feature.complexity for feature in self._pool.features])
+        for number, clauses in enumerate(self._clauses):
+            for clause in clauses:
+                hitting.add(self._separating(number, clause, excluded))
+        chosen = hitting.find()
+        number = 0
+        while number < len(self._tables):  # until none of them refutes the same features
+            found = self._violated(number, chosen)
+            for clause in found:
+                hitting.add(self._separating(number, clause, excluded))
+            number = 0 if found else number + 1
+            if found:
+                chosen = hitting.find()
+        return chosen
+
+    def _violated(self, number: int, chosen: Sequence[int]) -> list[Clause]:
+        """Clauses that the classes of features violate in one problem."""
+        _, word = np.unique(self._tables[number][chosen].T, axis=0, return_inverse=True)
+        found = self._refuting(number, word.reshape(-1).astype(np.int64))
+        if found:
+            self.rounds += 1
+            self._progress(
+                f"choosing among {len(self._pool.features):,} features: {len(chosen)} were refuted "
+                f"({self.rounds} times)"
+            )
+        return list(found)
+
+    def _separating(self, number: int, clause: Clause, excluded: Sequence[int]) -> Bools:
+        """The features that tell some pair of a clause apart."""
+        pairs = np.array(sorted(clause))
+        table = self._tables[number]
+        apart: Bools = (table[:, pairs[:, 0]] != table[:, pairs[:, 1]]).any(axis=1)
+        apart[list(excluded)] = False
+        if not apart.any():
+            raise self._too_weak(number, clause)
+        return apart
+
+    def _too_weak(self, number: int, clause: Clause) -> ProvedImpossible:
+        own = self.taken[number]
+        one, other = min(clause)
+        model, rows = own.candidates.model, own.candidates.rows
+        return ProvedImpossible(
+            f"no feature up to complexity {self._complexity} tells states apart of which every "
+            f"language separates some, such as {model.state_text(rows[one])} and "
+            f"{model.state_text(rows[other])} of {own.name}",
+            remedy="Allow more complex features, or name places so that they say where they lie "
+            "(c2-3).",
+        )

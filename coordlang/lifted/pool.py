@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""All features up to a complexity that are defined in given problems; equal ones once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations, product
+
+import numpy as np
+
+from coordlang.lifted.attributes import positions
+from coordlang.lifted.concepts import (
+    Both,
+    Concept,
+    Everything,
+    Gap,
+    Named,
+    One,
+    Role,
+    Size,
+    Some,
+    Without,
+)
+from coordlang.lifted.features import (
+    Attribute,
+    Count,
+    Distance,
+    Feature,
+    Least,
+    Number,
+    Residue,
+    Same,
+    Sign,
+    Term,
+)
+from coordlang.lifted.world import ANY, States, World, named_objects
+from planners.tables import Ints
+
+#: Objects that a count names, at most.
+_NAMED = 2
+#: More complex concepts are left out where there are so many, or where their tables have so many
+#: entries.
+_CONCEPTS = 1_000
+_ENTRIES = 200_000_000
+#: What the numbers of features are divided by, and cut at.
+_MODULI = (2, 3, 4)
+_MOSTS = (1, 2, 3)
+
+
+@dataclass(frozen=True, slots=True)
+class Pool:
+    """Features that differ in given states, simple ones first.
+
+    Attributes
+    ----------
+    features
+        Of all features that tell the same states apart the simplest one.
+    values
+        What they are: (features, states), states of all tables one after another.
+    tried
+        How many features were looked at, and concepts and numbers of which they are made.
+    """
+
+    features: tuple[Feature, ...]
+    values: Ints
+    tried: int
+
+
+def pool_of(states: Sequence[States], most: int, landmarks: bool = False) -> Pool:
+    """The features up to a complexity that tell some of these states apart.
+
+    With ``landmarks`` they may name places that all problems have, however different their maps.
+    """
+    vocabulary = _Vocabulary.of([own.world for own in states], landmarks)
+    concepts = _concepts(vocabulary, states, most)
+    found = set(_numbers(vocabulary, concepts, most))
+    numbers = _different_numbers(found, states)
+    kept: list[Feature] = []
+    table: list[Ints] = []
+    seen: set[bytes] = set()
+    tried = len(concepts) + len(found)
+    for feature in _ordered(_features(vocabulary, numbers, most), most):
+        tried += 1
+        values = _values(feature, states)
+        key, classes = _partition(values)
+        if classes > 1 and key not in seen:
+            seen.add(key)
+            kept.append(feature)
+            table.append(values)
+    shape = len(kept), sum(map(len, states))
+    return Pool(tuple(kept), np.array(table, np.int64).reshape(shape), tried)
+
+
+def _ordered(found: Iterable[Feature], most: int) -> list[Feature]:
+    chosen = (feature for feature in set(found) if feature.complexity <= most)
+    return sorted(chosen, key=lambda feature: (feature.complexity, str(feature)))
+
+
+def _values(feature: Feature, states: Sequence[States]) -> Ints:
+    """A feature's values, not kept: there are many features, of which few are used."""
+    return np.concatenate([feature.read(own) for own in states])
+
+
+def _partition(values: Ints) -> tuple[bytes, int]:
+    """What states values tell apart: classes numbered by first occurrence, and how many."""
+    classes, number = np.unique(values, return_inverse=True)
+    first = np.full(len(classes), len(values))
+    np.minimum.at(first, number, np.arange(len(values)))
+    return np.argsort(np.argsort(first))[number].astype(np.int16).tobytes(), len(classes)
+
+
+# What there is to say
+
+
+@dataclass(frozen=True, slots=True)
+class _Vocabulary:
+    """What features may mention.
+
+    Attributes
+    ----------
+    named
+        Objects that all problems have.
+    fluents
+        Fluent predicates with their numbers of arguments.
+    relations
+        Static relations.
+    paths
+        Those of them along which all problems have positions.
+    sets
+        Types, and predicates with one argument.
+    """
+
+    named: tuple[str, ...]
+    fluents: tuple[tuple[str, int], ...]
+    relations: tuple[str, ...]
+    paths: tuple[str, ...]
+    sets: tuple[str, ...]
+
+    @classmethod
+    def of(cls, worlds: Sequence[World], landmarks: bool) -> _Vocabulary:
+        fluents = {known for world in worlds for known in world.predicates.items()}
+        relations = sorted({name for world in worlds for name in world.relations})
+        paths = (
+            name
+            for name in relations
+            if all(positions(world.relations.get(name, ())) for world in worlds)
+        )
+        sets = {name for world in worlds for name in world.types}
+        sets |= {name for name, arity in fluents if arity == 1}
+        sets |= {
+            name
+            for world in worlds
+            for name, tuples in world.statics.items()
+            if len(tuples[0]) == 1
+        }
+        return cls(
+            named_objects(worlds, landmarks),
+            tuple(sorted(fluents)),
+            tuple(relations),
+            tuple(paths),
+            tuple(sorted(sets - {str(Everything())})),  # what is called so is not read back
+        )
+
+    def terms(self) -> Iterator[Term]:
+        for predicate, arity in self.fluents:
+            if arity == 2:
+                for name in self.named:
+                    yield Term(predicate, name)
+                    yield Term(predicate, name, inverse=True)
+
+    def roles(self) -> Iterator[Role]:
+        binary = [name for name, arity in self.fluents if arity == 2]
+        for name in (*binary, *self.relations):
+            yield Role(name)
+            yield Role(name, inverse=True)
+        for name in self.relations:
+            yield Role(name, closure=True)
+            yield Role(name, inverse=True, closure=True)
+
+
+def _features(vocabulary: _Vocabulary, numbers: Sequence[Number], most: int) -> Iterator[Feature]:
+    for number in numbers:
+        yield from (Residue(number, modulus) for modulus in _MODULI)
+        yield from (Least(number, cut) for cut in _MOSTS)
+    for one, other in combinations(numbers, 2):
+        if 1 + one.complexity + other.complexity <= most and _comparable(one, other):
+            yield Sign(one, other)
+    yield from (Same(one, other) for one, other in combinations(vocabulary.terms(), 2))
+
+
+def _comparable(one: Number, other: Number) -> bool:
+    if isinstance(one, Attribute) and isinstance(other, Attribute):
+        return (one.name, one.relation) == (other.name, other.relation)
+    if isinstance(one, Count) and isinstance(other, Count):
+        return (one.predicate, one.args.count(ANY)) == (other.predicate, other.args.count(ANY))
+    return isinstance(one, Size) and isinstance(other, Size)
+
+
+def _numbers(vocabulary: _Vocabulary, concepts: Sequence[Concept], most: int) -> Iterator[Number]:
+    terms = list(vocabulary.terms())
+    kinds = [("row", ""), ("column", "")]
+    kinds += [("degree", relation) for relation in vocabulary.relations]
+    kinds += [("position", relation) for relation in vocabulary.paths]
+    yield from (Attribute(*kind, term) for kind in kinds for term in terms)
+    for relation in vocabulary.relations:
+        yield from (Distance(relation, *pair) for pair in combinations(terms, 2))
+    for predicate, arity in vocabulary.fluents:
+        for args in product((ANY, *vocabulary.named), repeat=arity):
+            if sum(arg != ANY for arg in args) <= _NAMED:
+                yield Count(predicate, args)
+    yield from _numbers_of_concepts(vocabulary, concepts, most - 2)
+
+
+def _numbers_of_concepts(
+    vocabulary: _Vocabulary, concepts: Sequence[Concept], most: int
+) -> Iterator[Number]:
+    """Sizes and gaps of at most a complexity."""
+    yield from (Size(concept) for concept in concepts if 1 + concept.complexity <= most)
+    for one, other in combinations(concepts, 2):
+        if 1 + one.complexity + other.complexity <= most:
+            yield from (Gap(relation, one, other) for relation in vocabulary.relations)
+
+
+def _different_numbers(found: Iterable[Number], states: Sequence[States]) -> list[Number]:
+    """The simplest of equal numbers; none that is the same in all states."""
+    kept = []
+    seen: set[bytes] = set()
+    for number in sorted(set(found), key=lambda own: (own.complexity, str(own))):
+        values = np.concatenate([number.read(own) for own in states])
+        key = values.astype(np.int32).tobytes()
+        if key not in seen and len(values) and (values != values[0]).any():
+            seen.add(key)
+            kept.append(number)
+    for number in kept:
+        for own in states:
+            own.get(number)
+    return kept
+
+
+def _concepts(vocabulary: _Vocabulary, states: Sequence[States], most: int) -> list[Concept]:
+    """Concepts that differ, simple ones first; the rest is left out where they are too many."""
+    seen: set[bytes] = set()
+    levels: list[list[Concept]] = [[]]
+    entries = sum(len(own) * len(own.world.objects) for own in states)
+    for complexity in range(1, most - 2):
+        level: list[Concept] = []
+        for concept in sorted(_next_concepts(vocabulary, levels, complexity), key=str):
+            members = [concept.read(own) for own in states]
+            key = b"".join(np.packbits(own).tobytes() for own in members)
+            if key not in seen:
+                seen.add(key)
+                level.append(concept)
+                for own, table in zip(states, members, strict=True):
+                    own.known[concept] = table
+            if len(seen) > _CONCEPTS or len(seen) * entries > _ENTRIES:
+                return [concept for known in (*levels, level) for concept in known]
+        levels.append(level)
+    return [concept for level in levels for concept in level]
+
+
+def _next_concepts(
+    vocabulary: _Vocabulary, levels: Sequence[Sequence[Concept]], complexity: int
+) -> Iterator[Concept]:
+    """Concepts of a complexity, made of those of less."""
+    if complexity == 1:
+        yield Everything()
+        yield from map(Named, vocabulary.sets)
+        yield from map(One, vocabulary.named)
+    yield from map(Without, levels[complexity - 1])
+    for role in vocabulary.roles():
+        if role.complexity < complexity:
+            yield from (Some(role, concept) for concept in levels[complexity - role.complexity])
+    for left in range(1, complexity - 1):
+        right = complexity - 1 - left
+        if left < right:
+            yield from (Both(*pair) for pair in product(levels[left], levels[right]))
+        elif left == right:
+            yield from (Both(*pair) for pair in combinations(levels[left], 2))

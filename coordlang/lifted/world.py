@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The problem that features are read in: its objects, what never changes, and tables of states.
+
+Numbers of objects are positions in the sorted list of their names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+
+from coordlang.coordinates import Point, from_names
+from planners.joint.model import JointModel
+from planners.joint.states import TrueFacts
+from planners.loading import PlanningInstance
+from planners.pddl.lifted import Domain, Problem
+from planners.pddl.robots import static_atoms
+from planners.tables import Bools, Ints, Rows
+
+#: No object, or a number that is not defined.
+NONE = -1
+#: In place of an argument: any object.
+ANY = "_"
+
+Pair = tuple[str, str]
+
+
+@dataclass(frozen=True)
+class World:
+    """A problem of a domain, as features see it.
+
+    Attributes
+    ----------
+    objects
+        All objects, by name, sorted.
+    robots
+        The names of the robots, in the order of the model.
+    types
+        Type -> its objects.
+    statics
+        Predicate -> the argument tuples of its static atoms, sorted.
+    model
+        The joint model, whose states are read.
+    points
+        Where places lie, x to the right and y down: of a file, else of names such as ``c2-3``.
+    """
+
+    objects: tuple[str, ...]
+    robots: tuple[str, ...]
+    types: Mapping[str, frozenset[str]]
+    statics: Mapping[str, Sequence[tuple[str, ...]]]
+    model: JointModel
+    points: Mapping[str, Point] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls,
+        domain: Domain,
+        problem: Problem,
+        model: JointModel,
+        known: Mapping[str, Point] | None = None,
+    ) -> World:
+        """The world of a problem, with ``known`` coordinates of places if there are any."""
+        statics: dict[str, list[tuple[str, ...]]] = {}
+        for atom in static_atoms(domain, problem):
+            statics.setdefault(atom.predicate, []).append(atom.args)
+        types: dict[str, set[str]] = {}
+        for name, own in problem.objects.items():
+            for kind in frozenset().union(*map(domain.supertypes, own)):
+                types.setdefault(kind, set()).add(name)
+        ordered = {name: sorted(own) for name, own in sorted(statics.items())}
+        return cls(
+            tuple(sorted(problem.objects)),
+            model.robots,
+            {kind: frozenset(own) for kind, own in sorted(types.items())},
+            ordered,
+            model,
+            _points(ordered, known or {}),
+        )
+
+    @classmethod
+    def loaded(cls, loaded: PlanningInstance, known: Mapping[str, Point] | None = None) -> World:
+        """The world of a loaded problem."""
+        return cls.of(loaded.domain, loaded.problems[0], loaded.model, known)
+
+    @cached_property
+    def number(self) -> Mapping[str, int]:
+        """The number of each object."""
+        return {name: number for number, name in enumerate(self.objects)}
+
+    @cached_property
+    def predicates(self) -> Mapping[str, int]:
+        """The fluent predicates with their numbers of arguments (the least, where it varies)."""
+        found: dict[str, int] = {}
+        for atom in self.model.codec.facts.atoms:
+            arity = len(atom.args)
+            found[atom.predicate] = min(arity, found.get(atom.predicate, arity))
+        return found
+
+    @cached_property
+    def known(self) -> dict[tuple[str, str], Any]:
+        """What was computed of static relations before, by name."""
+        return {}
+
+    @cached_property
+    def relations(self) -> Mapping[str, Sequence[Pair]]:
+        """The static relations between objects: their pairs, sorted."""
+        pairs = {
+            name: [(args[0], args[1]) for args in tuples if len(args) == 2]
+            for name, tuples in self.statics.items()
+        }
+        return {name: own for name, own in pairs.items() if own}
+
+
+class Readable(Protocol):
+    """What can be read of states: concepts, numbers, features."""
+
+    def read(self, states: States) -> Any:
+        """Its values: one for each state, or for each state and object."""
+
+
+@dataclass(frozen=True)
+class States:
+    """States of a world, and what was read of them before."""
+
+    world: World
+    rows: Rows
+    known: dict[Readable, Any] = field(default_factory=dict, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def get(self, what: Readable) -> Any:
+        """What something is in all states; it is read once."""
+        if what not in self.known:
+            self.known[what] = what.read(self)
+        return self.known[what]
+
+    @cached_property
+    def true(self) -> TrueFacts:
+        """The true facts of each state."""
+        return TrueFacts.of(self.world.model.codec.facts_part(self.rows))
+
+    @cached_property
+    def _tables(self) -> dict[str, tuple[Ints, ...]]:
+        return {}
+
+    def atoms(self, predicate: str) -> tuple[Ints, ...]:
+        """The true atoms of a fluent predicate: their states, then the numbers of their arguments.
+
+        All arrays are as long as there are such atoms in all states together.
+        """
+        if predicate not in self._tables:
+            self._tables[predicate] = self._atoms(predicate)
+        return self._tables[predicate]
+
+    def _atoms(self, predicate: str) -> tuple[Ints, ...]:
+        world = self.world
+        arity = world.predicates.get(predicate, 0)
+        args = np.full((len(world.model.codec.facts), arity), NONE)
+        mine = np.zeros(len(args), bool)
+        for fact, atom in enumerate(world.model.codec.facts.atoms):
+            if atom.predicate == predicate and len(atom.args) == arity:
+                mine[fact] = True
+                args[fact] = [world.number[name] for name in atom.args]
+        chosen: Bools = mine[self.true.fact]
+        own = args[self.true.fact[chosen]]
+        return (self.true.row[chosen], *(own[:, place] for place in range(arity)))
+
+    def image(self, predicate: str, named: str, inverse: bool) -> Ints:
+        """In each state the object x with (predicate named x), or (predicate x named) if inverse.
+
+        `NONE` where there is none; of several the first by name.
+        """
+        count = len(self.world.objects)
+        found = np.full(len(self), count)
+        if self.world.predicates.get(predicate) == 2 and named in self.world.number:
+            state, *ends = self.atoms(predicate)
+            mine, other = reversed(ends) if inverse else ends
+            hit = mine == self.world.number[named]
+            np.minimum.at(found, state[hit], other[hit])
+        return np.where(found == count, NONE, found)
+
+    def count(self, predicate: str, args: Sequence[str]) -> Ints:
+        """Per state the number of true atoms of a predicate with these arguments, or `ANY`."""
+        if self.world.predicates.get(predicate) != len(args):
+            return np.zeros(len(self), np.int64)
+        state, *own = self.atoms(predicate)
+        hit = np.ones(len(state), bool)
+        for wanted, names in zip(args, own, strict=True):
+            if wanted != ANY:
+                hit &= names == self.world.number.get(wanted, NONE)
+        return np.bincount(state[hit], minlength=len(self))
+
+
+def named_objects(worlds: Sequence[World], landmarks: bool = False) -> tuple[str, ...]:
+    """The objects that features may name: those that all problems have, robots first.
+
+    Where problems have different objects, these are parts of different maps, say; then places that
+    a static relation links are named only as ``landmarks``.
+    """
+    common = set(worlds[0].objects).intersection(*(world.objects for world in worlds[1:]))
+    if not landmarks and any(set(world.objects) != common for world in worlds):
+        common -= {
+            name
+            for world in worlds
+            for tuples in world.statics.values()
+            for args in tuples
+            if len(args) > 1
+            for name in args
+        }
+    robots = worlds[0].robots
+    return tuple(name for name in (*robots, *sorted(common - set(robots))) if name != ANY)
+
+
+def _points(
+    statics: Mapping[str, Sequence[tuple[str, ...]]], known: Mapping[str, Point]
+) -> dict[str, Point]:
+    """Coordinates of the objects that static relations link: the known ones, else by names."""
+    points = dict(known)
+    for tuples in statics.values():
+        links = [(args[0], args[1]) for args in tuples if len(args) == 2]
+        names = sorted({name for link in links for name in link})
+        if not known.keys() >= set(names):
+            points |= from_names(names, links) or {}
+    return points

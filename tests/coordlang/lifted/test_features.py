@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Features: their values by definition, by hand, and read back from their text."""
+
+from __future__ import annotations
+
+from functools import cache
+from random import Random
+
+import numpy as np
+import pytest
+from _pytest.mark import ParameterSet
+from hypothesis import given, settings
+from hypothesis.strategies import (
+    DataObject,
+    SearchStrategy,
+    booleans,
+    builds,
+    just,
+    recursive,
+    sampled_from,
+)
+from hypothesis.strategies import data as strategy_data
+
+from coordlang.lifted.concepts import (
+    Both,
+    Concept,
+    Everything,
+    Gap,
+    Named,
+    One,
+    Role,
+    Size,
+    Some,
+    Without,
+)
+from coordlang.lifted.features import UNDEFINED, Feature, Least
+from coordlang.lifted.notation import feature_of
+from coordlang.lifted.pool import pool_of
+from coordlang.lifted.world import States, World
+from planners.errors import BadInput, Position
+from planners.loading import load
+from planners.search.reachable import explore
+from planners.tables import Rows
+from tests.support.domains import DOMAINS
+from tests.support.naive_features import members, value
+
+HERE = Position("test")
+WORLDS = [
+    ("grid", "gwb2-3x3"),
+    ("handover", "exchange"),
+    ("elevator", "same-floor"),
+    ("push-box", "next-door"),
+    ("grid", "gw2-2x3"),
+    ("charger", "queue"),
+    ("vans", "two-vans"),
+    ("t-map", "problem"),
+]
+
+
+def thorough(world: tuple[str, str]) -> ParameterSet:
+    return pytest.param(*world, marks=pytest.mark.thorough)
+
+
+@cache
+def states_of(folder: str, stem: str, each: int = 1) -> States:
+    """Every so many-th reachable state of a shipped problem."""
+    loaded = load(DOMAINS / folder / "domain.pddl", [DOMAINS / folder / f"{stem}.pddl"])
+    rows = explore(loaded.model, loaded.tasks[0].init[None, :]).rows
+    return States(World.loaded(loaded), rows[::each])
+
+
+def atoms_of(world: World, row: Rows) -> dict[str, list[tuple[str, ...]]]:
+    found: dict[str, list[tuple[str, ...]]] = {}
+    for fact in world.model.codec.true_facts(row):
+        atom = world.model.codec.facts.atoms[fact]
+        found.setdefault(atom.predicate, []).append(atom.args)
+    return found
+
+
+def types_of(world: World) -> dict[str, frozenset[str]]:
+    return {
+        name: frozenset(kind for kind, own in world.types.items() if name in own)
+        for name in world.objects
+    }
+
+
+def by_definition(feature: Feature, states: States) -> list[int]:
+    world = states.world
+    return [
+        value(feature, types_of(world), world.statics, atoms_of(world, row)) for row in states.rows
+    ]
+
+
+@pytest.mark.parametrize(("folder", "stem"), [*WORLDS[:3], *map(thorough, WORLDS[3:])])
+def test_values_are_those_of_the_definition(folder: str, stem: str) -> None:
+    every = states_of(folder, stem)
+    states = States(every.world, every.rows[:: -(-len(every) // 20)])
+    pool = list(pool_of([states], 7).features)
+    assert len(pool) > 10
+    pool = Random(1).sample(pool, min(len(pool), 60))
+    defined = 0
+    for feature in pool:
+        expected = by_definition(feature, states)
+        assert states.get(feature).tolist() == expected, str(feature)
+        defined += any(v != UNDEFINED for v in expected)
+        assert feature_of(str(feature), HERE) == feature
+    assert defined > 10
+
+
+def concepts(world: World) -> SearchStrategy[Concept]:
+    """Concepts over what a world has, and over names that it does not have."""
+    sets = [*world.types, *world.predicates, *world.statics, "nothing"]
+    roles = [*world.predicates, *world.relations, "nowhere"]
+    role = builds(Role, sampled_from(roles), booleans(), booleans())
+    simple: SearchStrategy[Concept] = (
+        just(Everything())
+        | builds(Named, sampled_from(sets))
+        | builds(One, sampled_from([*world.objects, "nobody"]))
+    )
+    return recursive(
+        simple,
+        lambda inner: (
+            builds(Without, inner) | builds(Both, inner, inner) | builds(Some, role, inner)
+        ),
+        max_leaves=4,
+    )
+
+
+@pytest.mark.parametrize(("folder", "stem"), [*WORLDS[1:3], *map(thorough, WORLDS[3:])])
+@settings(max_examples=25, deadline=None)
+@given(data=strategy_data())
+def test_concepts_are_those_of_the_definition(folder: str, stem: str, data: DataObject) -> None:
+    states = states_of(folder, stem, 9)
+    world = states.world
+    one, other = data.draw(concepts(world)), data.draw(concepts(world))
+    names = np.array(world.objects, object)
+    for row, found in zip(states.rows[:4], states.get(one)[:4], strict=True):
+        expected = members(one, types_of(world), world.statics, atoms_of(world, row))
+        assert set(names[found]) == expected, str(one)
+    few = States(world, states.rows[:4])
+    relation = data.draw(sampled_from([*world.relations, "nowhere"]))
+    for number in (Size(one), Gap(relation, one, other)):
+        feature = Least(number, 3)
+        assert few.get(feature).tolist() == by_definition(feature, few), str(feature)
+        assert feature_of(str(feature), HERE) == feature
+
+
+def feature(text: str) -> Feature:
+    return feature_of(text, HERE)
+
+
+def test_by_hand() -> None:
+    world = states_of("grid", "gw2-2x3").world
+    row = world.model.state(
+        [
+            a
+            for a in world.model.codec.facts.atoms
+            if str(a.args) in ("('r1', 'c0-1')", "('r2', 'c1-2')")
+        ]
+    )[None, :]
+    here = States(world, row)
+    texts = {
+        "(mod (column (at r1)) 3)": 1,
+        "(mod (row (at r2)) 3)": 1,
+        "(sign (- (column (at r1)) (column (at r2))))": -1,
+        "(mod (distance adjacent (at r1) (at r2)) 2)": 0,
+        "(min (degree adjacent (at r1)) 3)": 3,
+        "(min (degree adjacent (at r2)) 3)": 2,
+        "(min (count at _ _) 3)": 2,
+        "(min (count at r1 _) 3)": 1,
+        "(min (count at _ c1-2) 1)": 1,
+        "(same (at r1) (at r2))": 0,
+        "(same (at r1) (at r1))": 1,
+        "(min (row (inverse at r1)) 1)": UNDEFINED,
+        "(min (size (some (inverse at) robot)) 3)": 2,
+        "(min (size (some adjacent (some (inverse at) (one r1)))) 3)": 3,
+        "(min (size (and cell (not (some (inverse at) all)))) 3)": 3,
+        "(min (size (and (some adjacent (some (inverse at) (one r1))) (some adjacent (some "
+        "(inverse at) (one r2))))) 3)": 2,
+        "(mod (gap adjacent (one c0-0) (some (inverse at) (one r2))) 4)": 3,
+        "(min (gap adjacent (one r1) (one r2)) 3)": UNDEFINED,
+    }
+    for text, expected in texts.items():
+        assert here.get(feature(text)).tolist() == [expected], text
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "", "()", "(", ")", "((mod", "at", "(mod (row (at r1)) x)", "(mod (row (at r1)) 0)",
+        "(mod (row (at r1)) 03)", "(min (row (at r1)) -1)", "(sign (row (at r1)))",
+        "(mod (row r1) 3)", "(mod (row (at r1)) 3) x", "(" * 600 + ")" * 600, "(max (count at) 1)",
+        "(mod (degree (at r1)) 3)",
+    ],
+)  # fmt: skip
+def test_what_is_no_feature(text: str) -> None:
+    with pytest.raises(BadInput, match="defines no feature"):
+        feature(text)
+
+
+def test_equal_features_are_kept_once() -> None:
+    states = [states_of("grid", "gw2-2x3"), states_of("grid", "gw3-2x4")]
+    pool = pool_of(states, 8)
+    assert 3 < len(pool.features) < pool.tried
+    partitions = set()
+    for feature_, row in zip(pool.features, pool.values, strict=True):
+        assert row.tolist() == np.concatenate([own.get(feature_) for own in states]).tolist()
+        partitions.add(partition_of(row.tolist()))
+    assert len(partitions) == len(pool.features)
+    assert partition_of([0] * len(pool.values[0])) not in partitions
+
+
+def partition_of(values: list[int]) -> tuple[int, ...]:
+    first = {v: k for k, v in reversed(list(enumerate(values)))}
+    return tuple(first[v] for v in values)
+
+
+def test_coordinates_of_a_file() -> None:
+    """From the least one; where they are no whole numbers, in their order."""
+    loaded = load(DOMAINS / "handover" / "domain.pddl", [DOMAINS / "handover" / "exchange.pddl"])
+    names = ("east", "east-north", "west", "west-north")
+    rows = loaded.tasks[0].init[None, :]
+    column = feature("(mod (column (at r1)) 4)")  # r1 is at west
+    for xs, expected in (((3, 3, 5, 5), 2), ((0.5, 0.5, 0.7, 0.9), 1)):
+        points = {name: (x, float(k)) for k, (name, x) in enumerate(zip(names, xs, strict=True))}
+        assert States(World.loaded(loaded, points), rows).get(column).tolist() == [expected]
+    assert States(World.loaded(loaded), rows).get(column).tolist() == [UNDEFINED]
+
+
+def test_features_of_a_problem_without_what_they_name() -> None:
+    """Other robots, other predicates: nothing is named, nothing is counted."""
+    there = states_of("charger", "queue")
+    for text, expected in {
+        "(mod (row (holds r9)) 3)": UNDEFINED,
+        "(same (at r9) (at r1))": UNDEFINED,
+        "(min (count holds _ _) 2)": 0,
+        "(min (count at _) 2)": 0,
+        "(min (count at r9 _) 2)": 0,
+        "(min (size (some holds all)) 2)": 0,
+        "(min (distance road (at r1) (at r2)) 2)": UNDEFINED,
+        "(min (position door (at r1)) 2)": UNDEFINED,
+    }.items():
+        assert set(there.get(feature(text)).tolist()) == {expected}, text

@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Learned features: the simplest that suffice, verified, refuted where they do not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cache
+from itertools import combinations
+from random import Random
+
+import families
+import numpy as np
+import pytest
+
+from coordlang.language.partition import Partition
+from coordlang.lifted.choosing import SimplestHitting, undominated
+from coordlang.lifted.features import Feature
+from coordlang.lifted.instance import Instance
+from coordlang.lifted.language import LiftedLanguage
+from coordlang.lifted.learning import Learned, find_vectors, learn
+from coordlang.lifted.pool import pool_of
+from coordlang.tasks.candidates import all_pairs
+from coordlang.verification.by_definition import verify
+from planners.errors import ProvedImpossible
+from planners.pddl import parse_problem, read_domain
+from planners.pddl.sexpr import Source
+from planners.tables import Ints
+from tests.support.domains import DOMAINS, all_tasks
+
+
+def test_the_lightest_members_that_meet_all_sets() -> None:
+    choice = Random(3)
+    for _ in range(60):
+        weights = [choice.randint(1, 5) for _ in range(choice.randint(1, 7))]
+        members = range(len(weights))
+        sets = [
+            frozenset(choice.sample(members, choice.randint(1, len(weights))))
+            for _ in range(choice.randint(0, 6))
+        ]
+        hitting = SimplestHitting(weights)
+        for known in range(len(sets) + 1):
+            found = hitting.find()
+            least = min(
+                sum(weights[k] for k in some)
+                for size in range(len(weights) + 1)
+                for some in combinations(range(len(weights)), size)
+                if all(one & set(some) for one in sets[:known])
+            )
+            assert all(one & set(found) for one in sets[:known])
+            assert sum(weights[k] for k in found) == least
+            if known < len(sets):
+                hitting.add(np.array([k in sets[known] for k in members]))
+
+
+@pytest.mark.thorough
+def test_the_simplest_features_of_the_smallest_grid() -> None:
+    """Against all sets of features, each verified by definition."""
+    own = instance("grid", "gw1-2x2")
+    learned = learn([own], complexity=4)
+    pool = pool_of([own.states], 4).features
+    least = min(
+        sum(feature.complexity for feature in some)
+        for size in range(3)
+        for some in combinations(pool, size)
+        if holds(own, some)
+    )
+    assert sum(feature.complexity for feature in learned.features) == least
+    assert holds(own, learned.features)
+    ((states, tasks, words),) = learned.sizes
+    assert (states, tasks, words) == (12, 132, len(learned.word))
+
+
+def holds(own: Instance, chosen: Sequence[Feature]) -> bool:
+    _, classes = np.unique(own.vectors(chosen), axis=0, return_inverse=True)
+    return holds_by_words(own, classes.reshape(-1))
+
+
+def holds_by_words(own: Instance, words: Ints) -> bool:
+    names = [f"w{k}" for k in range(int(words.max()) + 1)]
+    partition = Partition.of_table(names, own.candidates.rows, words)
+    return verify(partition, own.candidates.spaces).holds
+
+
+@cache
+def instance(folder: str, stem: str) -> Instance:
+    return Instance(all_tasks(folder, stem))
+
+
+def test_four_words_for_rings() -> None:
+    """Two features, each with two values, that two small rings show."""
+    known = [instance("grid", stem) for stem in ("gwb1-2x4", "gwb2-3x3")]
+    learned = learn(known, [instance("grid", "gwb4-2x5"), instance("grid", "gwb3-3x4")])
+    assert len(learned.features) == 2
+    assert [words for *_, words in learned.sizes] == [4, 4, 4, 4]
+
+
+def test_what_is_held_back_is_learned_from_where_it_refutes() -> None:
+    """What suffices on 2x2 does not on 2x3."""
+    alone = learn([instance("grid", "gw1-2x2")])
+    assert not holds(instance("grid", "gw2-2x3"), alone.features)
+    both = learn([instance("grid", "gw1-2x2")], [instance("grid", "gw2-2x3")])
+    assert holds(instance("grid", "gw2-2x3"), both.features)
+    assert holds(instance("grid", "gw1-2x2"), both.features)
+    assert both.rounds > alone.rounds
+
+
+def test_features_that_are_too_weak() -> None:
+    with pytest.raises(ProvedImpossible, match="no feature up to complexity 3 tells states apart"):
+        learn([instance("grid", "gw2-2x3")], complexity=3)
+
+
+def test_values_that_nobody_has_seen_are_words_of_their_own() -> None:
+    large = instance("grid", "gw3-2x4")
+    learned = learn([instance("grid", "gw1-2x2"), instance("grid", "gw2-2x3")])
+    values = {vector: f"w{number}" for vector, number in learned.word.items() if number < 2}
+    lifted = LiftedLanguage(learned.features, ("w0", "w1"), values, ("r1", "r2"))
+    partition = lifted.partition(large.states)
+    vectors = large.vectors(learned.features)
+    assert partition.words[:2] == ("w0", "w1")
+    assert all(word.startswith("v") for word in partition.words[2:])
+    assert len(partition.words) == len(np.unique(vectors, axis=0)) > 2
+    words = [
+        partition.words[number] for number in partition.word_of(large.candidates.rows).tolist()
+    ]
+    assert len({*zip(words, map(tuple, vectors.tolist()), strict=True)}) == len(partition.words)
+
+
+# Fewer words
+
+
+@pytest.mark.thorough
+def test_the_fewest_words_over_classes() -> None:
+    """Against all partitions of the classes, on two problems at once."""
+    known = [instance("grid", "gw1-2x2"), instance("t-map", "problem")]
+    learned = learn(known, complexity=6, prefer="features")
+    every = [own.vectors(learned.features) for own in known]
+    table = np.unique(np.concatenate(every), axis=0)
+    assert learned.proved
+    classes = [find_vectors(table, own) for own in every]
+    least = next(
+        size
+        for size in range(1, len(table) + 1)
+        for words in partitions(len(table), size)
+        if all(
+            holds_by_words(one, np.array(words, np.int64)[own])
+            for one, own in zip(known, classes, strict=True)
+        )
+    )
+    assert len(set(learned.word.values())) == least < len(table)
+
+
+def partitions(count: int, size: int) -> Iterator[list[int]]:
+    """Into at most so many parts: parts are named in the order of their first member."""
+
+    def grow(words: list[int]) -> Iterator[list[int]]:
+        if len(words) == count:
+            yield words
+            return
+        for word in range(min(size, 1 + max(words, default=-1) + 1)):
+            yield from grow([*words, word])
+
+    return grow([])
+
+
+def test_merged_words_are_learned_from_what_was_held_back() -> None:
+    learned = learn(
+        [instance("grid", "gw1-2x2")],
+        [instance("t-map", "problem")],
+        complexity=6,
+        prefer="features",
+    )
+    assert learned.proved
+    for own in (instance("grid", "gw1-2x2"), instance("t-map", "problem")):
+        assert holds_by_words(own, words_in(own, learned))
+
+
+def test_words_may_come_first() -> None:
+    """Other features than the simplest ones may do with fewer words; never with more."""
+    known = [instance("t-map", "problem")]
+    simple = learn(known, complexity=6, prefer="features")
+    few = learn(known, complexity=6, prefer="words")
+    sizes = [len(set(learned.word.values())) for learned in (simple, few)]
+    assert sizes[1] <= sizes[0]
+    assert holds_by_words(known[0], words_in(known[0], few))
+
+
+def words_in(own: Instance, learned: Learned) -> Ints:
+    vectors = map(tuple, own.vectors(learned.features).tolist())
+    return np.array([learned.word[vector] for vector in vectors])
+
+
+def test_what_is_left_of_dominated_members() -> None:
+    """Of what is in the same sets the lightest; nothing that another one replaces."""
+    inside = np.array([[1, 1, 0], [1, 0, 0], [0, 0, 1], [0, 0, 1], [0, 0, 0], [0, 1, 0]], bool)
+    assert undominated(inside, np.array([2, 2, 3, 1, 1, 1])).tolist() == [0, 3, 5]
+
+
+@pytest.mark.thorough
+def test_landmarks_where_nothing_else_suffices() -> None:
+    """Round tracks: places are alike but for their names, which two tracks share in part."""
+    known = [track(3), track(4)]
+    learned = learn(known)
+    assert any("(one room" in str(f) or " room" in str(f) for f in learned.features)
+    for own in known:
+        assert holds_by_words(own, words_in(own, learned))
+
+
+def track(rooms: int) -> Instance:
+    domain = read_domain(DOMAINS / "push-box" / "domain.pddl")
+    problem = parse_problem(Source("problem", families.push_box(rooms)), domain)
+    return Instance(all_pairs(domain, [problem]))

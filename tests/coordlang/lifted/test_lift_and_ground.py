@@ -1,0 +1,269 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`lift` and `ground`: what is claimed of words in problems that they were not learned from."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import coordlang
+from coordlang.api.lifting import Lifted
+from coordlang.lifted.file import lifted_from_bytes, read_lifted, to_bytes
+from coordlang.lifted.language import LiftedLanguage
+from planners.errors import BadInput, Note, Position, ProvedImpossible, Refuted, UsageError
+from planners.pddl import parse_problem, read_domain
+from planners.pddl.lifted import Problem
+from planners.pddl.sexpr import Source
+from tests.support.domains import DOMAINS
+
+GRID = DOMAINS / "grid" / "domain.pddl"
+RINGS = [DOMAINS / "grid" / f"{stem}.pddl" for stem in ("gwb1-2x4", "gwb2-3x3")]
+LARGER = DOMAINS / "grid" / "gwb3-3x4.pddl"
+OPEN = DOMAINS / "grid" / "gw2-2x3.pddl"
+SMALL = DOMAINS / "grid" / "gw1-2x2.pddl"
+
+
+@pytest.fixture(scope="module")
+def rings() -> Lifted:
+    return coordlang.lift(GRID, *RINGS, tasks="all", jobs=1)
+
+
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("plans") / "one.plan"
+    found = coordlang.plans(GRID, LARGER)
+    path.write_text(found.ipc(next(iter(found))))
+    return path
+
+
+def test_what_is_learned_is_said(rings: Lifted) -> None:
+    data = rings.data()
+    assert data["words"] == 4
+    assert [one["formula"] for one in data["features"]] == [
+        "min(column(at(r1)), 1)",
+        "min(row(at(r1)), 1)",
+    ]
+    assert [(v["problem"], v["states"], v["tasks"]) for v in data["verified"]] == [
+        ("gwb1-2x4", 56, 3080),
+        ("gwb2-3x3", 56, 3080),
+    ]
+    assert data["tried"] > data["pool"] > len(data["features"])
+
+
+def test_the_same_bytes_again(rings: Lifted, tmp_path: Path) -> None:
+    again = coordlang.lift(GRID, *RINGS, tasks="all", jobs=1)
+    assert to_bytes(again.language) == to_bytes(rings.language)
+    path = tmp_path / "l.json.gz"
+    rings.save(path)
+    assert read_lifted(path) == rings.language
+
+
+def test_a_larger_problem(rings: Lifted) -> None:
+    language = coordlang.ground(rings.language, GRID, LARGER, jobs=1)
+    assert language.guarantee.method == "lifted; verified here"
+    assert language.provenance.tasks["count"] == 8010
+    assert coordlang.verify(language, GRID, LARGER, jobs=1)
+
+
+def test_an_unverified_language_covers_nothing(rings: Lifted, plan: Path) -> None:
+    language = coordlang.ground(rings.language, GRID, LARGER, verified=False, jobs=1)
+    assert language.guarantee.method == "lifted; verified on gwb1-2x4, gwb2-3x3"
+    said = coordlang.say(language, GRID, LARGER, plan)
+    assert not said.covered
+    assert coordlang.verify(language, GRID, LARGER, tasks="all", jobs=1)
+    verified = coordlang.ground(rings.language, GRID, LARGER, jobs=1)
+    assert coordlang.say(verified, GRID, LARGER, plan).covered
+    assert said.sentence == coordlang.say(verified, GRID, LARGER, plan).sentence
+
+
+def test_a_refuted_language_is_not_written(rings: Lifted) -> None:
+    """Words of rings are none of an open grid, whatever the file claims."""
+    with pytest.raises(Refuted, match=r"no coordination language for gw2-2x3.* on gwb1-2x4"):
+        coordlang.ground(rings.language, GRID, OPEN, jobs=1)
+    assert not coordlang.verify(rings.language, GRID, OPEN, tasks="all", jobs=1)
+
+
+def test_a_lifted_language_is_used_as_it_is(rings: Lifted, plan: Path) -> None:
+    """In a task whose states are in no table: say, understand, choices, explain."""
+    lifted = rings.language
+    said = coordlang.say(lifted, GRID, LARGER, plan)
+    assert said.covered
+    assert coordlang.understand(lifted, GRID, LARGER, said.sentence).count >= 1
+    found = coordlang.choices(lifted, GRID, LARGER, said.sentence, check=True)
+    assert found.guaranteed
+    assert found.monitor("r1").allowed()
+    explained = coordlang.explain(lifted, GRID, LARGER)
+    assert "w3: column(at(r1)) >= 1 and row(at(r1)) >= 1" in str(explained)
+    assert explained.words.head.startswith("4 words (lifted; verified here")
+
+
+def test_a_task_that_refutes_it_is_not_covered(rings: Lifted) -> None:
+    """A lifted language in a task of an open grid says a sentence, and guarantees nothing."""
+    problem = problem_text([("c0-0", "c0-1"), ("c0-1", "c0-0")], OPEN)
+    explained = coordlang.explain(rings.language, GRID, problem)
+    assert not explained.covered
+    assert "lifted; refuted here" in explained.words.head
+
+
+def problem_text(moves: list[tuple[str, str]], path: Path) -> Problem:
+    """A shipped problem with other starts and goals."""
+    text = path.read_text()
+    head = text[: text.index("(:init")]
+    links = [line for line in text.splitlines() if "(adjacent" in line]
+    links[-1] = links[-1].rstrip(")") + ")"
+    init = " ".join(f"(at r{k} {a})" for k, (a, _) in enumerate(moves, 1))
+    goal = " ".join(f"(at r{k} {b})" for k, (_, b) in enumerate(moves, 1))
+    whole = f"{head}(:init {init} {' '.join(links)})\n(:goal (and {goal})))"
+    return parse_problem(Source("changed", whole), read_domain(GRID))
+
+
+# What a sceptical user tries
+
+
+def test_another_domain(rings: Lifted) -> None:
+    folder = DOMAINS / "push-box"
+    with pytest.raises(BadInput, match="belongs to another domain"):
+        coordlang.ground(rings.language, folder / "domain.pddl", folder / "next-door.pddl")
+
+
+def test_other_robots(rings: Lifted) -> None:
+    three = DOMAINS / "grid" / "three-robots-3x3.pddl"
+    with pytest.raises(BadInput, match="about r1, r2, and the robots here are r1, r2, r3"):
+        coordlang.ground(rings.language, GRID, three, tasks=None, jobs=1)
+    with pytest.raises(BadInput, match="the robots are r1, r2, r3, those of gwb1-2x4 r1, r2"):
+        coordlang.lift(GRID, RINGS[0], three, jobs=1)
+
+
+def test_model_options_that_contradict(rings: Lifted) -> None:
+    with pytest.raises(UsageError, match=r"--cost makespan\+actions contradicts"):
+        coordlang.ground(rings.language, GRID, LARGER, cost="makespan+actions")
+
+
+def test_a_lifted_language_is_not_repaired(rings: Lifted) -> None:
+    with pytest.raises(UsageError, match="is a lifted language"):
+        coordlang.build(GRID, LARGER, start=rings.language)
+
+
+def test_a_problem_without_tasks(rings: Lifted, tmp_path: Path) -> None:
+    """Robots that cannot move: there is nothing to learn from, and nothing to verify."""
+    stuck = tmp_path / "stuck.pddl"
+    text = OPEN.read_text()
+    stuck.write_text(
+        text.replace("(adjacent", "(at r1 c0-0) #(adjacent").split("#")[0]
+        + ")(:goal (at r1 c0-0)))"
+    )
+    with pytest.raises(ProvedImpossible, match="there is no candidate task") as error:
+        coordlang.lift(GRID, OPEN, stuck, tasks="all", jobs=1)
+    assert "stuck.pddl" in str(error.value)
+    with pytest.raises(ProvedImpossible, match="there is no candidate task"):
+        coordlang.ground(rings.language, GRID, stuck, jobs=1)
+
+
+def test_features_that_are_too_weak() -> None:
+    with pytest.raises(ProvedImpossible, match=r"tells states apart .* of gw2-2x3"):
+        coordlang.lift(GRID, OPEN, tasks="all", complexity=3, jobs=1)
+
+
+@pytest.mark.parametrize("wrong", [{"prefer": "nothing"}, {"complexity": 0}])
+def test_wrong_options(wrong: dict[str, object]) -> None:
+    with pytest.raises(UsageError):
+        coordlang.lift(GRID, OPEN, jobs=1, **wrong)  # type: ignore[arg-type]
+
+
+def test_a_problem_without_static_relations(tmp_path: Path) -> None:
+    """Features come from what is left: counts and sizes."""
+    folder = DOMAINS / "flags"
+    lifted = coordlang.lift(folder / "domain.pddl", folder / "parade.pddl", tasks="all", jobs=1)
+    language = coordlang.ground(
+        lifted.language, folder / "domain.pddl", folder / "parade.pddl", jobs=1
+    )
+    assert language.guarantee.method == "lifted; verified here"
+
+
+def test_an_empty_claim_helps_nobody(rings: Lifted) -> None:
+    """A file without values is verified as any other: each combination has a word of its own."""
+    data = json.loads(to_bytes(rings.language))
+    data["values"], data["verified"] = {}, []
+    lifted = lifted_of(data)
+    language = coordlang.ground(lifted, GRID, LARGER, jobs=1)
+    assert set(language.words) == {"v0.0", "v0.1", "v1.0", "v1.1"}
+    unverified = coordlang.ground(lifted, GRID, LARGER, verified=False, jobs=1)
+    assert unverified.guarantee.method == "lifted; verified on no problem"
+    data["features"] = []
+    with pytest.raises(Refuted):
+        coordlang.ground(lifted_of({**data, "words": ["w0"]}), GRID, LARGER, jobs=1)
+
+
+def lifted_of(data: dict[str, object]) -> LiftedLanguage:
+    return lifted_from_bytes(json.dumps(data).encode(), Position("changed.json"))
+
+
+Change = Callable[[dict[str, object]], object]
+DAMAGED: dict[str, tuple[Change, str]] = {
+    "version": (lambda d: d.update(version=2), "version 2"),
+    "format": (lambda d: d.update(format="coordlang/language"), "format"),
+    "feature": (
+        lambda d: d.update(features=[{"name": "f", "definition": "(mod (x))", "complexity": 1}]),
+        "defines no feature",
+    ),
+    "modulus": (
+        lambda d: d.update(
+            features=[{"name": "f", "definition": f"(mod (row (at r1)) {10**30})", "complexity": 1}]
+        ),
+        "defines no feature",
+    ),
+    "values": (lambda d: d.update(values={"0": "w0"}), "are no values of 2 features"),
+    "no number": (lambda d: d.update(values={"0 x": "w0"}), "are no values of 2 features"),
+    "spaces": (lambda d: d.update(values={"0  1": "w0"}), "are no values of 2 features"),
+    "unknown word": (lambda d: d.update(values={"0 1": "w9"}), "which 'words' has not"),
+    "no words": (lambda d: d.update(words=[]), "words must be different"),
+    "equal words": (lambda d: d.update(words=["w0", "w0"]), "words must be different"),
+    "own word": (lambda d: d.update(words=["w0", "w1", "w2", "w3", "v0.1"]), "unknown values"),
+    "unseen": (lambda d: d.update(words=["w0", "w1", "w2", "w3", "w\u200b4"]), "U\\+200B"),
+    "no robots": (lambda d: d.update(robots=[]), "robots must be different"),
+    "missing": (lambda d: d.pop("features"), "missing required field `features`"),
+}
+
+
+@pytest.mark.parametrize("name", list(DAMAGED))
+def test_damaged_files(name: str, rings: Lifted) -> None:
+    data = json.loads(to_bytes(rings.language))
+    change, message = DAMAGED[name]
+    change(data)
+    with pytest.raises(BadInput, match=message) as error:
+        lifted_of(data)
+    assert str(error.value.position) == "changed.json"
+
+
+def test_a_file_that_is_cut_off_or_says_something_twice(rings: Lifted, tmp_path: Path) -> None:
+    text = to_bytes(rings.language).decode()
+    for broken in (text[: len(text) // 2], text.replace('"0 1"', '"0 0"')):
+        path = tmp_path / "broken.json"
+        path.write_text(broken)
+        with pytest.raises(BadInput):
+            coordlang.ground(path, GRID, LARGER)
+
+
+def test_features_that_give_other_words_are_not_shown(rings: Lifted) -> None:
+    """A language file whose table was changed by hand."""
+    language = coordlang.ground(rings.language, GRID, LARGER, jobs=1)
+    key = next(iter(language.states))
+    changed = replace(language, states={**language.states, key: "w3"})
+    with pytest.warns(Note, match="do not give its states their words"):
+        assert "column(" not in str(coordlang.explain(changed, GRID, LARGER))
+
+
+def test_names_that_are_not_ascii(tmp_path: Path) -> None:
+    """Robots and places with other letters."""
+    domain, problem = tmp_path / "d.pddl", tmp_path / "p.pddl"
+    domain.write_text(GRID.read_text())
+    text = SMALL.read_text().replace("r1", "\u00e9toile")
+    problem.write_text(text.replace("c0-", "\u043c0-").replace("c1-", "\u043c1-"))
+    lifted = coordlang.lift(domain, problem, tasks="all", jobs=1)
+    assert "\u00e9toile" in lifted.language.robots
+    language = coordlang.ground(lifted.language, domain, problem, jobs=1)
+    assert language.guarantee.method == "lifted; verified here"

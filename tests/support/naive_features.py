@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Features by their definitions: one state, given as a set of atoms, and lists of objects."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+from coordlang.lifted.concepts import (
+    Both,
+    Concept,
+    Everything,
+    Gap,
+    Named,
+    One,
+    Role,
+    Size,
+    Some,
+    Without,
+)
+from coordlang.lifted.features import (
+    UNDEFINED,
+    Attribute,
+    Count,
+    Distance,
+    Feature,
+    Number,
+    Residue,
+    Same,
+    Sign,
+    Term,
+)
+
+#: The argument tuples of the atoms that are true, by predicate.
+State = Mapping[str, Sequence[tuple[str, ...]]]
+
+
+#: Types of objects, by name.
+Objects = Mapping[str, frozenset[str]]
+
+
+def value(feature: Feature, objects: Objects, statics: State, state: State) -> int:
+    """What a feature is in a state."""
+    if isinstance(feature, Same):
+        here, there = _object(feature.one, state), _object(feature.other, state)
+        return UNDEFINED if here is None or there is None else here == there
+    if isinstance(feature, Sign):
+        one, other = (_number(n, objects, statics, state) for n in (feature.one, feature.other))
+        if one is None or other is None:
+            return UNDEFINED
+        return (one > other) - (one < other)
+    number = _number(feature.number, objects, statics, state)
+    if number is None:
+        return UNDEFINED
+    if isinstance(feature, Residue):
+        return number % feature.modulus
+    return min(number, feature.most)
+
+
+def _number(number: Number, objects: Objects, statics: State, state: State) -> int | None:
+    if isinstance(number, Size):
+        return len(members(number.concept, objects, statics, state))
+    if isinstance(number, Gap):
+        linked = _linked(number.relation, statics)
+        found = [
+            _steps(a, b, linked)
+            for a in members(number.one, objects, statics, state)
+            for b in members(number.other, objects, statics, state)
+        ]
+        return min((steps for steps in found if steps is not None), default=None)
+    if isinstance(number, Count):
+        atoms = state.get(number.predicate, ())
+        return sum(
+            1
+            for args in atoms
+            if len(args) == len(number.args)
+            and all(wanted in ("_", own) for wanted, own in zip(number.args, args, strict=True))
+        )
+    if isinstance(number, Distance):
+        ends = _object(number.one, state), _object(number.other, state)
+        return None if None in ends else _steps(*ends, _linked(number.relation, statics))
+    place = _object(number.term, state)
+    return None if place is None else _attribute(number, place, statics)
+
+
+def members(concept: Concept, objects: Objects, statics: State, state: State) -> set[str]:
+    """The objects in a concept."""
+    match concept:
+        case Everything():
+            return set(objects)
+        case Named(name):
+            atoms = [*statics.get(name, ()), *state.get(name, ())]
+            own = {args[0] for args in atoms if len(args) == 1}
+            return own | {o for o, types in objects.items() if name in types}
+        case One(name):
+            return {name} & set(objects)
+        case Without(inner):
+            return set(objects) - members(inner, objects, statics, state)
+        case Both(one, other):
+            left, right = (members(c, objects, statics, state) for c in (one, other))
+            return left & right
+        case Some(role, inner):
+            ends = members(inner, objects, statics, state)
+            return {a for a, b in related(role, statics, state) if b in ends}
+
+
+def related(role: Role, statics: State, state: State) -> set[tuple[str, str]]:
+    """The pairs in a role."""
+    atoms = [*statics.get(role.predicate, ()), *state.get(role.predicate, ())]
+    pairs = {(args[0], args[1]) for args in atoms if len(args) == 2}
+    if role.inverse:
+        pairs = {(b, a) for a, b in pairs}
+    while role.closure:
+        more = pairs | {(a, d) for a, b in pairs for c, d in pairs if b == c}
+        if more == pairs:
+            break
+        pairs = more
+    return pairs
+
+
+def _object(term: Term, state: State) -> str | None:
+    atoms = [args for args in state.get(term.predicate, ()) if len(args) == 2]
+    found = [a for a, b in atoms if b == term.named] if term.inverse else []
+    if not term.inverse:
+        found = [b for a, b in atoms if a == term.named]
+    return min(found, default=None)
+
+
+def _attribute(number: Attribute, place: str, statics: State) -> int | None:
+    if not number.relation:
+        cell = re.fullmatch(r"[a-z_]*(\d+)[-_](\d+)", place)
+        return int(cell[1 if number.name == "row" else 2]) if cell else None
+    pairs = statics.get(number.relation, ())
+    if number.name == "degree":
+        near = {a for a, b in pairs if b == place} | {b for a, b in pairs if a == place}
+        return len(near) if near else None
+    before = place
+    steps = 0
+    while earlier := [a for a, b in pairs if b == before]:
+        (before,), steps = earlier, steps + 1
+    return steps if any(place in pair for pair in pairs) else None
+
+
+def _linked(relation: str, statics: State) -> dict[str, set[str]]:
+    linked: dict[str, set[str]] = {}
+    for a, b in statics.get(relation, ()):
+        linked.setdefault(a, set()).add(b)
+        linked.setdefault(b, set()).add(a)
+    return linked
+
+
+def _steps(start: str | None, end: str | None, linked: Mapping[str, set[str]]) -> int | None:
+    if start not in linked:
+        return None
+    reached, steps = {start}, 0
+    while end not in reached:
+        further = reached.union(*(linked[place] for place in reached if place is not None))
+        if further == reached:
+            return None
+        reached, steps = further, steps + 1
+    return steps
