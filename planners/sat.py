@@ -67,7 +67,7 @@ def simplified(clauses: array[int], kept: Sequence[int]) -> list[list[int]]:
     """
     from pysat.process import Processor
 
-    listed = list(_split(clauses))
+    listed = list(split_clauses(clauses))
     with postponed_signals():
         processor = Processor(bootstrap_with=listed)
         try:
@@ -78,7 +78,8 @@ def simplified(clauses: array[int], kept: Sequence[int]) -> list[list[int]]:
     return list(found.clauses)
 
 
-def _split(clauses: array[int]) -> Iterator[list[int]]:
+def split_clauses(clauses: Iterable[int]) -> Iterator[list[int]]:
+    """The clauses of a formula in which 0 follows each."""
     clause: list[int] = []
     for literal in clauses:
         if literal:

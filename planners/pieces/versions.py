@@ -7,7 +7,6 @@ import platform
 import sys
 from functools import cache
 from hashlib import sha256
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 #: Packages whose versions must be equal where pieces of one work are done.
@@ -34,6 +33,8 @@ def versions_here(packages: tuple[str, ...]) -> dict[str, str]:
     packages
         The packages whose own code does the work; they are imported.
     """
+    from importlib.metadata import PackageNotFoundError, version  # takes long to load
+
     found = {"Python": ".".join(platform.python_version_tuple()[:2])}
     for package in packages:
         __import__(package)

@@ -1,28 +1,98 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The least second cost component of plans with the least makespan, from cores of a SAT solver.
+"""The least second cost component of plans with the least makespan, by a SAT solver.
 
-The cost is assumed to be 0: no action that costs something is done at all.  The solver answers with
-a *core*, some of these assumptions that cannot hold together: one of those actions is needed.  Each
-core raises the lower bound by one, and from then on one of its actions may be done, and for more
-there are new assumptions (core-guided MaxSAT, OLL; Andres, Kaufmann, Matheis and Schaub 2012).  The
-first plan that is found is a cheapest one.  Cores are small where goals have little to do with each
-other, and a bound on the sum of all costs says nothing for long.
+By *cores* from below where actions cost 0 or 1, else by a counter from above.  The cost is assumed
+to be 0: no action that costs something is done at all.  The solver answers with a core, some of
+these assumptions that cannot hold together: one of those actions is needed.  Each core raises the
+lower bound by one, and from then on one of its actions may be done, and for more there are new
+assumptions (core-guided MaxSAT, OLL; Andres, Kaufmann, Matheis and Schaub 2012).  The first plan
+that is found is a cheapest one.  Cores are small where goals have little to do with each other, and
+a bound on the sum of all costs says nothing for long.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
+from planners.joint.composition import ComposingStepper
 from planners.joint.model import JointModel, PlanningTask
+from planners.search.fixed_plans import FixedPlans, Plan
 from planners.search.goals import goal_facts
-from planners.search.plan_formula import PlanFormula
 from planners.search.questions import Literals, OutOfEffort
+from planners.tables import Ints
 
+#: Conflicts for the try by cores.
+_FIRST = 300_000
+#: The largest cost of one action that is counted.
+_COST = 8
 #: Conflicts for the question whether a core needs a second action, too.
 _EASY = 1_000
+
+
+def cheapest(
+    plans: FixedPlans, model: JointModel, task: PlanningTask, plan: Plan
+) -> tuple[Plan, Literals]:
+    """A cheapest plan, and literals that the cheapest ones have and no others; ``plan`` is known.
+
+    If that takes too much effort, then what is found are plans that cost no more than some plan;
+    without literals where costs are too large for a counter.
+    """
+    costs = label_costs(model)
+    if max(int(own.max(initial=0)) for own in costs) <= 1:
+        with suppress(OutOfEffort), plans.at_most(_FIRST):
+            cheap = least_cost(plans, model, task)
+            return plans.labels_chosen(), cheap
+    elif max(int(own.max(initial=0)) for own in costs) > _COST:
+        return plan, []
+    most = _cost_of(costs, plan)
+    sums = _counter(plans, costs, most)
+    with suppress(OutOfEffort):
+        while most and plans.holds(_at_most(sums, most - 1)):
+            plan = plans.labels_chosen()
+            most = _cost_of(costs, plan)
+    return plan, _at_most(sums, most)
+
+
+def label_costs(model: JointModel) -> list[Ints]:
+    """Per robot the second cost component of each of its labels; idling is free."""
+    assert isinstance(model.stepper, ComposingStepper)
+    return model.stepper.costs
+
+
+def _cost_of(costs: Sequence[Ints], plan: Plan) -> int:
+    return sum(int(costs[robot][label]) for step in plan for robot, label in enumerate(step))
+
+
+def _counter(plans: FixedPlans, costs: Sequence[Ints], most: int) -> Literals:
+    """A unary counter: its k-th literal is implied where plans cost more than k, up to ``most``."""
+    sums: Literals = []
+    for step in range(plans.steps):
+        for robot, own in enumerate(costs):
+            for least in range(1, int(own.max(initial=0)) + 1):
+                labels = np.flatnonzero(own >= least).tolist()
+                paid = plans.any_of([plans.label(step, robot, label) for label in labels])
+                sums = _one_more(plans, sums, paid, most)
+    return sums
+
+
+def _one_more(plans: FixedPlans, before: Literals, paid: int, most: int) -> Literals:
+    after = [plans.fresh() for _ in range(min(len(before) + 1, most + 1))]
+    for place, literal in enumerate(before):
+        if place < len(after):
+            plans.add([-literal, after[place]])
+        if place + 1 < len(after):
+            plans.add([-literal, -paid, after[place + 1]])
+    plans.add([-paid, after[0]])
+    return after
+
+
+def _at_most(sums: Literals, cost: int) -> Literals:
+    """A literal that says that no more is paid; none where it is no bound."""
+    return [-sums[cost]] if cost < len(sums) else []
 
 
 @dataclass(slots=True)
@@ -35,29 +105,28 @@ class _Sum:
 class _Sums:
     """The sums that are assumed to be small, by the literal that says that one is larger."""
 
-    def __init__(self, formula: PlanFormula, steps: int) -> None:
-        self._formula, self._steps = formula, steps
+    def __init__(self, plans: FixedPlans) -> None:
+        self._plans = plans
         #: Assumed to be false: the sum that each belongs to, and its place there.
         self.open: dict[int, tuple[_Sum | None, int]] = {}
         self._times: dict[int, Literals] = {}
 
-    def add_actions(self, task: PlanningTask) -> None:
+    def add_actions(self, model: JointModel, task: PlanningTask) -> None:
         """Assume of every action that costs something that it is not chosen at all.
 
         By none of the robots that are alike: which one of them does it does not matter.
         """
-        formula, model = self._formula, self._formula.model
         kinds = _kinds(model, task)
         alike: dict[tuple[str, ...], Literals] = {}
-        for robot, costs in enumerate(formula.costs):
+        for robot, costs in enumerate(label_costs(model)):
             own = model.robots[robot]
             for label in np.flatnonzero(costs).tolist():
                 words = model.labels[robot][label].strip("()").split()
                 action = tuple(kinds[robot] if word == own else word for word in words)
-                times = [formula.label(step, robot, label) for step in range(1, self._steps + 1)]
+                times = [self._plans.label(step, robot, label) for step in range(self._plans.steps)]
                 alike.setdefault(action, []).extend(times)
         for times in alike.values():
-            done = formula.any_of(times)
+            done = self._plans.any_of(times)
             self._times[done] = times
             self.open[done] = (None, 0)
 
@@ -66,10 +135,10 @@ class _Sums:
         for literal in core:
             own, place = self.open.pop(literal)
             if own is None:
-                own = _Sum(self._formula.counter(self._times.pop(literal)))
+                own = _Sum(self._plans.counter(self._times.pop(literal)))
             self._assume(own, place + 1)
         if len(core) > 1:
-            together = _Sum(self._formula.counter(core))
+            together = _Sum(self._plans.counter(core))
             place = 1
             while place < len(together.at_least) and self._must(together.at_least[place]):
                 place += 1
@@ -83,16 +152,16 @@ class _Sums:
     def _must(self, larger: int) -> bool:
         """Whether a sum must be larger, where that is seen at once."""
         try:
-            with self._formula.at_most(_EASY):
-                return not self._formula.holds([-larger])
+            with self._plans.at_most(_EASY):
+                return not self._plans.holds([-larger])
         except OutOfEffort:
             return False
 
 
-def least_cost(formula: PlanFormula, task: PlanningTask, steps: int) -> Literals:
-    """Literals that all hold in the cheapest plans of so many steps, and in no other plans.
+def least_cost(plans: FixedPlans, model: JointModel, task: PlanningTask) -> Literals:
+    """Literals that all hold in the cheapest plans, and in no other plans.
 
-    There are plans of so many steps, the formula is fixed to them, and costs are 0 or 1.  The last
+    There are plans, and costs are 0 or 1.  The last
     answer of the solver is one of the cheapest.  The cost of a plan is the number of refuted
     assumptions and the number of these literals that do not hold (if a sum is said to be larger
     only where it is), so the literals say the same as a bound on the cost, but each of few actions:
@@ -101,18 +170,18 @@ def least_cost(formula: PlanFormula, task: PlanningTask, steps: int) -> Literals
 
     Raises `planners.search.questions.OutOfEffort`.
     """
-    sums = _Sums(formula, steps)
-    sums.add_actions(task)
-    while cores := list(_disjoint(formula, set(sums.open))):
+    sums = _Sums(plans)
+    sums.add_actions(model, task)
+    while cores := list(_disjoint(plans, set(sums.open))):
         for core in cores:
             sums.relax(core)
     return [-literal for literal in sorted(sums.open)]
 
 
-def _disjoint(formula: PlanFormula, assumed: set[int]) -> Iterator[Literals]:
+def _disjoint(plans: FixedPlans, assumed: set[int]) -> Iterator[Literals]:
     """Cores without a common literal, until what is assumed besides holds."""
-    while not formula.holds([-literal for literal in sorted(assumed)]):
-        core = _smaller(formula, formula.core(assumed))
+    while not plans.holds([-literal for literal in sorted(assumed)]):
+        core = _smaller(plans, plans.core(assumed))
         assumed -= set(core)
         yield core
 
@@ -133,12 +202,12 @@ def _kinds(model: JointModel, task: PlanningTask) -> list[str]:
     return [model.robots[known.index(own)] for own in known]
 
 
-def _smaller(formula: PlanFormula, core: Literals) -> Literals:
+def _smaller(plans: FixedPlans, core: Literals) -> Literals:
     """A core that is no larger: what is needed of it, asked again while that helps."""
     while len(core) > 1:
-        answer = formula.holds([-literal for literal in core])
+        answer = plans.holds([-literal for literal in core])
         assert not answer, "a core was refuted"
-        again = formula.core(core)
+        again = plans.core(core)
         if len(again) >= len(core):
             break
         core = again

@@ -10,7 +10,7 @@ A question that is not decided with some effort is answered with yes: more is se
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import closing
 from dataclasses import dataclass
 from itertools import product
 
@@ -19,10 +19,10 @@ import numpy as np
 from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, PlanningTask
 from planners.limits import reaching
-from planners.search.cheapest import least_cost
+from planners.search.cheapest import cheapest
 from planners.search.fixed_plans import FixedPlans, Plan
 from planners.search.mutexes import mutexes
-from planners.search.plan_formula import PlanFormula, countable
+from planners.search.plan_formula import PlanFormula
 from planners.search.questions import Literals, OutOfEffort
 from planners.search.reachable import PieceSizes
 from planners.search.state_variables import StateVariable
@@ -32,8 +32,6 @@ from planners.tables import Bools, Rows
 #: States that are asked for to see whether exact bounds pay, and the share on optimal plans above
 #: which they do not.
 _SAMPLE, _MOST = 50, 0.5
-#: Conflicts for the first try to find the least cost.
-_FIRST = 300_000
 #: What a makespan that is refuted at once costs for each of its steps, in conflicts; the clauses of
 #: one step more are counted, too: of a task without plan there would be ever more.
 _EASY = 20
@@ -105,25 +103,20 @@ def exact_bound(
     except TooManyClauses:
         return None
     try:
-        with reaching(formula.so_far, SMALLER):
-            return _within_effort(formula, task, at_least, pieces.question, some)
+        with closing(formula), reaching(formula.so_far, SMALLER):
+            makespan, plan = _shortest(formula, task, at_least)
+            only_time = model.cost == "makespan"
+            if only_time and makespan == at_least and _mostly_pass(formula, plan, some):
+                return None
+            plans = formula.fixed(task.init, makespan)
     except OutOfEffort:
-        formula.close()
         return None
+    try:
+        with reaching(plans.so_far, SMALLER):
+            return _bound(plans, model, task, plan, pieces.question)
     except BaseException:
-        formula.close()
+        plans.close()
         raise
-
-
-def _within_effort(
-    formula: PlanFormula, task: PlanningTask, at_least: int, question: int, some: tuple[Rows, int]
-) -> ExactBound | None:
-    makespan, plan = _shortest(formula, task, at_least)
-    only_time = formula.model.cost == "makespan"
-    if only_time and makespan == at_least and _mostly_pass(formula, plan, some):
-        formula.close()
-        return None
-    return _bound(formula, task, plan, question)
 
 
 def _mostly_pass(formula: PlanFormula, plan: Plan, some: tuple[Rows, int]) -> bool:
@@ -134,21 +127,16 @@ def _mostly_pass(formula: PlanFormula, plan: Plan, some: tuple[Rows, int]) -> bo
     return passing > _MOST * len(sample)
 
 
-def _bound(formula: PlanFormula, task: PlanningTask, plan: Plan, effort: int) -> ExactBound:
-    cheap: Literals = []
-    formula.fix(task.init, len(plan))
-    if formula.model.cost != "makespan" and countable(formula.model):
-        plan, cheap = _cheapest(formula, task, plan)
-    formula.require(cheap)
-    plans = formula.fixed(len(plan))
-    try:
-        with reaching(plans.so_far, SMALLER):
-            used = _used(plans, formula.model, plan, effort)
-            plans = plans.smaller()
-    except BaseException:
-        plans.close()
-        raise
-    formula.close()
+def _bound(
+    plans: FixedPlans, model: JointModel, task: PlanningTask, plan: Plan, effort: int
+) -> ExactBound:
+    if model.cost != "makespan":
+        plan, cheap = cheapest(plans, model, task, plan)
+        plans.require(cheap)
+    plans.simplify()
+    plans.without_limit()
+    used = _used(plans, model, plan, effort)
+    plans.simplify()
     return ExactBound(plans, len(plan), used, effort)
 
 
@@ -166,30 +154,6 @@ def _shortest(formula: PlanFormula, task: PlanningTask, at_least: int) -> tuple[
         formula.spend(_EASY * makespan + formula.clauses_of_step)
         makespan += 1
     return makespan, formula.labels_chosen(makespan)
-
-
-def _cheapest(formula: PlanFormula, task: PlanningTask, plan: Plan) -> tuple[Plan, Literals]:
-    """A cheapest plan, and literals that the cheapest ones have and no others.
-
-    From below by cores where actions cost 1; if that takes long, from above.  If that does, too,
-    then what is found are plans that cost no more than some plan.
-    """
-    if all(int(own.max(initial=0)) <= 1 for own in formula.costs):
-        with suppress(OutOfEffort), formula.at_most(_FIRST):
-            cheap = least_cost(formula, task, len(plan))
-            return formula.labels_chosen(len(plan)), cheap
-    formula.count_costs(_cost_of(formula, plan))
-    with suppress(OutOfEffort):
-        while (cost := _cost_of(formula, plan)) and formula.holds(
-            formula.costs_at_most(len(plan), cost - 1)
-        ):
-            plan = formula.labels_chosen(len(plan))
-    return plan, formula.costs_at_most(len(plan), _cost_of(formula, plan))
-
-
-def _cost_of(formula: PlanFormula, plan: Plan) -> int:
-    costs = formula.costs
-    return sum(int(costs[robot][label]) for step in plan for robot, label in enumerate(step))
 
 
 def _used(plans: FixedPlans, model: JointModel, plan: Plan, effort: int) -> list[list[Bools]]:

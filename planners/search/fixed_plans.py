@@ -2,14 +2,13 @@
 """The plans of one task and length as a small formula, for many easy questions about them.
 
 Every question that is answered with yes gives all variables a value, so what counts is how many
-there are.  All variables but the robots' labels are eliminated where that makes the formula no
-larger (bounded variable elimination; Eén and Biere 2005), and those that are left are numbered
-anew.
+there are.  All variables but the robots' labels are eliminated where that makes the formula not
+much larger (bounded variable elimination; Eén and Biere 2005), again when more is known of optimal
+plans, and those that are left are numbered anew.
 """
 
 from __future__ import annotations
 
-import sys
 from array import array
 from collections.abc import Sequence
 
@@ -24,7 +23,7 @@ Plan = list[tuple[int, ...]]
 
 
 class FixedPlans(Questions):
-    """Which sequences of labels are plans, as clauses say it; questions may take any effort.
+    """Which sequences of labels are plans, as clauses say it.
 
     Parameters
     ----------
@@ -32,49 +31,43 @@ class FixedPlans(Questions):
         A formula, each clause followed by 0.
     labels
         Per step, from the first one on, and robot the variables of its labels.
+    effort
+        The solver's conflicts that may be spent.
     """
 
-    def __init__(self, clauses: array[int], labels: Sequence[Sequence[Ints]]) -> None:
-        kept = np.concatenate([own for step in labels for own in step])
-        super().__init__(sys.maxsize, len(kept))
-        sizes = [[len(own) for own in step] for step in labels]
+    def __init__(self, clauses: array[int], labels: Sequence[Sequence[Ints]], effort: int) -> None:
+        sizes = [len(own) for step in labels for own in step]
+        super().__init__(effort, sum(sizes))
         self.steps = len(labels)
         #: Per step and robot the variable of its first label.
-        self._first = 1 + np.cumsum([0, *(n for step in sizes for n in step)])[:-1].reshape(
-            self.steps, -1
-        )
-        self._sizes = sizes[0]
-        for clause in self._numbered(simplified(clauses, kept.tolist()), kept):
-            self.add(clause)
+        self._first = 1 + np.cumsum([0, *sizes])[:-1].reshape(self.steps, -1)
+        self._sizes = sizes[: self._first.shape[1]]
+        kept = np.concatenate([own for step in labels for own in step])
+        self._take(simplified(clauses, kept.tolist()), kept)
 
-    def smaller(self) -> FixedPlans:
-        """The same plans, with what is required by now simplified away; this one is closed."""
-        labels = [
-            [np.arange(size) + first for first, size in zip(step, self._sizes, strict=True)]
-            for step in self._first
-        ]
-        found = FixedPlans(self.clauses, labels)
-        self.close()
-        return found
+    def simplify(self) -> None:
+        """Eliminate what can be, now that more is required; other variables are forgotten."""
+        labels = np.arange(1, int(self._first[-1, -1]) + self._sizes[-1])
+        found = simplified(self.clauses, labels.tolist())
+        self.clear(len(labels))
+        self._take(found, labels)
 
-    def _numbered(self, clauses: Sequence[Sequence[int]], kept: Ints) -> list[list[int]]:
-        """The clauses with the kept variables first, and others that occur after them."""
-        number = {variable: k for k, variable in enumerate(kept.tolist(), start=1)}
-        found = []
+    def _take(self, clauses: Sequence[Sequence[int]], labels: Ints) -> None:
+        """Clauses with the labels' variables first, and others that occur after them."""
+        number = {variable: k for k, variable in enumerate(labels.tolist(), start=1)}
         for clause in clauses:
             renamed = []
             for literal in clause:
                 variable = number.setdefault(abs(literal), len(number) + 1)
                 renamed.append(variable if literal > 0 else -variable)
-            found.append(renamed)
+            self.add(renamed)
         self.variables = len(number)
-        return found
 
     def so_far(self) -> str:
         """What is asked just now, for messages."""
         return (
-            f"question {self.calls:,} to the SAT solver, about optimal plans of {self.steps} joint "
-            f"steps; {self.variables:,} variables"
+            f"question {self.calls:,} to the SAT solver, about plans of {self.steps} joint steps "
+            f"from the start; {self.variables:,} variables"
         )
 
     def firsts(self, depth: int) -> Ints:

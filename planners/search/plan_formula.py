@@ -2,7 +2,7 @@
 """Plans of a given number of joint steps as a propositional formula, for a SAT solver.
 
 Steps (`planners.search.step_formula`) are counted from the goal, so that one formula answers for
-every state how many steps, and how much of the second cost component, lead from it to the goal.
+every state how many steps lead from it to the goal.
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import FullState, Goal, JointModel
+from planners.sat import split_clauses
 from planners.search.fixed_plans import FixedPlans
 from planners.search.mutexes import Pair
 from planners.search.questions import Literals, Questions
@@ -21,12 +21,9 @@ from planners.search.state_variables import StateVariable
 from planners.search.step_formula import clauses_of, step_formula
 from planners.tables import Ints, Rows
 
-#: The largest cost of one action that is counted.
-_COST = 8
-
 
 class PlanFormula(Questions):
-    """Whether a state has a plan of at most some steps and some cost; exact.
+    """Whether a state has a plan of so many steps; exact.
 
     ``variables`` and ``pairs`` of facts that are never true together hold in the states that are
     asked for and in all that follow; ``effort`` are the solver's conflicts that may be spent.
@@ -48,14 +45,12 @@ class PlanFormula(Questions):
         effort: int,
     ) -> None:
         self.model = model
-        self.costs = label_costs(model)
         self._step = step_formula(model, variables, pairs)
         super().__init__(effort, self._step.size)
         self._steps = 0
         #: Per step its variables begin after this one; the goal's state is the first.
         self._base = [0]
         self._active: Literals = []
-        self._counted: list[Literals] = []
         #: The clauses of a step one after the other, each with 0 at its end.
         self._flat: Ints = np.array(
             [k for clause in self._step.clauses for k in (*clause, 0)], np.int64
@@ -84,13 +79,8 @@ class PlanFormula(Questions):
         moved = np.sign(self._flat) * np.where(
             number <= size, number + base, number - size + following
         )
-        clause = [-active]
-        for literal in moved.tolist():
-            if literal:
-                clause.append(literal)
-            else:
-                self.add(clause)
-                clause = [-active]
+        for clause in split_clauses(moved.tolist()):
+            self.add([-active, *clause])
         self._base.append(base)
         self._active.append(active)
         self._steps += 1
@@ -99,39 +89,6 @@ class PlanFormula(Questions):
     def clauses_of_step(self) -> int:
         """How many clauses one step more has."""
         return len(self._step.clauses)
-
-    def count_costs(self, most: int) -> None:
-        """Let costs up to ``most`` be bounded, in all steps that there are.
-
-        A unary counter: ``self._counted[r][k]`` is implied where steps r .. 1 cost more than k.
-        """
-        before: Literals = []
-        self._counted = [before]
-        for step in range(1, self._steps + 1):
-            for robot in range(len(self._step.first_label)):
-                for paid in self._paid(step, robot):
-                    before = self._one_more(before, paid, most)
-            self._counted.append(before)
-
-    def _one_more(self, before: Literals, paid: int, most: int) -> Literals:
-        after = [self.fresh() for _ in range(min(len(before) + 1, most + 1))]
-        for place, literal in enumerate(before):
-            if place < len(after):
-                self.add([-literal, after[place]])
-            if place + 1 < len(after):
-                self.add([-literal, -paid, after[place + 1]])
-        self.add([-paid, after[0]])
-        return after
-
-    def _paid(self, step: int, robot: int) -> Iterator[int]:
-        """Literals, as many of which hold as the robot's label in a step costs."""
-        costs = self.costs[robot]
-        base = self._base[step] + self._step.first_label[robot]
-        for least in range(1, int(costs.max(initial=0)) + 1):
-            paid = self.fresh()
-            for label in np.flatnonzero(costs >= least).tolist():
-                self.add([-(base + label), paid])
-            yield paid
 
     # ---- questions
 
@@ -147,32 +104,26 @@ class PlanFormula(Questions):
         numbers = self._base[steps] + 1 + np.arange(len(facts))
         return [*self._active[:steps], *(facts * numbers).tolist()]
 
-    def costs_at_most(self, steps: int, cost: int) -> Literals:
-        """A literal that says so of these steps, after `count_costs`; none where it is no bound."""
-        counted = self._counted[steps]
-        return [-counted[cost]] if cost < len(counted) else []
-
-    def fix(self, row: Rows, steps: int) -> None:
-        """Ask from now on, by `holds`, only about plans of so many steps from this state.
+    def fixed(self, row: Rows, steps: int) -> FixedPlans:
+        """The plans of so many steps from this state, for many easy questions.
 
         What is fixed is simplified away; what is assumed may be part of every clause learnt.
         """
-        self.require(self._begun(row, steps))
-
-    def fixed(self, steps: int) -> FixedPlans:
-        """The plans of so many steps that the formula has now, for many easy questions."""
+        clauses = self.clauses[:]
+        for literal in self._begun(row, steps):
+            clauses.extend((literal, 0))
         labels = [
             [
-                np.arange(len(own)) + self.label(step, robot, 0)
+                np.arange(len(own)) + self._label(step, robot)
                 for robot, own in enumerate(self.model.labels)
             ]
             for step in range(steps, 0, -1)
         ]
-        return FixedPlans(self.clauses, labels)
+        return FixedPlans(clauses, labels, self.left)
 
-    def label(self, step: int, robot: int, label: int) -> int:
-        """The variable of a robot's label in a step."""
-        return self._base[step] + self._step.first_label[robot] + label
+    def _label(self, step: int, robot: int) -> int:
+        """The variable of a robot's first label in a step."""
+        return self._base[step] + self._step.first_label[robot]
 
     def labels_chosen(self, steps: int) -> list[tuple[int, ...]]:
         """The robots' labels in the plan that the last answer found, from its first step on."""
@@ -180,28 +131,16 @@ class PlanFormula(Questions):
         found = []
         for step in range(steps, 0, -1):
             chosen = []
-            for robot, first in enumerate(self._step.first_label):
-                count = len(self.model.labels[robot])
-                own = true[self._base[step] + first - 1 : self._base[step] + first - 1 + count]
-                chosen.append(int(np.flatnonzero(own)[0]))
+            for robot, labels in enumerate(self.model.labels):
+                first = self._label(step, robot) - 1
+                chosen.append(int(np.argmax(true[first : first + len(labels)])))
             found.append(tuple(chosen))
         return found
-
-
-def label_costs(model: JointModel) -> list[NDArray[np.int64]]:
-    """Per robot the second cost component of each of its labels; idling is free."""
-    assert isinstance(model.stepper, ComposingStepper)
-    return model.stepper.costs
 
 
 def may_be_exact(model: JointModel) -> bool:
     """Whether a model may have a plan formula: its joint steps are composed."""
     return isinstance(model.stepper, ComposingStepper)
-
-
-def countable(model: JointModel) -> bool:
-    """Whether costs are small enough for a counter."""
-    return all(int(own.max(initial=0)) <= _COST for own in label_costs(model))
 
 
 def _goal_clauses(model: JointModel, goal: Goal) -> Iterator[Literals]:

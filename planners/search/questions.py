@@ -47,6 +47,12 @@ class Questions:
 
     # ---- the formula
 
+    def clear(self, variables: int) -> None:
+        """Begin a new formula, of so many variables."""
+        self.close()
+        self.variables, self.clauses = variables, array("i")
+        self._solver = sat_solver(SOLVER)
+
     def add(self, clause: Sequence[int]) -> None:
         """Let one of these literals be true."""
         self.clauses.extend(clause)

@@ -13,7 +13,7 @@ import pytest
 from planners.errors import BadInput, ProvedImpossible
 from planners.joint.model import Cost, JointModel, PlanningTask
 from planners.loading import PlanningInstance
-from planners.search.cheapest import least_cost
+from planners.search.cheapest import label_costs, least_cost
 from planners.search.exact_bound import ExactBound, exact_bound
 from planners.search.mutexes import mutexes
 from planners.search.plan_formula import PlanFormula
@@ -133,21 +133,23 @@ def cheapest_compared(seeds: range) -> Counter[str]:
         except TooManyClauses:
             continue
         with closing(formula):
+            own_costs = label_costs(model)
             costs = [
-                sum(int(formula.costs[r][label]) for step in plan for r, label in enumerate(step))
+                sum(int(own_costs[r][label]) for step in plan for r, label in enumerate(step))
                 for plan in every
             ]
             assert formula.solvable(task.init, steps)
-            formula.fix(task.init, steps)
-            cheap = least_cost(formula, task, steps)
+            fixed = formula.fixed(task.init, steps)
+        with closing(fixed):
+            cheap = least_cost(fixed, model, task)
             for plan, cost in zip(every, costs, strict=True):
                 chosen = [
-                    formula.label(steps - k, robot, label)
+                    fixed.label(k, robot, label)
                     for k, step in enumerate(plan)
                     for robot, label in enumerate(step)
                 ]
-                assert formula.holds(chosen)
-                assert formula.holds([*chosen, *cheap]) == (cost == min(costs))
+                assert fixed.holds(chosen)
+                assert fixed.holds([*chosen, *cheap]) == (cost == min(costs))
         met["one cost" if min(costs) == max(costs) else "more costs"] += 1
     return met
 
