@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which published tasks are solved: all their optimal plans counted, within a limit.
 
-    python benchmarks/coverage.py [--limit SECONDS] [--kept FILE] [--cost COST] [--first N] [ROW ..]
+    python benchmarks/coverage.py [--limit SECONDS] [--kept FILE] [--cost COST] [--first N]
+                                  [--heuristic NAME] [ROW ..]
     python benchmarks/coverage.py --list
 
 Rows are the problems of the twelve CoDMAP domains in ../shared/data (``--first N`` of each, the
-smallest files first), robots in the corners of open grids, and agents of a MovingAI scenario.
+smallest files first), robots in the corners of open grids, agents of a MovingAI scenario, and, on
+the MovingAI maps without one, robots in cells that are far from each other, each of which has to be
+where the next one is.
 Every row is a process of its own on one core with 8 GB of address space and ``--limit`` CPU
 seconds (60).  Columns: CPU seconds to load and to search, the least makespan and the second cost
 component, the exact number of optimal plans and the nodes of their graph; the states that the
@@ -82,7 +85,14 @@ def rows(first: int) -> list[str]:
         for path in sorted(SCENARIOS.glob("*.scen"))
         for agents in AGENTS
     ]
-    return [*codmap(first), *corners, *scenarios]
+    known = {path.stem.split("-random")[0] for path in SCENARIOS.glob("*.scen")}
+    far = [
+        f"{path.stem}, {robots} far apart"
+        for path in sorted(SCENARIOS.glob("*.map"))
+        if path.stem not in known
+        for robots in AGENTS
+    ]
+    return [*codmap(first), *corners, *scenarios, *far]
 
 
 def load(name: str, cost: str) -> PlanningInstance:
@@ -95,19 +105,58 @@ def load(name: str, cost: str) -> PlanningInstance:
         return Grid(name.replace(",", ""), int(size.split("x")[0]), int(robots), False).load()
     if name.endswith("agents"):
         return scenario(name)
+    if name.endswith("far apart"):
+        return far_apart(name)
     domain, problem = codmap(sys.maxsize)[name]
     return load_files(domain, [problem], ModelOptions(cost=cost))  # type: ignore[arg-type]
 
 
 def scenario(name: str) -> PlanningInstance:
     """The first agents of a scenario."""
-    from coordlang.movingai import planning_files
-    from planners.loading import load as load_files
-
     stem, agents = name.removesuffix(" agents").rsplit(", ", 1)
     file = SCENARIOS / f"{stem}.scen"
     map_name = file.read_text().splitlines()[1].split("\t")[1]
-    texts = planning_files(SCENARIOS / Path(map_name).name, file, int(agents))
+    return on_map(SCENARIOS / Path(map_name).name, file, int(agents))
+
+
+def far_apart(name: str) -> PlanningInstance:
+    """Robots in cells that are far from each other: each new one as far as can be from all."""
+    from coordlang.movingai import read_map
+
+    stem, robots = name.removesuffix(" far apart").rsplit(", ", 1)
+    path = SCENARIOS / f"{stem}.map"
+    found = read_map(path)
+    cells = [min(found.passable)]
+    while len(cells) < int(robots):
+        far = [walked(found.passable, cell) for cell in cells]
+        cells.append(max(sorted(far[0]), key=lambda cell: min(own[cell] for own in far)))
+    lines = ["version 1"]
+    for (y, x), (goal_y, goal_x) in zip(cells, [*cells[1:], cells[0]], strict=True):
+        size = f"{found.width}\t{found.height}"
+        lines.append(f"0\t{path.name}\t{size}\t{x}\t{y}\t{goal_x}\t{goal_y}\t0")
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "far.scen"
+        file.write_text("\n".join(lines) + "\n")
+        return on_map(path, file, int(robots))
+
+
+def walked(passable: frozenset[tuple[int, int]], start: tuple[int, int]) -> dict[Any, int]:
+    """The steps from a cell to those that can be reached."""
+    steps, queue = {start: 0}, [start]
+    for y, x in queue:
+        for cell in ((y + 1, x), (y - 1, x), (y, x + 1), (y, x - 1)):
+            if cell in passable and cell not in steps:
+                steps[cell] = steps[y, x] + 1
+                queue.append(cell)
+    return steps
+
+
+def on_map(path: Path, file: Path, agents: int) -> PlanningInstance:
+    """The first agents of a scenario file on a map."""
+    from coordlang.movingai import planning_files
+    from planners.loading import load as load_files
+
+    texts = planning_files(path, file, agents)
     with tempfile.TemporaryDirectory() as folder:
         for file_name, text in texts.items():
             (Path(folder) / file_name).write_text(text)
@@ -115,14 +164,14 @@ def scenario(name: str) -> PlanningInstance:
         return load_files(Path(folder) / "domain.pddl", [Path(folder) / problem])
 
 
-def one(name: str, cost: str) -> dict[str, Any]:
+def one(name: str, cost: str, heuristic: str) -> dict[str, Any]:
     """The figures of a row, in this process."""
     from planners.search.optimal_plans import search_with_effort
     from planners.search.plans import counts
 
     loaded = load(name, cost)
     figures: dict[str, Any] = {"load": round(process_time(), 2)}
-    space, effort = search_with_effort(loaded.model, loaded.tasks[0])
+    space, effort = search_with_effort(loaded.model, loaded.tasks[0], heuristic=heuristic)
     makespan, second = space.cost_of(0)
     return {
         **figures,
@@ -139,9 +188,10 @@ def one(name: str, cost: str) -> dict[str, Any]:
     }
 
 
-def measured(name: str, limit: int, cost: str) -> dict[str, Any]:
+def measured(name: str, limit: int, cost: str, heuristic: str = "auto") -> dict[str, Any]:
     """The figures of a row from a process of its own."""
-    arguments = (__file__, "--one", name, "--cost", cost, "--limit", str(limit))
+    how = ("--cost", cost, "--limit", str(limit), "--heuristic", heuristic)
+    arguments = (__file__, "--one", name, *how)
     done = run_python(arguments, most=20 * limit)
     figures: dict[str, Any] = {"row": name, **done.data, "memory": done.memory}
     if "plans" not in figures:
@@ -173,13 +223,14 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=10, metavar="N", help="problems of a domain")
     parser.add_argument("--limit", type=int, default=60, metavar="SECONDS", help="CPU seconds (60)")
     parser.add_argument("--cost", default="makespan+actions", help="of CoDMAP's tasks")
+    parser.add_argument("--heuristic", default="auto", help="what bounds the search; or blind")
     parser.add_argument("--kept", type=Path, metavar="FILE", help="where lines are kept")
     parser.add_argument("--one", metavar="ROW", help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.one:
         resource.setrlimit(resource.RLIMIT_CPU, (given.limit, given.limit + 1))
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-        print(json.dumps(one(given.one, given.cost)))
+        print(json.dumps(one(given.one, given.cost, given.heuristic)))
         return
     names = [n for n in rows(given.first) if not given.rows or n.startswith(tuple(given.rows))]
     if given.list:
@@ -187,7 +238,7 @@ def main() -> None:
         return
     known, table, solved = KeptRows(given.kept), PrintedTable(*COLUMNS), 0
     for name in names:
-        figures = known.get(name, partial(measured, name, given.limit, given.cost))
+        figures = known.get(name, partial(measured, name, given.limit, given.cost, given.heuristic))
         solved += "plans" in figures
         table.print(*cells(figures))
     print(f"{solved} of {len(names)} solved")
