@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -98,7 +99,7 @@ def exact_bound(
     well alone.
     """
     try:
-        pairs = mutexes(model, task.init)
+        pairs = partial(mutexes, model, task.init)
         formula = PlanFormula(model, task.goal, variables, pairs, pieces.effort)
     except TooManyClauses:
         return None

@@ -101,6 +101,15 @@ class Layers:
     composed: int = 0
 
 
+def probe_size(model: JointModel, bound: int, pieces: PieceSizes) -> int:
+    """Joint steps after which a solver is asked, within a bound on the makespan.
+
+    They are more where the formula for that is large.
+    """
+    size = sum(map(len, model.labels)) * (bound if bound < FAR - 1 else _STEPS)
+    return pieces.probe * (1 + size // _FORMULA)
+
+
 class _GrownError(Exception):
     """More joint steps than are composed without exact bounds."""
 
@@ -228,12 +237,8 @@ class BoundedSearch:
 
     @property
     def _probe(self) -> int:
-        """Joint steps that may be composed, where they are limited.
-
-        Before exact bounds they are more where the formula for these is large.
-        """
-        size = sum(map(len, self._model.labels)) * (self.bound if self.bound < FAR - 1 else _STEPS)
-        return self._share * self._pieces.probe * (1 + size // _FORMULA)
+        """Joint steps that may be composed, where they are limited."""
+        return self._share * probe_size(self._model, self.bound, self._pieces)
 
     def _on_optimal_plans(self, exact: ExactBound, edges: Edges, depth: int) -> Edges:
         """Leave out what leads to states through which no optimal plan passes.

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from planners.joint.model import JointModel, PlanningTask
 from planners.search.bounds import FAR
 from planners.search.guides import guide_for
+from planners.search.layers import probe_size
 from planners.search.reachable import PIECES
 from planners.search.state_variables import state_variables
 from planners.tables import Rows
@@ -30,7 +31,8 @@ class Outlook:
     within
         How many states of each of the first layers are within this bound.
     solver_after
-        Joint steps after which a SAT solver would be asked for the optimal cost; None if never.
+        Joint steps within this bound, after which a SAT solver would be asked for the optimal cost;
+        None if never.
     """
 
     heuristic: str
@@ -56,5 +58,5 @@ def outlook(model: JointModel, task: PlanningTask, layers: Sequence[Rows]) -> Ou
         guide.name,
         at_least if at_least < FAR else None,
         tuple(within),
-        PIECES.probe if guide.exact else None,
+        probe_size(model, at_least, PIECES) if guide.exact else None,
     )

@@ -7,7 +7,7 @@ every state how many steps lead from it to the goal.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from planners.tables import Ints, Rows
 class PlanFormula(Questions):
     """Whether a state has a plan of so many steps; exact.
 
-    ``variables`` and ``pairs`` of facts that are never true together hold in the states that are
+    ``variables`` and ``pairs()`` of facts that are never true together hold in the states that are
     asked for and in all that follow; ``effort`` are the solver's conflicts that may be spent.
 
     Raises
@@ -41,7 +41,7 @@ class PlanFormula(Questions):
         model: JointModel,
         goal: Goal,
         variables: Sequence[StateVariable],
-        pairs: Sequence[Pair],
+        pairs: Callable[[], Sequence[Pair]],
         effort: int,
     ) -> None:
         self.model = model

@@ -8,7 +8,7 @@ only where an effect changes it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -45,11 +45,11 @@ class StepFormula:
 
 
 def step_formula(
-    model: JointModel, variables: Sequence[StateVariable], pairs: Sequence[Pair]
+    model: JointModel, variables: Sequence[StateVariable], pairs: Callable[[], Sequence[Pair]]
 ) -> StepFormula:
     """The clauses of a step whose state has one value of each variable, and none of the pairs.
 
-    Raises `TooManyClauses`.
+    These are asked for when all conditions are written.  Raises `TooManyClauses`.
     """
     return _Builder(model).build(variables, pairs)
 
@@ -82,15 +82,11 @@ class _Builder:
         #: Per robot and some of its labels, as bytes, the variable that they imply.
         self._implied: dict[tuple[int, bytes], int] = {}
 
-    def build(self, variables: Sequence[StateVariable], pairs: Sequence[Pair]) -> StepFormula:
+    def build(
+        self, variables: Sequence[StateVariable], pairs: Callable[[], Sequence[Pair]]
+    ) -> StepFormula:
         for variable in variables:
             self._exactly_one([fact + 1 for fact in variable.facts])
-        known = {fact: number for number, own in enumerate(variables) for fact in own.facts}
-        for one, other in pairs:
-            if one == other:
-                self.clauses.append((-(one + 1),))
-            elif one not in known or known[one] != known.get(other):
-                self.clauses.append((-(one + 1), -(other + 1)))
         for robot, own in enumerate(self._stepper.labelled):
             self._one_label(robot, len(own))
             for label, action in enumerate(own):
@@ -98,6 +94,12 @@ class _Builder:
                     self._action(robot, label, action)
         for i, j in combinations(range(len(self._model.robots)), 2):
             self._apart(i, j)
+        known = {fact: number for number, own in enumerate(variables) for fact in own.facts}
+        for one, other in pairs():
+            if one == other:
+                self.clauses.append((-(one + 1),))
+            elif one not in known or known[one] != known.get(other):
+                self.clauses.append((-(one + 1), -(other + 1)))
         following = self._facts_follow()
         # Variables of the next state come after all of this step's.
         shifted = [

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 from contextlib import closing
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -128,7 +129,7 @@ def cheapest_compared(seeds: range) -> Counter[str]:
         variables = state_variables(model, task.init)
         try:
             formula = PlanFormula(
-                model, task.goal, variables, mutexes(model, task.init), PIECES.effort
+                model, task.goal, variables, partial(mutexes, model, task.init), PIECES.effort
             )
         except TooManyClauses:
             continue

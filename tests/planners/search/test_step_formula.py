@@ -26,7 +26,7 @@ def pairs_apart(model: JointModel) -> int:
     """How many pairs of labels exclude each other, in the formula as in the tables."""
     stepper = model.stepper
     assert isinstance(stepper, ComposingStepper)
-    formula = step_formula(model, (), ())
+    formula = step_formula(model, (), list)
     first = formula.first_label
     facts = len(model.codec.facts)
     about_labels = [
@@ -79,7 +79,7 @@ def test_what_excludes_is_said_fact_by_fact() -> None:
     )
     model = build(domain, [parse_problem(Source("problem", text), domain)], ModelOptions()).model
     assert pairs_apart(model) == 50 * 50
-    formula = step_formula(model, (), ())
+    formula = step_formula(model, (), list)
     between = [
         clause
         for clause in formula.clauses
