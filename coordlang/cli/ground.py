@@ -59,6 +59,9 @@ def command(
     Exit 0: written, and verified by definition unless --unverified.  1: refuted for this problem;
     nothing is written.  3: written, but not verified, for the memory did not suffice.
     """
+    from coordlang.language.file import to_bytes
+    from planners.limits import stop_clock
+
     listed = tasks if tasks not in ("all", "own") else None
     places = [coordinates] if coordinates else map(beside, pddl.problems)
     check_outputs([("-o", output)], [lifted, *pddl.paths, listed, *places])
@@ -74,7 +77,11 @@ def command(
             jobs=jobs,
             **model,
         )
-    language.save(output)
+    stop_clock()  # the work is done; from here on it is saved
+    if output == "-":
+        echo(to_bytes(language).decode(), nl=False)
+    else:
+        language.save(output)
     size = counted(len(language.words), "word")
     count = language.provenance.tasks["count"]
     tasks_text = f" for {counted(count, 'task')}" if count else ""

@@ -90,6 +90,9 @@ def command(
     Exit 0: written.  3: a limit ended the search for fewer words (--prefer); the best ones so far
     are written.  11: no features suffice.
     """
+    from coordlang.lifted.file import to_bytes
+    from planners.limits import stop_clock
+
     places = [coordinates] if coordinates else map(beside, (*pddl.problems, *check))
     check_outputs([("-o", output)], [*pddl.paths, *check, *places])
     with working("finding all optimal plans") as progress:
@@ -106,7 +109,11 @@ def command(
             jobs=jobs,
             **model,
         )
-    lifted.save(output)
+    stop_clock()  # the work is done; from here on it is saved
+    if output == "-":
+        echo(to_bytes(lifted.language).decode(), nl=False)
+    else:
+        lifted.save(output)
     echo(json.dumps(lifted.data()) if as_json else _text(lifted), err=output == "-")
     return _exit_code(lifted.learned.stopped)
 

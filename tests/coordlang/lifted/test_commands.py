@@ -45,6 +45,20 @@ def test_ground_and_verify(coordlang: Command, lifted: Path, tmp_path: Path) -> 
     assert coordlang("verify", lifted, GRID, LARGER, "--tasks", "all", "--jobs", "1").code == 0
 
 
+def test_files_on_stdout(
+    coordlang: Command, lifted: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """``-`` is stdout, and no file of that name; what is said goes to stderr."""
+    monkeypatch.chdir(tmp_path)
+    out = coordlang("lift", GRID, *RINGS, "--tasks", "all", "-o", "-", "--jobs", "1")
+    assert (out.code, out.out) == (0, lifted.read_text())
+    assert "4 words, functions of 2 features" in out.err
+    assert coordlang("ground", lifted, GRID, LARGER, "-o", "l.json", "--jobs", "1").code == 0
+    out = coordlang("ground", lifted, GRID, LARGER, "-o", "-", "--jobs", "1")
+    assert (out.code, out.out) == (0, Path("l.json").read_text())
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["l.json"]
+
+
 def test_what_is_refuted_is_not_written(coordlang: Command, lifted: Path, tmp_path: Path) -> None:
     language = tmp_path / "language.json"
     outcome = coordlang("ground", lifted, GRID, OPEN, "-o", language, "--jobs", "1")
