@@ -30,6 +30,7 @@ from coordlang.lifted.learning import Learned, learn
 from coordlang.lifted.wording import english, formula
 from coordlang.tasks.candidates import require_solvable
 from planners.errors import BadInput, Position, ProvedImpossible, Refuted, UsageError
+from planners.loading import PlanningInstance
 
 #: What a lifted language should have few of first, features or words.
 LiftPreference = Literal["features", "words"]
@@ -133,6 +134,13 @@ def lift(
     if complexity < 1:
         raise UsageError(f"--complexity {complexity}: expected 1 or more", remedy="Say 8.")
     given = GivenOptions.of(**model)
+    if factored is not None and check:
+        raise UsageError(
+            "--check and --factored: a folder of factored files holds one problem",
+            remedy="Leave out --check, or make a file of each folder: `coordlang inspect --write`.",
+        )
+    if isinstance(domain, PlanningInstance):
+        problems = problems or domain.problems
     every = [
         _instance(domain, problem, factored, tasks, given, coordinates, progress)
         for problem in ([*problems, *check] if factored is None else [None, *check])
@@ -163,7 +171,7 @@ def lift(
         first.model.robots,
         provenance.domain,
         {key: provenance.model[key] for key in keys},
-        bool(given.robots or given.robot_type),
+        bool(first.loaded.options.robots.names or first.loaded.options.robots.type),
         tuple(_verified(own, sizes) for own, sizes in zip(every, learned.sizes, strict=True)),
         {"program": "coordlang", "version": coordlang.__version__, "seed": seed},
     )
@@ -246,7 +254,7 @@ def _instance(
         progress(f"finding all optimal plans of {files.problems[0].name}")
     points = coordinates_of(coordinates, files.problems[0])
     try:
-        candidates = files.candidates(tasks, given.options())
+        candidates = files.candidates(tasks, files.given.options())
         require_solvable(candidates)
     except ProvedImpossible as error:
         error.position = error.position or Position(files.problems[0].source.name)

@@ -14,7 +14,7 @@ from msgspec import Meta
 from coordlang.language.duplicate_keys import duplicate_key
 from coordlang.language.record import DomainRecord, ModelRecord
 from coordlang.lifted.language import LiftedLanguage, Vector, Verified
-from coordlang.lifted.notation import feature_of
+from coordlang.lifted.notation import LARGEST, feature_of
 from coordlang.tasks.candidates import Kind
 from planners.errors import BadInput, Position
 from planners.files import FileFormat, read_bytes, require_seen
@@ -191,7 +191,8 @@ def vector_of(key: str, size: int, position: Position) -> Vector:
         vector = tuple(map(int, key.split()))
     except ValueError:
         vector = ()
-    if len(vector) != size or " ".join(map(str, vector)) != key:
+    is_plain = " ".join(map(str, vector)) == key and all(abs(v) < LARGEST for v in vector)
+    if len(vector) != size or not is_plain:
         raise BadInput(
             f"{echoed(key)} are no values of {size} features",
             position=position,

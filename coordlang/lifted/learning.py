@@ -23,9 +23,10 @@ from coordlang.lifted.language import Vector
 from coordlang.lifted.merging import Merged, merge_classes
 from coordlang.lifted.pool import Pool, pool_of
 from coordlang.lifted.world import States
+from coordlang.required.miscoordination import Inseparable, inseparable
 from coordlang.symmetry.group import SymmetryGroup
 from coordlang.vocabulary.refuter import Refuter
-from planners.errors import ProvedImpossible
+from planners.errors import Position, ProvedImpossible
 from planners.limits import run_until_stopped
 from planners.pieces.processes import Processes
 from planners.pieces.work import Runner
@@ -35,6 +36,8 @@ from planners.tables import Bools, Ints
 #: simple features, and a word for each of their combinations.
 Preference = Literal["features", "words"]
 
+#: Why some plans are beyond features.
+_UNSEEN = "Features see what is true, and not what was done last."
 #: Sets of features that are tried for fewer words.
 _TRIED = 8
 
@@ -299,6 +302,8 @@ class _Learner:
 
     def _separating(self, number: int, clause: Clause, excluded: Sequence[int]) -> Bools:
         """The features that tell some pair of a clause apart."""
+        if not clause:
+            raise self._inseparable(number)
         pairs = np.array(sorted(clause))
         table = self._tables[number]
         apart: Bools = (table[:, pairs[:, 0]] != table[:, pairs[:, 1]]).any(axis=1)
@@ -311,10 +316,27 @@ class _Learner:
         own = self.taken[number]
         one, other = min(clause)
         model, rows = own.candidates.model, own.candidates.rows
+        pairs = np.array(sorted(clause))
+        facts = model.codec.facts_part(rows)
+        if (facts[pairs[:, 0]] == facts[pairs[:, 1]]).all():
+            remedy = f"{_UNSEEN} `coordlang build --remember-actions` finds words of one problem."
+        else:
+            remedy = (
+                "Allow more complex features, or name places so that they say where they lie "
+                "(c2-3)."
+            )
         return ProvedImpossible(
             f"no feature up to complexity {self._complexity} tells states apart of which every "
             f"language separates some, such as {model.state_text(rows[one])} and "
             f"{model.state_text(rows[other])} of {own.name}",
-            remedy="Allow more complex features, or name places so that they say where they lie "
-            "(c2-3).",
+            remedy=remedy,
         )
+
+    def _inseparable(self, number: int) -> Inseparable:
+        """What an empty clause means: plans that fail together have the same states."""
+        candidates = self.taken[number].candidates
+        found = map(inseparable, candidates.spaces)
+        error = Inseparable(next(witness for witness in found if witness is not None))
+        error.position = Position(candidates.loaded.problems[0].source.name)
+        error.remedy = f"{_UNSEEN} `coordlang build --remember-actions` finds words of one problem."
+        return error

@@ -36,8 +36,8 @@ from planners.messages import echoed
 _TOKEN = re.compile(r"[()]|[^\s()]+")
 #: Longer definitions are refused; no feature of ours is as long.
 _LONGEST = 1_000
-#: Numbers in definitions are smaller than this.
-_LARGEST = 1_000_000
+#: Numbers in definitions, and values of features, are smaller than this.
+LARGEST = 1_000_000
 
 Tree = str | list["Tree"]
 
@@ -83,9 +83,9 @@ def _feature(tree: Tree) -> Feature | None:
     match tree:
         case ["sign", ["-", one, other]]:
             return Sign(_number(one), _number(other))
-        case ["mod", number, str(modulus)] if 1 < int(modulus) < _LARGEST:
+        case ["mod", number, str(modulus)] if 1 < int(modulus) < LARGEST:
             return Residue(_number(number), int(modulus))
-        case ["min", number, str(most)] if 0 < int(most) < _LARGEST:
+        case ["min", number, str(most)] if 0 < int(most) < LARGEST:
             return Least(_number(number), int(most))
         case ["same", one, other]:
             return Same(_term(one), _term(other))

@@ -14,6 +14,7 @@ import coordlang
 from coordlang.api.lifting import Lifted
 from coordlang.lifted.file import lifted_from_bytes, read_lifted, to_bytes
 from coordlang.lifted.language import LiftedLanguage
+from coordlang.required.miscoordination import Inseparable
 from planners.errors import BadInput, Note, Position, ProvedImpossible, Refuted, UsageError
 from planners.pddl import parse_problem, read_domain
 from planners.pddl.lifted import Problem
@@ -267,3 +268,69 @@ def test_names_that_are_not_ascii(tmp_path: Path) -> None:
     assert "\u00e9toile" in lifted.language.robots
     language = coordlang.ground(lifted.language, domain, problem, jobs=1)
     assert language.guarantee.method == "lifted; verified here"
+
+
+WALKERS = """(define (domain d) (:requirements :typing) (:types walker place)
+  (:predicates (at ?w - walker ?p - place) (way ?p ?q - place) (free ?p - place))
+  (:action walk :parameters (?w - walker ?p ?q - place)
+    :precondition (and (at ?w ?p) (way ?p ?q) (free ?q))
+    :effect (and (at ?w ?q) (not (at ?w ?p)) (free ?p) (not (free ?q)))))
+"""
+
+
+def test_a_loaded_problem(tmp_path: Path) -> None:
+    """Its robots were named when it was loaded, and nothing else says which they are."""
+    domain, problem = tmp_path / "d.pddl", tmp_path / "p.pddl"
+    domain.write_text(WALKERS)
+    problem.write_text(
+        "(define (problem p) (:domain d) (:objects r1 r2 - walker a b c - place)"
+        "(:init (at r1 a) (at r2 b) (free c) (way a b) (way b c) (way c a))"
+        "(:goal (and (at r1 b) (at r2 c))))"
+    )
+    with pytest.raises(BadInput, match="which objects are the robots"):
+        coordlang.load(domain, problem)
+    loaded = coordlang.load(domain, problem, robots=("r1", "r2"), cost="makespan+actions")
+    lifted = coordlang.lift(loaded, tasks="all", jobs=1).language
+    assert lifted.model["cost"] == "makespan+actions"
+    assert [known.problem for known in lifted.verified] == ["p"]
+    language = coordlang.ground(lifted, domain, problem, jobs=1)
+    assert language.guarantee.method == "lifted; verified here"
+
+
+def test_factored_files_are_one_problem(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="--check and --factored"):
+        coordlang.lift(factored=tmp_path, check=[SMALL])
+
+
+def test_values_beyond_all_bounds(rings: Lifted) -> None:
+    """No feature has them; as a number of the machine they would be an overflow."""
+    data = json.loads(to_bytes(rings.language))
+    data["values"][f"0 {10**25}"] = "w0"
+    with pytest.raises(BadInput, match="are no values of 2 features"):
+        lifted_of(data)
+
+
+INSEPARABLE = """(define (domain d) (:requirements :typing) (:types robot)
+  (:predicates (done ?r - robot))
+  (:action one :parameters (?r - robot)
+    :precondition (not (done ?r)) :effect (done ?r))
+  (:action two :parameters (?r ?s - robot)
+    :precondition (and (not (done ?r)) (not (= ?r ?s))) :effect (and (done ?r) (done ?s))))
+"""
+
+
+def test_plans_with_the_same_states(tmp_path: Path) -> None:
+    """No features tell them apart; nor what was done last, which features do not see."""
+    domain, problem = tmp_path / "d.pddl", tmp_path / "p.pddl"
+    domain.write_text(INSEPARABLE)
+    problem.write_text(
+        "(define (problem p) (:domain d) (:objects r1 r2 - robot) (:init) "
+        "(:goal (and (done r1) (done r2))))"
+    )
+    with pytest.raises(Inseparable, match="pass through the same states") as error:
+        coordlang.lift(domain, problem, jobs=1)
+    assert error.value.position == Position(str(problem))
+    with pytest.raises(ProvedImpossible, match="tells states apart") as remembering:
+        coordlang.lift(domain, problem, remember_actions=True, jobs=1)
+    for raised in (error, remembering):
+        assert "Features see what is true, and not what was done last" in str(raised.value)
