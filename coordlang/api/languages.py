@@ -47,7 +47,7 @@ from coordlang.language.recorded import (
 from coordlang.language.words import Language
 from coordlang.repairing import Repaired, repair_language
 from coordlang.required.miscoordination import Miscoordination
-from coordlang.tasks.candidates import Candidates
+from coordlang.tasks.candidates import Candidates, require_solvable
 from coordlang.verification.pieces import verify_candidates
 from planners.errors import ProvedImpossible, UsageError
 from planners.loading import ModelOptions
@@ -345,6 +345,8 @@ def verify(
     ------
     BadInput
         If the language belongs to another domain or world.
+    ProvedImpossible
+        If there is no candidate task.
     Refuted
         If a reason of the certificate is none.
     """
@@ -357,6 +359,7 @@ def verify(
         candidates = recorded_candidates(read, files.domain, files.problems, options, position)
     else:
         candidates = files.candidates(tasks, options)
+    require_solvable(candidates)
     partition = read.partition(candidates.model)
     say_size(candidates, note or progress)
     with opened_runner(jobs, scheduler, resume, note) as runner:

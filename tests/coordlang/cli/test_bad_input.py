@@ -640,3 +640,37 @@ def test_time_limit(coordlang: Command, t_map: tuple[Path, Path]) -> None:
     assert outcome.code == 23
     assert "the time limit of 0.5 s is over" in outcome.err
     assert outcome.out == ""
+
+
+NOBODY_MOVES = """(define (domain d) (:requirements :typing) (:types robot cell)
+  (:predicates (at ?r - robot ?c - cell) (way ?a ?b - cell) (key ?r - robot) (pass ?r - robot))
+  (:action alone :agent ?r - robot :parameters (?a ?b - cell)
+    :precondition (and (pass ?r) (at ?r ?a) (way ?a ?b))
+    :effect (and (at ?r ?b) (not (at ?r ?a))))
+  (:action with :agent ?r - robot :parameters (?a ?b - cell)
+    :precondition (and (at ?r ?a) (way ?a ?b)
+      (exists (?o - robot) (and (not (= ?o ?r)) (help ?o))))
+    :effect (and (pass ?r) (at ?r ?b) (not (at ?r ?a))))
+  (:action help :agent ?r - robot :parameters ()
+    :precondition (and (pass ?r) (key ?r)
+      (forall (?o - robot ?a ?b - cell) (not (with ?o ?a ?b))))
+    :effect (not (key ?r))))
+"""
+
+
+def test_verifying_no_task_at_all(coordlang: Command, tmp_path: Path) -> None:
+    """A start from which nobody can move, though each fact might change: there are no pairs."""
+    paths = [tmp_path / name for name in ("d.pddl", "p.pddl", "stuck.pddl", "l.json")]
+    domain, problem, stuck, language = paths
+    domain.write_text(NOBODY_MOVES)
+    text = (
+        "(define (problem p) (:domain d) (:objects r1 r2 - robot a b - cell)"
+        "(:init (at r1 a) (at r2 b) (way a b) (way b a) (key r1) (key r2) PASS)"
+        "(:goal (at r1 a)))"
+    )
+    problem.write_text(text.replace("PASS", "(pass r1) (pass r2)"))
+    stuck.write_text(text.replace("PASS", ""))
+    assert coordlang("build", domain, problem, "--tasks", "all", "-o", language).code == 0
+    outcome = coordlang("verify", language, domain, stuck, "--tasks", "all")
+    assert (outcome.code, outcome.out) == (11, "")
+    assert "there is no candidate task" in outcome.err
