@@ -28,6 +28,7 @@ from coordlang.api.options import (
     ModelKeywords,
     Unsolvable,
     require_one_of,
+    require_seed,
 )
 from coordlang.api.presenting import Presented
 from coordlang.api.repair import repair_data
@@ -214,6 +215,7 @@ def build(
     """
     options = BuildOptions(method, seed, alpha_only, prefer, overlap)
     require_one_of("--unsolvable", unsolvable, UNSOLVABLE)
+    require_seed(seed)
     begin = perf_counter()
     files = read_planning(domain, problems, factored, GivenOptions.of(**model))
     if start is None:

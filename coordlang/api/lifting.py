@@ -18,7 +18,7 @@ from coordlang.api.grounding import (
 )
 from coordlang.api.inputs import DomainSource, File, ProblemSource, TasksSource, read_planning
 from coordlang.api.languages import Progress
-from coordlang.api.options import GivenOptions, ModelKeywords, require_one_of
+from coordlang.api.options import GivenOptions, ModelKeywords, require_one_of, require_seed
 from coordlang.api.presenting import Presented
 from coordlang.api.workers import opened_runner
 from coordlang.language.provenance import Guarantee, provenance_of, world_sha256
@@ -131,6 +131,7 @@ def lift(
         If no features up to this complexity suffice.
     """
     require_one_of("--prefer", prefer, ("features", "words"))
+    require_seed(seed)
     if complexity < 1:
         raise UsageError(f"--complexity {complexity}: expected 1 or more", remedy="Say 8.")
     given = GivenOptions.of(**model)

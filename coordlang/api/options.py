@@ -68,6 +68,14 @@ def require_one_of(option: str, value: str | None, known: Sequence[str]) -> None
         )
 
 
+def require_seed(seed: int) -> None:
+    """Raise `UsageError` for a negative number, which no random choices can begin with."""
+    from planners.errors import UsageError
+
+    if seed < 0:
+        raise UsageError(f"--seed {seed}: expected 0 or more", remedy="Say 0.")
+
+
 def names_in(option: str, given: str | Sequence[str] | None) -> list[str]:
     """Return the names that an option is given, in one text or several; none for None.
 

@@ -58,7 +58,7 @@ def options_of(
         )
     idle = model.get("idle")
     return ModelOptions(
-        RobotSelection(own, None, recorded["--unowned"], recorded=bool(own)),
+        RobotSelection(own, None, recorded["--unowned"], recorded=bool(language.provenance.robots)),
         recorded["--cost"],
         recorded["--remember-actions"],
         tuple(idle) if idle is not None else None,

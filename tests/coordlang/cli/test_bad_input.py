@@ -674,3 +674,13 @@ def test_verifying_no_task_at_all(coordlang: Command, tmp_path: Path) -> None:
     outcome = coordlang("verify", language, domain, stuck, "--tasks", "all")
     assert (outcome.code, outcome.out) == (11, "")
     assert "there is no candidate task" in outcome.err
+
+
+@pytest.mark.parametrize("method", ["greedy", "minimal"])
+def test_negative_seeds(method: str, coordlang: Command, files: Files) -> None:
+    outcome = coordlang(
+        "build", files.domain, files.problem, "--method", method, "--seed", "-1", "-o",
+        files.domain.with_name("l.json"),
+    )  # fmt: skip
+    assert outcome.code == 2
+    assert "--seed -1: expected 0 or more" in outcome.err

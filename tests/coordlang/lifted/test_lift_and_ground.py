@@ -144,6 +144,12 @@ def test_model_options_that_contradict(rings: Lifted) -> None:
         coordlang.ground(rings.language, GRID, LARGER, cost="makespan+actions")
 
 
+def test_robots_that_are_not_all(rings: Lifted) -> None:
+    """The lifted file does not name robots, so what is wrong is what the user said."""
+    with pytest.raises(UsageError, match=r"--robots r1 contradicts the domain"):
+        coordlang.ground(rings.language, GRID, LARGER, robots=["r1"])
+
+
 def test_a_lifted_language_is_not_repaired(rings: Lifted) -> None:
     with pytest.raises(UsageError, match="is a lifted language"):
         coordlang.build(GRID, LARGER, start=rings.language)
@@ -169,7 +175,7 @@ def test_features_that_are_too_weak() -> None:
         coordlang.lift(GRID, OPEN, tasks="all", complexity=3, jobs=1)
 
 
-@pytest.mark.parametrize("wrong", [{"prefer": "nothing"}, {"complexity": 0}])
+@pytest.mark.parametrize("wrong", [{"prefer": "nothing"}, {"complexity": 0}, {"seed": -1}])
 def test_wrong_options(wrong: dict[str, object]) -> None:
     with pytest.raises(UsageError):
         coordlang.lift(GRID, OPEN, jobs=1, **wrong)  # type: ignore[arg-type]
