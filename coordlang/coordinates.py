@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -55,7 +55,15 @@ def read_coordinates(path: str | Path) -> dict[str, Point]:
         For anything else, and if two places have the same coordinates.
     """
     position = Position(str(path))
-    entries = COORDINATES.decode(read_bytes(path), position).coordinates
+    return checked(COORDINATES.decode(read_bytes(path), position).coordinates, position)
+
+
+def checked(entries: Mapping[str, Point], position: Position) -> dict[str, Point]:
+    """Coordinates by names in lower case.
+
+    Raises `BadInput` if some are too large or no numbers, and if places or points are not
+    different.
+    """
     for name, point in entries.items():
         if not all(abs(value) < _LARGEST for value in point):
             raise BadInput(

@@ -11,7 +11,7 @@ from pathlib import Path
 import coordlang
 from coordlang.api.inputs import File, PlanningInput, TasksSource
 from coordlang.api.languages import Progress
-from coordlang.coordinates import Point, read_coordinates
+from coordlang.coordinates import Point, checked, read_coordinates
 from coordlang.language.partition import Partition
 from coordlang.language.recorded import check_domain
 from coordlang.language.words import Language
@@ -51,7 +51,7 @@ def coordinates_of(given: CoordinatesSource | None, problem: Problem) -> Mapping
     if isinstance(given, str | PathLike):
         return read_coordinates(fspath(given))
     if given is not None:
-        return given
+        return checked(given, Position("the coordinates"))
     file = Path(problem.source.name)
     beside = file.parent / "coordinates.json"
     return read_coordinates(beside) if file.is_file() and beside.is_file() else {}

@@ -231,10 +231,12 @@ def ground(
         )
     if found.known == "refuted":
         known = ", ".join(v.problem for v in own.verified)
+        placed = any(f"({axis} " in str(f) for axis in ("row", "column") for f in own.features)
+        asks = " It is about where places lie: are they known here (--coordinates)?" * placed
         raise Refuted(
             f"the lifted language is no coordination language for {files.problems[0].name}; it was "
             f"verified on {known or 'no problem'}",
-            remedy="Learn from this problem, too: `coordlang lift .. --check PROBLEM`.",
+            remedy=f"Learn from this problem, too: `coordlang lift .. --check PROBLEM`.{asks}",
         )
     return found.language
 

@@ -79,7 +79,9 @@ class World:
             {kind: frozenset(own) for kind, own in sorted(types.items())},
             ordered,
             model,
-            _points(ordered, known or {}),
+            _points(
+                ordered, {name: p for name, p in (known or {}).items() if name in problem.objects}
+            ),
         )
 
     @classmethod

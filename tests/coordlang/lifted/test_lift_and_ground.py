@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import coordlang
+from coordlang.api.grounding import coordinates_of
 from coordlang.api.lifting import Lifted
 from coordlang.lifted.file import lifted_from_bytes, read_lifted, to_bytes
 from coordlang.lifted.language import LiftedLanguage
@@ -340,3 +341,23 @@ def test_plans_with_the_same_states(tmp_path: Path) -> None:
         coordlang.lift(domain, problem, remember_actions=True, jobs=1)
     for raised in (error, remembering):
         assert "Features see what is true, and not what was done last" in str(raised.value)
+
+
+def test_coordinates_given_as_objects() -> None:
+    """As those of a file: names in any case, and numbers."""
+    small = parse_problem(Source("small", SMALL.read_text()), read_domain(GRID))
+    assert coordinates_of({"C0-0": (0.0, 1.0)}, small) == {"c0-0": (0.0, 1.0)}
+    with pytest.raises(BadInput, match="the coordinates must be between"):
+        coordlang.lift(GRID, SMALL, coordinates={"c0-0": (float("nan"), 0.0)}, jobs=1)
+
+
+def test_coordinates_that_are_missing(rings: Lifted, tmp_path: Path) -> None:
+    """Places without telling names: who is refuted is told what may be missing."""
+    problem = tmp_path / "p.pddl"
+    text = RINGS[0].read_text()
+    problem.write_text(text.replace("c0-", "upper").replace("c1-", "lower"))
+    with pytest.raises(Refuted, match=r"are they known here \(--coordinates\)\?"):
+        coordlang.ground(rings.language, GRID, problem, jobs=1)
+    points = {f"{row}{x}": (x, y) for y, row in enumerate(("upper", "lower")) for x in range(4)}
+    language = coordlang.ground(rings.language, GRID, problem, coordinates=points, jobs=1)
+    assert language.guarantee.method == "lifted; verified here"
