@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from functools import cache
 from itertools import combinations
@@ -200,7 +201,7 @@ def test_landmarks_where_nothing_else_suffices() -> None:
     """Round tracks: places are alike but for their names, which two tracks share in part."""
     known = [track(3), track(4)]
     learned = learn(known)
-    assert any("(one room" in str(f) or " room" in str(f) for f in learned.features)
+    assert any(re.search(r"\broom[0-9]", str(feature)) for feature in learned.features)
     for own in known:
         assert holds_by_words(own, words_in(own, learned))
 
