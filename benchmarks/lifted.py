@@ -216,9 +216,7 @@ def instance(family: Family, text: str) -> Instance:
 
 def lifted_of(learned: Learned, robots: tuple[str, ...]) -> LiftedLanguage:
     """What was learned, as a language."""
-    words = tuple(f"w{k}" for k in range(len(set(learned.word.values()))))
-    values = {vector: words[number] for vector, number in learned.word.items()}
-    return LiftedLanguage(learned.features, words, values, robots)
+    return LiftedLanguage(learned.features, learned.words, learned.values, robots)
 
 
 def measured(name: str, family: Family, seconds: float) -> Figures:

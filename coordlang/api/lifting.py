@@ -161,14 +161,14 @@ def lift(
             progress=progress or _silent,
             runner=runner,
         )
-    words = tuple(f"w{k}" for k in range(len(set(learned.word.values()))))
+    words = learned.words
     first = every[0].candidates
     provenance = provenance_of(first, Guarantee("lifted", len(words), 1, len(words) == 1), {})
     keys = ("cost", "unowned", "remember_actions")
     language = LiftedLanguage(
         learned.features,
         words,
-        {vector: words[number] for vector, number in learned.word.items()},
+        learned.values,
         first.model.robots,
         provenance.domain,
         {key: provenance.model[key] for key in keys},

@@ -14,7 +14,7 @@ from coordlang.explanation.boxes import Points
 from coordlang.explanation.minimise import minimise
 from coordlang.language.words import Language
 from coordlang.lifted.features import Feature
-from coordlang.lifted.file import vector_of
+from coordlang.lifted.file import read_values
 from coordlang.lifted.language import LiftedLanguage, Vector
 from coordlang.lifted.notation import feature_of
 from coordlang.lifted.wording import condition, english, formula
@@ -78,9 +78,7 @@ def lifted_words(
     if not origin:
         return None
     features = tuple(feature_of(text, position) for text in origin["features"])
-    values = {
-        vector_of(key, len(features), position): word for key, word in origin["values"].items()
-    }
+    values = read_values(origin["values"], len(features), position)
     table = language.partition(model)
     states = States(World.of(domain, problem, model, known), table.rows)
     lifted = LiftedLanguage(features, language.words, values, model.robots)

@@ -21,15 +21,14 @@ Pairs = Sequence[Pair]
 
 def attribute(world: World, name: str, relation: str | None = None) -> Ints:
     """The number that each object has, `NONE` where it has none: (objects)."""
-    known = (name, relation or "")
-    if known in world.known:
-        before: Ints = world.known[known]
-        return before
+    return world.once(name, relation or "", lambda: _attribute(world, name, relation))
+
+
+def _attribute(world: World, name: str, relation: str | None) -> Ints:
     values = np.full(len(world.objects), NONE)
     for key, value in _values(world, name, relation).items():
         if key in world.number:
             values[world.number[key]] = value
-    world.known[known] = values
     return values
 
 
@@ -74,11 +73,19 @@ def positions(pairs: Pairs) -> Mapping[str, int]:
 
 def distances(world: World, relation: str) -> Ints:
     """(objects, objects): links of a static relation from one to another, `NONE` without a way."""
-    key = ("distance", relation)
-    if key not in world.known:
-        world.known[key] = _distances(world, relation)
-    found: Ints = world.known[key]
-    return found
+    return world.once("distance", relation, lambda: _distances(world, relation))
+
+
+def links(world: World, relation: str) -> Ints:
+    """(objects, objects): 1 where a static relation links the first object with the second."""
+
+    def computed() -> Ints:
+        linked = np.zeros((len(world.objects), len(world.objects)), np.int64)
+        for one, other in world.relations[relation]:
+            linked[world.number[one], world.number[other]] = 1
+        return linked
+
+    return world.once("links", relation, computed)
 
 
 def _distances(world: World, relation: str) -> Ints:

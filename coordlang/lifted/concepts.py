@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coordlang.lifted.attributes import distances
+from coordlang.lifted.attributes import distances, links
 from coordlang.lifted.world import NONE, States
 from planners.tables import Bools, Ints
 
@@ -48,9 +48,7 @@ class Role:
     def _step(self, states: States, members: Bools) -> Bools:
         world = states.world
         if self.predicate in world.relations:
-            linked = np.zeros((len(world.objects), len(world.objects)), np.float32)
-            for first, second in world.relations[self.predicate]:
-                linked[world.number[first], world.number[second]] = 1
+            linked = links(world, self.predicate).astype(np.float32)
             reached: Bools = members.astype(np.float32) @ (linked if self.inverse else linked.T) > 0
             return reached
         found = np.zeros_like(members)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -98,9 +99,7 @@ def to_bytes(lifted: LiftedLanguage) -> bytes:
             for k, feature in enumerate(lifted.features)
         ],
         "words": list(lifted.words),
-        "values": {
-            " ".join(map(str, vector)): word for vector, word in sorted(lifted.values.items())
-        },
+        "values": written_values(lifted.values),
         "verified": [asdict(known) for known in lifted.verified],
         "producer": dict(lifted.producer),
     }
@@ -134,7 +133,7 @@ def lifted_from_bytes(data: bytes, position: Position) -> LiftedLanguage:
     _check_names(record, position)
     _check_words(record, position)
     features = tuple(feature_of(own.definition, position) for own in record.features)
-    values = {vector_of(key, len(features), position): w for key, w in record.values.items()}
+    values = read_values(record.values, len(features), position)
     return LiftedLanguage(
         features,
         tuple(record.words),
@@ -185,7 +184,20 @@ def _check_words(record: LiftedRecord, position: Position) -> None:
         )
 
 
-def vector_of(key: str, size: int, position: Position) -> Vector:
+def written_values(values: Mapping[Vector, str]) -> dict[str, str]:
+    """The features' values -> word, as files have them: values joined by blanks, sorted."""
+    return {" ".join(map(str, vector)): word for vector, word in sorted(values.items())}
+
+
+def read_values(entries: Mapping[str, str], size: int, position: Position) -> dict[Vector, str]:
+    """The values of so many features -> word, as `written_values` writes them.
+
+    Raises `BadInput` for keys that are no such values.
+    """
+    return {_vector(key, size, position): word for key, word in entries.items()}
+
+
+def _vector(key: str, size: int, position: Position) -> Vector:
     """The values in a key.  Raises `BadInput` for anything else than so many whole numbers."""
     try:
         vector = tuple(map(int, key.split()))

@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 from coordlang.language.provenance import Guarantee, Provenance, provenance_of
 from coordlang.language.words import Language
+from coordlang.lifted.file import written_values
 from coordlang.lifted.language import LiftedLanguage, Verified
 from coordlang.lifted.world import States
 from coordlang.tasks.candidates import Candidates
@@ -75,21 +77,12 @@ def grounded(
     size = len(partition.words)
     method = guarantee_text(known, lifted.verified)
     provenance = provenance_of(candidates, Guarantee(method, size, 1, size == 1), producer)
-    tasks = provenance.tasks if known == "verified" else {"kind": "problems", "count": 0}
     origin = {
         "features": [str(feature) for feature in lifted.features],
-        "values": {
-            " ".join(map(str, vector)): word for vector, word in sorted(lifted.values.items())
-        },
+        "values": written_values(lifted.values),
         "verified": [one.problem for one in lifted.verified],
     }
-    provenance = Provenance(
-        provenance.robots,
-        provenance.guarantee,
-        provenance.domain,
-        provenance.model,
-        tasks,
-        provenance.producer,
-        origin,
-    )
+    provenance = replace(provenance, lifted=origin)
+    if known != "verified":
+        provenance = replace(provenance, tasks={"kind": "problems", "count": 0})
     return Language.of(partition, candidates.model, provenance)

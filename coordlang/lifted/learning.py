@@ -78,6 +78,17 @@ class Learned:
     taken: int
     stopped: BaseException | None = None
 
+    @property
+    def words(self) -> tuple[str, ...]:
+        """The words' names, by number."""
+        return tuple(f"w{k}" for k in range(len(set(self.word.values()))))
+
+    @property
+    def values(self) -> Mapping[Vector, str]:
+        """The features' values -> word, by name."""
+        words = self.words
+        return {vector: words[number] for vector, number in self.word.items()}
+
 
 def learn(
     known: Sequence[Instance],

@@ -227,14 +227,14 @@ def _different_numbers(found: Iterable[Number], states: Sequence[States]) -> lis
     kept = []
     seen: set[bytes] = set()
     for number in sorted(set(found), key=lambda own: (own.complexity, str(own))):
-        values = np.concatenate([number.read(own) for own in states])
+        parts = [number.read(own) for own in states]
+        values = np.concatenate(parts)
         key = values.astype(np.int32).tobytes()
         if key not in seen and len(values) and (values != values[0]).any():
             seen.add(key)
             kept.append(number)
-    for number in kept:
-        for own in states:
-            own.get(number)
+            for own, part in zip(states, parts, strict=True):
+                own.known[number] = part
     return kept
 
 

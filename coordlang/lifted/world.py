@@ -6,7 +6,7 @@ Numbers of objects are positions in the sorted list of their names.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Protocol
@@ -104,9 +104,14 @@ class World:
         return found
 
     @cached_property
-    def known(self) -> dict[tuple[str, str], Any]:
-        """What was computed of static relations before, by name."""
+    def _known(self) -> dict[tuple[str, str], Ints]:
         return {}
+
+    def once(self, name: str, relation: str, computed: Callable[[], Ints]) -> Ints:
+        """A table about a static relation, which is computed once."""
+        if (name, relation) not in self._known:
+            self._known[name, relation] = computed()
+        return self._known[name, relation]
 
     @cached_property
     def relations(self) -> Mapping[str, Sequence[Pair]]:
