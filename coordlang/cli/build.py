@@ -22,7 +22,8 @@ from coordlang.api.options import (
     Unsolvable,
 )
 from coordlang.cli.echo import echo
-from coordlang.cli.exit_codes import INTERRUPTED, UNPROVED, interrupted_by
+from coordlang.cli.exit_codes import UNPROVED, code_of_interrupt
+from coordlang.cli.failure import why_stopped
 from coordlang.cli.files import FILE, PlanningFiles, check_outputs, never_stdout, planning_files
 from coordlang.cli.shared_options import (
     ModelKeywords,
@@ -35,7 +36,6 @@ from coordlang.cli.shared_options import (
 from coordlang.cli.terminal import line_width, note_single_robot, working
 from planners.messages import visible
 from planners.notebook import counted
-from planners.signals import Interrupted
 
 if TYPE_CHECKING:
     from coordlang.api.languages import BuiltLanguage
@@ -264,9 +264,9 @@ def _exit_code(
     stopped = ended or built.stopped
     if isinstance(stopped, KeyboardInterrupt):
         echo(f"coordlang: interrupted; {_written(built, output, certificate)}", err=True)
-        return interrupted_by(stopped.number) if isinstance(stopped, Interrupted) else INTERRUPTED
+        return code_of_interrupt(stopped)
     if stopped is not None:
-        reason = str(stopped).splitlines()[0] if str(stopped) else "out of memory"
+        reason = why_stopped(stopped)
         if certificate and isinstance(stopped, coordlang.OutOfTime) and stopped is built.stopped:
             reason += ", a part of it kept for the certificate"
         short_of = "" if proved and exact else ", without proof"

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from planners.signals import Interrupted
+
 #: The answer is no: refuted, or nothing is guaranteed.
 REFUTED = 1
 #: An answer without the proof that was asked for.
@@ -18,3 +20,8 @@ BROKEN_PIPE = 141
 def interrupted_by(number: int) -> int:
     """The exit code of a process that a signal has ended, as a shell reports it."""
     return 128 + number
+
+
+def code_of_interrupt(stopped: KeyboardInterrupt) -> int:
+    """The exit code after an interrupt, by the keyboard or by a signal."""
+    return interrupted_by(stopped.number) if isinstance(stopped, Interrupted) else INTERRUPTED

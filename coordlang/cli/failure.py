@@ -16,6 +16,13 @@ from planners.errors import CoordlangError, Position
 from planners.messages import sentence
 
 
+def why_stopped(stopped: BaseException) -> str:
+    """What ended work whose best result is kept, in one line."""
+    if isinstance(stopped, KeyboardInterrupt):
+        return "interrupted"
+    return str(stopped).splitlines()[0] if str(stopped) else "out of memory"
+
+
 @dataclass(frozen=True, slots=True)
 class Failure:
     """What ended a command.

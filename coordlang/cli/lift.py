@@ -10,12 +10,12 @@ import click
 
 import coordlang
 from coordlang.cli.echo import echo
-from coordlang.cli.exit_codes import INTERRUPTED, UNPROVED, interrupted_by
+from coordlang.cli.exit_codes import UNPROVED, code_of_interrupt
+from coordlang.cli.failure import why_stopped
 from coordlang.cli.files import FILE, PlanningFiles, beside, check_outputs, planning_files
 from coordlang.cli.shared_options import ModelKeywords, kept_plans, limits, model_options
 from coordlang.cli.terminal import working
 from planners.notebook import counted
-from planners.signals import Interrupted
 
 if TYPE_CHECKING:
     from coordlang.api.lifting import Lifted
@@ -122,12 +122,11 @@ def _exit_code(stopped: BaseException | None) -> int:
     """Return the exit code, and write to stderr what ended the search for fewer words."""
     if stopped is None:
         return 0
-    is_interrupt = isinstance(stopped, KeyboardInterrupt)
-    reason = "interrupted" if is_interrupt else str(stopped).splitlines()[0]
-    echo(f"coordlang: {reason}; the best words so far are written: they are verified", err=True)
-    if not is_interrupt:
-        return UNPROVED
-    return interrupted_by(stopped.number) if isinstance(stopped, Interrupted) else INTERRUPTED
+    echo(
+        f"coordlang: {why_stopped(stopped)}; the best words so far are written: they are verified",
+        err=True,
+    )
+    return code_of_interrupt(stopped) if isinstance(stopped, KeyboardInterrupt) else UNPROVED
 
 
 def _text(lifted: Lifted) -> str:

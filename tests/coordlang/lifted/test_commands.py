@@ -186,3 +186,21 @@ def test_many_states_are_read_in_parts(
     monkeypatch.setattr("coordlang.lifted.language._ENTRIES", 100)
     assert coordlang("ground", lifted, GRID, LARGER, "-o", files[1], "--jobs", "1").code == 0
     assert files[0].read_bytes() == files[1].read_bytes()
+
+
+def test_memory_that_ends_without_a_word_leaves_the_verified_words(
+    coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The interpreter's own error says nothing."""
+
+    def merged(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("coordlang.lifted.learning.merge_classes", merged)
+    path = tmp_path / "l.json"
+    outcome = coordlang(
+        "lift", GRID, *RINGS, "--tasks", "all", "--prefer", "features", "-o", path, "--jobs", "1"
+    )
+    assert outcome.code == 3
+    assert "out of memory; the best words so far are written" in outcome.err
+    assert len(json.loads(path.read_text())["words"]) == 4
