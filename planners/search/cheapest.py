@@ -20,9 +20,9 @@ import numpy as np
 
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import JointModel, PlanningTask
-from planners.search.fixed_plans import FixedPlans, Plan
+from planners.search.fixed_plans import FixedPlans
 from planners.search.goals import goal_facts
-from planners.search.questions import Literals, OutOfEffort
+from planners.search.questions import Literals, OutOfEffort, Plan
 from planners.tables import Ints
 
 #: Conflicts for the try by cores.
@@ -42,11 +42,12 @@ def cheapest(
     without literals where costs are too large for a counter.
     """
     costs = label_costs(model)
-    if max(int(own.max(initial=0)) for own in costs) <= 1:
+    dearest = max(int(own.max(initial=0)) for own in costs)
+    if dearest <= 1:
         with suppress(OutOfEffort), plans.at_most(_FIRST):
             cheap = least_cost(plans, model, task)
             return plans.labels_chosen(), cheap
-    elif max(int(own.max(initial=0)) for own in costs) > _COST:
+    elif dearest > _COST:
         return plan, []
     most = _cost_of(costs, plan)
     sums = _counter(plans, costs, most)
@@ -161,12 +162,11 @@ class _Sums:
 def least_cost(plans: FixedPlans, model: JointModel, task: PlanningTask) -> Literals:
     """Literals that all hold in the cheapest plans, and in no other plans.
 
-    There are plans, and costs are 0 or 1.  The last
-    answer of the solver is one of the cheapest.  The cost of a plan is the number of refuted
-    assumptions and the number of these literals that do not hold (if a sum is said to be larger
-    only where it is), so the literals say the same as a bound on the cost, but each of few actions:
-    much follows from them at once.  Cores that have nothing in common are looked for first, for
-    these are small.
+    There are plans, and costs are 0 or 1.  The last answer of the solver is one of the cheapest.
+    The cost of a plan is the number of refuted assumptions and the number of these literals that do
+    not hold (if a sum is said to be larger only where it is), so the literals say the same as a
+    bound on the cost, but each of few actions: much follows from them at once.  Cores that have
+    nothing in common are looked for first, for these are small.
 
     Raises `planners.search.questions.OutOfEffort`.
     """

@@ -21,10 +21,10 @@ from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, PlanningTask
 from planners.limits import reaching
 from planners.search.cheapest import cheapest
-from planners.search.fixed_plans import FixedPlans, Plan
+from planners.search.fixed_plans import FixedPlans
 from planners.search.mutexes import mutexes
 from planners.search.plan_formula import PlanFormula
-from planners.search.questions import Literals, OutOfEffort
+from planners.search.questions import Literals, OutOfEffort, Plan
 from planners.search.reachable import PieceSizes
 from planners.search.state_variables import StateVariable
 from planners.search.step_formula import TooManyClauses
@@ -105,11 +105,11 @@ def exact_bound(
         return None
     try:
         with closing(formula), reaching(formula.so_far, SMALLER):
-            makespan, plan = _shortest(formula, task, at_least)
+            plan = _shortest(formula, task, at_least)
             only_time = model.cost == "makespan"
-            if only_time and makespan == at_least and _mostly_pass(formula, plan, some):
+            if only_time and len(plan) == at_least and _mostly_pass(formula, plan, some):
                 return None
-            plans = formula.fixed(task.init, makespan)
+            plans = formula.fixed(task.init, len(plan))
     except OutOfEffort:
         return None
     try:
@@ -149,12 +149,12 @@ def _unless_refuted(plans: FixedPlans, literals: Literals, effort: int) -> bool:
         return True
 
 
-def _shortest(formula: PlanFormula, task: PlanningTask, at_least: int) -> tuple[int, Plan]:
+def _shortest(formula: PlanFormula, task: PlanningTask, at_least: int) -> Plan:
     makespan = at_least
     while not formula.solvable(task.init, makespan):
         formula.spend(_EASY * makespan + formula.clauses_of_step)
         makespan += 1
-    return makespan, formula.labels_chosen(makespan)
+    return formula.labels_chosen(makespan)
 
 
 def _used(plans: FixedPlans, model: JointModel, plan: Plan, effort: int) -> list[list[Bools]]:

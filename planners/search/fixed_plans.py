@@ -15,11 +15,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from planners.sat import simplified
-from planners.search.questions import Questions
-from planners.tables import Ints
-
-#: The robots' labels, step by step.
-Plan = list[tuple[int, ...]]
+from planners.search.questions import Plan, Questions
+from planners.tables import Ints, ranges
 
 
 class FixedPlans(Questions):
@@ -29,20 +26,22 @@ class FixedPlans(Questions):
     ----------
     clauses
         A formula, each clause followed by 0.
-    labels
-        Per step, from the first one on, and robot the variables of its labels.
+    first
+        Per step, from the first one on, and robot the variable of its first label; the others
+        follow.
+    sizes
+        Per robot how many labels there are.
     effort
         The solver's conflicts that may be spent.
     """
 
-    def __init__(self, clauses: array[int], labels: Sequence[Sequence[Ints]], effort: int) -> None:
-        sizes = [len(own) for step in labels for own in step]
-        super().__init__(effort, sum(sizes))
-        self.steps = len(labels)
+    def __init__(self, clauses: array[int], first: Ints, sizes: Sequence[int], effort: int) -> None:
+        self.steps, self._sizes = len(first), sizes
+        runs = np.tile(sizes, self.steps)
+        super().__init__(effort, int(runs.sum()))
+        kept = ranges(first.reshape(-1), runs)
         #: Per step and robot the variable of its first label.
-        self._first = 1 + np.cumsum([0, *sizes])[:-1].reshape(self.steps, -1)
-        self._sizes = sizes[: self._first.shape[1]]
-        kept = np.concatenate([own for step in labels for own in step])
+        self._first: Ints = 1 + (np.cumsum(runs) - runs).reshape(first.shape)
         self._take(simplified(clauses, kept.tolist()), kept)
 
     def simplify(self) -> None:
@@ -80,11 +79,4 @@ class FixedPlans(Questions):
 
     def labels_chosen(self) -> Plan:
         """The robots' labels in the plan that the last answer found."""
-        true = self.true()
-        return [
-            tuple(
-                int(np.argmax(true[first - 1 : first - 1 + size]))
-                for first, size in zip(step, self._sizes, strict=True)
-            )
-            for step in self._first.tolist()
-        ]
+        return self.chosen(self._first, self._sizes)

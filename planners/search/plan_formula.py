@@ -16,7 +16,7 @@ from planners.joint.model import FullState, Goal, JointModel
 from planners.sat import split_clauses
 from planners.search.fixed_plans import FixedPlans
 from planners.search.mutexes import Pair
-from planners.search.questions import Literals, Questions
+from planners.search.questions import Literals, Plan, Questions
 from planners.search.state_variables import StateVariable
 from planners.search.step_formula import clauses_of, step_formula
 from planners.tables import Ints, Rows
@@ -112,30 +112,21 @@ class PlanFormula(Questions):
         clauses = self.clauses[:]
         for literal in self._begun(row, steps):
             clauses.extend((literal, 0))
-        labels = [
-            [
-                np.arange(len(own)) + self._label(step, robot)
-                for robot, own in enumerate(self.model.labels)
-            ]
-            for step in range(steps, 0, -1)
-        ]
-        return FixedPlans(clauses, labels, self.left)
+        return FixedPlans(clauses, self._first(steps), self._sizes, self.left)
 
-    def _label(self, step: int, robot: int) -> int:
-        """The variable of a robot's first label in a step."""
-        return self._base[step] + self._step.first_label[robot]
+    def _first(self, steps: int) -> Ints:
+        """The variables of the robots' first labels, from the first of so many steps on."""
+        base = np.array(self._base[steps:0:-1], np.int64)
+        first: Ints = base[:, None] + np.array(self._step.first_label)
+        return first
 
-    def labels_chosen(self, steps: int) -> list[tuple[int, ...]]:
+    @property
+    def _sizes(self) -> list[int]:
+        return [len(own) for own in self.model.labels]
+
+    def labels_chosen(self, steps: int) -> Plan:
         """The robots' labels in the plan that the last answer found, from its first step on."""
-        true = self.true()
-        found = []
-        for step in range(steps, 0, -1):
-            chosen = []
-            for robot, labels in enumerate(self.model.labels):
-                first = self._label(step, robot) - 1
-                chosen.append(int(np.argmax(true[first : first + len(labels)])))
-            found.append(tuple(chosen))
-        return found
+        return self.chosen(self._first(steps), self._sizes)
 
 
 def may_be_exact(model: JointModel) -> bool:

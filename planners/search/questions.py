@@ -11,7 +11,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from planners.sat import SolverName, sat_solver, solve_slice
-from planners.tables import Bools
+from planners.tables import Ints
 
 #: Hard questions and many easy ones: Glucose takes about half as long as MiniSat for the hard ones.
 SOLVER: SolverName = "glucose4"
@@ -19,6 +19,8 @@ SOLVER: SolverName = "glucose4"
 _SLICE = 2_000
 
 Literals = list[int]
+#: The robots' labels, step by step.
+Plan = list[tuple[int, ...]]
 
 
 class OutOfEffort(Exception):
@@ -108,10 +110,19 @@ class Questions:
                 return answer
             self.spend(effort)
 
-    def true(self) -> Bools:
-        """Which variables are true, the first one first, in the model of the last answer."""
-        found: Bools = np.array(self._solver.get_model()) > 0
-        return found
+    def chosen(self, first: Ints, sizes: Sequence[int]) -> Plan:
+        """In the model of the last answer, of each run of variables the first that is true.
+
+        ``first`` (steps, robots) is where runs begin, ``sizes`` (robots) how long they are.
+        """
+        true = np.array(self._solver.get_model()) > 0
+        return [
+            tuple(
+                int(np.argmax(true[begin - 1 : begin - 1 + size]))
+                for begin, size in zip(step, sizes, strict=True)
+            )
+            for step in first.tolist()
+        ]
 
     def core_of(self, literals: Iterable[int]) -> Literals:
         """Of literals that were assumed in the last question: those that were refuted together."""
@@ -119,8 +130,7 @@ class Questions:
 
     def core(self, literals: Iterable[int]) -> Literals:
         """Of literals whose negations were assumed in the last question: those that refuted it."""
-        refuted = {-literal for literal in self._solver.get_core() or ()}
-        return sorted(refuted & set(literals))
+        return sorted(-literal for literal in self.core_of(-literal for literal in literals))
 
     # ---- the effort
 
