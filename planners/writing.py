@@ -243,7 +243,9 @@ def _folder(text: str) -> Path:
 
 
 def _denied(path: str | Path, mode: int) -> str | None:
-    return None if os.access(path, mode) else os.strerror(errno.EACCES)
+    # Another process may have removed it since it was seen: that denies nothing.
+    allowed = os.access(path, mode) or not os.path.exists(path)
+    return None if allowed else os.strerror(errno.EACCES)
 
 
 def _umask() -> int:

@@ -336,3 +336,20 @@ def test_killed_at_every_rename(at: int, after: bool, old_pair: Path) -> None:
         (3, True): "new",
     }
     assert _pair(old_pair) == expected[at, after]
+
+
+def test_a_file_that_goes_while_it_is_asked_for_denies_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two processes with one cache: one lets an entry go that the other has just seen there."""
+    path = tmp_path / "entry"
+    path.write_text("old")
+    access = os.access
+
+    def gone_first(asked: str | Path, mode: int) -> bool:
+        path.unlink(missing_ok=True)
+        return access(asked, mode)
+
+    monkeypatch.setattr(os, "access", gone_first)
+    write_atomically(path, b"new")
+    assert path.read_bytes() == b"new"
