@@ -33,6 +33,7 @@ ROOMS = (
     "coordlang/tasks",
     "coordlang/symmetry",
     "coordlang/required",
+    "coordlang/tolerance",
     "coordlang/vocabulary",
     "coordlang/language",
     "coordlang/verification",

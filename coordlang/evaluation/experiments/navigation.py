@@ -27,11 +27,11 @@ from coordlang.evaluation.lab.recipe import (
     percent,
     table,
 )
-from coordlang.evaluation.lab.statistics import wilson
 from coordlang.evaluation.material.disruption_trials import subaction_trials, warehouse_trials
 from coordlang.evaluation.material.languages import TITLES, language_for
 from coordlang.evaluation.material.suite import OTHERS, WORLDS
 from coordlang.evaluation.material.warehouse import LAYOUTS, WAREHOUSES, deliveries, listed_tasks
+from coordlang.tolerance.sampled import wilson
 
 METHODS = ("greedy", "separating", "minimal")
 #: Languages that take more than minutes to build: an unfinished one would depend on the machine.

@@ -10,7 +10,6 @@ import pytest
 
 from coordlang.evaluation.experiments.scenario import subplans
 from coordlang.evaluation.lab.recipe import Settings
-from coordlang.evaluation.lab.statistics import wilson
 from coordlang.evaluation.material.disruption_trials import (
     Trial,
     Trials,
@@ -27,6 +26,7 @@ from coordlang.evaluation.material.warehouse import (
     human_in,
     listed_tasks,
 )
+from coordlang.tolerance.sampled import wilson
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.search.plans import Plan
 from tests.support import naive

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from coordlang.evaluation.experiments import communication, flexibility
-from coordlang.evaluation.lab.statistics import mean_interval, wilson
+from coordlang.evaluation.lab.statistics import mean_interval
 from coordlang.evaluation.material.brute_force import find_by_brute_force, pairs_of_plans
 from coordlang.evaluation.material.sentence_statistics import SentenceStatistics, task_statistics
 from coordlang.evaluation.material.state_orders import (
@@ -23,6 +23,7 @@ from coordlang.language.flexibility import flexibility as measured
 from coordlang.language.partition import Partition
 from coordlang.language.sentences import sentence_counts
 from coordlang.required.divergences import states_on_plans
+from coordlang.tolerance.sampled import wilson
 from coordlang.verification.by_definition import verify
 from planners.errors import OutOfMemory
 from tests.support import naive
