@@ -11,7 +11,7 @@ from typing import get_args
 from planners.errors import BadInput, Position, UsageError
 from planners.grounding import FEWER, ground_actions, ground_goal
 from planners.grounding.networks import apply_network
-from planners.joint.assembly import assemble
+from planners.joint.assembly import SLACK_LEFT, assemble
 from planners.joint.model import Cost, JointModel, PlanningTask, show
 from planners.limits import reaching
 from planners.messages import echoed
@@ -41,6 +41,10 @@ class ModelOptions:
         Whether a state also holds each robot's last subaction.
     idle
         The robots that may idle without an action of their own; None: found from the model.
+    slack
+        Joint steps that plans may take more than the least makespan.
+    sees_slack
+        Whether states on plans say how many of these are left.
 
     Raises
     ------
@@ -52,8 +56,20 @@ class ModelOptions:
     cost: Cost = "makespan"
     remember_actions: bool = False
     idle: tuple[str, ...] | None = None
+    slack: int = 0
+    sees_slack: bool = False
 
     def __post_init__(self) -> None:
+        if isinstance(self.slack, bool) or not isinstance(self.slack, int) or self.slack < 0:
+            raise UsageError(
+                f"--slack {echoed(str(self.slack))}: expected a number of joint steps, 0 or more",
+                remedy="Say --slack 1.",
+            )
+        if self.sees_slack and not self.slack:
+            raise UsageError(
+                "--words-see-slack belongs to --slack, and there is none",
+                remedy="Add --slack 1, or leave out --words-see-slack.",
+            )
         _require_one_of("cost", self.cost, get_args(Cost))
         _require_one_of("unowned", self.robots.unowned, get_args(Unowned))
 
@@ -99,6 +115,12 @@ def build(
             "'last'",
             remedy="Rename the predicate.",
         )
+    if options.sees_slack and SLACK_LEFT in domain.predicates:
+        raise UsageError(
+            f"--words-see-slack writes facts ({SLACK_LEFT} N), but this domain has a predicate "
+            f"{SLACK_LEFT!r}",
+            remedy="Rename the predicate.",
+        )
     first = problems[0]
     for other in problems[1:]:
         _check_same_world(domain, first, other)
@@ -120,6 +142,8 @@ def build(
             cost=options.cost,
             remember_actions=options.remember_actions,
             idle=options.idle,
+            slack=options.slack,
+            sees_slack=options.sees_slack,
         )
     tasks = tuple(task_of(model, domain, problem) for problem in problems)
     return PlanningInstance(domain, tuple(problems), model, tasks, options, team)

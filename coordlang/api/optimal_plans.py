@@ -39,18 +39,27 @@ class OptimalPlans(Presented):
 
     @property
     def count(self) -> int:
-        """The exact number of plans: different sequences of joint actions."""
+        """The exact number of plans: different sequences of joint actions.
+
+        With slack of those with all steps that are allowed, the last ones at rest.
+        """
         return self._plans.count
 
     @property
     def makespan(self) -> int:
-        """The number of joint steps of every optimal plan."""
+        """The number of joint steps of every optimal plan; with slack some take more."""
         return self.cost[0]
+
+    @property
+    def slack(self) -> int:
+        """How many joint steps more than ``makespan`` plans may take."""
+        return self._plans.space.model.slack
 
     @property
     def cost(self) -> tuple[int, int]:
         """The optimal cost: joint steps, and the second component (0 where the cost has none)."""
-        return self._plans.space.cost_of(0)
+        space = self._plans.space
+        return space.least_makespan(0), space.cost_of(0)[1]
 
     @property
     def robots(self) -> tuple[str, ...]:
@@ -106,12 +115,14 @@ class OptimalPlans(Presented):
         return list(islice(self, most))
 
     def _texts(self, plan: Plan) -> PlanSteps:
-        return texts(self._plans.space.model, plan)
+        return texts(self._plans.space.model, self._plans.without_rest(plan))
 
     def _numbers(self, plan: Sequence[Texts]) -> Plan | None:
         model = self._plans.space.model
         steps = [model.numbers(step) for step in plan]
-        return None if None in steps else tuple(step for step in steps if step is not None)
+        if None in steps:
+            return None
+        return self._plans.padded(tuple(step for step in steps if step is not None))
 
     def _known(self, plan: Sequence[Texts]) -> Plan:
         numbers = self._numbers(plan)

@@ -54,6 +54,8 @@ class ModelKeywords(TypedDict, total=False):
     unowned: Unowned | None
     cost: Cost | None
     remember_actions: bool
+    slack: int | None
+    words_see_slack: bool
 
 
 def require_one_of(option: str, value: str | None, known: Sequence[str]) -> None:
@@ -104,6 +106,8 @@ class GivenOptions:
     unowned: Unowned | None = None
     cost: Cost | None = None
     remember_actions: bool = False
+    slack: int | None = None
+    words_see_slack: bool = False
 
     @classmethod
     def of(
@@ -113,6 +117,8 @@ class GivenOptions:
         unowned: Unowned | None = None,
         cost: Cost | None = None,
         remember_actions: bool = False,
+        slack: int | None = None,
+        words_see_slack: bool = False,
     ) -> GivenOptions:
         """Check them.
 
@@ -141,7 +147,15 @@ class GivenOptions:
                 f"--remember-actions is given or not: {echoed(remember_actions)} is neither",
                 remedy="In Python it is True or False.",
             )
-        return cls(chosen, robot_type and robot_type.lower(), unowned, cost, remember_actions)
+        return cls(
+            chosen,
+            robot_type and robot_type.lower(),
+            unowned,
+            cost,
+            remember_actions,
+            slack,
+            words_see_slack,
+        )
 
     def options(self) -> ModelOptions:
         """Return the options of a model that no language file describes.
@@ -157,7 +171,13 @@ class GivenOptions:
         unowned = "error" if self.unowned is None else self.unowned
         cost = "makespan" if self.cost is None else self.cost
         selection = RobotSelection(self.robots, self.robot_type, unowned)
-        return ModelOptions(selection, cost, self.remember_actions)
+        return ModelOptions(
+            selection,
+            cost,
+            self.remember_actions,
+            slack=0 if self.slack is None else self.slack,
+            sees_slack=self.words_see_slack,
+        )
 
     def for_language(self, language: Language) -> ModelOptions:
         """Return the options that the language records.

@@ -11,7 +11,13 @@ import coordlang
 from coordlang.cli.echo import echo
 from coordlang.cli.files import PlanningFiles, planning_files
 from coordlang.cli.listing import Listing, form_of, listing_options
-from coordlang.cli.shared_options import ModelKeywords, kept_plans, limits, model_options
+from coordlang.cli.shared_options import (
+    ModelKeywords,
+    kept_plans,
+    limits,
+    model_options,
+    slack_option,
+)
 from coordlang.cli.terminal import note_single_robot, working
 
 
@@ -29,6 +35,7 @@ from coordlang.cli.terminal import note_single_robot, working
 )
 @click.option("--json", "as_json", is_flag=True, help="Short for --format json.")
 @model_options
+@slack_option
 @planning_files("DOMAIN PROBLEM", most=1)
 @kept_plans
 @limits
@@ -45,7 +52,8 @@ def command(
 ) -> None:
     """Count, list or sample all optimal plans of a task.
 
-    A plan is a sequence of joint actions; plans are listed in a stable order.
+    A plan is a sequence of joint actions; plans are listed in a stable order.  With --slack B those
+    that take at most B steps more, too; a rest at the end of a plan is left out.
     """
     listing = Listing.of(only_count, most, sample, seed)
     form = form_of(form, as_json)
@@ -62,4 +70,4 @@ def command(
         echo(plans.count)
     else:
         echo(listing.text(plans, listed), nl=False)
-        listing.note_more(plans, listed, "optimal plans")
+        listing.note_more(plans, listed, "plans" if plans.slack else "optimal plans")

@@ -91,6 +91,22 @@ def model_options(function: CommandFunction) -> CommandFunction:
     return wrapped
 
 
+def slack_option(function: CommandFunction) -> CommandFunction:
+    """``--slack``, as part of ``model`` (below `model_options`)."""
+
+    @click.option(
+        "--slack",
+        type=click.IntRange(min=0),
+        metavar="B",
+        help="Plans may take B joint steps more than the least makespan (default: 0).",
+    )
+    @functools.wraps(function)
+    def wrapped(slack: int | None, model: ModelKeywords, **arguments: object) -> int | None:
+        return function(model={**model, "slack": slack}, **arguments)
+
+    return wrapped
+
+
 def kept_plans(function: CommandFunction) -> CommandFunction:
     """``--no-cache``; the command searches no task again that it finds in the user's cache."""
 
@@ -195,5 +211,6 @@ __all__ = [
     "model_options",
     "note",
     "pieces_options",
+    "slack_option",
     "was_given",
 ]

@@ -156,7 +156,8 @@ def _reason(space: PlanSpace, node: int, labels: tuple[int, ...]) -> str:
     goal = space.goals[space.goal[node]]
     left = int(space.layer[node]) - 1
     try:
-        onward = search(model, PlanningTask("the rest", steps.result[same[0]], goal))
+        rest = PlanningTask("the rest", steps.result[same[0]], goal)
+        onward = search(model.without_slack, rest)
     except ProvedImpossible:
         return "it is possible, but then the goal can no longer be reached"
     makespan, _ = onward.cost_of(0)

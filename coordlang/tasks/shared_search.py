@@ -22,7 +22,12 @@ class SharedSearch:
         self._found: dict[Goal, list[PlanSpace]] = {}
 
     def search(self, task: PlanningTask) -> PlanSpace:
-        """The plan space of a task.  Raises `ProvedImpossible` if there is none."""
+        """The plan space of a task.  Raises `ProvedImpossible` if there is none.
+
+        With slack, plans of another task through this one's initial state may have used some of it.
+        """
+        if self._model.slack:
+            return search(self._model, task)
         known = self._found.setdefault(task.goal, [])
         for space in known:
             node = _node_of(space, task)

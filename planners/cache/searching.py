@@ -54,7 +54,11 @@ def search(model: JointModel, task: PlanningTask) -> PlanSpace:
     """All optimal plans of one task, see `planners.search.optimal_plans.search`.
 
     In a block of `keeping_plans` they are read from the folder, if they are there, and else kept.
+    Those within slack are not kept, but the optimal ones are, by which they are found.
     """
+    if model.slack:
+        makespan, _ = search(model.without_slack, task).cost_of(0)
+        return optimal_plans.search_within(model, task, makespan)
     used = _USED.get()
     if used is None:
         return optimal_plans.search(model, task)

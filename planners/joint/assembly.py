@@ -16,6 +16,9 @@ from planners.joint.states import StateCodec
 from planners.pddl.lifted import Atom, Domain, Problem, StepAtom
 from planners.pddl.robots import Team, fluent_predicates, natural, static_atoms
 
+#: The predicate of the facts that say how many joint steps of the slack are left.
+SLACK_LEFT = "slack-left"
+
 #: The texts of a robot's labels, idling first.
 Labels = tuple[str, ...]
 
@@ -30,6 +33,8 @@ def assemble(
     cost: Cost,
     remember_actions: bool,
     idle: tuple[str, ...] | None,
+    slack: int = 0,
+    sees_slack: bool = False,
 ) -> JointModel:
     """The joint model of a team's ground actions.
 
@@ -41,13 +46,17 @@ def assemble(
         The true atoms of all initial states: what can ever be true depends on them.
     idle
         The robots that may idle without an action of their own; None: found from the model.
+    slack
+        Joint steps that plans may take more than the least makespan.
+    sees_slack
+        Whether states on plans say how many of these are left.
     """
     robots = team.robots
     subactions = [[a for a in actions if robot in a.owners] for robot in range(len(robots))]
     labels = _labels_of_parts(actions, robots) if domain.is_joint_action else _labels(subactions)
-    codec = StateCodec(
-        _facts(domain, actions, starts), robots, labels if remember_actions else None
-    )
+    left = [Atom(SLACK_LEFT, (str(k),)) for k in range(slack + 1)] if sees_slack else []
+    facts = FactTable.of({*_facts(domain, actions, starts), *left})
+    codec = StateCodec(facts, robots, labels if remember_actions else None)
     keeps_idle = _keeps_idle(domain, robots, subactions, actions, starts, idle)
     evaluator = Evaluator(codec.facts, {} if domain.is_joint_action else _step_atoms(subactions))
     stepper: Stepper
@@ -68,16 +77,18 @@ def assemble(
         cost=cost,
         statics=static_atoms(domain, problem),
         is_joint_action=domain.is_joint_action,
+        slack=slack,
+        slack_facts=tuple(facts.index[atom] for atom in left),
     )
 
 
 def _facts(
     domain: Domain, actions: Sequence[GroundAction], starts: Sequence[frozenset[Atom]]
-) -> FactTable:
+) -> set[Atom]:
     """The fluent atoms that some initial state has or some action adds."""
     fluents = fluent_predicates(domain)
     possible = {atom for start in starts for atom in start if atom.predicate in fluents}
-    return FactTable.of(possible | {e.atom for a in actions for e in a.effects if e.adds})
+    return possible | {e.atom for a in actions for e in a.effects if e.adds}
 
 
 def _labels(subactions: Sequence[Sequence[GroundAction]]) -> tuple[Labels, ...]:

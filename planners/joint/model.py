@@ -9,7 +9,7 @@ applicable, a whole table of states at a time.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
 import numpy as np
@@ -120,7 +120,9 @@ class JointModel:
 
     ``labels[i]`` are robot i's labels, ``labels[i][0]`` being idle.  ``actions`` are the ground
     actions it is made of; ``keeps_idle[i]`` says whether robot i may idle without an action of its
-    own.
+    own.  ``slack`` is how many joint steps more than the least makespan plans may take
+    (`planners.search.slack`); ``slack_facts``, where states on plans say how many of them are left,
+    are the numbers of the facts that do: none left, one left, and so on.
     """
 
     name: str
@@ -134,6 +136,22 @@ class JointModel:
     cost: Cost = "makespan"
     statics: frozenset[Atom] = frozenset()
     is_joint_action: bool = False
+    slack: int = 0
+    slack_facts: tuple[int, ...] = ()
+
+    @property
+    def without_slack(self) -> JointModel:
+        """The same model, of which optimal plans are meant."""
+        return replace(self, slack=0, slack_facts=())
+
+    @property
+    def resting(self) -> tuple[frozenset[int], ...]:
+        """For each robot the labels with which it rests: idling, and do-nothing actions alone."""
+        found = []
+        for robot, own in enumerate(self.labels):
+            nothing = {a.label for a in self.actions if a.does_nothing and a.owners == (robot,)}
+            found.append(frozenset({0, *(k for k, text in enumerate(own) if text in nothing)}))
+        return tuple(found)
 
     @property
     def remembers(self) -> bool:
@@ -164,10 +182,13 @@ class JointModel:
         return Steps(base.source, base.labels, result, base.cost)
 
     def holds(self, goal: Goal, rows: Rows) -> Bools:
-        """Which states of a table satisfy a goal.  Remembered actions never count."""
+        """Which states of a table satisfy a goal.  Remembered actions and slack never count."""
         if isinstance(goal, FullState):
-            wanted = self.codec.mask(goal.facts)
-            same: Bools = (self.codec.facts_part(rows) == wanted).all(axis=1)
+            facts = self.codec.facts_part(rows)
+            if self.slack_facts:
+                facts = facts.copy()
+                self.codec.clear(facts, slice(None), self.slack_facts)
+            same: Bools = (facts == self.codec.mask(goal.facts)).all(axis=1)
             return same
         return self.evaluator.holds(goal, rows, np.arange(len(rows)))
 
@@ -192,8 +213,10 @@ class JointModel:
         return self.codec.key(row) or NO_FACT
 
     def full_state(self, row: Rows) -> FullState:
-        """The goal that is this state; what it remembers is left out."""
-        return FullState(tuple(self.codec.true_facts(row)))
+        """The goal that is this state; what it remembers, and slack, are left out."""
+        return FullState(
+            tuple(fact for fact in self.codec.true_facts(row) if fact not in self.slack_facts)
+        )
 
     def robot_number(self, name: str) -> int | None:
         """The number of a robot, None if there is no such robot."""

@@ -2,6 +2,7 @@
 """All optimal plans of tasks: search forward, then back along optimal edges.
 
 The set ``Pi(I, G)`` of the paper, as the paths of a graph (Proposition 1 of docs/concepts.md).
+Where the model has slack, those within it (`planners.search.slack`).
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from planners.search.guides import guide_for
 from planners.search.layers import BoundedSearch, Layers
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, PieceSizes, Space
+from planners.search.slack import explore_within, require_rest, seeing, seen_rows
 from planners.search.state_variables import state_variables
 from planners.search.unreachable import searched
 from planners.tables import Bools, Ints, Rows, ranges, unique_rows
@@ -61,14 +63,30 @@ def search(
     """All optimal plans of one task, expanding only states that may be on one.
 
     Forward in layers, bounded by ``heuristic`` (`planners.search.guides`), then back along optimal
-    edges.
+    edges.  With slack the least makespan is found first, and then what is within the bound.
 
     Raises
     ------
     ProvedImpossible
         If the goal cannot be reached.
+    UsageError
+        If robots cannot wait in the goal, and there is slack.
     """
-    return search_with_effort(model, task, pieces, heuristic)[0]
+    if not model.slack:
+        return search_with_effort(model, task, pieces, heuristic)[0]
+    makespan, _ = search_with_effort(model.without_slack, task, pieces, heuristic)[0].cost_of(0)
+    return search_within(model, task, makespan, pieces)
+
+
+def search_within(
+    model: JointModel, task: PlanningTask, makespan: int, pieces: PieceSizes = PIECES
+) -> PlanSpace:
+    """The plans of one task within the model's slack; ``makespan`` is the least one."""
+    space = explore_within(model, task, makespan + model.slack, pieces)
+    with reaching(lambda: f"the plans within slack, over {len(space):,} states", "less slack"):
+        graph = _batch(space, [(task.goal, task.init[None, :])])
+    used, state = np.unique(graph.state, return_inverse=True)
+    return replace(graph, rows=graph.rows[used], state=state)
 
 
 def search_with_effort(
@@ -224,7 +242,7 @@ def plan_spaces(
     ProvedImpossible
         For a task whose goal cannot be reached.
     """
-    size = max(1, pieces.pairs // max(1, len(space)))
+    size = max(1, pieces.pairs // max(1, len(space) * (1 + space.model.slack)))
     for start in range(0, len(tasks), size):
 
         def so_far(done: int = start) -> str:
@@ -255,15 +273,22 @@ def _batch(space: Space, tasks: Sequence[tuple[Goal, Rows | None]]) -> PlanSpace
         states.append(found)
     second, graph = _second_costs(space, distance)
     node = np.full(distance.shape, -1)
-    node[graph.goal, graph.state] = np.arange(len(graph))
+    begins = np.flatnonzero(graph.layer == distance[graph.goal, graph.state] + space.model.slack)
+    node[graph.goal[begins], graph.state[begins]] = begins
     goal = np.repeat(np.arange(len(tasks)), [len(s) for s in states])
     state = np.concatenate(states)
-    return replace(
+    plans = replace(
         graph,
         goals=tuple(goal for goal, _ in tasks),
         starts=node[goal, state],
         second=second[goal, state],
     ).reduced()
+    if space.model.slack:
+        require_rest(plans)
+    if space.model.slack_facts:
+        left = plans.layer - distance[plans.goal, plans.state]
+        plans = seeing(plans, left, seen_rows(space.model, space.rows))
+    return plans
 
 
 def distances(space: Space, reached: Bools) -> Ints:
@@ -333,18 +358,25 @@ class _BackwardSteps:
 
 
 def _second_costs(space: Space, distance: Ints) -> tuple[Ints, PlanSpace]:
-    """The least second cost component at least makespan, and the graph of the optimal edges."""
+    """The least second cost component within the bound on steps, and the graph of optimal edges.
+
+    A node is a goal, a state and the steps that are left: the distance, and up to the model's slack
+    more.
+    """
     goal, state = np.nonzero(distance >= 0)
-    layer = distance[goal, state]
+    slack = np.repeat(np.arange(space.model.slack + 1), len(goal))
+    goal, state = (np.tile(part, space.model.slack + 1) for part in (goal, state))
+    layer = distance[goal, state] + slack
     order = np.lexsort((state, goal, layer))
-    goal, state, layer = goal[order], state[order], layer[order]
-    node = np.full(distance.shape, -1)
-    node[goal, state] = np.arange(len(goal))
+    goal, state, layer, slack = goal[order], state[order], layer[order], slack[order]
+    node = np.full((space.model.slack + 1, *distance.shape), -1)
+    node[slack, goal, state] = np.arange(len(goal))
     source, step = space.steps_from(state)
     after = distance[goal[source], space.targets(step)]
-    keep = (after == layer[source] - 1) & (layer[source] > 0)
-    source, step = source[keep], step[keep]
-    target = node[goal[source], space.targets(step)]
+    left = layer[source] - 1 - after  # the slack after the step: never more than before
+    keep = (after >= 0) & (left >= 0) & (layer[source] > 0)
+    source, step, left = source[keep], step[keep], left[keep]
+    target = node[left, goal[source], space.targets(step)]
     cost = space.cost[step]
     value = np.where(layer == 0, 0, _FAR)
     if cost.any():
@@ -357,7 +389,8 @@ def _second_costs(space: Space, distance: Ints) -> tuple[Ints, PlanSpace]:
     else:
         value = np.zeros(len(goal), np.int64)
     second = np.zeros(distance.shape, np.int64)
-    second[goal, state] = value
+    begins = slack == space.model.slack
+    second[goal[begins], state[begins]] = value[begins]
     return second, PlanSpace(
         model=space.model,
         rows=space.rows,

@@ -57,6 +57,10 @@ class PlansFile(msgspec.Struct, frozen=True):
     robots: Annotated[list[str] | None, Meta(description="The order of the robots in a step.")] = (
         None
     )
+    slack: Annotated[
+        int | None,
+        Meta(description="Steps that plans may take more than the least makespan, if any."),
+    ] = None
 
 
 PLANS = FileFormat("plans", "JSON plan file", PlansFile)
@@ -98,11 +102,12 @@ def texts(model: JointModel, plan: Plan) -> tuple[Texts, ...]:
 
 
 def to_ipc(plans: Plans, plan: Plan) -> str:
-    """An IPC plan file.
+    """An IPC plan file; of a plan within slack without its rest at the end.
 
     Joint-action PDDL: one ``(action args)`` a line.  Otherwise one subaction a line with its step,
     ``0: (move r1 a b)``, idling left out, a shared subaction once.  Then ``; makespan = 3``.
     """
+    plan = plans.without_rest(plan)
     lines = [
         text if plans.space.model.is_joint_action else f"{number}: {text}"
         for number, text in _lines(plans, plan)
@@ -116,6 +121,7 @@ def to_plansys2(plans: Plans, plan: Plan) -> str:
     The time is the joint step, and each action lasts one step.  Lines before one with "Solution
     Found" are skipped by its readers.
     """
+    plan = plans.without_rest(plan)
     lines = [f"{number}.000: {text}  [1.000]" for number, text in _lines(plans, plan)]
     return "\n".join([";;;; Solution Found", *lines]) + "\n"
 
@@ -132,17 +138,19 @@ def _lines(plans: Plans, plan: Plan) -> Iterator[tuple[int, str]]:
 def to_json(plans: Plans, listed: Sequence[Plan], task: int = 0) -> dict[str, Any]:
     """The data of a JSON plan file: the listed plans, the exact number of all, the optimal cost."""
     model = plans.space.model
-    makespan, second = plans.space.cost_of(task)
+    _, second = plans.space.cost_of(task)
     data: dict[str, Any] = {
         "plans": [
             {"cost": len(plan), "actions": [list(step) for step in texts(model, plan)]}
-            for plan in listed
+            for plan in map(plans.without_rest, listed)
         ],
         "count": json_count(plans.count),
         "complete": len(listed) == plans.count,
-        "optimal_cost": makespan,
+        "optimal_cost": plans.space.least_makespan(task),
         "robots": list(model.robots),
     }
+    if model.slack:
+        data["slack"] = model.slack
     if model.cost != "makespan":
         data["optimal_second_cost"] = second
     return data

@@ -3,7 +3,9 @@
 
 Costs are lexicographic, makespan first: with ``d(s)`` the cost from ``s`` to the goal, the optimal
 plans from ``I`` are exactly the paths of edges ``s -> t`` with ``d(s) = c(edge) + d(t)``.  All of
-them have the same length (Proposition 1 of docs/concepts.md).
+them have the same length (Proposition 1 of docs/concepts.md).  Plans within slack are paths of the
+same kind of graph: all have as many steps as are allowed, the last of them at rest
+(`planners.search.slack`).
 """
 
 from __future__ import annotations
@@ -49,8 +51,8 @@ class UnfoldingStep:
 class PlanSpace:
     """The optimal plans of one or several tasks as paths of one layered graph.
 
-    A *node* is a pair of a goal and a state that lies on some optimal plan to it.  Nodes are sorted
-    by layer.
+    A *node* is a pair of a goal and a state that lies on some optimal plan to it; with slack, a
+    goal, a state and the steps that are left.  Nodes are sorted by layer.
 
     ``rows`` (states, words) is the table of states; per node: ``state`` its number in ``rows``,
     ``goal`` the number of its goal, ``layer`` the joint steps left to the goal, ``first`` (nodes +
@@ -108,8 +110,15 @@ class PlanSpace:
         return int(self.labels.shape[1])
 
     def cost_of(self, task: int) -> tuple[int, int]:
-        """The optimal cost of a task: (makespan, second component)."""
+        """What each plan of a task costs: (joint steps with those at rest, second component).
+
+        Without slack this is the optimal cost.
+        """
         return int(self.layer[self.starts[task]]), int(self.second[task])
+
+    def least_makespan(self, task: int) -> int:
+        """The makespan of an optimal plan of a task: what `cost_of` says, without the slack."""
+        return int(self.layer[self.starts[task]]) - self.model.slack
 
     # ---- one node, one edge
 

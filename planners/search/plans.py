@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Optimal plans counted, iterated, ranked and sampled, without listing them."""
+"""Optimal plans counted, iterated, ranked and sampled, without listing them; or those in slack."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from random import Random
 import numpy as np
 
 from planners.search.plan_space import PlanSpace
+from planners.search.slack import rests
 
 #: A plan: the label numbers of all robots, step by step.
 Plan = tuple[tuple[int, ...], ...]
@@ -112,6 +113,35 @@ class Plans:
                 return None
             node = target
         return rank
+
+    def padded(self, plan: Plan) -> Plan | None:
+        """A plan within slack that is given without its rest at the end, with it.
+
+        None if there is none, or it is too long.
+        """
+        left = int(self.space.layer[self.start]) - len(plan)
+        path = self.space.path_with(self.start, plan) if left >= 0 else None
+        if path is None:
+            return None
+        node = self.space.nodes_on(self.start, path)[-1]
+        rest: list[tuple[int, ...]] = []
+        for _ in range(left):
+            edges = self.space.out_edges(node)
+            labels = self.space.labels[edges.start : edges.stop]
+            found = np.flatnonzero(rests(self.space.model, labels))
+            if not len(found):
+                return None
+            edge = edges.start + int(found[0])
+            rest.append(self.space.labels_of(edge))
+            node = self.space.target_of(edge)
+        return (*plan, *rest)
+
+    def without_rest(self, plan: Plan) -> Plan:
+        """A plan without the steps at its end in which every robot rests."""
+        if not self.space.model.slack:
+            return plan
+        busy = np.flatnonzero(~rests(self.space.model, np.array(plan).reshape(len(plan), -1)))
+        return plan[: int(busy[-1]) + 1] if len(busy) else ()
 
     def sample(self, number: int, seed: int) -> Iterator[Plan]:
         """Plans drawn uniformly and independently; the same seed draws the same plans."""

@@ -8,7 +8,7 @@ themselves: they are sent where the plans come from, not the plans.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Protocol, overload
 
@@ -22,6 +22,7 @@ from planners.pieces.work import digest
 from planners.search.optimal_plans import distances, plan_spaces
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, PieceSizes, Space
+from planners.search.slack import seen_rows
 from planners.tables import Bools, Ints, Rows
 
 #: Estimated nodes times robots in one portion.  Smaller ones find the same label sets again and
@@ -75,11 +76,17 @@ class Explored:
 
     space: Space
     goals: Sequence[tuple[Goal, Rows | None]]
+    #: The states as plan spaces number them: with slack, where states say it.
+    _rows: Rows = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_rows", seen_rows(self.space.model, self.space.rows))
 
     def portion(self, goals: range) -> PlanSpace:
         """See `Source.portion`; O(goals x joint steps)."""
         tasks = self.goals[goals.start : goals.stop]
-        pieces = PieceSizes(pairs=max(1, len(tasks) * len(self.space)))
+        pairs = len(tasks) * len(self.space) * (1 + self.space.model.slack)
+        pieces = PieceSizes(pairs=max(1, pairs))
         (space,) = plan_spaces(self.space, tasks, pieces)
         return space
 
@@ -90,7 +97,7 @@ class Explored:
     @property
     def rows(self) -> Rows:
         """See `Source.rows`."""
-        return self.space.rows
+        return self._rows
 
     @property
     def robots(self) -> int:
@@ -99,8 +106,9 @@ class Explored:
 
     @property
     def efforts(self) -> Ints:
-        """As many nodes as there are states: a goal's plan space can have no more."""
-        return np.full(len(self.goals), len(self.space) * len(self.space.model.robots))
+        """As many nodes as there are states, for each slack: a goal's plan space has no more."""
+        nodes = len(self.space) * (1 + self.space.model.slack)
+        return np.full(len(self.goals), nodes * len(self.space.model.robots))
 
     @property
     def is_every_pair(self) -> bool:
@@ -183,7 +191,8 @@ class PlanSpaces(Sequence[PlanSpace]):
 
     def __init__(self, source: Explored) -> None:
         self._source = source
-        size = max(1, PIECES.pairs // max(1, len(source.space)))
+        slack = source.space.model.slack
+        size = max(1, PIECES.pairs // max(1, len(source.space) * (1 + slack)))
         count = len(source.goals)
         self._batches = [range(low, min(low + size, count)) for low in range(0, count, size)]
         self._made: dict[int, PlanSpace] = {}
@@ -251,7 +260,8 @@ def estimate(source: Source) -> Estimate:
     efforts = source.efforts
     nodes = int(efforts.sum()) // source.robots
     if isinstance(source, Explored) and source.is_every_pair:
-        nodes = source.tasks + len(efforts)  # each start is a node, and each goal
+        # Each start is a node, and each goal, with each slack that may be left.
+        nodes = (source.tasks + len(efforts)) * (1 + source.space.model.slack)
     return Estimate(len(efforts), nodes, source.robots, len(cut(efforts)))
 
 
@@ -296,4 +306,5 @@ def _of_model(model: JointModel) -> Iterator[object]:
     yield model.robots
     yield model.labels
     yield model.cost
+    yield model.slack
     yield tuple(model.codec.facts.texts)

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from planners.joint.conditions import Labels
-from planners.joint.model import JointModel, Steps
+from planners.joint.model import JointModel, Options, Steps
 from planners.limits import reaching
 from planners.tables import Ints, Rows, find_rows, ranges, unique_rows
 
@@ -89,7 +89,10 @@ class Space:
 
 
 def blocks(
-    model: JointModel, rows: Rows, pieces: PieceSizes = PIECES
+    model: JointModel,
+    rows: Rows,
+    pieces: PieceSizes = PIECES,
+    only: Callable[[Rows, Options], Options] | None = None,
 ) -> Iterator[tuple[int, Steps]]:
     """`JointModel.successors` of a long table in pieces.
 
@@ -99,7 +102,7 @@ def blocks(
     """
     start, size = 0, min(pieces.states, 500)
     while start < len(rows):
-        steps = model.successors(rows[start : start + size])
+        steps = model.successors(rows[start : start + size], only)
         yield start, steps
         start += size
         size = max(1, min(pieces.states, int(pieces.steps * size / max(1, len(steps)))))
@@ -134,7 +137,7 @@ def explore(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> Spac
             layer = new[find_rows(seen, new) < 0]
             seen, _ = unique_rows(np.concatenate((seen, layer)))
             depth += 1
-        return _joined(model, seen, sources, found)
+        return joined_steps(model, seen, sources, found)
 
 
 def count(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> tuple[int, int]:
@@ -165,16 +168,22 @@ def count(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> tuple[
     return len(seen), steps_counted
 
 
-def _joined(model: JointModel, seen: Rows, sources: list[Rows], found: list[Steps]) -> Space:
+def joined_steps(model: JointModel, seen: Rows, sources: list[Rows], found: list[Steps]) -> Space:
+    """The steps out of tables of states, as a space of the states ``seen``, which are sorted.
+
+    Steps to other states are left out.
+    """
     source = np.concatenate(
         [find_rows(seen, rows)[steps.source] for rows, steps in zip(sources, found, strict=True)]
     )
+    target = np.concatenate([find_rows(seen, s.result) for s in found])
     order = np.argsort(source, kind="stable")
+    order = order[target[order] >= 0]
     return Space(
         model=model,
         rows=seen,
         first=np.searchsorted(source[order], np.arange(len(seen) + 1)),
-        target=np.concatenate([find_rows(seen, s.result) for s in found])[order],
+        target=target[order],
         labels=np.concatenate([s.labels for s in found])[order],
         cost=np.concatenate([s.cost for s in found])[order],
     )

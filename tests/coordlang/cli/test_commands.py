@@ -264,3 +264,25 @@ def test_a_bug_is_said_plainly(
     assert outcome.code == 32
     assert "internal error" in outcome.err
     assert "--debug shows where" in outcome.err
+
+
+def test_plans_within_slack(coordlang: Command) -> None:
+    files = DOMAINS / "three-cells" / "domain.pddl", DOMAINS / "three-cells" / "problem.pddl"
+    outcome = coordlang("plans", *files, "--slack", "1", "--json", "--max", "100")
+    data = json.loads(outcome.out)
+    assert (data["count"], data["optimal_cost"], data["slack"]) == (20, 2, 1)
+    costs = [plan["cost"] for plan in data["plans"]]
+    assert (costs.count(2), costs.count(3)) == (4, 16)
+    plans = door.plans(*files, slack=1)
+    assert (plans.count, plans.makespan, plans.slack) == (20, 2, 1)
+    assert [plans.rank(plan) for plan in plans] == list(range(20))
+    # One that is shown without its rest is the same plan.
+    assert {len(plan) for plan in plans} == {2, 3}
+
+
+def test_slack_where_robots_cannot_wait(coordlang: Command) -> None:
+    outcome = coordlang(
+        "plans", JOINT / "domain.pddl", JOINT / "corners-3x3.pddl", "--slack", "1", "--count"
+    )
+    assert outcome.code == 2
+    assert "must be able to wait" in outcome.err

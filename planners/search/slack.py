@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Slack: plans that take a few joint steps more than the least makespan.
+
+A *plan within slack B* is a sequence of joint steps that ends in the goal and takes at most B steps
+more than the least makespan ``m``; it may pass through the goal before.  Two of them that differ
+only in a rest at the end, steps in which every robot idles, are one plan: all are written with
+exactly ``m + B`` steps, the last ones at rest.  So the graph has nodes (state, steps left), and as
+every joint step takes one of these, no node repeats on a plan although states may (Proposition 22
+of docs/concepts.md).  Under a second cost component the plans within the bound that cost least are meant.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from planners.errors import UsageError
+from planners.joint.conditions import Labels
+from planners.joint.model import JointModel, Options, PlanningTask, Steps
+from planners.limits import reaching
+from planners.search.bounds import FAR
+from planners.search.guides import guide_for
+from planners.search.plan_space import PlanSpace
+from planners.search.reachable import PIECES, PieceSizes, Space, blocks, joined_steps
+from planners.search.state_variables import state_variables
+from planners.tables import Bools, Ints, Rows, find_rows, unique_rows
+
+
+def explore_within(
+    model: JointModel, task: PlanningTask, steps: int, pieces: PieceSizes = PIECES
+) -> Space:
+    """The states and joint steps of all plans of a task with at most so many steps, and some more.
+
+    A state is kept if the steps to it and a lower bound on the steps from it are within ``steps``.
+    Breadth first, so that the steps to it are the least: every state of such a plan is kept.  The
+    joint steps are those between states that are kept.
+    """
+    guide = guide_for("auto", model, task, state_variables(model, task.init))
+    layer = seen = task.init[None, :]
+    sources: list[Rows] = []
+    found: list[Steps] = []
+    depth = 0
+
+    def so_far() -> str:
+        return f"{len(seen):,} states within {depth} of {steps} steps of {task.name}"
+
+    def only(rows: Rows, options: Options) -> Options:
+        if guide.in_time is None:
+            return options
+        return guide.in_time(rows, options, steps - depth)[0]
+
+    with reaching(so_far, "less slack", lambda: sum(map(len, found)), "joint steps"):
+        while len(layer) and depth < steps:
+            depth += 1
+            fresh: list[Rows] = [layer[:0]]
+            for start, piece in blocks(model, layer, pieces, only):
+                sources.append(layer[start:])
+                found.append(piece)
+                fresh.append(unique_rows(piece.result)[0])
+            new, _ = unique_rows(np.concatenate(fresh))
+            layer = new[find_rows(seen, new) < 0]
+            if guide.bound is not None:
+                bound = guide.bound(layer)
+                layer = layer[(bound < FAR) & (depth + bound <= steps)]
+            seen, _ = unique_rows(np.concatenate((seen, layer)))
+        # Goal states that are met in the last layer rest there, as do others.
+        for start, piece in blocks(model, layer, pieces):
+            sources.append(layer[start:])
+            found.append(piece)
+        return joined_steps(model, seen, sources, found)
+
+
+def rests(model: JointModel, labels: Labels) -> Bools:
+    """In which of these joint steps (steps, robots) every robot rests (`JointModel.resting`)."""
+    resting = np.ones(len(labels), np.bool_)
+    for robot, own in enumerate(model.resting):
+        resting &= np.isin(labels[:, robot], sorted(own))
+    return resting
+
+
+def require_rest(graph: PlanSpace) -> None:
+    """Raise `UsageError` where a goal is reached early and the robots cannot all rest there.
+
+    ``graph`` are the nodes that the tasks' plans pass through, goal states among them with steps
+    left; from all others some step is on a shortest way.
+    """
+    source = graph.sources
+    ends = np.zeros(len(graph), np.bool_)
+    for number, goal in enumerate(graph.goals):
+        mine = np.flatnonzero(graph.goal == number)
+        ends[mine] = graph.model.holds(goal, graph.rows[graph.state[mine]])
+    good = rests(graph.model, graph.labels) & ends[graph.target]
+    can = graph.layer == 0
+    can[source[good]] = True
+    stuck = np.flatnonzero(ends & ~can)
+    if len(stuck):
+        text = graph.model.state_text(graph.rows[graph.state[stuck[0]]])
+        raise UsageError(
+            f"--slack: a plan that is early must be able to wait, but in the goal state {text} the "
+            "robots cannot all idle",
+            remedy="Give the domain a joint step in which nothing is done, or leave out --slack.",
+        )
+
+
+def seen_rows(model: JointModel, rows: Rows) -> Rows:
+    """All states with all that may be left of the slack, where states say it; else the states."""
+    if not model.slack_facts:
+        return rows
+    every = np.tile(rows, (len(model.slack_facts), 1))
+    for left, fact in enumerate(model.slack_facts):
+        model.codec.set(every, slice(left * len(rows), (left + 1) * len(rows)), [fact])
+    found, _ = unique_rows(every)
+    return found
+
+
+def seeing(graph: PlanSpace, left: Ints, rows: Rows) -> PlanSpace:
+    """A graph whose states say what is left of the slack.
+
+    Parameters
+    ----------
+    left
+        (nodes) the slack that is left.
+    rows
+        `seen_rows` of the graph's states.
+    """
+    model = graph.model
+    own = graph.rows[graph.state].copy()
+    for slack, fact in enumerate(model.slack_facts):
+        model.codec.set(own, left == slack, [fact])
+    return replace(graph, rows=rows, state=find_rows(rows, own))

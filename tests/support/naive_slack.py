@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Plans within slack by the definition: every sequence of joint steps is tried.  Tiny inputs only."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from planners.joint.model import JointModel, PlanningTask
+from planners.search.plans import Plan
+from planners.tables import Rows
+
+#: A joint step: its labels, its cost, and the state that it leads to.
+Step = tuple[tuple[int, ...], int, bytes]
+
+
+class TooMany(Exception):
+    """More sequences than a twin should list."""
+
+
+class Sequences:
+    """The sequences of joint steps of a task that end in its goal, by their number of steps."""
+
+    def __init__(self, model: JointModel, task: PlanningTask, most: int = 4_000) -> None:
+        self.model, self.task, self.most = model.without_slack, task, most
+        self.steps = cache(self._steps)
+        self.holds = cache(self._holds)
+
+    def _row(self, state: bytes) -> Rows:
+        return np.frombuffer(state, np.uint64)[None, :]
+
+    def _steps(self, state: bytes) -> tuple[Step, ...]:
+        found = self.model.successors(self._row(state))
+        return tuple(
+            (tuple(labels), int(cost), row.tobytes())
+            for labels, cost, row in zip(
+                found.labels.tolist(), found.cost, found.result, strict=True
+            )
+        )
+
+    def _holds(self, state: bytes) -> bool:
+        return bool(self.model.holds(self.task.goal, self._row(state))[0])
+
+    def of_length(self, length: int) -> dict[Plan, int]:
+        """All that end in the goal after so many steps, each with what it costs."""
+        reached: list[tuple[Plan, int, bytes]] = [((), 0, self.task.init.tobytes())]
+        for _ in range(length):
+            reached = [
+                ((*plan, labels), paid + cost, after)
+                for plan, paid, state in reached
+                for labels, cost, after in self.steps(state)
+            ]
+            if len(reached) > self.most:
+                raise TooMany
+        return {plan: paid for plan, paid, state in reached if self.holds(state)}
+
+    def makespan(self, most: int) -> int | None:
+        """The least number of steps, None if it is larger."""
+        return next((k for k in range(most + 1) if self.of_length(k)), None)
+
+    def within(self, slack: int) -> set[Plan] | None:
+        """The plans within slack, with a rest at the end; None where the task is too hard."""
+        makespan = self.makespan(4)
+        if makespan is None:
+            return None
+        found = self.of_length(makespan + slack)
+        cheapest = min(found.values(), default=0)
+        return {plan for plan, paid in found.items() if paid == cheapest}
