@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any, Unpack
 
 from coordlang.api.inputs import DomainSource, File, ProblemSource, read_planning
@@ -13,8 +14,12 @@ from coordlang.api.options import GivenOptions, ModelKeywords
 from coordlang.api.presenting import Presented
 from coordlang.api.witness import witness_data, witness_text
 from coordlang.api.workers import opened_runner
+from coordlang.language.tolerance import percent
 from coordlang.required.miscoordination import Miscoordination
-from coordlang.required.pieces import answers
+from coordlang.tolerance.failure import mean
+from coordlang.tolerance.failures import Failures, estimate_data, estimate_text
+from coordlang.tolerance.sampled import FailureEstimate
+from coordlang.tolerance.task_answers import answers
 from planners.notebook import counted, html_table
 from planners.search.plan_file import json_count
 
@@ -23,13 +28,17 @@ from planners.search.plan_file import json_count
 class TaskCoordination(Presented):
     """Whether one task requires coordination (RC); true iff it does.
 
-    ``witness`` has two optimal plans whose mixture is none, or is None.
+    ``witness`` has two optimal plans whose mixture is none, or is None.  ``failure`` is how often
+    robots miscoordinate that draw their plans uniformly, independently and without a word: exact;
+    None where that is too much to count, and ``estimate`` is drawn.
     """
 
     problem: str
     makespan: int
     plans: int
     witness: Miscoordination | None
+    failure: Fraction | None = Fraction(0)
+    estimate: FailureEstimate | None = None
 
     @property
     def required(self) -> bool:
@@ -46,6 +55,7 @@ class TaskCoordination(Presented):
             "makespan": self.makespan,
             "plans": self.plans,
             "required": self.required,
+            "failure": self.failure,
         }
 
     def data(self) -> dict[str, Any]:
@@ -56,6 +66,8 @@ class TaskCoordination(Presented):
             "plans": json_count(self.plans),
             "requires_coordination": self.required,
             "miscoordination": witness_data(self.witness),
+            "failure": None if self.failure is None else float(self.failure),
+            **({"failure_estimate": estimate_data(self.estimate)} if self.estimate else {}),
         }
 
     def __str__(self) -> str:
@@ -68,7 +80,19 @@ class TaskCoordination(Presented):
             answer += ": any mixture of them is optimal"
         plans = f"{counted(self.plans, 'optimal plan')} of {counted(self.makespan, 'step')}"
         line = f"{self.problem}: {plans}; coordination {answer}"
-        return f"{line}\n\n{witness_text(self.witness, width)}" if self.witness else line
+        if self.witness is None:
+            return line
+        return f"{line}{self._failure_text()}\n\n{witness_text(self.witness, width)}"
+
+    def _failure_text(self) -> str:
+        """How often robots fail in silence, as a line of its own."""
+        if self.failure is not None:
+            share = percent(float(self.failure))
+        elif self.estimate is not None:
+            share = estimate_text(self.estimate)
+        else:
+            return ""
+        return f"\nWithout a word, robots that choose by themselves fail in {share} of all runs."
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -87,6 +111,18 @@ class Coordination(Presented):
     def witness(self) -> Miscoordination | None:
         """The first task's miscoordination that there is, or None."""
         return next((task.witness for task in self.tasks if task.witness), None)
+
+    @property
+    def failure_mean(self) -> Fraction | None:
+        """How often robots fail without a word, over all tasks; None where it is not counted."""
+        counted = [task.failure for task in self.tasks if task.failure is not None]
+        return mean(counted) if len(counted) == len(self.tasks) else None
+
+    @property
+    def failure_worst(self) -> Fraction | None:
+        """The same in the worst task."""
+        counted = [task.failure for task in self.tasks if task.failure is not None]
+        return max(counted) if len(counted) == len(self.tasks) else None
 
     def __bool__(self) -> bool:
         return self.required
@@ -107,14 +143,22 @@ class Coordination(Presented):
 
     def data(self) -> dict[str, Any]:
         """Return the answers as JSON data."""
-        return {"tasks": [task.data() for task in self.tasks]}
+        means = {"failure_mean": self.failure_mean, "failure_worst": self.failure_worst}
+        return {
+            "tasks": [task.data() for task in self.tasks],
+            **{key: None if value is None else float(value) for key, value in means.items()},
+        }
 
     def __str__(self) -> str:
         return self.text()
 
     def text(self, width: int = WIDTH) -> str:
         """Return the answers in lines of at most ``width`` characters, as far as atoms allow."""
-        return "\n".join(task.text(width) for task in self.tasks)
+        lines = [task.text(width) for task in self.tasks]
+        overall = Failures(self.failure_mean, self.failure_worst)
+        if len(lines) > 1 and self.required and overall.mean is not None:
+            lines.append(f"\nOver all tasks, without a word, robots {overall.text()}.")
+        return "\n".join(lines)
 
     def _repr_html_(self) -> str:
         head = ("problem", "makespan", "plans", "coordination")
@@ -156,7 +200,14 @@ def coordination(
     with opened_runner(jobs, scheduler, resume, note) as runner:
         found = answers(loaded, runner)
     tasks = tuple(
-        TaskCoordination(problem.source.name, answer.makespan, answer.plans, answer.witness)
+        TaskCoordination(
+            problem.source.name,
+            answer.makespan,
+            answer.plans,
+            answer.witness,
+            answer.failures.mean,
+            answer.failures.estimate,
+        )
         for problem, answer in zip(files.problems, found, strict=True)
     )
     return Coordination(loaded.model.robots, tasks)

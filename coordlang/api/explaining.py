@@ -28,6 +28,7 @@ from coordlang.explanation.text import (
 )
 from coordlang.explanation.words import MappedStates, all_covers, mapped_states
 from coordlang.language.sentences import TaskSentence, task_sentences
+from coordlang.language.tolerance import Tolerance, tolerance_data
 from coordlang.tasks.candidates import describe
 from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
 from planners.errors import UsageError
@@ -116,7 +117,11 @@ class WordsExplained(Presented):
         number = language.provenance.tasks["count"]
         tasks = counted(number, "task") if number else "no recorded task"
         words, robots = counted(len(language.words), "word"), ", ".join(self.used.model.robots)
-        return f"{words} ({g.method}, {proof}) for {tasks} of {robots}."
+        line = f"{words} ({g.method}, {proof}) for {tasks} of {robots}."
+        tolerance = language.tolerance
+        if tolerance is not None and tolerance.warning is not None:
+            line += f"\n{tolerance.warning[0].upper()}{tolerance.warning[1:]}."
+        return line
 
     def _proof(self) -> list[str]:
         """Return what is proved of the formulas' lengths, in at most one line."""
@@ -181,6 +186,11 @@ class Explanation(Presented):
         """Whether the task is one that the language guarantees."""
         return self.words.used.covered
 
+    @property
+    def tolerance(self) -> Tolerance | None:
+        """What may go wrong, or be longer, under the language; None: nothing."""
+        return self.words.used.tolerance
+
     def facts(self) -> Mapping[str, object]:
         """Return the main facts, as a notebook shows them."""
         return {"formulas": self.formulas, "covered": self.covered}
@@ -196,6 +206,7 @@ class Explanation(Presented):
             "task": describe(used.space, used.task),
             "covered": used.covered,
             "sentences": listed,
+            **tolerance_data(used.tolerance),
         }
 
     def __str__(self) -> str:
@@ -216,7 +227,7 @@ class Explanation(Presented):
             f"has {counted(total, 'optimal plan')} of {counted(steps, 'step')} "
             f"in {counted(len(self.all_sentences), 'sentence')}.",
         ]
-        if self.with_demands and used.covered:
+        if self.with_demands and used.guaranteed:
             lines.append(
                 "Each robot may choose for itself: whatever the others choose, "
                 "it is an optimal plan."

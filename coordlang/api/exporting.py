@@ -22,6 +22,7 @@ from coordlang.api.options import (
 )
 from coordlang.api.presenting import Presented
 from coordlang.api.speaking import SentencePlans, SentenceSource, given_sentence
+from coordlang.language.tolerance import Tolerance, tolerance_data
 from coordlang.use.choices.choices import choices as choices_under
 from coordlang.use.export.behaviour_tree import behaviour_trees
 from coordlang.use.export.ltlf import SentenceFormula, export_ltlf
@@ -81,6 +82,11 @@ class ExportedTask(Presented):
     def covered(self) -> bool:
         """Whether the task is one that the language guarantees."""
         return self.plans_found.task_language.covered
+
+    @property
+    def tolerance(self) -> Tolerance | None:
+        """What may go wrong, or be longer, under the language; None: nothing."""
+        return self.plans_found.task_language.tolerance
 
     @property
     def open_plans(self) -> SentencePlans:
@@ -161,6 +167,7 @@ class ExportedFormula(Presented):
     words: dict[str, str]
     symbols: dict[str, str]
     covered: bool
+    tolerance: Tolerance | None = None
 
     def facts(self) -> Mapping[str, object]:
         """Return the main facts, as a notebook shows them."""
@@ -176,6 +183,7 @@ class ExportedFormula(Presented):
             "over_words": self.over_words,
             "words": self.words,
             "symbols": self.symbols,
+            **tolerance_data(self.tolerance),
         }
 
 
@@ -190,6 +198,7 @@ class ExportedTrees(Presented):
     subplans: dict[str, int]
     guaranteed: bool
     covered: bool
+    tolerance: Tolerance | None = None
 
     def facts(self) -> Mapping[str, object]:
         """Return the main facts, as a notebook shows them."""
@@ -204,6 +213,7 @@ class ExportedTrees(Presented):
             "xml": self.xml,
             "subplans": {robot: json_count(n) for robot, n in self.subplans.items()},
             "guaranteed": self.guaranteed,
+            **tolerance_data(self.tolerance),
         }
 
 
@@ -300,7 +310,7 @@ def export(
         return _trees(used, words)
     found: SentenceFormula = export_ltlf(used, words)
     return ExportedFormula(
-        found.formula, found.over_words, found.words, found.symbols, used.covered
+        found.formula, found.over_words, found.words, found.symbols, used.covered, used.tolerance
     )
 
 
@@ -312,6 +322,7 @@ def _trees(used: TaskLanguage, words: Sequence[int]) -> ExportedTrees:
         subplans={robots[own.robot]: own.automaton.count for own in found.robots},
         guaranteed=found.guaranteed,
         covered=used.covered,
+        tolerance=used.tolerance,
     )
 
 

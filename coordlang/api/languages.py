@@ -45,10 +45,13 @@ from coordlang.language.recorded import (
     recorded_candidates,
     with_recorded,
 )
+from coordlang.language.tolerance import Tolerance, tolerance_data
 from coordlang.language.words import Language
 from coordlang.repairing import Repaired, repair_language
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.tasks.candidates import Candidates, require_solvable
+from coordlang.tolerance.failure import TooManyToCount
+from coordlang.tolerance.failures import NONE, Failures, failures_under
 from coordlang.verification.pieces import verify_candidates
 from planners.errors import ProvedImpossible, UsageError
 from planners.loading import ModelOptions
@@ -100,6 +103,11 @@ class BuiltLanguage(Presented):
         return self.candidates.skipped
 
     @property
+    def failures(self) -> Failures:
+        """How often robots that choose by themselves under the words fail; never, if verified."""
+        return NONE
+
+    @property
     def stopped(self) -> BaseException | None:
         """What ended the method before its proof was complete, or None."""
         return self.built.stopped
@@ -129,6 +137,7 @@ class BuiltLanguage(Presented):
             "mixtures": first.evaluations,
             "verify_nodes": self.built.verdict.nodes,
             "verified": self.built.verdict.holds,
+            **self.failures.data(),
             "proved_minimal": guarantee.proved_minimal,
             **self.built.figures,
             **({"repair": repair_data(self.repaired)} if self.repaired else {}),
@@ -254,6 +263,9 @@ def build(
 class Verification(Presented):
     """Whether a language is a coordination language for its tasks; true iff it is.
 
+    Or iff it is none and robots fail no more often than it claims (``tolerance``; ``failures`` says
+    how often they do).
+
     ``witness`` has plans of one sentence that miscoordinate, or is None.  ``overlapping``: whether
     states have further words.  ``certificate`` is the checked one, where one was given, and
     ``claimed`` the lower bound that the language file claims.
@@ -267,9 +279,21 @@ class Verification(Presented):
     overlapping: bool
     certificate: Checked | None
     claimed: int
+    failures: Failures = NONE
+    tolerance: Tolerance | None = None
 
     def __bool__(self) -> bool:
-        return self.holds and self.proves_claim
+        return (self.holds or self.is_tolerated) and self.proves_claim
+
+    @property
+    def is_tolerated(self) -> bool:
+        """Whether robots fail, and no more often than the language claims."""
+        found, claimed = self.failures.tolerance, self.tolerance
+        if self.holds or found is None or claimed is None:
+            return False
+        return _at_most(found.failure_mean, claimed.failure_mean) and _at_most(
+            found.failure_worst, claimed.failure_worst
+        )
 
     @property
     def lower_bound(self) -> int | None:
@@ -297,6 +321,8 @@ class Verification(Presented):
             "lower_bound": self.lower_bound,
             "reasons": self.certificate.reasons if self.certificate else None,
             "proved_minimal": self.proved_minimal,
+            **self.failures.data(),
+            **tolerance_data(self.tolerance),
         }
 
     def facts(self) -> Mapping[str, object]:
@@ -366,6 +392,11 @@ def verify(
     say_size(candidates, note or progress)
     with opened_runner(jobs, scheduler, resume, note) as runner:
         verdict = verify_candidates(partition, candidates, runner, progress or _silent)
+        found = NONE
+        if not verdict.holds:
+            (progress or _silent)("counting how often robots fail")
+            found = failures_under(partition, candidates, is_claimed=_claims_failures(read))
+    _require_counted(found, read)
     checked = None
     if proof and verdict.holds:
         checked = check_certificate(proof, candidates, progress or _silent)
@@ -383,7 +414,26 @@ def verify(
         bool(read.also),
         checked,
         read.guarantee.lower_bound,
+        found,
+        read.tolerance,
     )
+
+
+def _at_most(found: float | None, claimed: float | None) -> bool:
+    return found is not None and claimed is not None and found <= claimed
+
+
+def _claims_failures(language: Language) -> bool:
+    return language.tolerance is not None and language.tolerance.may_fail
+
+
+def _require_counted(found: Failures, language: Language) -> None:
+    """Raise `TooManyToCount` where a language claims how often robots fail, and nobody can tell."""
+    if _claims_failures(language) and found.mean is None:
+        raise TooManyToCount(
+            f"what the language tolerates cannot be checked: {found.why_not}",
+            remedy="Say --tasks FILE with fewer tasks.",
+        )
 
 
 def _certificate(certificate: File | Certificate | None) -> Certificate | None:

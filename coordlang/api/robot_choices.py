@@ -14,6 +14,7 @@ from coordlang.api.language_inputs import LanguageSource, read_task_language
 from coordlang.api.options import GivenOptions, ModelKeywords, names_in
 from coordlang.api.presenting import Presented
 from coordlang.api.speaking import SentenceSource, given_sentence
+from coordlang.language.tolerance import Tolerance
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.use.choices.choices import MOST, Choices
 from coordlang.use.choices.choices import choices as choices_under
@@ -51,6 +52,11 @@ class RobotsChoices(Presented):
     def covered(self) -> bool:
         """Whether the task is one that the language guarantees."""
         return self.found.task_language.covered
+
+    @property
+    def tolerance(self) -> Tolerance | None:
+        """What may go wrong, or be longer, under the language; None: nothing."""
+        return self.found.task_language.tolerance
 
     @property
     def guaranteed(self) -> bool:

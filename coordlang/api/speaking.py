@@ -19,6 +19,7 @@ from coordlang.api.options import (
     require_one_of,
 )
 from coordlang.api.presenting import Presented
+from coordlang.language.tolerance import Tolerance, tolerance_data
 from coordlang.use.sentence.best_sentence import BestSentence, best_sentence
 from coordlang.use.sentence.drawing import cut_note, to_dot
 from coordlang.use.sentence.guided_search import ExpandedStates, GuidedPlan, plan_under_sentence
@@ -42,10 +43,14 @@ NODES_DRAWN = 200
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Said(Presented):
-    """The sentence of each plan; ``covered`` says whether the language guarantees the task."""
+    """The sentence of each plan; ``covered`` says whether the language guarantees the task.
+
+    ``tolerance`` says what may go wrong, or be longer, all the same; None: nothing.
+    """
 
     sentences: tuple[str, ...]
     covered: bool
+    tolerance: Tolerance | None = None
 
     @property
     def sentence(self) -> str:
@@ -66,7 +71,11 @@ class Said(Presented):
 
     def data(self) -> dict[str, Any]:
         """Return the sentences as JSON data."""
-        return {"sentences": list(self.sentences), "covered": self.covered}
+        return {
+            "sentences": list(self.sentences),
+            "covered": self.covered,
+            **tolerance_data(self.tolerance),
+        }
 
 
 def given_sentence(sentence: SentenceSource | None) -> SentenceSource:
@@ -111,7 +120,7 @@ def say(
             if len(plans) > 1:
                 error.what = f"plan {number} of {len(plans)}: {error.what}"
             raise
-    return Said(tuple(sentences), used.covered)
+    return Said(tuple(sentences), used.covered, used.tolerance)
 
 
 class SentencePlans(OptimalPlans):
@@ -132,6 +141,11 @@ class SentencePlans(OptimalPlans):
     def covered(self) -> bool:
         """Whether the task is one that the language guarantees: then the plans mix freely."""
         return self._open.task_language.covered
+
+    @property
+    def tolerance(self) -> Tolerance | None:
+        """What may go wrong, or be longer, under the language; None: nothing."""
+        return self._open.task_language.tolerance
 
     def dag(self, nodes: int | None = None) -> PlanDag:
         """Return the plans as the paths of a DAG, cut to about so many nodes (None: all)."""
@@ -234,6 +248,11 @@ class PlanUnderSentence(Presented):
     without_sentence: GuidedPlan
     fulfilled: tuple[Fulfilled, ...]
     open_plans: SentencePlans
+
+    @property
+    def tolerance(self) -> Tolerance | None:
+        """What may go wrong, or be longer, under the language; None: nothing."""
+        return self.open_plans.tolerance
 
     @property
     def cost(self) -> tuple[int, int]:

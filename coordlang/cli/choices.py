@@ -147,7 +147,11 @@ def _guarantee_code(found: RobotsChoices, check: bool) -> int:
     """Return the exit code of what is guaranteed, and write to stderr what is not."""
     from coordlang.api.witness import witness_text
 
-    if found.witness is not None:
+    tolerated = found.covered and not check and found.tolerance is not None
+    if found.witness is not None and tolerated:
+        echo("choices of this task miscoordinate, for example:", err=True)
+        echo(witness_text(found.witness, line_width(err=True)), err=True)
+    elif found.witness is not None:
         why = "the language does not cover it"
         if found.covered:
             why = "the file holds no coordination language"
@@ -160,7 +164,7 @@ def _guarantee_code(found: RobotsChoices, check: bool) -> int:
             err=True,
         )
         return 0
-    return covered_code(found.covered)
+    return covered_code(found.covered, found.tolerance)
 
 
 def _text(found: RobotsChoices, check: bool) -> str:

@@ -13,7 +13,7 @@ from coordlang.cli.echo import echo
 from coordlang.cli.files import PlanningFiles, language_argument, planning_files
 from coordlang.cli.group import RenamedOptions
 from coordlang.cli.shared_options import ModelKeywords, kept_plans, limits, model_options
-from coordlang.cli.terminal import covered_code, line_width, working
+from coordlang.cli.terminal import covered_code, line_width, warn_of_failures, working
 from planners.errors import OutOfMemory
 
 if TYPE_CHECKING:
@@ -66,7 +66,10 @@ def command(
     else:
         echo(found.words.head + "\n")
         echo(_task_and_words(found))
-    return covered_code(found.covered) if task else 0
+    if task:
+        return covered_code(found.covered, found.tolerance)
+    warn_of_failures(found.tolerance)
+    return 0
 
 
 def _task_and_words(found: Explanation) -> str:

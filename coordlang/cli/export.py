@@ -112,12 +112,12 @@ def command(
         with working("finding formulas of the words"):
             formula = coordlang.export(*files, factored=pddl.factored, to="ltlf", **model)
         _write_formula(formula, output, as_json)
-        return covered_code(formula.covered)
+        return covered_code(formula.covered, formula.tolerance)
     if target == "bt":
         with working("finding the robots' choices"):
             trees = coordlang.export(*files, factored=pddl.factored, to="bt", **model)
         write(json.dumps(trees.data()) + "\n" if as_json else trees.xml, output)
-        return covered_code(trees.covered)
+        return covered_code(trees.covered, trees.tolerance)
     with working("compiling the task"):
         exported = coordlang.export(
             *files,
@@ -131,7 +131,7 @@ def command(
         _write_plan(exported, translate_plan, output, as_json)
     else:
         _write_pddl(exported, output, as_json)
-    return covered_code(exported.covered)
+    return covered_code(exported.covered, exported.tolerance)
 
 
 def _check_not_pddl(target: Target, translate_plan: str | None) -> None:

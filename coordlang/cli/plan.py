@@ -80,14 +80,14 @@ def command(
         )
     if form == "json":
         echo(json.dumps(found.data()))
-        return covered_code(found.covered)
+        return covered_code(found.covered, found.tolerance)
     echo(found.plansys2() if form == "plansys2" else found.ipc(), nl=False)
     for entry in found.fulfilled:
         _comment(entry)
     expanded = counted(found.expanded, "node")
     without = f"without the sentence {found.without_sentence.expanded:,}"
     echo(f"A* ({heuristic}) expanded {expanded}; {without}", err=True)
-    return covered_code(found.covered)
+    return covered_code(found.covered, found.tolerance)
 
 
 def _comment(entry: Fulfilled) -> None:

@@ -17,7 +17,7 @@ from coordlang.cli.files import (
     planning_files,
 )
 from coordlang.cli.shared_options import ModelKeywords, kept_plans, limits, model_options
-from coordlang.cli.terminal import working
+from coordlang.cli.terminal import warn_of_failures, working
 from planners.messages import visible
 from planners.notebook import counted
 
@@ -108,6 +108,7 @@ def command(
             write_atomically(path, text.encode())
     shown = f"{counted(report.tasks, 'task')} of {report.candidates:,}"
     place = "stdout" if output == "-" else visible(output)
+    warn_of_failures(read.tolerance)
     echo(f"{shown}, {len(report.html):,} bytes, written to {place}", err=output == "-")
 
 

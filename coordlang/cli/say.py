@@ -34,4 +34,4 @@ def command(
             language, pddl.domain, pddl.problem, plan, factored=pddl.factored, **model
         )
     echo(json.dumps(said.data()) if as_json else str(said))
-    return covered_code(said.covered)
+    return covered_code(said.covered, said.tolerance)

@@ -17,6 +17,7 @@ from planners.messages import visible
 
 if TYPE_CHECKING:
     from coordlang.api.languages import Progress
+    from coordlang.language.tolerance import Tolerance
     from planners.limits import Underway
 
 #: Seconds of work before progress is shown: short commands neither flicker nor load rich.
@@ -148,8 +149,18 @@ def note_single_robot(robots: tuple[str, ...]) -> None:
         )
 
 
-def covered_code(is_covered: bool) -> int:
-    """Return the exit code of an answer: 1, with a warning, for a task that is not covered."""
+def warn_of_failures(tolerance: Tolerance | None) -> None:
+    """Write a warning where words are in use under which robots may miscoordinate."""
+    if tolerance is not None and tolerance.warning is not None:
+        echo(f"coordlang: warning: {tolerance.warning}", err=True)
+
+
+def covered_code(is_covered: bool, tolerance: Tolerance | None) -> int:
+    """Return the exit code of an answer: 1, with a warning, for a task that is not covered.
+
+    What the language tolerates is a warning, too.
+    """
+    warn_of_failures(tolerance)
     if is_covered:
         return 0
     echo(

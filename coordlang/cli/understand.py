@@ -89,7 +89,7 @@ def command(
         echo(f"coordlang: note: {note}; --nodes N draws more", err=True)
     if form == "ipc" and not only_count:
         listing.note_more(plans, listing.chosen(plans), "plans")
-    return covered_code(plans.covered)
+    return covered_code(plans.covered, plans.tolerance)
 
 
 def _check_form(form: str, listing: Listing, nodes: int | None) -> None:

@@ -76,7 +76,8 @@ def command(
 
     All plans of one sentence then mix freely.
 
-    Exit 0: it is.  1: it is not, and two plans that miscoordinate are shown.
+    Exit 0: it is, or robots fail as rarely as its file claims.  1: neither, and two plans that
+    miscoordinate are shown.
     """
     if dimacs and not certificate:
         raise click.UsageError("--dimacs belongs to --certificate")
@@ -96,7 +97,7 @@ def command(
         )
     echo(json.dumps(found.data()) if as_json else _text(found))
     if not found.holds:
-        return REFUTED
+        return 0 if found.is_tolerated else REFUTED
     if found.certificate is not None:
         _show_bound(found, found.certificate, language, dimacs, as_json)
     return 0
@@ -105,14 +106,23 @@ def command(
 def _text(found: Verification) -> str:
     from coordlang.api.witness import witness_text
 
+    words, tasks = counted(found.words, "word"), counted(found.tasks, "task")
+    fail = f"robots that choose by themselves {found.failures.text()}"
+    if found.is_tolerated:
+        return (
+            f"as claimed: {words}, {tasks}: this is no coordination language, and {fail} "
+            f"({found.nodes:,} walk nodes)"
+        )
     if found.witness:
         sentence = " ".join(found.witness.sentence or ())
         head = f'refuted: plans with the sentence "{sentence} .." miscoordinate'
-        return f"{head}\n{witness_text(found.witness, line_width())}"
+        claimed = found.tolerance.warning if found.tolerance else None
+        if claimed is not None:
+            fail += f".\nThe file claims less: {claimed}"
+        return f"{head}\n{witness_text(found.witness, line_width())}\n\nOn the whole {fail}."
     mixing = "all optimal plans of one sentence mix freely"
     if found.overlapping:
         mixing = "words overlap, every optimal plan has a sentence whose plans mix freely"
-    words, tasks = counted(found.words, "word"), counted(found.tasks, "task")
     return f"verified: {words}, {tasks}: {mixing} ({found.nodes:,} walk nodes)"
 
 

@@ -14,6 +14,7 @@ from msgspec import UNSET
 from coordlang.language.duplicate_keys import duplicate_key
 from coordlang.language.provenance import Guarantee, Provenance
 from coordlang.language.record import LANGUAGE, LanguageRecord, TasksRecord
+from coordlang.language.tolerance import Tolerance
 from coordlang.language.words import Language
 from planners.errors import BadInput, Position
 from planners.files import read_bytes, require_seen
@@ -37,13 +38,15 @@ def to_bytes(language: Language) -> bytes:
         "words": list(language.words),
         "states": dict(language.states),
         "default": language.default,
-        "guarantee": asdict(language.guarantee),
+        "guarantee": _guarantee_data(language.guarantee),
         "producer": dict(provenance.producer),
     }
     if language.also:
         data["also"] = {state: list(words) for state, words in language.also.items()}
     if provenance.lifted:
         data["lifted"] = dict(provenance.lifted)
+    if provenance.tolerance is not None:
+        data["tolerance"] = provenance.tolerance.data()
     return msgspec.json.format(msgspec.json.encode(data), indent=1) + b"\n"
 
 
@@ -103,6 +106,7 @@ def language_from_bytes(data: bytes, position: Position) -> Language:
             tasks=_present(TasksRecord("problems", 0) if record.tasks is UNSET else record.tasks),
             producer=record.producer,
             lifted={} if record.lifted is UNSET else msgspec.to_builtins(record.lifted),
+            tolerance=_tolerance(record, position),
         ),
     )
 
@@ -165,20 +169,57 @@ def _guarantee(record: LanguageRecord, position: Position) -> Guarantee | None:
     if record.guarantee is UNSET:
         return None
     g = record.guarantee
-    if g.size != size or not 1 <= g.lower_bound <= g.size:
+    most = g.size if g.coordination_language else max(g.size, g.lower_bound)
+    if g.size != size or not 1 <= g.lower_bound <= most:
         raise BadInput(
             f"the guarantee (size {g.size}, lower bound {g.lower_bound}) contradicts "
             f"the {size} words",
             position=position,
             remedy="Correct 'guarantee', or build the language again.",
         )
-    if g.proved_minimal != (g.lower_bound == g.size):
+    if g.proved_minimal != (g.coordination_language and g.lower_bound == g.size):
         raise BadInput(
             "'proved_minimal' contradicts the lower bound",
             position=position,
-            remedy="It is true exactly where lower_bound is size: correct 'guarantee'.",
+            remedy="It is true exactly where lower_bound is size, and of a coordination language "
+            "only: correct 'guarantee'.",
         )
-    return Guarantee(g.method, g.size, g.lower_bound, g.proved_minimal)
+    return Guarantee(g.method, g.size, g.lower_bound, g.proved_minimal, g.coordination_language)
+
+
+def _guarantee_data(guarantee: Guarantee) -> dict[str, Any]:
+    """A guarantee as files hold it: that it is a coordination language goes without saying."""
+    data = asdict(guarantee)
+    if guarantee.coordination_language:
+        del data["coordination_language"]
+    return data
+
+
+def _tolerance(record: LanguageRecord, position: Position) -> Tolerance | None:
+    if record.tolerance is UNSET:
+        return None
+    claimed = record.tolerance
+    mean, worst = claimed.failure_mean, claimed.failure_worst
+    wrong = None
+    if (mean is None) != (worst is None):
+        wrong = "'failure_mean' and 'failure_worst' belong together"
+    elif mean is not None and worst is not None and not 0 <= mean <= worst <= 1:
+        wrong = f"failures of {mean} on average and {worst} at worst contradict each other"
+    elif claimed.slack is not None and claimed.slack < 0:
+        wrong = f"a slack of {claimed.slack} is none"
+    elif mean is not None and _claims_coordination(record):
+        wrong = "'guarantee' must say that it is no coordination language"
+    if wrong is not None:
+        raise BadInput(
+            f"{wrong} ('tolerance')",
+            position=position,
+            remedy="Correct 'tolerance' and 'guarantee', or build the language again.",
+        )
+    return Tolerance(mean, worst, claimed.slack)
+
+
+def _claims_coordination(record: LanguageRecord) -> bool:
+    return record.guarantee is not UNSET and record.guarantee.coordination_language
 
 
 class _States(msgspec.Struct):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from hashlib import sha256
 from typing import Any
 
+from coordlang.language.tolerance import Tolerance
 from coordlang.tasks.candidates import Candidates
 from coordlang.tasks.task_file import task_data
 from planners.joint.model import show
@@ -31,12 +32,15 @@ class Guarantee:
         A proved bound on the number of words of any partition that is a language for its tasks.
     proved_minimal
         Whether the size equals that bound.
+    coordination_language
+        Whether all plans of a task with one sentence mix freely.
     """
 
     method: str
     size: int
     lower_bound: int
     proved_minimal: bool
+    coordination_language: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +57,8 @@ class Provenance:
         The entries of these names in a language file.
     lifted
         The features of which the words are functions, if they are; empty otherwise.
+    tolerance
+        What may go wrong, or be longer, under the words; None: nothing.
     """
 
     robots: tuple[str, ...] = ()
@@ -62,6 +68,7 @@ class Provenance:
     tasks: Mapping[str, Any] = field(default_factory=dict)
     producer: Mapping[str, Any] = field(default_factory=dict)
     lifted: Mapping[str, Any] = field(default_factory=dict)
+    tolerance: Tolerance | None = None
 
 
 def provenance_of(

@@ -92,6 +92,33 @@ class GuaranteeRecord(msgspec.Struct):
         ),
     ]
     proved_minimal: Annotated[bool, Meta(description="Whether the size equals that bound.")]
+    coordination_language: Annotated[
+        bool,
+        Meta(
+            description="Whether all plans of a task with one sentence mix freely; false where "
+            "'tolerance' says how often they do not."
+        ),
+    ] = True
+
+
+class ToleranceRecord(msgspec.Struct):
+    """What is claimed in place of a coordination language for optimal plans."""
+
+    failure_mean: Annotated[
+        Annotated[float, Meta(ge=0, le=1)] | None,
+        Meta(
+            description="How often robots that choose by themselves under a sentence "
+            "miscoordinate: the probability for a task drawn uniformly."
+        ),
+    ] = None
+    failure_worst: Annotated[
+        Annotated[float, Meta(ge=0, le=1)] | None,
+        Meta(description="The same for the task in which it is highest."),
+    ] = None
+    slack: Annotated[
+        Annotated[int, Meta(ge=0)] | None,
+        Meta(description="The joint steps by which plans may be longer than the least makespan."),
+    ] = None
 
 
 class LiftedFromRecord(msgspec.Struct):
@@ -153,6 +180,13 @@ class LanguageRecord(msgspec.Struct):
             "language all the same."
         ),
     ] = {}
+    tolerance: Annotated[
+        ToleranceRecord | UnsetType,
+        Meta(
+            description="What may go wrong, or be longer, under these words; without it they are a "
+            "coordination language for optimal plans."
+        ),
+    ] = UNSET
     lifted: Annotated[
         LiftedFromRecord | UnsetType,
         Meta(description="The features of which the words are functions, if they are lifted."),

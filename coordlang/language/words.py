@@ -15,6 +15,7 @@ import numpy as np
 from coordlang.language.keys import keys_of, read_keys
 from coordlang.language.partition import Partition
 from coordlang.language.provenance import Guarantee, Provenance
+from coordlang.language.tolerance import Tolerance
 from planners.errors import BadInput
 from planners.joint.model import JointModel
 from planners.messages import echoed
@@ -72,6 +73,17 @@ class Language:
         """What is known of the number of words; nothing is, where nothing is claimed."""
         size = len(self.words)
         return self.provenance.guarantee or Guarantee("unknown", size, 1, size == 1)
+
+    @property
+    def tolerance(self) -> Tolerance | None:
+        """What may go wrong, or be longer, under these words; None: nothing."""
+        return self.provenance.tolerance
+
+    @property
+    def may_fail(self) -> bool:
+        """Whether the file says that plans of one sentence may miscoordinate."""
+        claimed = self.tolerance is not None and self.tolerance.may_fail
+        return claimed or not self.guarantee.coordination_language
 
     def sizes(self) -> dict[str, int]:
         """How many of the listed states each word holds."""

@@ -14,6 +14,7 @@ from coordlang.coordinates import Point
 from coordlang.explanation.lifted_words import lifted_words
 from coordlang.explanation.text import counted
 from coordlang.language.provenance import domain_sha256
+from coordlang.language.tolerance import percent
 from coordlang.language.words import Language
 from coordlang.report.data import MOST_PLACES, page_data
 from coordlang.report.shown import select_tasks
@@ -130,6 +131,8 @@ def _render(
         all_listed=language.provenance.tasks.get("kind") == "all",
         terms_open=_TERMS_OPEN if len(words) <= _FEW_WORDS else 1,
         figures=_figures(language),
+        may_fail=language.may_fail,
+        warning=language.tolerance.warning if language.tolerance else None,
         about=_about(language, domain, problems, data, seed),
         formula=_formula,
         counted=counted,
@@ -174,7 +177,7 @@ def _json(data: Mapping[str, Any]) -> str:
 
 
 def _figures(language: Language) -> list[tuple[str, str, str]]:
-    g = language.guarantee
+    g, tolerance = language.guarantee, language.tolerance
     kind = {"all": "all pairs of states", "problems": "of the problems", "file": "of a task file"}
     return [
         (
@@ -189,6 +192,11 @@ def _figures(language: Language) -> list[tuple[str, str, str]]:
         ),
         ("States", _number(len(language.states)), "on optimal plans of these tasks"),
         ("Method", g.method, ""),
+        *(
+            [("Failures", percent(tolerance.failure_mean), "on average over the tasks")]
+            if tolerance is not None and tolerance.failure_mean is not None
+            else []
+        ),
     ]
 
 

@@ -16,14 +16,17 @@ from coordlang.report.shown import ShownTask
 from coordlang.report.world import World
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.tasks.listed import goal_text
+from coordlang.tolerance.failure import TooManyToCount, failure_probability
 from coordlang.use.sentence.task_language import TaskLanguage
 from coordlang.verification.by_definition import verify
 from planners.errors import OutOfMemory
 from planners.joint.model import JointModel
 from planners.joint.states import split_atoms
 from planners.search.plans import counts
-from planners.tables import Rows
+from planners.tables import Ints, Rows
 
+#: Additions beyond which it is not counted how often robots fail in a task.
+_ADDITIONS = 300_000
 #: Plan-space edges beyond which a task is not verified again for the page.
 _VERIFIED = 20_000
 
@@ -115,6 +118,8 @@ def task_data(part: TaskPart, tables: Tables) -> dict[str, Any]:
         "name": part.shown.name,
         "covered": language.covered,
         "requires": requires,
+        "silence": _failure(language, None) if requires else None,
+        "failure": _failure(language, language.word) if part.violation else None,
         "verified": part.verified,
         "steps": makespan,
         "second": second if model.cost != "makespan" else None,
@@ -127,6 +132,22 @@ def task_data(part: TaskPart, tables: Tables) -> dict[str, Any]:
         "witness": _witness_data(part.shown.witness, part.played, tables),
         "violation": _witness_data(part.violation, part.violation_played, tables),
     }
+
+
+def _failure(language: TaskLanguage, word: Ints | None) -> float | None:
+    """How often robots that choose by themselves fail in the task, None if that is too much work.
+
+    ``word`` has the word number of each node; None: without a word.
+    """
+    space = language.space
+    alone = space.with_tasks(space.starts[[language.task]], space.second[[language.task]])
+    kept = space.descendants(space.starts[[language.task]])
+    words = None if word is None else word[kept]
+    try:
+        found = failure_probability([alone], [words], _ADDITIONS)
+    except TooManyToCount:
+        return None
+    return float(found.mean)
 
 
 def _graph_data(language: TaskLanguage, graph: Graph, tables: Tables) -> dict[str, Any]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Required coordination of many tasks in pieces: by goals, and by problems.
+"""Required coordination of many tasks in pieces: by goals.
 
 Divergences at a node depend on its goal only, so the goals are cut into portions, and each is a
 piece of work (`planners.pieces`).  Of goals that are images of each other under a symmetry one is
@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 
-import msgspec
 import numpy as np
 
 from coordlang.required.divergences import (
@@ -23,21 +22,15 @@ from coordlang.required.divergences import (
 )
 from coordlang.required.miscoordination import (
     Inseparable,
-    Miscoordination,
     inseparable,
-    miscoordination,
     require_separable,
     separable,
 )
 from coordlang.required.partings import minimal
 from coordlang.symmetry.goals import SymmetricGoals, symmetric_goals
 from coordlang.tasks.candidates import Candidates
-from planners.cache import Folder, keeping_plans, search, shared_folder
-from planners.joint.model import JointModel, PlanningTask
 from planners.limits import reaching
-from planners.loading import PlanningInstance
 from planners.pieces.work import Runner, Table, Work, digest, tables
-from planners.search.plans import counts
 from planners.search.portions import PORTION, Explored, Source, cut
 from planners.tables import Ints
 
@@ -134,51 +127,6 @@ def _spread(found: Differences, goals: SymmetricGoals) -> Differences:
     rows = minimal(goals.images_of_rows(rows))
     first = replace(found.first, divergences=Divergences(rows[:, 0], rows[:, 1:]))
     return Differences(first, goals.images_of_states(found.states))
-
-
-@dataclass(frozen=True, slots=True)
-class TaskAnswer:
-    """One task: its optimal makespan and plans, and plans that miscoordinate, if there are any."""
-
-    makespan: int
-    plans: int
-    witness: Miscoordination | None
-
-
-def answers(loaded: PlanningInstance, runner: Runner) -> list[TaskAnswer]:
-    """Search the task of each problem and decide whether it requires coordination, in pieces.
-
-    Raises
-    ------
-    ProvedImpossible
-        For the first task without a plan.
-    """
-    model, tasks = loaded.model, loaded.tasks
-    effort = float(len(model.codec.facts) * sum(map(len, model.labels)))  # a guess: no search yet
-    numbers = range(len(tasks))
-    hashes = (loaded.domain.source.sha256, *(p.source.sha256 for p in loaded.problems))
-    identity = digest(*hashes, repr(loaded.options))
-    shared = (model, tasks, shared_folder())
-    work = Work("coordination", _answer, shared, numbers, identity, [effort for _ in numbers])
-    return [_read_answer(table) for table in tables(runner.run(work))]
-
-
-def _answer(shared: tuple[JointModel, Sequence[PlanningTask], Folder | None], number: int) -> Table:
-    """One piece: a task."""
-    model, tasks, folder = shared
-    with keeping_plans(folder):
-        space = search(model, tasks[number])
-    witness = miscoordination(space, 0)
-    return {
-        "makespan": np.array(space.cost_of(0)[0]),
-        "plans": np.array(str(counts(space)[int(space.starts[0])])),
-        "witness": np.frombuffer(msgspec.json.encode(witness), np.uint8),
-    }
-
-
-def _read_answer(table: Table) -> TaskAnswer:
-    witness = msgspec.json.decode(table["witness"].tobytes(), type=Miscoordination | None)
-    return TaskAnswer(int(table["makespan"]), int(str(table["plans"])), witness)
 
 
 def _differences(shared: _Goals, goals: range) -> Table:

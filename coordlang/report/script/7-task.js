@@ -33,9 +33,10 @@ class TaskView {
       make('strong', {}, counted(plans, 'optimal plan')), ` of `, make('strong', {}, counted(task.steps, 'step')), cost, ', ',
       ...(task.all_sentences === null ? ['too many sentences to count. '] : [make('strong', {}, counted(task.all_sentences, 'sentence')), '. ']),
       task.requires === null ? 'Whether coordination is required was not decided: too large.' : task.requires
-        ? 'Coordination is required: some mixtures of these plans go wrong.' : 'No coordination is required: any mixture of these plans is optimal.');
+        ? `Coordination is required: some mixtures of these plans go wrong${task.silence === null ? '' : `, without a word ${percent(task.silence)} of all`}.` : 'No coordination is required: any mixture of these plans is optimal.');
     const warning = this.byId('task-warning');
     const text = task.violation ? 'In this task it is no coordination language: plans with one sentence miscoordinate, as shown below.'
+        + (task.failure === null ? '' : ` Robots that choose by themselves fail in ${percent(task.failure)} of all runs.`)
       : task.covered ? '' : 'This task is not among those that the language was built for. Nothing is guaranteed for it'
         + (task.verified === null ? '.' : '; checked for this page, its sentences hold here.');
     warning.textContent = text; warning.hidden = !text;

@@ -80,7 +80,7 @@ class Choices:
 
         Proved by walking them all, or else by the language's own guarantee.
         """
-        return self.task_language.covered if self.mixtures is None else self.mixtures.holds
+        return self.task_language.guaranteed if self.mixtures is None else self.mixtures.holds
 
     def of(self, robots: Sequence[int] | None) -> tuple[RobotChoices, ...]:
         """The choices of the robots with these numbers; of all robots for None."""

@@ -9,7 +9,9 @@ from operator import or_
 from typing import Any
 
 import msgspec
+from msgspec import UNSET
 
+from coordlang.language.tolerance import tolerance_data
 from coordlang.tasks.candidates import describe
 from coordlang.use.choices.choices import Choices, RobotChoices
 from coordlang.use.choices.monitor import FORMAT, IDLE, VERSION, Monitor
@@ -32,6 +34,7 @@ def to_record(choices: Choices, robots: Sequence[int] | None = None) -> ChoicesF
         plans=json_count(Plans.of(choices.fits).count),
         covered=task_language.covered,
         guaranteed=choices.guaranteed,
+        tolerance=tolerance_data(task_language.tolerance).get("tolerance", UNSET),
         combinations_walked=choices.mixtures.nodes if choices.mixtures is not None else None,
         choices=[_robot(choices, own) for own in choices.of(robots)],
     )

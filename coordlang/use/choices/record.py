@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 import msgspec
-from msgspec import Meta
+from msgspec import UNSET, Meta, UnsetType
 
 from coordlang.use.choices.monitor import FORMAT, VERSION
 from planners.files import FileFormat
@@ -76,6 +76,10 @@ class ChoicesFile(msgspec.Struct, frozen=True):
     choices: Annotated[
         list[RobotRecord], Meta(description="The choices of each robot that was asked for.")
     ]
+    tolerance: Annotated[
+        dict[str, float] | UnsetType,
+        Meta(description="What the language tolerates, as in its file; missing: nothing."),
+    ] = UNSET
 
 
 CHOICES = FileFormat("choices", "choices file", ChoicesFile, FORMAT, VERSION)

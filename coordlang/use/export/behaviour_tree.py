@@ -57,11 +57,12 @@ def behaviour_trees(choices: Choices) -> str:
 
 def _comment(choices: Choices) -> str:
     sentence = " ".join(choices.task_language.partition.words[word] for word in choices.words)
-    promise = (
-        "Whatever each robot chooses, all of them together follow an optimal plan."
-        if choices.guaranteed
-        else "The language does not cover this task: choices of different robots need not mix."
-    )
+    if choices.guaranteed:
+        promise = "Whatever each robot chooses, all of them together follow an optimal plan."
+    elif choices.task_language.covered:
+        promise = "This is no coordination language: choices of different robots need not mix."
+    else:
+        promise = "The language does not cover this task: choices of different robots need not mix."
     leaves = "".join(
         f"\n    {name} ({kind}, {port}): {does}." for name, (kind, port, does) in LEAVES.items()
     )

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from coordlang.language.tolerance import tolerance_data
 from coordlang.tasks.candidates import describe
 from coordlang.use.sentence.picture import to_svg
 from coordlang.use.sentence.plan_dag import NODES_SHOWN, DagNode, PlanDag, plan_dag
@@ -92,6 +93,7 @@ def open_plans_data(
         "sentence": task_language.text(open_plans.words),
         "covered": task_language.covered,
         "task": describe(task_language.space, task_language.task),
+        **tolerance_data(task_language.tolerance),
         **to_json(open_plans.plans, listed),
     }
     if graph is not None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from coordlang.language.partition import Partition
 from coordlang.language.recorded import check_source, options_of, recorded_list
+from coordlang.language.tolerance import Tolerance
 from coordlang.language.words import Language
 from coordlang.tasks.candidates import Candidates, describe
 from coordlang.tasks.listed import ListedTask, model_of_listed
@@ -74,6 +75,16 @@ class TaskLanguage:
     def start(self) -> int:
         """The plan-space node of the task's initial state."""
         return int(self.space.starts[self.task])
+
+    @property
+    def guaranteed(self) -> bool:
+        """Whether the language guarantees that the plans of a sentence mix freely in this task."""
+        return self.covered and not (self.language and self.language.may_fail)
+
+    @property
+    def tolerance(self) -> Tolerance | None:
+        """What may go wrong, or be longer, under the language; None: nothing."""
+        return self.language.tolerance if self.language else None
 
     @property
     def model(self) -> JointModel:

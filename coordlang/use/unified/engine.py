@@ -313,6 +313,9 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         if solved.task_language is not None and not solved.task_language.covered:
             text = "the language does not cover this task: it guarantees nothing here"
             messages.append(LogMessage(LogLevel.WARNING, text))
+        tolerance = solved.task_language.tolerance if solved.task_language is not None else None
+        if tolerance is not None and tolerance.warning is not None:
+            messages.append(LogMessage(LogLevel.WARNING, tolerance.warning))
         makespan, second = plans.space.cost_of(0)
         metrics = {"makespan": str(makespan), "plans": str(plans.count)}
         if plans.space.model.cost != "makespan":

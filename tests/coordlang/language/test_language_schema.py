@@ -19,6 +19,7 @@ import coordlang
 from coordlang.building import build_language
 from coordlang.language.file import language_from_bytes, read_language, to_bytes, write_language
 from coordlang.language.record import json_schema
+from coordlang.language.tolerance import Tolerance
 from planners.errors import BadInput, Position
 from tests.support.command import Command
 from tests.support.domains import DOMAINS, all_tasks
@@ -76,6 +77,13 @@ def test_what_is_written_is_valid(method: str, folder: str, stem: str, tmp_path:
 
 Change = Callable[[dict[str, Any]], object]
 
+
+def no_language(data: dict[str, Any]) -> dict[str, Any]:
+    """A guarantee that says that this is no coordination language."""
+    never = {"proved_minimal": False, "coordination_language": False}
+    return {"guarantee": {**data["guarantee"], **never}}
+
+
 #: What neither the schema nor the reader takes.
 WRONG: list[Change] = [
     lambda d: d.update(format="coordlang/tasks"),
@@ -120,6 +128,13 @@ WRONG: list[Change] = [
     lambda d: d["guarantee"].update(proved_minimal=1),
     lambda d: d.update(producer=[]),
     lambda d: d.update(also={"(at r1 a) (at r2 b)": "w1"}),
+    lambda d: d["guarantee"].update(coordination_language=0),
+    lambda d: d.update(tolerance={"failure_mean": -0.1, "failure_worst": 0.5}),
+    lambda d: d.update(tolerance={"failure_mean": 0.1, "failure_worst": 1.5}),
+    lambda d: d.update(tolerance={"failure_mean": "5/66", "failure_worst": 0.5}),
+    lambda d: d.update(tolerance={"slack": -1}),
+    lambda d: d.update(tolerance={"slack": 0.5}),
+    lambda d: d.update(tolerance=[]),
 ]
 #: What only the reader can refuse.
 CONTRADICTORY: list[Change] = [
@@ -128,7 +143,27 @@ CONTRADICTORY: list[Change] = [
     lambda d: d["guarantee"].update(size=2, lower_bound=2),
     lambda d: d["guarantee"].update(lower_bound=2),
     lambda d: d["guarantee"].update(lower_bound=4),
+    lambda d: d["guarantee"].update(coordination_language=False),  # and proved minimal
+    lambda d: d.update(tolerance={"failure_mean": 0.1, "failure_worst": 0.5}),  # a language
+    lambda d: d.update(no_language(d), tolerance={"failure_mean": 0.1}),
+    lambda d: d.update(no_language(d), tolerance={"failure_worst": 0.1}),
+    lambda d: d.update(no_language(d), tolerance={"failure_mean": 0.3, "failure_worst": 0.2}),
 ]
+
+
+def test_a_tolerance_is_written_and_read(written: dict[str, Any]) -> None:
+    """With one word, where three are needed, too: it is no coordination language."""
+    data = copy.deepcopy(written)
+    data["guarantee"] |= {"lower_bound": 4}
+    data |= no_language(data) | {"tolerance": {"failure_mean": 0.25, "failure_worst": 1}}
+    assert valid(data)
+    read = language_from_bytes(json.dumps(data).encode(), Position("text"))
+    assert read.tolerance == Tolerance(0.25, 1.0)
+    assert read.may_fail
+    again = json.loads(to_bytes(read))
+    assert again["tolerance"] == {"failure_mean": 0.25, "failure_worst": 1.0}
+    assert again["guarantee"]["coordination_language"] is False
+    assert "coordination_language" not in written["guarantee"]
 
 
 @pytest.mark.parametrize("number", range(len(WRONG)))

@@ -15,8 +15,9 @@ import pytest
 import coordlang
 from coordlang.language.partition import Partition
 from coordlang.required.miscoordination import Inseparable
-from coordlang.required.pieces import Differences, answers, differences
+from coordlang.required.pieces import Differences, differences
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
+from coordlang.tolerance.task_answers import answers
 from coordlang.verification.by_definition import verify
 from coordlang.verification.pieces import verify_candidates
 from planners.errors import BadInput, ProvedImpossible

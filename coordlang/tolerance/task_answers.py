@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tasks of problems in pieces: whether each requires coordination, and how often robots fail."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import msgspec
+import numpy as np
+
+from coordlang.required.miscoordination import Miscoordination, miscoordination
+from coordlang.tolerance.failures import NONE, Failures, failures
+from coordlang.tolerance.sampled import FailureEstimate
+from planners.cache import Folder, keeping_plans, search, shared_folder
+from planners.joint.model import JointModel, PlanningTask
+from planners.loading import PlanningInstance
+from planners.pieces.work import Runner, Table, Work, digest, tables
+from planners.search.plans import counts
+
+#: Additions after which the failures of one task are estimated, some seconds of work.
+_ADDITIONS = 3_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class TaskAnswer:
+    """One task: its optimal makespan and plans, and plans that miscoordinate, if there are any.
+
+    ``failures`` says how often robots do that draw their plans without a word.
+    """
+
+    makespan: int
+    plans: int
+    witness: Miscoordination | None
+    failures: Failures
+
+
+def answers(loaded: PlanningInstance, runner: Runner) -> list[TaskAnswer]:
+    """Search the task of each problem and decide whether it requires coordination, in pieces.
+
+    Raises
+    ------
+    ProvedImpossible
+        For the first task without a plan.
+    """
+    model, tasks = loaded.model, loaded.tasks
+    effort = float(len(model.codec.facts) * sum(map(len, model.labels)))  # a guess: no search yet
+    numbers = range(len(tasks))
+    hashes = (loaded.domain.source.sha256, *(p.source.sha256 for p in loaded.problems))
+    identity = digest(*hashes, repr(loaded.options))
+    shared = (model, tasks, shared_folder())
+    work = Work("coordination", _answer, shared, numbers, identity, [effort for _ in numbers])
+    return [_read_answer(table) for table in tables(runner.run(work))]
+
+
+def _answer(shared: tuple[JointModel, Sequence[PlanningTask], Folder | None], number: int) -> Table:
+    """One piece: a task."""
+    model, tasks, folder = shared
+    with keeping_plans(folder):
+        space = search(model, tasks[number])
+    witness = miscoordination(space, 0)
+    found = NONE if witness is None else failures([space], [None], _ADDITIONS)
+    return {
+        "makespan": np.array(space.cost_of(0)[0]),
+        "plans": np.array(str(counts(space)[int(space.starts[0])])),
+        "witness": np.frombuffer(msgspec.json.encode(witness), np.uint8),
+        "failures": np.frombuffer(_to_json(found), np.uint8),
+    }
+
+
+def _to_json(found: Failures) -> bytes:
+    """Exact numbers as text."""
+    mean = None if found.mean is None else str(found.mean)
+    estimate = found.estimate
+    drawn = None if estimate is None else (estimate.failures, estimate.runs)
+    return msgspec.json.encode((mean, drawn, found.why_not))
+
+
+def _from_json(data: bytes) -> Failures:
+    mean, drawn, why_not = msgspec.json.decode(data)
+    exact = None if mean is None else Fraction(mean)
+    return Failures(exact, exact, FailureEstimate(*drawn) if drawn else None, why_not)
+
+
+def _read_answer(table: Table) -> TaskAnswer:
+    witness = msgspec.json.decode(table["witness"].tobytes(), type=Miscoordination | None)
+    found = _from_json(table["failures"].tobytes())
+    return TaskAnswer(int(table["makespan"]), int(str(table["plans"])), witness, found)
