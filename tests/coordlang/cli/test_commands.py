@@ -167,6 +167,8 @@ def test_build_for_given_problems(coordlang: Command, tmp_path: Path) -> None:
         "lower_bound": None,
         "proved_minimal": None,
         "reasons": None,
+        "failure_mean": 0,
+        "failure_worst": 0,
     }
 
 
