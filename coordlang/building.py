@@ -17,6 +17,7 @@ from coordlang.language.words import Language
 from coordlang.required.divergences import FirstDifferences, required_nodes
 from coordlang.required.pieces import differences
 from coordlang.tasks.candidates import Candidates, require_solvable
+from coordlang.tolerance.failures import NONE, Failures
 from coordlang.verification.by_definition import Verdict
 from coordlang.verification.overlapping import verify_overlapping
 from coordlang.verification.pieces import verify_candidates
@@ -47,7 +48,8 @@ class Built:
     """A verified language and the figures of its making.
 
     ``figures`` are the method's own (rounds, clauses, ..), ``seconds`` are by phase.  ``stopped``
-    is the error that ended the method before its proof was complete, or None.  ``job`` and
+    is the error that ended the method before its proof was complete, or None.  ``failures`` says
+    how often robots miscoordinate under the words: never under a verified language.  ``job`` and
     ``evidence``, clauses that prove the lower bound, are what `certificate_of` needs.
     """
 
@@ -60,6 +62,7 @@ class Built:
     stopped: BaseException | None
     job: Job
     evidence: Mapping[Clause, Evidence]
+    failures: Failures = NONE
 
 
 @dataclass(frozen=True, slots=True)

@@ -52,7 +52,9 @@ from coordlang.required.miscoordination import Miscoordination
 from coordlang.tasks.candidates import Candidates, require_solvable
 from coordlang.tolerance.failure import TooManyToCount
 from coordlang.tolerance.failures import NONE, Failures, failures_under
+from coordlang.tolerating import WordLimit, build_few_words
 from coordlang.verification.pieces import verify_candidates
+from coordlang.vocabulary.few_words import FewWords
 from planners.errors import ProvedImpossible, UsageError
 from planners.loading import ModelOptions
 
@@ -75,6 +77,9 @@ def load_language(path: File) -> Language:
 class BuiltLanguage(Presented):
     """A verified language, and how it was made.
 
+    Or, with a limit on the words, one under which robots may fail: ``failures`` says how often, and
+    ``few_words`` how it was found.
+
     ``seconds`` are by phase.  ``stopped`` is the error that ended the method before its proof was
     complete, or None: the language is a verified one all the same.  ``repaired`` says what became
     of the language that it started from, None without one.
@@ -86,6 +91,7 @@ class BuiltLanguage(Presented):
     built: Built
     seconds: Mapping[str, float]
     repaired: Repaired | None = None
+    few_words: FewWords | None = None
 
     @property
     def guarantee(self) -> Guarantee:
@@ -105,7 +111,7 @@ class BuiltLanguage(Presented):
     @property
     def failures(self) -> Failures:
         """How often robots that choose by themselves under the words fail; never, if verified."""
-        return NONE
+        return self.built.failures
 
     @property
     def stopped(self) -> BaseException | None:
@@ -164,6 +170,8 @@ def build(
     alpha_only: bool = False,
     prefer: BuildPreference | None = None,
     overlap: bool = False,
+    words: int | None = None,
+    worst: bool = False,
     start: LanguageSource | None = None,
     unsolvable: Unsolvable = "fail",
     seed: int = 0,
@@ -194,6 +202,12 @@ def build(
         words have short formulas; ``"early"``: its sentences differ early.
     overlap
         Whether states get further words while that leaves more plans open.
+    words
+        The most words, in place of a method: those under which robots that choose by themselves
+        fail least often (docs/concepts.md, what communication is worth).  1 is silence.  Where
+        they fail, the result is no coordination language, and says so (``failures``).
+    worst
+        With ``words``: minimise how often robots fail in the worst task, not over all tasks.
     start
         A language to repair in place of building one: as few states as possible change their word.
         It then also serves the tasks that this language records, unless the map has changed.
@@ -223,6 +237,7 @@ def build(
         returned, with ``stopped`` set.
     """
     options = BuildOptions(method, seed, alpha_only, prefer, overlap)
+    limit = _word_limit(words, worst, options, start)
     require_one_of("--unsolvable", unsolvable, UNSOLVABLE)
     require_seed(seed)
     begin = perf_counter()
@@ -234,10 +249,12 @@ def build(
         old, candidates, contained = _to_repair(start, files, tasks, unsolvable)
     seconds = {"space": perf_counter() - begin}
     say_size(candidates, note or progress)
-    repaired = None
+    repaired = few = None
     with opened_runner(jobs, scheduler, resume, note) as runner:
         say = progress or _silent
-        if start is None:
+        if limit is not None:
+            built, few = build_few_words(candidates, limit, seed=seed, progress=say, runner=runner)
+        elif start is None:
             built = build_language(
                 candidates, **asdict(options), reserve=reserve, progress=say, runner=runner
             )
@@ -249,14 +266,14 @@ def build(
     producer = {
         "program": "coordlang",
         "version": coordlang.__version__,
-        "arguments": _arguments(tasks, options, start),
+        "arguments": _arguments(tasks, {**asdict(options), "words": words, "worst": worst}, start),
         "seed": seed,
         "solver": f"python-sat {version('python-sat')}",
         "seconds": {name: round(value, 3) for name, value in seconds.items()},
     }
     provenance = replace(built.language.provenance, producer=producer)
     language = replace(built.language, provenance=provenance)
-    return BuiltLanguage(language, options, candidates, built, seconds, repaired)
+    return BuiltLanguage(language, options, candidates, built, seconds, repaired, few)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -454,6 +471,22 @@ def _candidates(
         raise
 
 
+def _word_limit(
+    words: int | None, worst: bool, options: BuildOptions, start: LanguageSource | None
+) -> WordLimit | None:
+    """Return how many words there may be, None where a method or a repair decides."""
+    if words is None:
+        if worst:
+            raise UsageError("--worst belongs to --words", remedy="Add --words K.")
+        return None
+    if options != BuildOptions(seed=options.seed) or start is not None:
+        raise UsageError(
+            "--words finds the words in its own way",
+            remedy="Leave out --method, --alpha-only, --prefer, --overlap and --start.",
+        )
+    return WordLimit(words, worst)
+
+
 def _require_no_method(options: BuildOptions) -> None:
     """Raise `UsageError` for options of a method, where a language is repaired."""
     if options != BuildOptions(seed=options.seed):
@@ -474,10 +507,10 @@ def _to_repair(
 
 
 def _arguments(
-    tasks: TasksSource | None, options: BuildOptions, start: LanguageSource | None
+    tasks: TasksSource | None, options: Mapping[str, Any], start: LanguageSource | None
 ) -> list[str]:
     """Return the keywords of a call as a language file records them."""
-    given = {name: value for name, value in asdict(options).items() if value}
+    given = {name: value for name, value in options.items() if value}
     files = {"tasks": tasks, "start": start}
     given |= {k: fspath(file) for k, file in files.items() if isinstance(file, str | PathLike)}
     return [f"{name}={value}" for name, value in sorted(given.items())]

@@ -32,6 +32,7 @@ from coordlang.cli.shared_options import (
     limits,
     model_options,
     pieces_options,
+    was_given,
 )
 from coordlang.cli.terminal import line_width, note_single_robot, working
 from planners.messages import visible
@@ -79,6 +80,18 @@ _FOR_CERTIFICATE = 0.25
     help="Then give states further words while that leaves more plans open.",
 )
 @click.option(
+    "--words",
+    type=click.IntRange(min=1),
+    metavar="K",
+    help="At most K words, in place of a method: those under which robots that choose by "
+    "themselves fail least often.  1: silence.",
+)
+@click.option(
+    "--worst",
+    is_flag=True,
+    help="With --words: minimise how often they fail in the worst task, not on average.",
+)
+@click.option(
     "--start",
     type=FILE,
     metavar="LANGUAGE",
@@ -120,6 +133,8 @@ def command(
     alpha_only: bool,
     prefer: BuildPreference | None,
     overlap: bool,
+    words: int | None,
+    worst: bool,
     start: str | None,
     certificate: str | None,
     unsolvable: Unsolvable,
@@ -131,11 +146,17 @@ def command(
 ) -> int:
     """Build a coordination language and verify it before it is written.
 
+    With --words K: words that may be too few for that, and how often robots then fail.
+
     Exit 0: written, with the proof that the method promises.  3: written without it (a limit was
     hit).
     """
     from planners.limits import stop_clock, time_left
 
+    if words is not None and (certificate or was_given("method")):
+        raise click.UsageError(
+            "--words finds the words in its own way: without --method or --certificate"
+        )
     end = monotonic() + time_left()
     never_stdout("--certificate", certificate)
     listed = tasks if tasks != "all" else None
@@ -147,6 +168,8 @@ def command(
         alpha_only=alpha_only,
         prefer=prefer,
         overlap=overlap,
+        words=words,
+        worst=worst,
         start=start,
         unsolvable=unsolvable,
         seed=seed,
@@ -270,7 +293,8 @@ def _exit_code(
         if certificate and isinstance(stopped, coordlang.OutOfTime) and stopped is built.stopped:
             reason += ", a part of it kept for the certificate"
         short_of = "" if proved and exact else ", without proof"
-        echo(f"coordlang: {reason}; the best language so far is written{short_of}", err=True)
+        best = "language" if built.few_words is None else "partition into words"
+        echo(f"coordlang: {reason}; the best {best} so far is written{short_of}", err=True)
     if exact:
         return 0 if proved and ended is None else UNPROVED
     return 0 if stopped is None else UNPROVED
@@ -284,7 +308,8 @@ def _written(built: BuiltLanguage, output: str, certificate: str | None = None) 
     if built.guarantee.proved_minimal:
         text = f"the language is written{where}: it is verified and proved minimal"
     else:
-        text = f"the best language so far is written{where}: it is verified"
+        text = f"the best language so far is written{where}: it is "
+        text += "verified" if built.built.verdict.holds else "no coordination language"
     if certificate is None or is_device(certificate):
         return text
     # The certificate of another language went when this one was written.
@@ -298,15 +323,35 @@ def _summary(built: BuiltLanguage, figures: dict[str, Any], output: str) -> str:
     if figures["proved_minimal"]:
         proof = "proved minimal, "
     words, tasks = counted(figures["words"], "word"), counted(figures["tasks"], "task")
+    verified = "verified"
+    if built.few_words is not None and not figures["verified"]:
+        proof, verified = "", "no coordination language"
     return (
-        f"{words} ({figures['method']}, {proof}verified) for {tasks}, "
+        f"{words} ({figures['method']}, {proof}{verified}) for {tasks}, "
         f"{figures['tasks_requiring_coordination']:,} of which require coordination\n"
         f"{figures['states_on_plans']:,} states on optimal plans, "
         f"{figures['divergences']:,} divergences, "
         f"{figures['walk_nodes']:,} nodes of plans, {total:.2f} s\n"
-        f"{_flexibility(figures)}{_readability(figures)}{_repair(built, err=output == '-')}"
+        f"{_failures(built)}{_flexibility(figures)}{_readability(figures)}"
+        f"{_repair(built, err=output == '-')}"
         f"written to {'stdout' if output == '-' else visible(output)}"
     )
+
+
+def _failures(built: BuiltLanguage) -> str:
+    """How often robots fail under as many words as were asked for; whole lines."""
+    from coordlang.tolerance.failures import Failures
+
+    found = built.few_words
+    if found is None:
+        return ""
+    line = f"robots that choose by themselves {built.failures.text()}"
+    if built.built.verdict.holds:
+        line = "no robot fails: this is a coordination language"
+    elif found.is_best and len(built.language.words) > 1:
+        line += " (the least of all partitions)"
+    silence = Failures(found.silence.mean, found.silence.worst)
+    return f"{line}\nin silence they {silence.text()}\n"
 
 
 def _repair(built: BuiltLanguage, *, err: bool) -> str:

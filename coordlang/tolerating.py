@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Candidate tasks and a number of words -> words under which robots fail as rarely as possible."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from coordlang.building import Built, Clock
+from coordlang.language.partition import Partition
+from coordlang.language.provenance import Guarantee, provenance_of
+from coordlang.language.words import Language
+from coordlang.required.choices import Choices
+from coordlang.required.divergences import Divergences, FirstDifferences, states_on_plans
+from coordlang.required.miscoordination import Inseparable
+from coordlang.required.pieces import differences
+from coordlang.tasks.candidates import Candidates, require_solvable
+from coordlang.tolerance.failures import Failures
+from coordlang.verification.by_definition import Verdict
+from coordlang.verification.pieces import verify_candidates
+from coordlang.vocabulary.few_words import FewWords, few_words
+from coordlang.vocabulary.greedy import greedy
+from coordlang.vocabulary.job import Assignment, Job
+from planners.errors import UsageError
+from planners.pieces.processes import Processes
+from planners.pieces.work import Runner
+from planners.search.portions import require_room
+
+#: What a file says of how the words were found.
+METHOD = "few-words"
+
+
+@dataclass(frozen=True, slots=True)
+class WordLimit:
+    """How many words a language may have, and what is then minimised.
+
+    Attributes
+    ----------
+    words
+        The most words; 1 is silence.
+    worst
+        Minimise how often robots fail in the worst task, not over all tasks.
+
+    Raises
+    ------
+    UsageError
+        For less than one word.
+    """
+
+    words: int
+    worst: bool = False
+
+    def __post_init__(self) -> None:
+        if self.words < 1:
+            raise UsageError(
+                f"a language has a word at least, not {self.words}",
+                remedy="--words 1 is silence.",
+            )
+
+
+def build_few_words(
+    candidates: Candidates,
+    limit: WordLimit,
+    *,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda _: None,
+    runner: Runner | None = None,
+) -> tuple[Built, FewWords]:
+    """Find words, at most so many, under which robots that choose by themselves fail least often.
+
+    Where they never do, the words are verified by definition, as every coordination language.
+
+    Parameters
+    ----------
+    candidates
+        The tasks that they are for.  Plans of them may be inseparable.
+    limit
+        How many words.
+    seed
+        Of all random choices.
+    progress
+        Called with a line of text now and then.
+    runner
+        Who does pieces of the work; None: this process.
+
+    Raises
+    ------
+    ProvedImpossible
+        There is no candidate task.
+    TooManyToCount
+        Not even how often robots fail in silence can be counted.
+    """
+    require_solvable(candidates)
+    require_room(candidates.source)
+    runner = runner or Processes(jobs=1)
+    clock = Clock()
+    first, language = _first_differences(candidates, runner, progress)
+    clock.note("coordination")
+    states = tuple(states_on_plans(candidates.spaces).tolist())
+    job = Job(candidates, states, first, seed=seed, progress=progress)
+    found = few_words(
+        candidates.spaces,
+        states,
+        len(candidates.rows),
+        limit.words,
+        worst=limit.worst,
+        seed=seed,
+        language=language,
+        progress=progress,
+    )
+    clock.note("vocabulary")
+    partition = Partition.of_states(candidates.rows, found.partition)
+    verdict = Verdict(False, candidates.count, 0, None)
+    if not found.failures.worst:
+        verdict = verify_candidates(partition, candidates, runner, progress)
+        if not verdict.holds:
+            raise AssertionError(f"no robot fails, but these words do: {verdict.witness}")
+    clock.note("verify")
+    size = len(partition.words)
+    is_least = verdict.holds and size == job.lower_bound
+    guarantee = Guarantee(METHOD, size, job.lower_bound, is_least, verdict.holds)
+    failures = Failures(found.failures.mean, found.failures.worst)
+    provenance = provenance_of(candidates, guarantee, {"program": "coordlang"})
+    if not verdict.holds:
+        provenance = replace(provenance, tolerance=failures.tolerance)
+    built = Built(
+        language=Language.of(partition, candidates.model, provenance),
+        first_differences=first,
+        states=len(states),
+        verdict=verdict,
+        figures=_figures(found),
+        seconds=clock.seconds,
+        stopped=found.stopped,
+        job=job,
+        evidence={},
+        failures=failures,
+    )
+    return built, found
+
+
+def _figures(found: FewWords) -> dict[str, float]:
+    return {
+        "silence_mean": float(found.silence.mean),
+        "silence_worst": float(found.silence.worst),
+        "partitions_measured": found.measured,
+        "partitions_recounted": found.recounted,
+        "least_of_all_partitions": found.is_best,
+    }
+
+
+def _first_differences(
+    candidates: Candidates, runner: Runner, progress: Callable[[str], None]
+) -> tuple[FirstDifferences, Assignment | None]:
+    """Where coordination is required, and a language if there is one.
+
+    Where plans are inseparable there is none, and divergences are not defined.
+    """
+    try:
+        found = differences(candidates, runner, progress)
+    except Inseparable:
+        return _without_divergences(candidates), None
+    job = Job(candidates, tuple(found.states.tolist()), found.first)
+    return found.first, greedy(job).partition
+
+
+def _without_divergences(candidates: Candidates) -> FirstDifferences:
+    spaces = candidates.spaces
+    none = Divergences(np.zeros(0, np.int64), np.zeros((0, len(candidates.model.robots)), np.int64))
+    requiring = sum(int(Choices(space).requires[space.starts].sum()) for space in spaces)
+    nodes, edges = (sum(map(len, spaces)), sum(len(space.targets()) for space in spaces))
+    return FirstDifferences(none, requiring, nodes, edges, 0, 0)

@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The best words of a given number: tables of plans against the count, and all partitions tried."""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from fractions import Fraction
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import coordlang as library
+from coordlang.building import build_language
+from coordlang.required.choices import Choices
+from coordlang.required.divergences import states_on_plans
+from coordlang.tasks.candidates import Candidates
+from coordlang.tolerance.failure import failure_probability
+from coordlang.tolerance.plan_table import plan_table
+from coordlang.vocabulary import few_words as module
+from coordlang.vocabulary.few_words import canonical, few_words, partitions
+from tests.support import naive
+from tests.support.command import Command
+from tests.support.domains import DOMAINS, all_tasks, own_task
+from tests.support.random_spaces import random_spaces
+
+SQUARE = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "gw1-2x2.pddl"
+
+
+@pytest.mark.parametrize(("robots", "number"), [(2, 30), (3, 20)])
+def test_tables_of_plans_measure_what_is_counted(robots: int, number: int) -> None:
+    compared = some = 0
+    for seed, (_, space) in enumerate(random_spaces(range(number), robots, 2_000)):
+        states = int(space.state.max()) + 1
+        table = plan_table([space], states, most_tasks=10_000, seed=seed)
+        if not table.is_complete:
+            continue
+        required = Choices(space).requires[space.starts]
+        word = np.random.default_rng(seed).integers(0, 3, states)
+        counted = failure_probability([space], [word[space.state]]).tasks
+        measured = table.failures(word, np.arange(len(table)))
+        assert [float(p) for p in np.array(counted)[required]] == pytest.approx(measured)
+        for state in range(0, states, 5):
+            tasks = table.tasks_of_state[state]
+            assert table.failures(word, tasks) == pytest.approx(measured[tasks])
+        compared += 1
+        some += len(table) > 0
+    assert compared >= 10
+    assert some >= 5
+
+
+def test_some_of_many_plans_are_drawn() -> None:
+    """A task with more plans than are listed: near the count, in silence."""
+    space = own_task("grid", "corners-5x5").spaces[0]
+    states = int(space.state.max()) + 1
+    word = np.zeros(states, np.int64)
+    table = plan_table([space], states, most_tasks=10, seed=1, listed=100)
+    assert not table.is_complete
+    (measured,) = table.failures(word, np.arange(1))
+    assert measured == pytest.approx(float(failure_probability([space], [None]).mean), abs=0.1)
+
+
+def by_hand(candidates: Candidates, words: int) -> tuple[dict[str, Fraction], int]:
+    """Brute force by the definition: the least mean, and the least worst task; partitions tried."""
+    states = states_on_plans(candidates.spaces).tolist()
+    tasks = []
+    for space in candidates.spaces:
+        for task in range(len(space.starts)):
+            plans = naive.listed(space, task, 100)
+            good = set(plans)
+            fails = {
+                (a, b)
+                for (a, one), (b, other) in product(enumerate(plans), repeat=2)
+                if naive.mixture((one, other)) not in good
+            }
+            tasks.append(([naive.states(space, task, plan) for plan in plans], fails))
+    least = {"mean": Fraction(1), "worst": Fraction(1)}
+    tried = 0
+    for chosen in product(range(words), repeat=len(states)):
+        if canonical(chosen) != chosen:
+            continue
+        tried += 1
+        word = dict(zip(states, chosen, strict=True))
+        found = [failure(plans, fails, word) for plans, fails in tasks if fails]
+        least["mean"] = min(least["mean"], sum(found, start=Fraction(0)) / len(tasks))
+        least["worst"] = min(least["worst"], max(found))
+    return least, tried
+
+
+def failure(
+    plans: list[tuple[int, ...]], fails: set[tuple[int, int]], word: dict[int, int]
+) -> Fraction:
+    said: dict[tuple[int, ...], list[int]] = defaultdict(list)
+    for number, states in enumerate(plans):
+        said[naive.sentence([word[s] for s in states])].append(number)
+    return sum(
+        (
+            Fraction(sum(pair in fails for pair in product(group, repeat=2)), len(group))
+            for group in said.values()
+        ),
+        start=Fraction(0),
+    ) / len(plans)
+
+
+@pytest.mark.parametrize(
+    ("folder", "stem", "mean"),
+    [("grid", "gw1-2x2", Fraction(5, 132)), ("t-map", "problem", Fraction(1, 132))],
+)
+def test_two_words_are_the_best_of_all_partitions(folder: str, stem: str, mean: Fraction) -> None:
+    """Design figures: 3.79 % on the open 2x2 grid, 0.76 % on the T-shaped map."""
+    candidates = all_tasks(folder, stem)
+    least, tried = by_hand(candidates, 2)
+    states = states_on_plans(candidates.spaces).tolist()
+    assert least["mean"] == mean
+    assert tried == partitions(len(states), 2, 10_000) == 2_048
+    for worst in (False, True):
+        found = few_words(candidates.spaces, states, len(candidates.rows), 2, worst=worst, seed=3)
+        assert found.is_best
+        assert found.measured == tried
+        assert found.failures.worst == least["worst"] if worst else found.failures.mean == mean
+        word = np.zeros(len(candidates.rows), np.int64)
+        word[list(found.partition)] = list(found.partition.values())
+        again = failure_probability(
+            candidates.spaces, [word[space.state] for space in candidates.spaces]
+        )
+        assert again == found.failures
+
+
+def test_annealing_finds_the_best_two_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_ALL", 1)
+    candidates = all_tasks("grid", "gw1-2x2")
+    states = states_on_plans(candidates.spaces).tolist()
+    found = few_words(candidates.spaces, states, len(candidates.rows), 2, seed=1)
+    assert not found.is_best
+    assert found.failures.mean == Fraction(5, 132)
+    assert found.measured > 400
+
+
+def test_words_for_plans_that_are_too_many_to_list(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The exact count is the measure: a task with 252 plans, of which 50 may be listed."""
+    monkeypatch.setattr(module, "_TASKS", 0)
+    candidates = own_task("grid", "corners-4x4")
+    states = states_on_plans(candidates.spaces).tolist()
+    settings = module.FewWordsSettings(least_moves=150, most_moves=150, coolings=1)
+    found = few_words(candidates.spaces, states, len(candidates.rows), 2, seed=1, settings=settings)
+    assert 0 < found.failures.mean < found.silence.mean / 2
+
+
+@pytest.mark.parametrize(("states", "words", "number"), [(3, 3, 5), (4, 2, 8), (5, 5, 52)])
+def test_numbers_of_partitions(states: int, words: int, number: int) -> None:
+    """Bell and Stirling numbers."""
+    assert partitions(states, words, 1_000) == number
+    assert len(list(module._all(states, words))) == number
+    assert partitions(states, words, number - 1) == number
+
+
+def test_a_limit_leaves_the_best_so_far() -> None:
+    candidates = all_tasks("grid", "gw2-2x3")
+    states = states_on_plans(candidates.spaces).tolist()
+
+    def interrupt(text: str) -> None:
+        if "moves" in text and " 0 of" not in text:
+            raise KeyboardInterrupt
+
+    found = few_words(
+        candidates.spaces, states, len(candidates.rows), 3, seed=1, progress=interrupt
+    )
+    assert isinstance(found.stopped, KeyboardInterrupt)
+    assert found.measured > 50
+    assert found.failures.mean < found.silence.mean
+
+
+@pytest.mark.parametrize(
+    ("words", "mean", "guarantee"),
+    [(1, Fraction(5, 66), False), (2, Fraction(5, 132), False), (3, 0, True), (9, 0, True)],
+)
+def test_files_say_what_they_are(
+    words: int, mean: Fraction | int, guarantee: bool, coordlang: Command, tmp_path: Path
+) -> None:
+    path = tmp_path / "l.json"
+    built = coordlang("build", *SQUARE, "--tasks", "all", "--words", words, "-o", path)
+    assert built.code == 0
+    assert ("this is a coordination language" in built.out) == guarantee
+    data = json.loads(path.read_text())
+    assert len(data["words"]) <= words
+    assert data["guarantee"].get("coordination_language", True) == guarantee
+    assert data.get("tolerance", {}).get("failure_mean", 0) == float(mean)
+    verified = coordlang("verify", path, *SQUARE)
+    assert verified.code == 0
+    assert verified.out.startswith("verified" if guarantee else "as claimed")
+    again = tmp_path / "again.json"
+    coordlang("build", *SQUARE, "--tasks", "all", "--words", words, "-o", again)
+    other = json.loads(again.read_text())
+    del data["producer"], other["producer"]
+    assert data == other
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--worst",),
+        ("--words", 0),
+        ("--words", 2, "--method", "minimal"),
+        ("--words", 2, "--method", "greedy"),
+        ("--words", 2, "--overlap"),
+        ("--words", 2, "--certificate", "c.json"),
+    ],
+)
+def test_words_are_found_in_their_own_way(
+    options: tuple[object, ...], coordlang: Command, tmp_path: Path
+) -> None:
+    assert coordlang("build", *SQUARE, *options, "-o", tmp_path / "l.json").code == 2
+    assert not (tmp_path / "l.json").exists()
+
+
+def test_a_function_gives_words_too() -> None:
+    built = library.build(*SQUARE, tasks="all", words=2, worst=True)
+    assert built.failures.mean == Fraction(5, 132)
+    assert built.data()["failure_mean"] == 5 / 132
+    assert not built.guarantee.coordination_language
+    with pytest.raises(library.UsageError, match="--worst belongs to --words"):
+        library.build(*SQUARE, worst=True)
+    assert library.build(*SQUARE, tasks="all", words=1).failures.mean == Fraction(5, 66)
+    verified = build_language(all_tasks("grid", "gw1-2x2"), "minimal")
+    assert verified.failures.mean == 0
