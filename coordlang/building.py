@@ -25,6 +25,7 @@ from coordlang.vocabulary import EXACT, METHODS, Job, Outcome, greedy
 from coordlang.vocabulary.early import early
 from coordlang.vocabulary.enlarging import enlarge
 from coordlang.vocabulary.flexible import flexible
+from coordlang.vocabulary.hidden_slack import hidden_differences
 from coordlang.vocabulary.job import Assignment, Evidence
 from coordlang.vocabulary.minimal import refuting_clauses
 from planners.errors import UsageError
@@ -168,7 +169,15 @@ def build_language(
     require_solvable(candidates)
     runner = runner or Processes(jobs=1)
     clock = Clock()
-    found = differences(candidates, runner, progress)
+    hidden = candidates.model.hides_slack
+    if hidden and not options.is_exact:
+        raise UsageError(
+            f"--method {method} parts plans where their states first differ, and with slack they "
+            "may differ in where they wait",
+            remedy="Add --words-see-slack, by which states say how much is left, or --method "
+            "minimal.",
+        )
+    found = (hidden_differences if hidden else differences)(candidates, runner, progress)
     clock.note("coordination")
     states = tuple(found.states.tolist())
     verified: list[_Verified] = []
@@ -217,9 +226,13 @@ def build_language(
 def _with_incumbent(job: Job) -> Job:
     """Verify a greedy partition, which is what is left when an anytime method is stopped.
 
-    It is verified now because there is no time then.
+    It is verified now because there is no time then.  Where states hide slack it has a word for
+    each state: no plans are inseparable.
     """
-    first = greedy(job).partition
+    if job.candidates.model.hides_slack:
+        first: Assignment = {state: word for word, state in enumerate(job.states)}
+    else:
+        first = greedy(job).partition
     job.check(first)
     return replace(job, incumbent=first)
 

@@ -11,6 +11,7 @@ import numpy as np
 from coordlang.building import Built, Clock
 from coordlang.language.partition import Partition
 from coordlang.language.provenance import Guarantee, provenance_of
+from coordlang.language.tolerance import Tolerance
 from coordlang.language.words import Language
 from coordlang.required.choices import Choices
 from coordlang.required.divergences import Divergences, FirstDifferences, states_on_plans
@@ -22,6 +23,7 @@ from coordlang.verification.by_definition import Verdict
 from coordlang.verification.pieces import verify_candidates
 from coordlang.vocabulary.few_words import FewWords, few_words
 from coordlang.vocabulary.greedy import greedy
+from coordlang.vocabulary.hidden_slack import hidden_differences
 from coordlang.vocabulary.job import Assignment, Job
 from planners.errors import UsageError
 from planners.pieces.processes import Processes
@@ -124,7 +126,9 @@ def build_few_words(
     failures = Failures(found.failures.mean, found.failures.worst)
     provenance = provenance_of(candidates, guarantee, {"program": "coordlang"})
     if not verdict.holds:
-        provenance = replace(provenance, tolerance=failures.tolerance)
+        slack = provenance.tolerance.slack if provenance.tolerance else None
+        tolerance = failures.tolerance or Tolerance()
+        provenance = replace(provenance, tolerance=replace(tolerance, slack=slack))
     built = Built(
         language=Language.of(partition, candidates.model, provenance),
         first_differences=first,
@@ -155,12 +159,16 @@ def _first_differences(
 ) -> tuple[FirstDifferences, Assignment | None]:
     """Where coordination is required, and a language if there is one.
 
-    Where plans are inseparable there is none, and divergences are not defined.
+    Where plans are inseparable there is none, and divergences are not defined; nor are they where
+    states hide slack.
     """
+    hidden = candidates.model.hides_slack
     try:
-        found = differences(candidates, runner, progress)
+        found = (hidden_differences if hidden else differences)(candidates, runner, progress)
     except Inseparable:
         return _without_divergences(candidates), None
+    if hidden:
+        return found.first, {state: word for word, state in enumerate(found.states.tolist())}
     job = Job(candidates, tuple(found.states.tolist()), found.first)
     return found.first, greedy(job).partition
 

@@ -30,7 +30,8 @@ class TaskCoordination(Presented):
 
     ``witness`` has two optimal plans whose mixture is none, or is None.  ``failure`` is how often
     robots miscoordinate that draw their plans uniformly, independently and without a word: exact;
-    None where that is too much to count, and ``estimate`` is drawn.
+    None where that is too much to count, and ``estimate`` is drawn.  Plans take up to ``slack``
+    joint steps more than the (least) ``makespan``.
     """
 
     problem: str
@@ -39,6 +40,7 @@ class TaskCoordination(Presented):
     witness: Miscoordination | None
     failure: Fraction | None = Fraction(0)
     estimate: FailureEstimate | None = None
+    slack: int = 0
 
     @property
     def required(self) -> bool:
@@ -68,6 +70,7 @@ class TaskCoordination(Presented):
             "miscoordination": witness_data(self.witness),
             "failure": None if self.failure is None else float(self.failure),
             **({"failure_estimate": estimate_data(self.estimate)} if self.estimate else {}),
+            **({"slack": self.slack} if self.slack else {}),
         }
 
     def __str__(self) -> str:
@@ -77,8 +80,11 @@ class TaskCoordination(Presented):
         """Return the answer in lines of at most ``width`` characters, as far as atoms allow."""
         answer = "is required" if self.required else "is not required"
         if not self.required and self.plans > 1:
-            answer += ": any mixture of them is optimal"
+            answer += f": any mixture of them is {'one' if self.slack else 'optimal'}"
         plans = f"{counted(self.plans, 'optimal plan')} of {counted(self.makespan, 'step')}"
+        if self.slack:
+            most = counted(self.makespan + self.slack, "step")
+            plans = f"{counted(self.plans, 'plan')} within slack {self.slack}, of at most {most}"
         line = f"{self.problem}: {plans}; coordination {answer}"
         if self.witness is None:
             return line
@@ -207,6 +213,7 @@ def coordination(
             answer.witness,
             answer.failures.mean,
             answer.failures.estimate,
+            loaded.model.slack,
         )
         for problem, answer in zip(files.problems, found, strict=True)
     )

@@ -222,15 +222,18 @@ class Explanation(Presented):
         used = self.words.used
         total = Plans.of(used.space, used.task).count
         steps, _ = used.space.cost_of(used.task)
+        plans = f"{counted(total, 'optimal plan')} of"
+        if used.model.slack:
+            plans = f"{counted(total, 'plan')} within slack {used.model.slack}, of at most"
         lines = [
             f"The task {describe(used.space, used.task)}",
-            f"has {counted(total, 'optimal plan')} of {counted(steps, 'step')} "
+            f"has {plans} {counted(steps, 'step')} "
             f"in {counted(len(self.all_sentences), 'sentence')}.",
         ]
         if self.with_demands and used.guaranteed:
             lines.append(
                 "Each robot may choose for itself: whatever the others choose, "
-                "it is an optimal plan."
+                f"it is {'a plan within the slack' if used.model.slack else 'an optimal plan'}."
             )
         if self.with_demands:
             for asks in self.demands(SENTENCES_SHOWN):

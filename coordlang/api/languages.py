@@ -502,6 +502,11 @@ def _to_repair(
     """Return the language, the tasks that it is to serve, and whether its own are among them."""
     language, position = read_language_source(start)
     check_domain(language, files.domain, position)
+    if files.given.slack or (language.tolerance is not None and language.tolerance.slack):
+        raise UsageError(
+            "--start does not go with --slack: a language for plans within slack is built anew",
+            remedy="Leave out --start.",
+        )
     candidates = _candidates(files, tasks, unsolvable, files.options_of(language))
     return language, *with_recorded(language, candidates, position)
 

@@ -135,6 +135,11 @@ def lift(
     if complexity < 1:
         raise UsageError(f"--complexity {complexity}: expected 1 or more", remedy="Say 8.")
     given = GivenOptions.of(**model)
+    if given.slack:
+        raise UsageError(
+            "--slack: words over features are learned from optimal plans",
+            remedy="Build a language of this problem: `coordlang build --slack`.",
+        )
     if factored is not None and check:
         raise UsageError(
             "--check and --factored: a folder of factored files holds one problem",

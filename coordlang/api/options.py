@@ -201,4 +201,6 @@ class GivenOptions:
             unowned=self.unowned,
             cost=self.cost,
             remember_actions=self.remember_actions,
+            slack=self.slack,
+            sees_slack=self.words_see_slack,
         )

@@ -32,6 +32,7 @@ from coordlang.cli.shared_options import (
     limits,
     model_options,
     pieces_options,
+    slack_option,
     was_given,
 )
 from coordlang.cli.terminal import line_width, note_single_robot, working
@@ -122,8 +123,14 @@ _FOR_CERTIFICATE = 0.25
 )
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as one JSON object.")
+@click.option(
+    "--words-see-slack",
+    is_flag=True,
+    help="States also say how many steps of the slack are left, and words may differ in that.",
+)
 @pieces_options
 @model_options
+@slack_option
 @kept_plans
 @limits
 def command(
@@ -141,6 +148,7 @@ def command(
     output: str,
     seed: int,
     as_json: bool,
+    words_see_slack: bool,
     pieces: PiecesKeywords,
     model: ModelKeywords,
 ) -> int:
@@ -174,6 +182,7 @@ def command(
         unsolvable=unsolvable,
         seed=seed,
         reserve=_FOR_CERTIFICATE if certificate else 0.0,
+        words_see_slack=words_see_slack,
         **pieces,
         **model,
     )

@@ -17,6 +17,7 @@ from coordlang.cli.shared_options import (
     limits,
     model_options,
     pieces_options,
+    slack_option,
 )
 from coordlang.cli.terminal import line_width, note_single_robot, working
 
@@ -26,6 +27,7 @@ from coordlang.cli.terminal import line_width, note_single_robot, working
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
 @pieces_options
 @model_options
+@slack_option
 @kept_plans
 @limits
 def command(
@@ -33,7 +35,8 @@ def command(
 ) -> None:
     """Decide which tasks require coordination.
 
-    Show how robots that follow different optimal plans miscoordinate.
+    Show how robots that follow different optimal plans miscoordinate; with --slack B plans that
+    take at most B steps more.
     """
     with working("finding all optimal plans"):
         found = coordlang.coordination(*pddl.files, factored=pddl.factored, **pieces, **model)

@@ -120,9 +120,12 @@ def _text(found: Verification) -> str:
         if claimed is not None:
             fail += f".\nThe file claims less: {claimed}"
         return f"{head}\n{witness_text(found.witness, line_width())}\n\nOn the whole {fail}."
-    mixing = "all optimal plans of one sentence mix freely"
+    slack = found.tolerance.slack if found.tolerance else None
+    plans = f"plan{'s' * (not found.overlapping)}"
+    plans = f"{plans} within slack {slack}" if slack else f"optimal {plans}"
+    mixing = f"all {plans} of one sentence mix freely"
     if found.overlapping:
-        mixing = "words overlap, every optimal plan has a sentence whose plans mix freely"
+        mixing = f"words overlap, every {plans} has a sentence whose plans mix freely"
     return f"verified: {words}, {tasks}: {mixing} ({found.nodes:,} walk nodes)"
 
 

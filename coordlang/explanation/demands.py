@@ -256,8 +256,11 @@ def _deciding(
 ) -> tuple[int, ...]:
     """The fewest robots whose subactions decide whether the next word is ``after``.
 
-    At each of some states; early ones in ``order`` first.
+    At each of some states; early ones in ``order`` first.  All of them, where states say what is
+    left of the slack: that is no effect of a joint step.
     """
+    if space.model.slack_facts:
+        return tuple(sorted(order))
     rows = space.rows[states[:_STATES]]
     steps = space.model.successors(rows)
     mapped = find_rows(partition.rows, steps.result) >= 0

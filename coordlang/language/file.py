@@ -13,7 +13,7 @@ from msgspec import UNSET
 
 from coordlang.language.duplicate_keys import duplicate_key
 from coordlang.language.provenance import Guarantee, Provenance
-from coordlang.language.record import LANGUAGE, LanguageRecord, TasksRecord
+from coordlang.language.record import LANGUAGE, LanguageRecord, TasksRecord, ToleranceRecord
 from coordlang.language.tolerance import Tolerance
 from coordlang.language.words import Language
 from planners.errors import BadInput, Position
@@ -196,9 +196,7 @@ def _guarantee_data(guarantee: Guarantee) -> dict[str, Any]:
 
 
 def _tolerance(record: LanguageRecord, position: Position) -> Tolerance | None:
-    if record.tolerance is UNSET:
-        return None
-    claimed = record.tolerance
+    claimed = ToleranceRecord() if record.tolerance is UNSET else record.tolerance
     mean, worst = claimed.failure_mean, claimed.failure_worst
     wrong = None
     if (mean is None) != (worst is None):
@@ -207,6 +205,8 @@ def _tolerance(record: LanguageRecord, position: Position) -> Tolerance | None:
         wrong = f"failures of {mean} on average and {worst} at worst contradict each other"
     elif claimed.slack is not None and claimed.slack < 0:
         wrong = f"a slack of {claimed.slack} is none"
+    elif record.model.words_see_slack is True and not claimed.slack:
+        wrong = "words see slack, and there is none"
     elif mean is not None and _claims_coordination(record):
         wrong = "'guarantee' must say that it is no coordination language"
     if wrong is not None:
@@ -215,7 +215,7 @@ def _tolerance(record: LanguageRecord, position: Position) -> Tolerance | None:
             position=position,
             remedy="Correct 'tolerance' and 'guarantee', or build the language again.",
         )
-    return Tolerance(mean, worst, claimed.slack)
+    return None if record.tolerance is UNSET else Tolerance(mean, worst, claimed.slack)
 
 
 def _claims_coordination(record: LanguageRecord) -> bool:

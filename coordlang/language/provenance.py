@@ -11,6 +11,7 @@ from typing import Any
 from coordlang.language.tolerance import Tolerance
 from coordlang.tasks.candidates import Candidates
 from coordlang.tasks.task_file import task_data
+from planners.joint.assembly import SLACK_LEFT
 from planners.joint.model import show
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.pddl_text import domain_text
@@ -86,24 +87,29 @@ def provenance_of(
         domain={
             "name": loaded.domain.name,
             "sha256": domain_sha256(loaded.domain),
-            "fluents": key_predicates(loaded.domain, loaded.options.remember_actions),
+            "fluents": key_predicates(
+                loaded.domain, loaded.options.remember_actions, loaded.options.sees_slack
+            ),
         },
         model={
             "cost": loaded.options.cost,
             "unowned": loaded.options.robots.unowned,
             "remember_actions": loaded.options.remember_actions,
+            **({"words_see_slack": True} if loaded.options.sees_slack else {}),
             "idle": [robot for robot, keeps in keeps_idle if keeps],
             "problem_sha256": loaded.problems[0].source.sha256,
             "world_sha256": world_sha256(loaded.domain, loaded.problems[0]),
         },
         tasks=tasks,
+        tolerance=Tolerance(slack=loaded.options.slack) if loaded.options.slack else None,
         producer=producer,
     )
 
 
-def key_predicates(domain: Domain, remember_actions: bool) -> list[str]:
+def key_predicates(domain: Domain, remember_actions: bool, sees_slack: bool = False) -> list[str]:
     """The predicates of the atoms that a state key may hold, sorted."""
-    return sorted(fluent_predicates(domain) | ({"last"} if remember_actions else set()))
+    more = ({"last"} if remember_actions else set()) | ({SLACK_LEFT} if sees_slack else set())
+    return sorted(fluent_predicates(domain) | more)
 
 
 def domain_sha256(domain: Domain) -> str:

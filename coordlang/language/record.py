@@ -49,6 +49,13 @@ class ModelRecord(msgspec.Struct):
     remember_actions: Annotated[
         bool, Meta(description="Whether states also hold each robot's last subaction.")
     ] = False
+    words_see_slack: Annotated[
+        bool | UnsetType,
+        Meta(
+            description="Whether states also say how many joint steps of the slack are left: "
+            "(slack-left 1)."
+        ),
+    ] = UNSET
     idle: Annotated[
         list[str] | None,
         Meta(

@@ -33,6 +33,8 @@ def options_of(
     unowned: str | None = None,
     cost: str | None = None,
     remember_actions: bool | None = None,
+    slack: int | None = None,
+    sees_slack: bool | None = None,
 ) -> ModelOptions:
     """How the language's model is built.
 
@@ -43,8 +45,16 @@ def options_of(
         "--cost": model.get("cost", "makespan"),
         "--unowned": model.get("unowned", "error"),
         "--remember-actions": model.get("remember_actions", False),
+        "--slack": (language.tolerance.slack if language.tolerance else None) or 0,
+        "--words-see-slack": model.get("words_see_slack", False),
     }
-    given = {"--cost": cost, "--unowned": unowned, "--remember-actions": remember_actions or None}
+    given = {
+        "--cost": cost,
+        "--unowned": unowned,
+        "--remember-actions": remember_actions or None,
+        "--slack": slack,
+        "--words-see-slack": sees_slack or None,
+    }
     for flag, value in given.items():
         if value is not None and value != recorded[flag]:
             raise _contradiction(flag, value, recorded[flag])
@@ -62,10 +72,12 @@ def options_of(
         recorded["--cost"],
         recorded["--remember-actions"],
         tuple(idle) if idle is not None else None,
+        recorded["--slack"],
+        recorded["--words-see-slack"],
     )
 
 
-def _contradiction(flag: str, given: str | bool, recorded: str | bool) -> UsageError:
+def _contradiction(flag: str, given: str | int, recorded: str | int) -> UsageError:
     option = flag if given is True else f"{flag} {given}"
     built = f"without {flag}" if recorded is False else f"with {flag} {recorded}"
     return UsageError(

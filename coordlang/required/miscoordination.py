@@ -56,15 +56,27 @@ def miscoordination(space: PlanSpace, task: int) -> Miscoordination | None:
 class Inseparable(ProvedImpossible):
     """Two plans introduce RC but pass through the same states.
 
-    No state-based language can tell them apart.
+    No state-based language can tell them apart.  ``hides_slack``: they differ in where they wait.
     """
 
-    def __init__(self, witness: Miscoordination) -> None:
+    def __init__(self, witness: Miscoordination, *, hides_slack: bool = False) -> None:
+        if hides_slack:
+            what = "plans within slack", ", though they may wait in different ones"
+            remedy = (
+                "Build with --words-see-slack: states then also say how much of the slack is left; "
+                "or with --remember-actions."
+            )
+        else:
+            what = "optimal plans", ""
+            remedy = (
+                "Build with --remember-actions: the state then also holds each robot's last "
+                "subaction."
+            )
         super().__init__(
-            f"two optimal plans of task {_short(witness.task)} introduce required coordination "
-            "but pass through the same states: no language over states can tell them apart",
-            remedy="Build with --remember-actions: the state then also holds each robot's last "
-            "subaction.",
+            f"two {what[0]} of task {_short(witness.task)} introduce required coordination "
+            f"but pass through the same states{what[1]}: no language over states can tell them "
+            "apart",
+            remedy=remedy,
         )
         self.witness = witness
 

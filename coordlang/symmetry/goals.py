@@ -102,12 +102,14 @@ def symmetric_goals(
     """The goals of all pairs of states up to symmetry; None where one speaks for itself only.
 
     None, too, where it is not worth the while: for tasks of other kinds, under
-    ``--remember-actions``, for less work than ``least``, and for fewer than ``for_action`` pairs
-    of states for each ground action and fact.
+    ``--remember-actions`` and slack, for less work than ``least``, and for fewer than
+    ``for_action`` pairs of states for each ground action and fact.
     """
     model = candidates.model
     states = len(candidates.rows)
-    if candidates.kind != "all" or model.remembers or states**2 * len(model.robots) < least:
+    if candidates.kind != "all" or model.remembers or model.slack:
+        return None
+    if states**2 * len(model.robots) < least:
         return None
     if states**2 < for_action * (len(model.actions) + len(model.codec.facts)):
         return None

@@ -113,9 +113,10 @@ def symmetry_group(
     Returns
     -------
     SymmetryGroup
-        The identity alone under ``--remember-actions``: symmetries only save work.
+        The identity alone under ``--remember-actions`` and where states say what is left of the
+        slack: symmetries only save work.
     """
-    if candidates.model.remembers:
+    if candidates.model.remembers or candidates.model.slack_facts:
         return SymmetryGroup(())
     check = SymmetryCheck(candidates)
     proposed = automorphism_generators(candidates, largest_graph)

@@ -116,7 +116,7 @@ def _all_pairs_remembering(loaded: PlanningInstance, inits: Rows) -> Candidates:
     Every task starts with no action to remember.
     """
     model = loaded.model
-    forgetting = replace(model, codec=replace(model.codec, memory=None))
+    forgetting = replace(model.without_slack, codec=replace(model.codec, memory=None))
     base = explore(forgetting, model.codec.facts_part(inits))
     zeros = np.zeros((len(base), len(model.robots)), np.uint64)
     starts = np.hstack((base.rows, zeros))

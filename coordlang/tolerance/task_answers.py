@@ -62,7 +62,7 @@ def _answer(shared: tuple[JointModel, Sequence[PlanningTask], Folder | None], nu
     witness = miscoordination(space, 0)
     found = NONE if witness is None else failures([space], [None], _ADDITIONS)
     return {
-        "makespan": np.array(space.cost_of(0)[0]),
+        "makespan": np.array(space.least_makespan(0)),
         "plans": np.array(str(counts(space)[int(space.starts[0])])),
         "witness": np.frombuffer(msgspec.json.encode(witness), np.uint8),
         "failures": np.frombuffer(_to_json(found), np.uint8),

@@ -109,9 +109,11 @@ def parts(candidates: Candidates, group: SymmetryGroup) -> list[Part]:
     intersections of halves keeps shortest ways, and is a part of the map.  A state belongs to a
     part if what is true in it names no object outside.
 
-    Only for all pairs of states as tasks, few enough for one plan space.
+    Only for all pairs of states as tasks, few enough for one plan space, and for optimal plans: a
+    symmetry of a part takes its steps to such steps, but need not keep the slack that is left.
     """
-    if candidates.kind != "all" or candidates.model.remembers or len(candidates.spaces) != 1:
+    model = candidates.model
+    if candidates.kind != "all" or model.remembers or model.slack or len(candidates.spaces) != 1:
         return []
     space = candidates.spaces[0]
     graph, named = _neighbours(candidates), _named(candidates)

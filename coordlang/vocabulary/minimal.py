@@ -209,6 +209,8 @@ class _Search:
 
         Not where it takes long and there are symmetries: equivariant words are fewer.
         """
+        if self._job.candidates.model.hides_slack:
+            return  # there are no first differences of states
         spaces = self._job.candidates.spaces
         most = _SEPARATING_COMBINATIONS // (1 + len(self.known.group.symmetries))
         if sum(map(_combinations, spaces)) > most:

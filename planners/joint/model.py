@@ -144,6 +144,19 @@ class JointModel:
         """The same model, of which optimal plans are meant."""
         return replace(self, slack=0, slack_facts=())
 
+    def forgetting_slack(self, rows: Rows) -> Rows:
+        """States, one or a table, without what they say of the slack."""
+        if not self.slack_facts:
+            return rows
+        rows = rows.copy()
+        self.codec.clear(rows if rows.ndim == 2 else rows[None, :], slice(None), self.slack_facts)
+        return rows
+
+    @property
+    def hides_slack(self) -> bool:
+        """Whether plans have slack and states do not say how much is left: states may repeat."""
+        return bool(self.slack) and not self.slack_facts
+
     @property
     def resting(self) -> tuple[frozenset[int], ...]:
         """For each robot the labels with which it rests: idling, and do-nothing actions alone."""
@@ -184,10 +197,7 @@ class JointModel:
     def holds(self, goal: Goal, rows: Rows) -> Bools:
         """Which states of a table satisfy a goal.  Remembered actions and slack never count."""
         if isinstance(goal, FullState):
-            facts = self.codec.facts_part(rows)
-            if self.slack_facts:
-                facts = facts.copy()
-                self.codec.clear(facts, slice(None), self.slack_facts)
+            facts = self.codec.facts_part(self.forgetting_slack(rows))
             same: Bools = (facts == self.codec.mask(goal.facts)).all(axis=1)
             return same
         return self.evaluator.holds(goal, rows, np.arange(len(rows)))
@@ -214,9 +224,7 @@ class JointModel:
 
     def full_state(self, row: Rows) -> FullState:
         """The goal that is this state; what it remembers, and slack, are left out."""
-        return FullState(
-            tuple(fact for fact in self.codec.true_facts(row) if fact not in self.slack_facts)
-        )
+        return FullState(tuple(self.codec.true_facts(self.forgetting_slack(row))))
 
     def robot_number(self, name: str) -> int | None:
         """The number of a robot, None if there is no such robot."""

@@ -6,7 +6,8 @@ more than the least makespan ``m``; it may pass through the goal before.  Two of
 only in a rest at the end, steps in which every robot idles, are one plan: all are written with
 exactly ``m + B`` steps, the last ones at rest.  So the graph has nodes (state, steps left), and as
 every joint step takes one of these, no node repeats on a plan although states may (Proposition 22
-of docs/concepts.md).  Under a second cost component the plans within the bound that cost least are meant.
+of docs/concepts.md).  Under a second cost component the plans within the bound that cost least are
+meant.
 """
 
 from __future__ import annotations

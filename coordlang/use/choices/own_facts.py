@@ -92,7 +92,7 @@ def with_own_facts(automaton: Automaton, own: OwnFacts, start: int) -> Automaton
 
 def _variants(model: JointModel, robot: int) -> tuple[dict[int, list[Changes]], int]:
     """What the actions of each label certainly do, and the facts that are not own."""
-    others = 0
+    others = _bits(model.slack_facts)  # they change by themselves
     variants: dict[int, list[Changes]] = {}
     for action in model.actions:
         certain, uncertain = _changes(model, action)

@@ -31,6 +31,7 @@ from dataclasses import dataclass
 
 from coordlang.use.export.membership import membership
 from coordlang.use.export.naming import RobotLabel, named_by_words
+from coordlang.use.sentence.slack import refuse_slack
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.classical import (
     ClassicalAction,
@@ -151,6 +152,7 @@ def export_pddl(
     NoPlanFits
         If no optimal plan has the sentence.
     """
+    refuse_slack(task_language.model, "--to pddl")
     space, model = task_language.plans_with(words), task_language.model
     makespan, second = space.cost_of(0)
     start = space.starts[0]

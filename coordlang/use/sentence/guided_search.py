@@ -11,11 +11,13 @@ import numpy as np
 
 from coordlang.language.partition import Partition
 from coordlang.language.sentences import sentence
+from coordlang.use.sentence.plan_sentence import sentence_of_plan
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.joint.model import Goal, JointModel
 from planners.joint.states import bits
 from planners.search.bounds import FAR, Heuristic, heuristic
 from planners.search.plans import Plan
+from planners.search.slack import rests
 from planners.tables import Rows
 
 #: (joint steps, second component of the cost).
@@ -113,7 +115,8 @@ def plan_under_sentence(
     words
         The word numbers of the sentence; any optimal plan for None.
     name
-        The heuristic (`planners.search.bounds.HEURISTICS`).
+        The heuristic (`planners.search.bounds.HEURISTICS`).  Of plans within slack the earliest is
+        read off the plan space, without a search.
     states
         What earlier searches with the same language and model have expanded.
     count_words
@@ -125,6 +128,8 @@ def plan_under_sentence(
         If no optimal plan of the task has the sentence.
     """
     space = task_language.space
+    if space.model.slack:
+        return _earliest(task_language, words)
     states = states or ExpandedStates(task_language.model, task_language.partition)
     goal = space.goals[space.goal[task_language.start]]
     init = space.rows[space.state[task_language.start]]
@@ -134,6 +139,33 @@ def plan_under_sentence(
         task_language.plans_with(words or ())  # raises: says where the sentence first breaks
         raise AssertionError("A* missed an optimal plan")
     return found
+
+
+def _earliest(task_language: TaskLanguage, words: Sequence[int] | None) -> GuidedPlan:
+    """The plan within slack that rests soonest, the first one of these in their order."""
+    if words is None:
+        space, start = task_language.space, task_language.start
+    else:
+        space = task_language.plans_with(words)
+        start = int(space.starts[0])
+    resting = rests(space.model, space.labels)
+    # Per node the steps until a rest that lasts to the end; per edge those with it.
+    left = np.zeros(len(space), np.int64)
+    through = np.zeros(len(resting), np.int64)
+    for edges in space.edges_by_layer():
+        after = left[edges.target]
+        through[edges.edges] = np.where(resting[edges.edges] & (after == 0), 0, 1 + after)
+        left[edges.source] = np.iinfo(np.int64).max
+        np.minimum.at(left, edges.source, through[edges.edges])
+    plan, second, node = [], 0, start
+    while left[node] > 0:
+        edge = next(e for e in space.out_edges(node) if through[e] == left[node])
+        plan.append(space.labels_of(edge))
+        second += int(space.cost[edge])
+        node = space.target_of(edge)
+    found = tuple(plan)
+    texts = [task_language.model.texts(step) for step in found]
+    return GuidedPlan(found, sentence_of_plan(task_language, texts), (len(found), second), 0, 0, 0)
 
 
 def a_star(

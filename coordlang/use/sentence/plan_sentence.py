@@ -14,7 +14,7 @@ from planners.errors import BadInput, Position, Refuted
 from planners.joint.model import IDLE, FullState, Goal, JointModel
 from planners.pddl.formula_tree import conjuncts, formula_text
 from planners.search.plan_file import NoSuchAction, Texts, read_plans
-from planners.search.plans import Plan
+from planners.search.plans import Plan, Plans
 from planners.tables import Rows
 
 
@@ -104,7 +104,8 @@ def sentence_of_plan(task_language: TaskLanguage, plan: Sequence[Texts]) -> tupl
     executed = execute(task_language, plan)
     space, node = task_language.space, task_language.start
     words = [int(task_language.word[node])]
-    for step, labels in enumerate(executed.labels):
+    with_rest = Plans(space, node, []).padded(executed.labels) if space.model.slack else None
+    for step, labels in enumerate(with_rest or executed.labels):
         edge = space.edge_with(node, labels)
         if edge is None:
             raise _not_optimal(task_language, plan, executed, step)
@@ -119,7 +120,8 @@ def execute(task_language: TaskLanguage, plan: Sequence[Texts]) -> ExecutedPlan:
     Raises `NotAPlan` for a step that cannot be taken, or if the goal does not hold at the end.
     """
     model, space = task_language.model, task_language.space
-    rows, second, numbers = [space.rows[space.state[task_language.start]]], 0, []
+    init = model.forgetting_slack(space.rows[space.state[task_language.start]])
+    rows, second, numbers = [init], 0, []
     for number, step in enumerate(plan):
         labels = _label_numbers(model, step, number)
         steps = model.successors(rows[-1][None, :])
@@ -212,14 +214,18 @@ def _not_optimal(
     """The error that says how much too expensive a plan is, and where it leaves optimal ones."""
     model, space = task_language.model, task_language.space
     makespan, second = space.cost_of(task_language.task)
-    excess = len(plan) - makespan, executed.second - second
+    excess = max(0, len(plan) - makespan), executed.second - second
     if excess[0]:
         enough = f"{makespan} {'is' if makespan == 1 else 'are'} enough"
+        if model.slack:
+            least = space.least_makespan(task_language.task)
+            enough = f"with slack {model.slack} {makespan} are allowed, as {least} are enough"
         wrong = f"it takes {_steps(len(plan))}, and {enough}"
     else:
         what = "subactions" if model.cost == "makespan+actions" else "action costs of"
+        few = "are as few as can be" if not model.slack else "are within the slack"
         wrong = (
-            f"its {_steps(makespan)} are as few as can be, "
+            f"its {_steps(len(plan))} {few}, "
             f"but with {executed.second} {what} where {second} are enough"
         )
     if step == makespan:

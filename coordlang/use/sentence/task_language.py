@@ -119,7 +119,7 @@ class TaskLanguage:
         return tuple(number[word] for word in words)
 
     def plans_with(self, words: Sequence[int]) -> PlanSpace:
-        """The task's optimal plans with the sentence ``words``; see `plans_with_sentence`."""
+        """The task's plans with the sentence ``words``; see `plans_with_sentence`."""
         return plans_with_sentence(self.space, self.word, self.task, words, self.partition.words)
 
     def text(self, words: Sequence[int]) -> str:
@@ -193,8 +193,9 @@ def _covers(language: Language, space: PlanSpace, recorded: Sequence[PlanningTas
         return len(ends) == 1 and all(
             model.codec.key(state) in language.states for state in (row, space.rows[ends[0]])
         )
+    init = model.forgetting_slack(row)
     return any(
-        _literals(task.goal) == _literals(space.goals[0]) and (task.init == row).all()
+        _literals(task.goal) == _literals(space.goals[0]) and (task.init == init).all()
         for task in recorded
     )
 

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Plans within slack that no words tell apart, because states do not say what is left of it.
+
+A robot may wait in one state or in another: the states that the plans pass through are the same,
+each with its repetitions taken as one, and so are their sentences under any partition.  So plans
+are inseparable iff they miscoordinate under the words that are one for each state (Proposition 23
+of docs/concepts.md), and the verifier decides that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from coordlang.language.partition import Partition
+from coordlang.required.divergences import (
+    Divergences,
+    FirstDifferences,
+    required_nodes,
+    states_on_plans,
+)
+from coordlang.required.miscoordination import Inseparable
+from coordlang.required.pieces import Differences
+from coordlang.tasks.candidates import Candidates
+from coordlang.verification.pieces import verify_candidates
+from planners.pieces.work import Runner
+
+
+def hidden_differences(
+    candidates: Candidates, runner: Runner, progress: Callable[[str], None] = lambda _: None
+) -> Differences:
+    """Count the tasks that require coordination, and the states on plans, of separable plans.
+
+    There are no first differences of states to speak of: a plan may part from another one by
+    waiting in the state that they share.
+
+    Raises
+    ------
+    Inseparable
+        With two plans (n for n robots) that no words tell apart.
+    """
+    progress("looking for inseparable plans")
+    states = states_on_plans(candidates.spaces)
+    apart = Partition.of_states(
+        candidates.rows, {state: number for number, state in enumerate(states.tolist())}
+    )
+    verdict = verify_candidates(apart, candidates, runner, progress)
+    if verdict.witness is not None:
+        raise Inseparable(replace(verdict.witness, sentence=None), hides_slack=True)
+    progress("looking where coordination is required")
+    requiring = nodes = edges = 0
+    for space in candidates.spaces:
+        requiring += int(required_nodes(space)[space.starts].sum())
+        nodes += len(space)
+        edges += len(space.sources)
+    robots = len(candidates.model.robots)
+    none = Divergences(np.zeros(0, np.int64), np.zeros((0, robots), np.int64))
+    return Differences(FirstDifferences(none, requiring, nodes, edges, 0, verdict.nodes), states)

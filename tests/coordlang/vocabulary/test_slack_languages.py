@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Languages for plans within slack: built, verified and refused as the definitions say."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from random import Random
+
+import numpy as np
+import pytest
+
+from coordlang.building import build_language
+from coordlang.language.partition import Partition
+from coordlang.required.divergences import first_differences, states_on_plans
+from coordlang.required.miscoordination import Inseparable
+from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
+from coordlang.verification.by_definition import verify
+from planners.errors import BadInput, ProvedImpossible, UsageError
+from planners.loading import ModelOptions
+from planners.pddl import read_domain, read_problem
+from planners.search.plans import counts
+from tests.support.domains import DOMAINS
+from tests.support.naive import is_language
+from tests.support.random_models import random_model
+
+#: Plans of a task that the twin lists at most, and of all tasks together.
+MOST, MOST_TOGETHER = 60, 250
+
+
+def shipped(folder: str, stem: str, *, every: bool = False, **options: object) -> Candidates:
+    domain = read_domain(DOMAINS / folder / "domain.pddl")
+    problem = read_problem(DOMAINS / folder / f"{stem}.pddl", domain)
+    make = all_pairs if every else from_problems
+    return make(domain, [problem], ModelOptions(**options))  # type: ignore[arg-type]
+
+
+def small_tasks(seeds: range, robots: int) -> Iterator[Candidates]:
+    """Random candidate tasks with slack 1 whose plans can be listed, seen and hidden."""
+    for seed in seeds:
+        domain, problem, options = random_model(seed, robots)
+        options = replace(options, slack=1, sees_slack=seed % 2 == 0)
+        try:
+            found = from_problems(domain, [problem], options)
+        except (ProvedImpossible, BadInput, UsageError):
+            continue
+        (space,) = found.spaces
+        if 1 < counts(space)[int(space.starts[0])] <= (MOST if robots == 2 else 12):
+            yield found
+
+
+def agree(seeds: range, robots: int) -> tuple[int, int]:
+    """Verdicts compared with the definition; how many are no languages, and how many are."""
+    refuted = held = 0
+    for found in small_tasks(seeds, robots):
+        (space,) = found.spaces
+        states = states_on_plans([space]).tolist()
+        random = Random(len(space))
+        for words in (1, 2, 3, len(states)):
+            word = {state: random.randrange(words) for state in states}
+            if words == len(states):
+                word = {state: number for number, state in enumerate(states)}
+            holds = verify(Partition.of_states(found.rows, word), [space]).holds
+            assert holds == is_language(space, word, 10_000)
+            refuted, held = refuted + (not holds), held + holds
+    return refuted, held
+
+
+def test_verdicts_are_those_of_the_definition() -> None:
+    refuted, held = agree(range(50), 2)
+    assert min(refuted, held) > 5
+    refuted, held = agree(range(25), 3)
+    assert min(refuted, held) > 0
+
+
+def minimal_is_exhaustive(seeds: range) -> tuple[int, int]:
+    """Least numbers of words compared with brute force; how many tasks, and how many inseparable."""
+    number = inseparable = 0
+    for found in small_tasks(seeds, 2):
+        (space,) = found.spaces
+        states = states_on_plans([space]).tolist()
+        if len(states) > 9:
+            continue
+        apart = {state: word for word, state in enumerate(states)}
+        if not is_language(space, apart, 10_000):
+            with pytest.raises(Inseparable) as error:
+                build_language(found, "minimal")
+            assert error.value.exit_code == 11
+            inseparable += 1
+            continue
+        least = build_language(found, "minimal").language.guarantee
+        brute = build_language(found, "exhaustive").language.guarantee
+        assert least.proved_minimal
+        assert least.size == brute.size
+        number += least.size > 1
+    return number, inseparable
+
+
+def test_the_least_number_of_words_is_that_of_brute_force() -> None:
+    number, inseparable = minimal_is_exhaustive(range(50))
+    assert number > 0
+    assert inseparable > 0
+
+
+@pytest.mark.thorough
+def test_more_tasks() -> None:
+    assert min(agree(range(50, 700), 2)) > 50
+    assert min(minimal_is_exhaustive(range(50, 500))) > 10
+
+
+@pytest.mark.parametrize("method", ["greedy", "separating", "minimal"])
+def test_all_methods_where_states_say_what_is_left(method: str) -> None:
+    built = build_language(
+        shipped("three-cells", "problem", slack=1, sees_slack=True, every=True), method
+    )
+    assert built.verdict.holds
+    assert built.language.guarantee.size == 6
+    assert built.language.guarantee.proved_minimal == (method == "minimal")
+
+
+def test_waiting_here_or_there_is_one_sentence_and_both_plans_are_named() -> None:
+    found = shipped("three-cells", "problem", slack=1, every=True)
+    with pytest.raises(Inseparable, match="wait in different ones") as error:
+        build_language(found, "minimal")
+    witness = error.value.witness
+    first, second = witness.states
+    assert first != second
+
+    def once(states: tuple[str, ...]) -> list[str]:
+        return [s for n, s in enumerate(states) if n == 0 or s != states[n - 1]]
+
+    assert once(first) == once(second)
+    assert "--words-see-slack" in str(error.value)
+    # With it, and with --remember-actions, the same tasks have languages.
+    for more in ({"sees_slack": True}, {"remember_actions": True}):
+        seen = shipped("three-cells", "problem", slack=1, every=True, **more)
+        assert build_language(seen, "minimal").language.guarantee.proved_minimal
+
+
+def test_methods_that_part_plans_where_states_first_differ_are_refused() -> None:
+    """Propositions 3 to 6 speak of nodes: a plan may part from another one by waiting."""
+    found = shipped("grid", "corners-3x3", slack=1)
+    for method in ("greedy", "separating"):
+        with pytest.raises(UsageError, match="with slack") as error:
+            build_language(found, method)
+        assert error.value.exit_code == 2
+    alphas = first_differences(found.spaces).divergences
+    waiting = (alphas.following == alphas.last[:, None]).any(axis=1)
+    assert waiting.any()  # no partition gives p, s1 and p three words ..
+    built = build_language(found, "minimal")
+    assert built.language.guarantee.size == 4  # .. but there is a language
+    # Proposition 24: it is one for optimal plans as well, for what has ended rests.
+    optimal = shipped("grid", "corners-3x3")
+    assert verify(built.language.partition(found.model), optimal.spaces).holds
+
+
+def test_a_language_within_slack_is_one_within_less() -> None:
+    """Under words of states, and where no second cost chooses other plans."""
+    held = 0
+    for found in small_tasks(range(60), 2):
+        if found.model.slack_facts or found.model.cost != "makespan":
+            continue
+        states = states_on_plans(found.spaces).tolist()
+        random = Random(len(states))
+        optimal = from_problems(
+            found.loaded.domain, found.loaded.problems, replace(found.loaded.options, slack=0)
+        )
+        for words in (1, 2, 2, 2, 3):
+            word = {state: random.randrange(words) for state in states}
+            partition = Partition.of_states(found.rows, word)
+            if verify(partition, found.spaces).holds:
+                held += words > 1
+                assert verify(partition, optimal.spaces).holds
+    assert held > 5
+
+
+def test_states_repeat_on_plans_and_nodes_do_not() -> None:
+    found = shipped("grid", "corners-3x3", slack=2)
+    (space,) = found.spaces
+    assert len(np.unique(space.state)) < len(space)
+    assert found.model.hides_slack
+    assert not shipped("grid", "corners-3x3", slack=2, sees_slack=True).model.hides_slack
