@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from math import prod
 from os import fspath
 from typing import Any, Unpack
@@ -16,6 +17,7 @@ from coordlang.api.presenting import Presented
 from coordlang.api.speaking import SentenceSource, given_sentence
 from coordlang.language.tolerance import Tolerance
 from coordlang.required.miscoordination import Miscoordination
+from coordlang.tolerance.failure import TooManyToCount, failure_of_sentence
 from coordlang.use.choices.choices import MOST, Choices
 from coordlang.use.choices.choices import choices as choices_under
 from coordlang.use.choices.dot import to_dot
@@ -25,6 +27,9 @@ from planners.errors import UsageError
 from planners.notebook import html_table
 from planners.search.plans import Plans
 from planners.writing import write_atomically
+
+#: Additions that are made to count how often choices fail, some seconds of work.
+_ADDITIONS = 1_000_000
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -62,6 +67,21 @@ class RobotsChoices(Presented):
     def guaranteed(self) -> bool:
         """Whether every combination of choices is an optimal plan."""
         return self.found.guaranteed
+
+    @property
+    def failure(self) -> Fraction | None:
+        """How often robots that choose by themselves under the sentence miscoordinate.
+
+        Each draws one of the plans with the sentence, uniformly.  None where it is too much to
+        count.
+        """
+        if self.guaranteed:
+            return Fraction(0)
+        used = self.found.task_language
+        try:
+            return failure_of_sentence(used.space, used.start, self.found.fits, _ADDITIONS)
+        except TooManyToCount:
+            return None
 
     @property
     def witness(self) -> Miscoordination | None:

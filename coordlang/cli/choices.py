@@ -146,10 +146,12 @@ def command(
 def _guarantee_code(found: RobotsChoices, check: bool) -> int:
     """Return the exit code of what is guaranteed, and write to stderr what is not."""
     from coordlang.api.witness import witness_text
+    from coordlang.language.tolerance import percent
 
     tolerated = found.covered and not check and found.tolerance is not None
     if found.witness is not None and tolerated:
-        echo("choices of this task miscoordinate, for example:", err=True)
+        share = "" if found.failure is None else f" in {percent(float(found.failure))} of all runs"
+        echo(f"choices of this task miscoordinate{share}, for example:", err=True)
         echo(witness_text(found.witness, line_width(err=True)), err=True)
     elif found.witness is not None:
         why = "the language does not cover it"

@@ -84,6 +84,34 @@ def failure_probability(
     return FailureProbability(tuple(found))
 
 
+def failure_of_sentence(
+    space: PlanSpace, start: int, fits: PlanSpace, most: int = MOST
+) -> Fraction:
+    """How often robots miscoordinate in a task once a sentence was said.
+
+    Parameters
+    ----------
+    space, start
+        The optimal plans of the task, and the node of its initial state.
+    fits
+        Those with the sentence, as a plan space of one task.
+    most
+        The most additions.
+
+    Raises
+    ------
+    TooManyToCount
+        Beyond that.
+    """
+    sets = WeightedSets(LabelSets())
+    begin = int(fits.starts[0])
+    (parts,) = FailureCount(fits, None, sets, most).by_sentence({begin})[begin].values()
+    factors, chosen = zip(*parts, strict=True)
+    good = prod(factors) * FailureCount(space, None, sets, most).good(chosen, start)
+    size = factors[0] * sets.totals[chosen[0]]
+    return 1 - Fraction(good, size**space.robots)
+
+
 def mean(values: Sequence[Fraction]) -> Fraction:
     """The mean of exact numbers; those with one denominator are added first."""
     numerators: Counter[int] = Counter()
@@ -148,14 +176,15 @@ class FailureCount:
         """Of these starting nodes, from the goals up."""
         if not asked:
             return {}
-        found: dict[int, Fraction] = {}
+        said = self.by_sentence(asked)
+        return {node: self._probability(node, list(said[node].values())) for node in sorted(asked)}
+
+    def by_sentence(self, nodes: set[int]) -> dict[int, dict[int, _Parts]]:
+        """The plans from these nodes, and from all below them, by the number of their sentence."""
         said: dict[int, dict[int, _Parts]] = {}
-        below = np.flatnonzero(self.space.descendants(np.array(sorted(asked))))
-        for node in below.tolist():
+        for node in np.flatnonzero(self.space.descendants(np.array(sorted(nodes)))).tolist():
             said[node] = self._said(node, said)
-            if node in asked:
-                found[node] = self._probability(node, list(said[node].values()))
-        return found
+        return said
 
     def _said(self, node: int, said: dict[int, dict[int, _Parts]]) -> dict[int, _Parts]:
         """The plans from a node by sentence, given those from the nodes below it."""

@@ -10,8 +10,14 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.tolerance.failure import TooManyToCount, failure_probability
+from coordlang.language.sentences import sentence_counts
+from coordlang.tolerance.failure import (
+    TooManyToCount,
+    failure_of_sentence,
+    failure_probability,
+)
 from coordlang.tolerance.sampled import estimated_failure
+from coordlang.use.sentence.fitting_plans import plans_with_sentence
 from tests.support import naive_failures
 from tests.support.domains import all_tasks, own_task
 from tests.support.naive import TooLarge
@@ -87,6 +93,20 @@ def test_estimates_agree_with_the_count() -> None:
             seen.append(counted)
     assert all(seen)
     assert len(set(seen)) == 4
+
+
+def test_failures_of_one_sentence_make_up_those_of_all() -> None:
+    """The mean over the sentences, each as often as it is said, is the task's probability."""
+    (space,) = own_task("grid", "three-robots-3x3").spaces
+    word = space.state % 3 // 2
+    said = sentence_counts(space, word)[int(space.starts[0])]
+    failures = []
+    for words, plans in sorted(said.items()):
+        fits = plans_with_sentence(space, word, 0, words, ("w0", "w1"))
+        failure = failure_of_sentence(space, int(space.starts[0]), fits)
+        failures.append(Fraction(plans, said.total()) * failure)
+    assert len(failures) > 1
+    assert sum(failures) == failure_probability([space], [word]).mean > 0
 
 
 def test_a_count_that_takes_too_long_is_given_up() -> None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from fractions import Fraction
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -124,7 +125,8 @@ def test_choices_under_words_that_are_too_few_are_not_guaranteed(
     assert not found.guaranteed
     assert found.data()["tolerance"] == SILENCE
     shown = coordlang("choices", path, *SQUARE, "w0")
-    assert "choices of this task miscoordinate, for example:" in shown.err
+    assert "choices of this task miscoordinate in 50 % of all runs, for example:" in shown.err
+    assert found.failure == Fraction(1, 2)
     assert coordlang("choices", path, *SQUARE, "w0", "--check").code == 1
     assert "no coordination language" in coordlang("export", path, *SQUARE, "w0", "--to", "bt").out
 
