@@ -158,27 +158,53 @@ def _shortest(formula: PlanFormula, task: PlanningTask, at_least: int) -> Plan:
 
 
 def _used(plans: FixedPlans, model: JointModel, plan: Plan, effort: int) -> list[list[Bools]]:
-    """Which labels occur where in optimal plans: each that is found shows one a robot and step."""
-    sizes = [len(own) for own in model.labels]
-    used = [[np.zeros(size, np.bool_) for size in sizes] for _ in plan]
+    """Which labels occur where in optimal plans: each that is found shows one a robot and step.
 
-    def enter(found: Plan) -> None:
-        for depth, labels in enumerate(found):
-            for robot, label in enumerate(labels):
-                used[depth][robot][label] = True
+    First those that occur in no step at all are looked for: one refutation does for all steps.
+    """
+    found = _Used(plans, [len(own) for own in model.labels], plan, effort)
+    robots = range(len(model.robots))
+    steps = range(plans.steps)
+    for robot in robots:
+        found.ask(robot, steps)
+    for step, robot in product(steps, robots):
+        found.ask(robot, [step])
+    return found.used
 
-    enter(plan)
-    for depth, robot in product(range(len(plan)), range(len(sizes))):
-        while not (own := used[depth][robot]).all():
-            others = [plans.label(depth, robot, k) for k in np.flatnonzero(~own).tolist()]
+
+class _Used:
+    """The labels that were found in optimal plans: ``used[k][robot]`` (labels)."""
+
+    def __init__(self, plans: FixedPlans, sizes: Sequence[int], plan: Plan, effort: int) -> None:
+        self._plans, self._effort = plans, effort
+        self.used = [[np.zeros(size, np.bool_) for size in sizes] for _ in plan]
+        self._enter(plan)
+
+    def _enter(self, plan: Plan) -> None:
+        for own, labels in zip(self.used, plan, strict=True):
+            for used, label in zip(own, labels, strict=True):
+                used[label] = True
+
+    def ask(self, robot: int, steps: Sequence[int]) -> None:
+        """Find, or refute, all labels that a robot has in none of some steps, as far as is known.
+
+        If that is not decided for one step, they may all occur there.
+        """
+        while others := self._unknown(robot, steps):
             try:
-                with plans.at_most(effort):
-                    found = plans.holds([plans.some_of(others)])
+                with self._plans.at_most(self._effort):
+                    holds = self._plans.holds([self._plans.some_of(others)])
             except OutOfEffort:
-                own[:] = True
+                if len(steps) == 1:
+                    self.used[steps[0]][robot][:] = True
                 break
-            if not found:
-                plans.require([-literal for literal in others])
+            if not holds:
+                self._plans.require([-literal for literal in others])
                 break
-            enter(plans.labels_chosen())
-    return used
+            self._enter(self._plans.labels_chosen())
+
+    def _unknown(self, robot: int, steps: Sequence[int]) -> Literals:
+        """The literals of labels that the robot was not found to have in any of these steps."""
+        unknown = ~np.any([self.used[step][robot] for step in steps], axis=0)
+        labels = np.flatnonzero(unknown).tolist()
+        return [self._plans.label(step, robot, label) for step in steps for label in labels]

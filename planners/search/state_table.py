@@ -119,7 +119,13 @@ class StateTable:
 
     def add(self, rows: Rows) -> tuple[Ints, Bools]:
         """The numbers of states, and which of them are new; equal new ones count once as new."""
-        packed = self._packing.packed(rows)
+        different, number = _different(rows)
+        found, fresh = self._add(self._packing.packed(rows[different]))
+        new = np.zeros(len(rows), np.bool_)
+        new[different] = fresh
+        return found[number], new
+
+    def _add(self, packed: Rows) -> tuple[Ints, Bools]:
         self._make_room(len(packed))
         numbers = np.full(len(packed), -1)
         fresh = np.zeros(len(packed), np.bool_)
@@ -170,6 +176,17 @@ class StateTable:
             placed = self._slots[slot[todo]] == todo
             todo = todo[~placed]
             slot[todo] = (slot[todo] + 1) & mask
+
+
+def _different(rows: Rows) -> tuple[Ints, Ints]:
+    """Some of the rows, among which all different ones are, and for each row its number there.
+
+    Few of them are equal: those alone whose hash is that of another row, too.
+    """
+    _, first, number = np.unique(_hashed(rows), return_index=True, return_inverse=True)
+    met = np.flatnonzero((rows[first[number]] != rows).any(axis=1))
+    number[met] = len(first) + np.arange(len(met))
+    return np.concatenate((first, met)), number
 
 
 def _hashed(packed: Rows) -> Ints:

@@ -12,6 +12,7 @@ import pytest
 
 from planners.joint.states import TrueFacts
 from planners.loading import PlanningInstance, load
+from planners.search import state_table
 from planners.search.bounds import FAR, relaxed
 from planners.search.goals import goal_facts
 from planners.search.optimal_plans import distances
@@ -101,7 +102,13 @@ def test_labels_too_late_for_a_robots_own_variable_lead_nowhere_in_time() -> Non
         assert (kept.result == every.result[~late]).all()
 
 
-def test_a_state_table_numbers_each_state_once() -> None:
+@pytest.mark.parametrize("hashes", [2**62, 7, 1])
+def test_a_state_table_numbers_each_state_once(
+    hashes: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where few or all states have one hash."""
+    hashed = state_table._hashed
+    monkeypatch.setattr(state_table, "_hashed", lambda rows: hashed(rows) % hashes)
     loaded = load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "gw4-3x3.pddl"])
     space = explore(loaded.model, loaded.tasks[0].init[None, :])
     variables = state_variables(loaded.model, loaded.tasks[0].init)
