@@ -136,9 +136,14 @@ def _name(thing: Any) -> str:
 
 
 def _language(given: Language | str | None) -> Language | None:
-    if given is None or isinstance(given, Language):
-        return given
+    if given is None:
+        return None
     try:
-        return read_language(given)
+        language = given if isinstance(given, Language) else read_language(given)
     except BadInput as error:
         raise UPUsageError(str(error)) from None
+    if language.tolerance is not None and language.tolerance.slack:
+        raise UPUsageError(
+            "this language is for plans within slack, and this engine gives optimal plans only"
+        )
+    return language

@@ -647,6 +647,16 @@ def test_a_sentence_leaves_exactly_its_plans() -> None:
         solve(problem, language=language, sentence="hello")
 
 
+def test_a_language_for_plans_within_slack_is_refused(coordlang: Command, tmp_path: Path) -> None:
+    """The engine's plans are optimal ones."""
+    file = tmp_path / "language.json"
+    files = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "corners-3x3.pddl"
+    made = coordlang("build", *files, "--slack", "1", "--words-see-slack", "-o", file)
+    assert made.code == 0
+    with pytest.raises(UPUsageError, match="plans within slack"):
+        solve(crossing(), language=str(file))
+
+
 def test_a_language_file_for_the_problem_that_the_library_read(
     coordlang: Command, tmp_path: Path
 ) -> None:
