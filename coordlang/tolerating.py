@@ -17,6 +17,7 @@ from coordlang.required.choices import Choices
 from coordlang.required.divergences import Divergences, FirstDifferences, states_on_plans
 from coordlang.required.miscoordination import Inseparable
 from coordlang.required.pieces import differences
+from coordlang.symmetry.group import symmetry_group
 from coordlang.tasks.candidates import Candidates, require_solvable
 from coordlang.tolerance.failures import Failures
 from coordlang.verification.by_definition import Verdict
@@ -110,6 +111,7 @@ def build_few_words(
         worst=limit.worst,
         seed=seed,
         language=language,
+        symmetries=symmetry_group(candidates).permutations if limit.words > 1 else (),
         progress=progress,
     )
     clock.note("vocabulary")

@@ -21,7 +21,7 @@ from planners.search.plans import Plan, Plans, counts
 from planners.tables import Ints, ranges
 
 #: Plans of a task up to which all are listed.
-LISTED = 300
+LISTED = 1_000
 #: Mixtures of drawn plans that are looked at in one task.
 _MIXTURES = 3_000
 #: Multiplier of sentence hashes, an odd number without a pattern in its bits.
@@ -45,9 +45,11 @@ class PlanTable:
     of_robot
         (tasks, robots) How many different sequences each robot has.
     cells
-        (cells, robots) What each robot does in a mixture that is optimal.
-    cell_of_task, cells_in
-        (tasks) The first cell of each task, and how many it has.
+        (cells, robots) What each robot does in a mixture that is optimal, sorted by task and by
+        what robot 1 does.
+    part_of_task, cell_of_part
+        (tasks) The number of the first sequence of robot 1 in each task, all tasks counted on, and
+        (sequences + 1) the first cell of each of them.
     tasks_of_state
         For each state the tasks with plans through it.
     is_complete
@@ -61,8 +63,8 @@ class PlanTable:
     parts: Ints
     of_robot: Ints
     cells: Ints
-    cell_of_task: Ints
-    cells_in: Ints
+    part_of_task: Ints
+    cell_of_part: Ints
     tasks_of_state: tuple[Ints, ...]
     is_complete: bool
 
@@ -88,17 +90,24 @@ class PlanTable:
         first, inverse, sizes = said
         task = number[first]
         robots = self.parts.shape[1]
-        cells = self.cells_in[tasks][task]
-        cell = ranges(self.cell_of_task[tasks][task], cells)
-        sentence = np.repeat(np.arange(len(first)), cells)
-        good = np.ones(len(cell))
-        for robot in range(robots):
+        # Robot 1 does something of the sentence in few cells: the others are not looked at.
+        width = self.of_robot[tasks, 0][task]
+        offset = np.cumsum(width) - width
+        weight = np.bincount(offset[inverse] + self.parts[plans, 0], minlength=int(width.sum()))
+        does = np.flatnonzero(weight)
+        sentence = np.repeat(np.arange(len(first)), width)[does]
+        part = does - offset[sentence] + self.part_of_task[tasks[task]][sentence]
+        cells = self.cell_of_part[part + 1] - self.cell_of_part[part]
+        cell = ranges(self.cell_of_part[part], cells)
+        sentence = np.repeat(sentence, cells)
+        good = np.repeat(weight[does], cells).astype(np.float64)
+        for robot in range(1, robots):
             width = self.of_robot[tasks, robot][task]
             offset = np.cumsum(width) - width
             at = offset[inverse] + self.parts[plans, robot]
             weight = np.bincount(at, minlength=int(width.sum()))
             good *= weight[offset[sentence] + self.cells[cell, robot]]
-        well = np.add.reduceat(good, np.cumsum(cells) - cells)
+        well = np.bincount(sentence, good, minlength=len(first))
         size = sizes.astype(np.float64)
         bad = np.maximum(size**robots - well, 0) / size ** (robots - 1)
         found: Floats = np.bincount(task, bad, minlength=len(tasks)) / self.plans[tasks]
@@ -239,7 +248,8 @@ def _together(entries: Sequence[_Task], tasks: int, states: int, is_complete: bo
         for entry in entries
     ]
     plans = np.array([len(entry.states) for entry in entries], np.int64)
-    cells = np.array([len(entry.cells) for entry in entries], np.int64)
+    cells, cell_of_part = _sorted_cells(entries)
+    ways = np.array([entry.of_robot[0] for entry in entries], np.int64)
     of_state: list[list[int]] = [[] for _ in range(states)]
     for number, entry in enumerate(entries):
         for state in np.unique(entry.states).tolist():
@@ -251,9 +261,19 @@ def _together(entries: Sequence[_Task], tasks: int, states: int, is_complete: bo
         plans,
         np.concatenate([entry.parts for entry in entries]) if entries else np.zeros((0, 1), int),
         np.array([entry.of_robot for entry in entries], np.int64),
-        np.concatenate([entry.cells for entry in entries]) if entries else np.zeros((0, 1), int),
-        np.cumsum(cells) - cells,
         cells,
+        np.cumsum(ways) - ways,
+        cell_of_part,
         tuple(np.array(numbers, np.int64) for numbers in of_state),
         is_complete,
     )
+
+
+def _sorted_cells(entries: Sequence[_Task]) -> tuple[Ints, Ints]:
+    """The cells of all tasks, sorted by what robot 1 does, and where those of each way begin."""
+    cells, counts = [np.zeros((0, 1), np.int64)], [np.zeros(0, np.int64)]
+    for entry in entries:
+        cells.append(entry.cells[np.argsort(entry.cells[:, 0], kind="stable")])
+        counts.append(np.bincount(entry.cells[:, 0], minlength=entry.of_robot[0]))
+    bounds = np.concatenate(([0], np.cumsum(np.concatenate(counts))))
+    return np.concatenate(cells[1:] or cells), bounds

@@ -8,7 +8,7 @@ are recounted exactly.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from math import exp, inf
@@ -35,6 +35,8 @@ _ADDITIONS = 20_000
 _NORM = 8
 #: Values that are equal but for rounding.
 _EQUAL = 1e-9
+#: Shares of the moves that change the words of an orbit, and that exchange two states' words.
+_ORBITS, _EXCHANGES = 0.25, 0.15
 #: Partitions that are recounted exactly after a cooling.
 _RECOUNTED = 3
 
@@ -59,8 +61,8 @@ class FewWordsSettings:
 
     moves: int = 40
     least_moves: int = 400
-    most_moves: int = 8_000
-    coolings: int = 3
+    most_moves: int = 4_000
+    coolings: int = 8
     hot: float = 0.7
     cold: float = 0.01
     sample: int = 30
@@ -108,6 +110,7 @@ class _Search:
     rows: int
     words: int
     worst: bool
+    symmetries: Sequence[Sequence[int]] = ()
     best: FewWords | None = None
     silence: FailureProbability | None = None
     measured: int = 0
@@ -178,6 +181,8 @@ def few_words(
     worst: bool = False,
     seed: int = 0,
     language: Assignment | None = None,
+    start: Assignment | None = None,
+    symmetries: Sequence[Sequence[int]] = (),
     settings: FewWordsSettings | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> FewWords:
@@ -198,17 +203,24 @@ def few_words(
         Of all random choices.
     language
         A coordination language, from which the search starts; None: it is not known.
+    start
+        Words, at most so many, that are as good as known: the result is no worse.
+    symmetries
+        Permutations of the states that take optimal plans to optimal plans, for the moves: the
+        states that one takes each other to change their word together.
 
     Raises
     ------
     TooManyToCount
         If not even silence can be counted.
     """
-    search = _Search(spaces, tuple(states), rows, words, worst)
+    search = _Search(spaces, tuple(states), rows, words, worst, symmetries)
     progress("counting how often robots fail in silence")
     search.count([0] * len(search.states))
     if language is not None and len(set(language.values())) <= words:
         search.count([language[state] for state in search.states])
+    if start is not None:
+        search.count([start[state] for state in search.states])
     is_best = words == 1 or search.is_language
 
     def run() -> None:
@@ -221,7 +233,9 @@ def few_words(
             is_best = _try_all(search, table, progress)
             return
         measure = _measure(search, table)
-        _anneal(search, measure, language, random, settings or FewWordsSettings(), progress)
+        _anneal(
+            search, measure, start or language, random, settings or FewWordsSettings(), progress
+        )
 
     stopped = run_until_stopped(run)
     if stopped is not None and search.candidates:
@@ -393,7 +407,7 @@ def _anneal(
                     f"annealing, cooling {cooling}: {number:,} of {moves:,} moves, "
                     f"at {at.energy:.4f}"
                 )
-            at = _moved(search, measure, at, random.choice(movable), random, heat)
+            at = _moved(search, measure, at, movable, random, heat)
         search.recount()
         if search.is_language or search.best is before:
             return
@@ -421,28 +435,59 @@ def _heats(
     """The heat of each move: from hot to cold, in units of what a move typically costs."""
     costs = []
     for state in random.sample(movable, min(settings.sample, len(movable))):
-        changed = _changed(search, measure, at, state, random)
+        change = {state: _other_word(search, at, state, random)}
+        changed = _changed(search, measure, at, change)
         costs.append(abs(changed.energy - at.energy))
     unit = float(np.median([cost for cost in costs if cost > _EQUAL] or [_EQUAL]))
     factor = (settings.cold / settings.hot) ** (1 / max(1, moves - 1))
     return (unit * settings.hot * factor**number for number in range(moves))
 
 
-def _changed(search: _Search, measure: _Measure, at: _State, state: int, random: Random) -> _State:
-    """The partition in which a state has another word, drawn."""
+def _changed(search: _Search, measure: _Measure, at: _State, change: Mapping[int, int]) -> _State:
+    """The partition in which some states have other words."""
     word = at.word.copy()
-    word[state] = (word[state] + random.randrange(1, search.words)) % search.words
-    tasks = measure.tasks_of_state[state]
+    word[list(change)] = list(change.values())
+    lists = [measure.tasks_of_state[state] for state in change]
+    tasks = lists[0] if len(lists) == 1 else np.unique(np.concatenate(lists))
     values = at.values.copy()
     values[tasks] = measure.failures(word, tasks)
     return _State(word, values, search.energy(values, measure.tasks))
 
 
+def _other_word(search: _Search, at: _State, state: int, random: Random) -> int:
+    return (int(at.word[state]) + random.randrange(1, search.words)) % search.words
+
+
+def _random_change(
+    search: _Search, at: _State, movable: Sequence[int], random: Random
+) -> dict[int, int]:
+    """New words: for one state, for the states that a symmetry takes it to, or for two."""
+    kind, state = random.random(), random.choice(movable)
+    word = _other_word(search, at, state, random)
+    if kind < _ORBITS and search.symmetries:
+        image = random.choice(search.symmetries)
+        change, follows = {state: word}, image[state]
+        while follows != state:
+            change[follows] = word
+            follows = image[follows]
+        return change
+    if kind > 1 - _EXCHANGES:
+        other = random.choice(movable)
+        if at.word[other] != at.word[state]:
+            return {state: int(at.word[other]), other: int(at.word[state])}
+    return {state: word}
+
+
 def _moved(
-    search: _Search, measure: _Measure, at: _State, state: int, random: Random, heat: float
+    search: _Search,
+    measure: _Measure,
+    at: _State,
+    movable: Sequence[int],
+    random: Random,
+    heat: float,
 ) -> _State:
     """The partition after a move, which is taken if it is better, or by chance (Metropolis)."""
-    after = _changed(search, measure, at, state, random)
+    after = _changed(search, measure, at, _random_change(search, at, movable, random))
     worse = after.energy - at.energy
     if worse > 0 and random.random() >= exp(-worse / heat):
         search.measured += 1

@@ -71,16 +71,53 @@ def flexibility_bounds(
     return np.array(bounds, np.float64)
 
 
-def _average_box(plans: Sequence[Plan], most_boxes: int) -> float:
-    """The size of the largest box with a plan in it, averaged over the plans.
+def bits_bounds(
+    spaces: Sequence[PlanSpace],
+    requires: Sequence[Bools],
+    *,
+    most_plans: int = MOST_PLANS,
+    most_boxes: int = MOST_BOXES,
+) -> Floats:
+    """For each task a lower bound on the bits that must be said, so that no mixture fails.
 
-    Of all divisions of the robots the least size counts for each plan.
+    The entropy of the sentence that is said of a plan drawn uniformly, under any division of the
+    task's plans into sets that mix freely, whether words of states can make it or not: a plan in a
+    set of n_s plans takes ``log2(N / n_s)`` bits, and n_s is at most the size of its largest box
+    (Proposition 30 of docs/concepts.md).
+
+    Parameters
+    ----------
+    spaces, requires, most_plans, most_boxes
+        As in `flexibility_bounds`; the bound of a task with more plans is 0.
+    """
+    bounds: list[float] = []
+    for space, required in zip(spaces, requires, strict=True):
+        counted = counts(space)
+        for start in space.starts.tolist():
+            plans = Plans(space, start, counted)
+            if not required[start] or plans.count > most_plans:
+                bounds.append(0.0)
+            else:
+                sizes = np.array(_box_sizes(list(plans), most_boxes), np.float64)
+                bounds.append(float(np.log2(plans.count / sizes).mean()))
+    return np.array(bounds, np.float64)
+
+
+def _average_box(plans: Sequence[Plan], most_boxes: int) -> float:
+    """The size of the largest box with a plan in it, averaged over the plans."""
+    return float(sum(_box_sizes(plans, most_boxes)) / len(plans))
+
+
+def _box_sizes(plans: Sequence[Plan], most_boxes: int) -> list[int]:
+    """For each plan the size of the largest box with it.
+
+    Of all divisions of the robots the least size counts.
     """
     robots = len(plans[0][0])
     # With two robots both divisions are one table.
     divisions = range(robots) if robots > 2 else range(1)
     sizes = [_Table.of(plans, robot).box_sizes(most_boxes) for robot in divisions]
-    return float(sum(map(min, zip(*sizes, strict=True))) / len(plans))
+    return list(map(min, zip(*sizes, strict=True)))
 
 
 @dataclass(frozen=True, slots=True)
