@@ -9,7 +9,7 @@ silence; a coordination language has probability 0.
 
 No plans are listed: of plan i the mixture uses robot i's labels only, so ``good_s`` is the sum over
 the optimal plans of the product over robots of the number of plans with sentence s in which the
-robot does the same (Proposition 29 of docs/concepts.md).
+robot does the same (Proposition 25 of docs/concepts.md).
 """
 
 from __future__ import annotations

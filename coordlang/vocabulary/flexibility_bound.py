@@ -83,7 +83,7 @@ def bits_bounds(
     The entropy of the sentence that is said of a plan drawn uniformly, under any division of the
     task's plans into sets that mix freely, whether words of states can make it or not: a plan in a
     set of n_s plans takes ``log2(N / n_s)`` bits, and n_s is at most the size of its largest box
-    (Proposition 30 of docs/concepts.md).
+    (Proposition 26 of docs/concepts.md).
 
     Parameters
     ----------
