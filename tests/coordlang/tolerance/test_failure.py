@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 from fractions import Fraction
+from itertools import product
 from random import Random
 
 import numpy as np
@@ -16,7 +17,7 @@ from coordlang.tolerance.failure import (
     failure_of_sentence,
     failure_probability,
 )
-from coordlang.tolerance.sampled import estimated_failure
+from coordlang.tolerance.sampled import _Game, estimated_failure
 from coordlang.use.sentence.fitting_plans import plans_with_sentence
 from tests.support import naive_failures
 from tests.support.domains import all_tasks, own_task
@@ -81,18 +82,30 @@ def test_silence_on_the_smallest_maps() -> None:
 
 
 def test_estimates_agree_with_the_count() -> None:
-    """Drawn plans fail about as often as is counted: in silence, and under two words."""
+    """Drawn plans fail about as often as is counted: in silence, and under few words."""
     seen = []
-    for candidates in (all_tasks("grid", "gw1-2x2"), own_task("grid", "three-robots-3x3")):
-        for words in (1, 2):
-            word = [None if words == 1 else space.state % 3 // 2 for space in candidates.spaces]
-            counted = failure_probability(candidates.spaces, word).mean
-            low, high = estimated_failure(candidates.spaces, word, runs=700, seed=1).interval
-            assert low <= counted <= high
-            assert high - low < 0.08
-            seen.append(counted)
+    for candidates, words in product(
+        (all_tasks("grid", "gw1-2x2"), own_task("grid", "three-robots-3x3")), ((0,), (0, 0, 1, 2))
+    ):
+        word = [np.array(words)[space.state % len(words)] for space in candidates.spaces]
+        counted = failure_probability(candidates.spaces, word).mean
+        low, high = estimated_failure(candidates.spaces, word, runs=700, seed=2).interval
+        assert low <= counted <= high
+        assert high - low < 0.08
+        seen.append(counted)
     assert all(seen)
     assert len(set(seen)) == 4
+
+
+def test_plans_with_a_sentence_are_drawn_by_their_number() -> None:
+    (space,) = own_task("grid", "three-robots-3x3").spaces
+    word = space.state % 3
+    game = _Game(space, word)
+    counted = sentence_counts(space, word)
+    sentences = {said for of_node in counted.values() for said in of_node}
+    for node, of_node in counted.items():
+        for said in sentences:
+            assert game._number(node, said) == of_node[said]
 
 
 def test_failures_of_one_sentence_make_up_those_of_all() -> None:

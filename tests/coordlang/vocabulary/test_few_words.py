@@ -22,6 +22,7 @@ from coordlang.tolerance.plan_table import plan_table
 from coordlang.vocabulary import few_words as module
 from coordlang.vocabulary.few_words import canonical, few_words, partitions
 from tests.support import naive
+from tests.support.candidates import on_graph
 from tests.support.command import Command
 from tests.support.domains import DOMAINS, all_tasks, own_task
 from tests.support.random_spaces import random_spaces
@@ -126,6 +127,20 @@ def test_two_words_are_the_best_of_all_partitions(folder: str, stem: str, mean: 
             candidates.spaces, [word[space.state] for space in candidates.spaces]
         )
         assert again == found.failures
+
+
+def test_the_worst_task_may_want_other_words_than_the_mean() -> None:
+    candidates = on_graph(59, 2)
+    assert candidates is not None
+    states = states_on_plans(candidates.spaces).tolist()
+    least, _ = by_hand(candidates, 2)
+    assert least == {"mean": Fraction(1, 60), "worst": Fraction(1, 3)}
+    mean, worst = (
+        few_words(candidates.spaces, states, len(candidates.rows), 2, worst=worst).failures
+        for worst in (False, True)
+    )
+    assert (mean.mean, mean.worst) == (Fraction(1, 60), Fraction(1, 2))
+    assert (worst.mean, worst.worst) == (Fraction(1, 45), Fraction(1, 3))
 
 
 def test_annealing_finds_the_best_two_words(monkeypatch: pytest.MonkeyPatch) -> None:
