@@ -674,6 +674,11 @@ def test_a_language_file_for_the_problem_that_the_library_read(
     result = solve(problem, language=str(file))
     assert result.status == Status.SOLVED_OPTIMALLY
     assert "does not cover this task" in str(result.log_messages)
+    files = path / "domain.pddl", path / "two-doors.pddl"
+    assert coordlang("build", *files, "-o", file, "--words", 1).code == 0
+    result = solve(read("handover", "two-doors"), language=str(file))
+    assert result.status == Status.SOLVED_OPTIMALLY
+    assert "fail in 50 % of all runs" in str(result.log_messages)
     with pytest.raises(UPUsageError, match="unknown predicate"):
         solve(crossing(), language=str(file))
 
