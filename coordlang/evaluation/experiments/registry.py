@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 from coordlang.evaluation.experiments import (
     communication,
+    delays,
     flexibility,
     game,
     navigation,
@@ -25,6 +26,7 @@ RECIPES: Mapping[str, Recipe] = {
         planning_cost.RECIPE,
         navigation.RECIPE,
         game.RECIPE,
+        delays.RECIPE,
         scenario.RECIPE,
     )
 }

@@ -25,6 +25,9 @@ MARKERS = {
     "separating": ("#009E73", "^"),
     "minimal": ("#0072B2", "P"),
     "flexible": ("#56B4E9", "X"),
+    "slack": ("#009E73", "^"),
+    "few": ("#CC79A7", "v"),
+    "silence": ("#777777", "o"),
 }
 GREY = "#777777"
 

@@ -190,6 +190,31 @@ def lines(
         return figure
 
 
+def line_panels(
+    x: Sequence[float],
+    panels: Sequence[tuple[str, Sequence[Series]]],
+    x_label: str,
+    unit: str,
+) -> Figure:
+    """Draw values over the numbers ``x``, with intervals, in titled panels side by side."""
+    with drawing(4.2 * len(panels) + 1.8, 3.6, len(panels)) as (figure, found):
+        for axes, (title, series) in zip(found, panels, strict=True):
+            for one in series:
+                hue, marker = MARKERS[one.kind]
+                values = _numbers(one.values)
+                axes.plot(x, values, color=hue, marker=marker, markersize=6, label=one.label)
+                for at, low, high in zip(x, _numbers(one.low), _numbers(one.high), strict=False):
+                    axes.plot([at, at], [low, high], color=hue, linewidth=1.6)
+            axes.set_title(title, fontsize=10)
+            axes.set_xlabel(x_label)
+            axes.set_xticks(list(x))
+            axes.sharey(found[0])
+        found[0].set_ylabel(unit)
+        found[0].set_ylim(bottom=0)
+        found[-1].legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0)
+        return figure
+
+
 def _numbers(values: Sequence[float | None]) -> list[float]:
     """Return the values with NaN for None, which matplotlib does not draw."""
     return [float("nan") if value is None else float(value) for value in values]

@@ -9,7 +9,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TextIO
 
-from coordlang.building import build_language
+from coordlang.building import Built, build_language
 from coordlang.evaluation.lab.identity import code_hash, file_hash
 from coordlang.evaluation.lab.recipe import Settings
 from coordlang.evaluation.material.suite import World
@@ -17,7 +17,9 @@ from coordlang.language.file import read_language, write_language
 from coordlang.language.words import Language
 from coordlang.tasks.candidates import Candidates
 from coordlang.tasks.listed import ListedTask
+from coordlang.tolerating import WordLimit, build_few_words
 from planners.errors import UsageError
+from planners.loading import ModelOptions
 
 #: The methods that experiments compare, in the order of tables.
 COMPARED = ("greedy", "separating", "minimal", "flexible")
@@ -28,7 +30,14 @@ TITLES = {
     "separating": "separating",
     "minimal": "minimal",
     "flexible": "minimal, most flexible",
+    "slack": "separating, slack 1",
+    "few": "the best two words",
+    "silence": "one word",
 }
+#: Plans within slack 1, under words that see what is left of it.
+_SLACK = ModelOptions(slack=1, sees_slack=True)
+#: Words, at most, of what is no coordination language.
+_FEW = {"few": 2, "silence": 1}
 
 
 def language_for(
@@ -36,7 +45,8 @@ def language_for(
 ) -> tuple[Candidates, Language]:
     """Return the candidate tasks of a world and a language for them, built once and stored.
 
-    The method "flexible" is ``--method minimal --prefer flexible``.
+    The method "flexible" is ``--method minimal --prefer flexible``, "slack" is ``--method
+    separating --slack 1 --words-see-slack``, and "few" and "silence" are ``--words 2`` and ``1``.
 
     Raises
     ------
@@ -45,20 +55,26 @@ def language_for(
     UsageError
         If the language cannot be stored.
     """
-    candidates = world.candidates(settings.domains, listed)
+    options = _SLACK if method == "slack" else None
+    candidates = world.candidates(settings.domains, listed, options)
     path = settings.cache / f"{_key(world, method, settings, listed)}.json.gz"
     with _opened_lock(settings.cache, path) as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # waits for a process that builds it
         if path.exists():
             return candidates, read_language(path)
-        if method == "flexible":
-            built = build_language(candidates, "minimal", seed=settings.seed, prefer="flexible")
-        else:
-            built = build_language(candidates, method, seed=settings.seed)
+        built = _built(candidates, method, settings.seed)
         if built.stopped is not None:
             raise built.stopped
         write_language(built.language, path)
         return candidates, built.language
+
+
+def _built(candidates: Candidates, method: str, seed: int) -> Built:
+    if method == "flexible":
+        return build_language(candidates, "minimal", seed=seed, prefer="flexible")
+    if method in _FEW:
+        return build_few_words(candidates, WordLimit(_FEW[method]), seed=seed)[0]
+    return build_language(candidates, "separating" if method == "slack" else method, seed=seed)
 
 
 def _opened_lock(cache: Path, path: Path) -> TextIO:

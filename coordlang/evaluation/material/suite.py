@@ -12,6 +12,7 @@ from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_
 from coordlang.tasks.listed import ListedTask
 from coordlang.tasks.task_file import read_task_file
 from planners.errors import UsageError
+from planners.loading import ModelOptions
 from planners.pddl import read_domain, read_problem
 
 
@@ -42,17 +43,22 @@ class World:
             names.append(self.tasks)
         return tuple(f"{self.folder}/{name}" for name in names)
 
-    def candidates(self, domains: Path, listed: Sequence[ListedTask] = ()) -> Candidates:
+    def candidates(
+        self,
+        domains: Path,
+        listed: Sequence[ListedTask] = (),
+        options: ModelOptions | None = None,
+    ) -> Candidates:
         """Return the candidate tasks, or those that are ``listed`` if there are any."""
         domain = read_domain(domains / self.files[0])
         problem = read_problem(domains / self.files[1], domain)
         if listed:
-            return from_listed(domain, [problem], listed)
+            return from_listed(domain, [problem], listed, options)
         if self.tasks == "all":
-            return all_pairs(domain, [problem])
+            return all_pairs(domain, [problem], options)
         if self.tasks == "problem":
-            return from_problems(domain, [problem])
-        return from_listed(domain, [problem], read_task_file(domains / self.files[2]))
+            return from_problems(domain, [problem], options)
+        return from_listed(domain, [problem], read_task_file(domains / self.files[2]), options)
 
 
 def _row(name: str, size: str, filtered: bool = False) -> World:

@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Robots that are late: each is delayed with some probability a step, and goes on with its part.
+
+A delayed robot rests and then goes on where it was.  The parts of a mixture were meant to be done
+in step, so delays may break what mixes freely, whatever was agreed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations, product
+from random import Random
+
+import numpy as np
+
+from coordlang.language.sentences import Sentence, sentence
+from coordlang.use.sentence.fitting_plans import plans_with_sentence
+from coordlang.use.sentence.task_language import TaskLanguage
+from planners.joint.model import Goal, JointModel
+from planners.search.plan_space import PlanSpace
+from planners.search.plans import Plan, Plans, counts
+from planners.tables import Rows
+
+#: A robot's part of a plan: its labels, without the rest at its end.
+Part = tuple[int, ...]
+#: The labels of a joint step, and the state that it leads to, as bytes.
+_Steps = dict[tuple[int, ...], bytes]
+
+
+class Execution:
+    """Carries parts out in a joint model, with delays.
+
+    In each joint step every robot that is not done does the next step of its part, unless it is
+    delayed; all others rest.  If that is no joint step, the run has failed; or, if robots yield,
+    as many as can do their steps together do, and the others wait (of several such sets the one
+    with robots that come first).  If nobody is delayed and nobody can do a step, they wait for
+    ever.
+    """
+
+    def __init__(self, model: JointModel) -> None:
+        self._model = model.without_slack
+        self._resting = [sorted(own) for own in model.resting]
+        self._steps: dict[bytes, _Steps] = {}
+
+    def part_of(self, plan: Plan, robot: int) -> Part:
+        """A robot's part of a plan, without the rest at its end."""
+        labels = [step[robot] for step in plan]
+        while labels and labels[-1] in self._resting[robot]:
+            labels.pop()
+        return tuple(labels)
+
+    def run(
+        self, init: Rows, parts: Sequence[Part], delay: float, yields: bool, random: Random
+    ) -> tuple[Rows, int] | None:
+        """The state in which all parts are done and the joint steps that it took, None: it failed.
+
+        Parameters
+        ----------
+        init
+            The row of the initial state.
+        delay
+            The probability, below 1, with which a robot that is not done is delayed in a step.
+        yields
+            Whether robots wait for each other where they cannot all do their steps.
+        """
+        state, done, steps = init.tobytes(), [0] * len(parts), 0
+        while busy := [r for r, part in enumerate(parts) if done[r] < len(part)]:
+            ready = [robot for robot in busy if not (delay and random.random() < delay)]
+            for acting in _larger_first(ready) if yields else [tuple(ready)]:
+                after = self._after(state, {r: parts[r][done[r]] for r in acting})
+                if after is not None:
+                    break
+            else:
+                return None
+            if not acting and len(ready) == len(busy):
+                return None
+            for robot in acting:
+                done[robot] += 1
+            state, steps = after, steps + 1
+        return np.frombuffer(state, np.uint64), steps
+
+    def _after(self, state: bytes, acting: dict[int, int]) -> bytes | None:
+        """The state after a joint step in which these robots act and the others rest, if any."""
+        if state not in self._steps:
+            found = self._model.successors(np.frombuffer(state, np.uint64)[None, :])
+            self._steps[state] = {
+                tuple(labels): row.tobytes()
+                for labels, row in zip(found.labels.tolist(), found.result, strict=True)
+            }
+        steps = self._steps[state]
+        choices = ([acting[r]] if r in acting else own for r, own in enumerate(self._resting))
+        return next((steps[labels] for labels in product(*choices) if labels in steps), None)
+
+
+def _larger_first(robots: Sequence[int]) -> Iterator[tuple[int, ...]]:
+    for size in range(len(robots), -1, -1):
+        yield from combinations(robots, size)
+
+
+@dataclass(frozen=True, slots=True)
+class DelayedRuns:
+    """How many runs ended in the goal, and their joint steps beyond the least makespan together."""
+
+    runs: int
+    well: int
+    late: int
+
+    @property
+    def lateness(self) -> float:
+        """The joint steps beyond the least makespan of a run that ends in the goal, on average."""
+        return self.late / self.well if self.well else 0.0
+
+
+class DelayTrials:
+    """Runs of tasks under one language: a plan is drawn, something is said, and each robot draws.
+
+    Parameters
+    ----------
+    languages
+        The language in every task.
+    together
+        Whether the whole plan is said, so that all robots follow it.
+    """
+
+    def __init__(self, languages: Sequence[TaskLanguage], *, together: bool = False) -> None:
+        self._languages, self._together = languages, together
+        self._execution = Execution(languages[0].model)
+        self._counted: dict[int, list[int]] = {}
+        self._said: dict[tuple[int, Sentence], Plans] = {}
+
+    def sample(self, delay: float, yields: bool, runs: int, random: Random) -> DelayedRuns:
+        """Runs of tasks drawn uniformly."""
+        well = late = 0
+        for _ in range(runs):
+            task = random.randrange(len(self._languages))
+            lateness = self._run(task, delay, yields, random)
+            if lateness is not None:
+                well, late = well + 1, late + lateness
+        return DelayedRuns(runs, well, late)
+
+    def _run(self, task: int, delay: float, yields: bool, random: Random) -> int | None:
+        """The steps beyond the least makespan, None where the run does not end in the goal."""
+        used = self._languages[task]
+        robots = range(len(used.model.robots))
+        plan = _drawn(self._all(task), random)
+        plans = [plan for _ in robots]
+        if not self._together:
+            open_plans = self._with_sentence(task, self._sentence(used, plan))
+            plans = [_drawn(open_plans, random) for _ in robots]
+        parts = [
+            self._execution.part_of(own, robot) for robot, own in zip(robots, plans, strict=True)
+        ]
+        return self.lateness(task, parts, delay, yields, random)
+
+    def lateness(
+        self, task: int, parts: Sequence[Part], delay: float, yields: bool, random: Random
+    ) -> int | None:
+        """The same for parts that are given."""
+        used = self._languages[task]
+        space = used.space
+        row = space.rows[space.state[used.start]]
+        ended = self._execution.run(used.model.forgetting_slack(row), parts, delay, yields, random)
+        if ended is None or not used.model.holds(_goal(used), ended[0][None, :])[0]:
+            return None
+        return ended[1] - space.least_makespan(used.task)
+
+    def _all(self, task: int) -> Plans:
+        used = self._languages[task]
+        if id(used.space) not in self._counted:
+            self._counted[id(used.space)] = counts(used.space)
+        return Plans(used.space, used.start, self._counted[id(used.space)])
+
+    def _sentence(self, used: TaskLanguage, plan: Plan) -> Sentence:
+        path = used.space.path_with(used.start, plan)
+        assert path is not None, "a plan is a path of its plan space"
+        return sentence(used.word[used.space.nodes_on(used.start, path)].tolist())
+
+    def _with_sentence(self, task: int, words: Sentence) -> Plans:
+        if (task, words) not in self._said:
+            used = self._languages[task]
+            names = used.partition.words
+            fits: PlanSpace = plans_with_sentence(used.space, used.word, used.task, words, names)
+            self._said[task, words] = Plans.of(fits)
+        return self._said[task, words]
+
+
+def _drawn(plans: Plans, random: Random) -> Plan:
+    return plans.unrank(random.randrange(plans.count))
+
+
+def _goal(used: TaskLanguage) -> Goal:
+    goal: Goal = used.space.goals[used.space.goal[used.start]]
+    return goal
