@@ -87,7 +87,8 @@ def command(
 ) -> int:
     """Run experiments of the paper and set their results beside the paper's own.
 
-    NAME is table1, communication, flexibility, planning_cost, navigation, game, scenario, or all.
+    NAME is table1, communication, flexibility, planning_cost, navigation, game, delays, scenario,
+    or all.
     A run that was stopped or killed goes on where it was when it is started again.
     """
     from coordlang.evaluation.experiments.registry import RECIPES

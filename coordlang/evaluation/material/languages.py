@@ -30,7 +30,7 @@ TITLES = {
     "separating": "separating",
     "minimal": "minimal",
     "flexible": "minimal, most flexible",
-    "slack": "separating, slack 1",
+    "slack": "greedy, slack 1",
     "few": "the best two words",
     "silence": "one word",
 }
@@ -45,8 +45,8 @@ def language_for(
 ) -> tuple[Candidates, Language]:
     """Return the candidate tasks of a world and a language for them, built once and stored.
 
-    The method "flexible" is ``--method minimal --prefer flexible``, "slack" is ``--method
-    separating --slack 1 --words-see-slack``, and "few" and "silence" are ``--words 2`` and ``1``.
+    The method "flexible" is ``--method minimal --prefer flexible``, "slack" is ``--slack 1
+    --words-see-slack``, and "few" and "silence" are ``--words 2`` and ``1``.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def _built(candidates: Candidates, method: str, seed: int) -> Built:
         return build_language(candidates, "minimal", seed=seed, prefer="flexible")
     if method in _FEW:
         return build_few_words(candidates, WordLimit(_FEW[method]), seed=seed)[0]
-    return build_language(candidates, "separating" if method == "slack" else method, seed=seed)
+    return build_language(candidates, "greedy" if method == "slack" else method, seed=seed)
 
 
 def _opened_lock(cache: Path, path: Path) -> TextIO:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections import defaultdict
 from dataclasses import replace
 from fractions import Fraction
-from itertools import product
+from itertools import combinations, product
 from pathlib import Path
 from random import Random
 
@@ -15,15 +15,17 @@ import pytest
 
 from coordlang.evaluation.experiments import delays
 from coordlang.evaluation.lab.recipe import Record, Settings
-from coordlang.evaluation.material.delays import DelayTrials, Execution
+from coordlang.evaluation.material.delays import DelayTrials, Execution, Part
 from coordlang.evaluation.material.languages import language_for
 from coordlang.evaluation.material.suite import WORLDS
 from coordlang.language.sentences import sentence
 from coordlang.tolerance.failure import failure_probability
 from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
-from planners.joint.model import PlanningTask
+from planners.joint.model import JointModel, PlanningTask
 from planners.loading import load
-from planners.search.plans import Plans
+from planners.search.optimal_plans import search
+from planners.search.plans import Plan, Plans
+from planners.tables import Rows
 from tests.support.domains import DOMAINS
 
 
@@ -121,18 +123,62 @@ def test_a_delay_by_hand() -> None:
     execution, task, [parts] = swap()
     rest = (0, parts[1][0])  # r2 waits first, as in plan 1
     in_step = execution.run(task.init, [parts[0], rest], 0.5, False, Script())
-    assert in_step is not None and in_step[1] == 2
+    assert in_step is not None
+    assert in_step[1] == 2
     late = execution.run(task.init, [parts[0], rest], 0.5, False, Script(1.0, 1.0, 1.0, 0.0))
     assert late is None  # r1 moves to b, where r2 still is
     yields = execution.run(task.init, [parts[0], rest], 0.5, True, Script(1.0, 1.0, 1.0, 0.0))
-    assert yields is not None and yields[1] == 3
+    assert yields is not None
+    assert yields[1] == 3
     # r1 is late: r2 has not gone yet when it rests; then both go on in step, one step later.
     first = execution.run(task.init, [parts[0], parts[1]], 0.5, False, Script(0.0, 1.0))
     assert first is None  # r2 moves to a, where r1 still is
 
 
+def fails_late(model: JointModel, task: PlanningTask, plan: Plan, most: int) -> bool:
+    """Whether a plan fails in some run in which each robot is delayed at most so many steps."""
+    execution = Execution(model)
+    parts = [execution.part_of(plan, robot) for robot in range(len(model.robots))]
+    steps = range(len(plan) + most * len(parts))
+    for late in product(*(combinations(steps, most) for _ in parts)):
+        found = _with_delays(execution, task.init, parts, late)
+        if found is None or not model.holds(task.goal, found[None, :])[0]:
+            return True
+    return False
+
+
+def _with_delays(
+    execution: Execution, init: Rows, parts: list[Part], late: tuple[tuple[int, ...], ...]
+) -> Rows | None:
+    """The state at the end, where robot i is delayed in the joint steps ``late[i]``."""
+    done, state, step = [0] * len(parts), init, 0
+    while any(n < len(part) for n, part in zip(done, parts, strict=True)):
+        now = [
+            (part[n],) if n < len(part) and step not in late[robot] else ()
+            for robot, (n, part) in enumerate(zip(done, parts, strict=True))
+        ]
+        ended = execution.run(state, now, 0.0, False, Random(0)) if any(now) else (state, 1)
+        if ended is None:
+            return None
+        state = ended[0]
+        done = [n + len(own) for n, own in zip(done, now, strict=True)]
+        step += 1
+    return state
+
+
+def test_no_plan_of_a_swap_on_the_three_cells_survives_one_delay() -> None:
+    """So by Proposition 25 no language is 1-delay-robust there."""
+    loaded = load(
+        DOMAINS / "three-cells" / "domain.pddl", [DOMAINS / "three-cells" / "problem.pddl"]
+    )
+    plans = list(Plans.of(search(loaded.model, loaded.tasks[0])))
+    assert len(plans) == 4
+    assert all(fails_late(loaded.model, loaded.tasks[0], plan, 1) for plan in plans)
+    assert not any(fails_late(loaded.model, loaded.tasks[0], plan, 0) for plan in plans)
+
+
 def test_robots_that_wait_for_each_other_for_ever_fail() -> None:
-    execution, task, [parts] = swap()
+    execution, task, [_parts] = swap()
     other = tuple(execution._model.labels[0].index(text) for text in ["(move r1 a b)"])
     back = tuple(execution._model.labels[1].index(text) for text in ["(move r2 b a)"])
     # Each is in the other's way, and swapping is no joint step.
