@@ -10,13 +10,14 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.building import build_language
+from coordlang.building import build_language, certificate_of
+from coordlang.certificate import check
 from coordlang.language.partition import Partition
 from coordlang.required.divergences import first_differences, states_on_plans
 from coordlang.required.miscoordination import Inseparable
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.verification.by_definition import verify
-from planners.errors import BadInput, ProvedImpossible, UsageError
+from planners.errors import BadInput, ProvedImpossible, Refuted, UsageError
 from planners.loading import ModelOptions
 from planners.pddl import read_domain, read_problem
 from planners.search.plans import counts
@@ -172,6 +173,16 @@ def test_a_language_within_slack_is_one_within_less() -> None:
                 held += words > 1
                 assert verify(partition, optimal.spaces).holds
     assert held > 5
+
+
+def test_lower_bounds_are_certified() -> None:
+    found = shipped("three-cells", "problem", slack=1, sees_slack=True, every=True)
+    built = build_language(found, "minimal")
+    checked = check(certificate_of(built), found)
+    assert checked.lower_bound == built.language.guarantee.size == 6
+    # For optimal plans its reasons are none.
+    with pytest.raises(Refuted):
+        check(certificate_of(built), shipped("three-cells", "problem", every=True))
 
 
 def test_states_repeat_on_plans_and_nodes_do_not() -> None:
