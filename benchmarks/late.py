@@ -49,12 +49,10 @@ from planners.search.reachable import Space, explore
 ROWS = {
     "GW1": ("grid", "gw1-2x2", "all"),
     "GW2": ("grid", "gw2-2x3", "all"),
-    "GW3": ("grid", "gw3-2x4", "all"),
     "GWB5": ("grid", "gwb5-3x3", "gwb5-3x3.tasks.json"),
     "corners-3x3": ("grid", "corners-3x3", "problem"),
     "corners-4x4": ("grid", "corners-4x4", "problem"),
     "corridor": ("corridor", "problem", "problem"),
-    "rooms": ("corridor", "problem", "rooms.tasks.json"),
     "handover": ("handover", "two-doors", "all"),
     "exchange": ("handover", "exchange", "problem"),
     "tray": ("tray", "serve", "all"),
