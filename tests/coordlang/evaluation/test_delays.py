@@ -167,7 +167,7 @@ def _with_delays(
 
 
 def test_no_plan_of_a_swap_on_the_three_cells_survives_one_delay() -> None:
-    """So by Proposition 25 no language is 1-delay-robust there."""
+    """So by Proposition 27 no language is 1-delay-robust there."""
     loaded = load(
         DOMAINS / "three-cells" / "domain.pddl", [DOMAINS / "three-cells" / "problem.pddl"]
     )
