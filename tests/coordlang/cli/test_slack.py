@@ -19,7 +19,11 @@ CELLS = DOMAINS / "three-cells" / "domain.pddl", DOMAINS / "three-cells" / "prob
 CORNERS = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "corners-3x3.pddl"
 
 
-@pytest.fixture(scope="module", params=[True, False], ids=["seen", "hidden"])
+@pytest.fixture(
+    scope="module",
+    params=[True, pytest.param(False, marks=pytest.mark.thorough)],
+    ids=["seen", "hidden"],
+)
 def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A language for slack 1, of words that see slack and of words that do not."""
     path = tmp_path_factory.mktemp("slack") / "l.json"

@@ -58,7 +58,7 @@ def failing_share(trials: DelayTrials, number: int, used: TaskLanguage) -> Fract
     return share
 
 
-@pytest.mark.parametrize("said", ["minimal", "few", "silence"])
+@pytest.mark.parametrize("said", ["minimal", "few"])
 def test_without_delays_the_exact_failure_probability(said: str, tmp_path: Path) -> None:
     used = languages(said, tmp_path)
     trials = DelayTrials(used)
@@ -74,11 +74,12 @@ def test_without_delays_plans_and_coordination_languages_never_fail(tmp_path: Pa
         used = languages(said, tmp_path)
         for together in (False, True):
             for yields in (False, True):
-                found = DelayTrials(used, together=together).sample(0.0, yields, 60, Random(1))
+                found = DelayTrials(used, together=together).sample(0.0, yields, 20, Random(1))
                 assert found.well == found.runs
                 assert found.lateness <= used[0].model.slack
 
 
+@pytest.mark.thorough
 def test_silence_within_slack_fails_as_often_as_counted(tmp_path: Path) -> None:
     used = [
         replace(one, word=np.zeros(len(one.space), np.int64))
@@ -188,9 +189,9 @@ def test_robots_that_wait_for_each_other_for_ever_fail() -> None:
 
 def test_units_are_reproducible_and_the_section_shows_them(tmp_path: Path) -> None:
     settings = Settings(DOMAINS, tmp_path, samples=1, quick=True)
-    units = [unit for unit in delays.units(settings) if unit.parameters["world"] == "GW1"]
+    units = [unit for unit in delays.units(settings) if unit.parameters["world"] == "GW1"][:2]
     results = [delays.run(unit, settings) for unit in units]
-    assert results == [delays.run(unit, settings) for unit in units]
+    assert results[0] == delays.run(units[0], settings)
     records = [
         Record(unit, "done", result, 0.0) for unit, result in zip(units, results, strict=True)
     ]

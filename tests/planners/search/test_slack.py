@@ -81,26 +81,39 @@ def agree(seeds: range, robots: int) -> int:
 
 
 def test_random_tasks_have_the_plans_that_the_definition_lists() -> None:
-    assert agree(range(30), 2) > 5
-    assert agree(range(10), 3) > 0
+    assert agree(range(8), 2) > 0
+    assert agree(range(3), 3) > 0
 
 
 @pytest.mark.thorough
 def test_more_random_tasks_have_them() -> None:
-    assert agree(range(30, 700), 2) > 100
-    assert agree(range(10, 250), 3) > 20
+    assert agree(range(8, 250), 2) > 20
+    assert agree(range(3, 80), 3) > 5
 
 
-@settings(max_examples=10, deadline=None)
+@pytest.mark.thorough
+@settings(max_examples=40, deadline=None)
 @given(st.integers(1000, 5000))
 def test_hypothesis_finds_no_task_with_others(seed: int) -> None:
     agree(range(seed, seed + 1), 2)
 
 
-@pytest.mark.parametrize(("folder", "stem", "makespan", "counts"), SLACK_COUNTS)
+@pytest.mark.parametrize(("folder", "stem", "makespan", "counts"), SLACK_COUNTS[:3])
 def test_counts_of_shipped_problems(
     folder: str, stem: str, makespan: int, counts: tuple[int, ...]
 ) -> None:
+    compare_counts(folder, stem, makespan, counts)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("folder", "stem", "makespan", "counts"), SLACK_COUNTS[3:])
+def test_counts_of_larger_problems(
+    folder: str, stem: str, makespan: int, counts: tuple[int, ...]
+) -> None:
+    compare_counts(folder, stem, makespan, counts)
+
+
+def compare_counts(folder: str, stem: str, makespan: int, counts: tuple[int, ...]) -> None:
     for slack, count in enumerate(counts):
         found = loaded(folder, stem, slack)
         plans = Plans.of(search(found.model, found.tasks[0]))
@@ -110,7 +123,7 @@ def test_counts_of_shipped_problems(
 
 def test_one_pass_over_an_explored_space_finds_what_searches_find() -> None:
     for sees in (False, True):
-        found = loaded("t-map", "problem", 2, sees_slack=sees)
+        found = loaded("three-cells", "problem", 2, sees_slack=sees)
         model, task = found.model, found.tasks[0]
         space = explore(model, task.init[None, :])
         (every,) = plan_spaces(space, [(task.goal, None)])
@@ -153,7 +166,7 @@ def test_the_cheapest_within_the_bound_under_a_second_cost() -> None:
     """With time to spare one robot makes the detour alone: fewer subactions than in least time."""
     costs = []
     for slack in (0, 1, 2):
-        found = loaded("corridor", "problem", slack, cost="makespan+actions")
+        found = loaded("t-map", "problem", slack, cost="makespan+actions")
         space = search(found.model, found.tasks[0])
         costs.append(space.cost_of(0))
     assert [steps for steps, _ in costs] == [costs[0][0] + slack for slack in (0, 1, 2)]
