@@ -133,6 +133,7 @@ def _render(
         figures=_figures(language),
         may_fail=language.may_fail,
         warning=language.tolerance.warning if language.tolerance else None,
+        slack=language.tolerance.slack if language.tolerance else None,
         about=_about(language, domain, problems, data, seed),
         formula=_formula,
         counted=counted,

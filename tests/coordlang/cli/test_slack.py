@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from random import Random
 from typing import Literal
 
 import pytest
@@ -90,6 +91,22 @@ def test_robots_may_choose_for_themselves(made: Path) -> None:
         assert not any(own.mask >> fact & 1 for fact in found.found.task_language.model.slack_facts)
 
 
+def test_monitors_of_robots_that_choose_by_themselves_end_in_the_goal(made: Path) -> None:
+    draws = Random(3)
+    for plan in library.plans(*CORNERS, slack=1).sample(3, seed=4):
+        sentence = library.say(made, *CORNERS, plan=plan).sentences[0]
+        found = library.choices(made, *CORNERS, sentence=sentence)
+        monitors = [found.monitor(robot) for robot in ("r1", "r2")]
+        done = []
+        while not all(monitor.finished for monitor in monitors):
+            step = tuple(draws.choice(monitor.allowed()) for monitor in monitors)
+            for monitor, own in zip(monitors, step, strict=True):
+                monitor.did(own)
+            done.append(step)
+        assert len(done) == 5
+        assert library.plans(*CORNERS, slack=1).rank(done) is not None
+
+
 def test_commands_that_follow(made: Path, coordlang: Command, tmp_path: Path) -> None:
     plan = library.plans(*CORNERS, slack=1)[100]
     sentence = library.say(made, *CORNERS, plan=plan).sentences[0]
@@ -100,6 +117,7 @@ def test_commands_that_follow(made: Path, coordlang: Command, tmp_path: Path) ->
     assert coordlang("export", made, *CORNERS, sentence, "--to", "bt", "-o", trees).code == 0
     page = tmp_path / "page.html"
     assert coordlang("report", made, *CORNERS, "-o", page).code == 0
+    assert "up to 1 joint step more than the least makespan" in page.read_text()
 
 
 @pytest.mark.parametrize("to", ["pddl", "ltlf"])
