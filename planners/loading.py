@@ -26,6 +26,9 @@ from planners.pddl.robots import (
     without_idle_environment,
 )
 
+#: The most slack that is taken: plans of so many joint steps fill any memory.
+MOST_SLACK = 1_000_000
+
 
 @dataclass(frozen=True, slots=True)
 class ModelOptions:
@@ -63,6 +66,11 @@ class ModelOptions:
         if isinstance(self.slack, bool) or not isinstance(self.slack, int) or self.slack < 0:
             raise UsageError(
                 f"--slack {echoed(str(self.slack))}: expected a number of joint steps, 0 or more",
+                remedy="Say --slack 1.",
+            )
+        if self.slack > MOST_SLACK:
+            raise UsageError(
+                f"--slack {echoed(str(self.slack))}: more than {MOST_SLACK:,} joint steps",
                 remedy="Say --slack 1.",
             )
         if self.sees_slack and not self.slack:

@@ -148,7 +148,8 @@ def _guarantee_code(found: RobotsChoices, check: bool) -> int:
     from coordlang.api.witness import witness_text
     from coordlang.language.tolerance import percent
 
-    tolerated = found.covered and not check and found.tolerance is not None
+    claimed = found.tolerance is not None and found.tolerance.may_fail
+    tolerated = found.covered and not check and claimed
     if found.witness is not None and tolerated:
         share = "" if found.failure is None else f" in {percent(float(found.failure))} of all runs"
         echo(f"choices of this task miscoordinate{share}, for example:", err=True)

@@ -116,9 +116,8 @@ def _text(found: Verification) -> str:
     if found.witness:
         sentence = " ".join(found.witness.sentence or ())
         head = f'refuted: plans with the sentence "{sentence} .." miscoordinate'
-        claimed = found.tolerance.warning if found.tolerance else None
-        if claimed is not None:
-            fail += f".\nThe file claims less: {claimed}"
+        if found.tolerance is not None and found.tolerance.may_fail:
+            fail += f".\nThe file claims less: {found.tolerance.warning}"
         return f"{head}\n{witness_text(found.witness, line_width())}\n\nOn the whole {fail}."
     slack = found.tolerance.slack if found.tolerance else None
     plans = f"plan{'s' * (not found.overlapping)}"

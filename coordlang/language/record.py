@@ -12,6 +12,7 @@ from coordlang.tasks.candidates import Kind
 from coordlang.tasks.listed import ListedTask
 from planners.files import FileFormat
 from planners.joint.model import Cost
+from planners.loading import MOST_SLACK
 from planners.pddl.robots import Unowned
 
 # What JSON Schema can say and the reader checks with messages of its own.
@@ -123,7 +124,7 @@ class ToleranceRecord(msgspec.Struct):
         Meta(description="The same for the task in which it is highest."),
     ] = None
     slack: Annotated[
-        Annotated[int, Meta(ge=0)] | None,
+        Annotated[int, Meta(ge=0, le=MOST_SLACK)] | None,
         Meta(description="The joint steps by which plans may be longer than the least makespan."),
     ] = None
 

@@ -6,6 +6,11 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
+_UNKNOWN = (
+    "this is no coordination language: robots that choose by themselves under its sentences may "
+    "fail, and its file does not say how often"
+)
+
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
@@ -19,22 +24,25 @@ class Tolerance:
         is claimed, because it is a coordination language.
     slack
         The joint steps by which plans may be longer than the least makespan; None: by none.
+    fails_unknown
+        Whether it is no coordination language, and nothing says how often robots fail.
     """
 
     failure_mean: float | None = None
     failure_worst: float | None = None
     slack: int | None = None
+    fails_unknown: bool = False
 
     @property
     def may_fail(self) -> bool:
-        """Whether robots that choose by themselves may miscoordinate."""
+        """Whether it is claimed how often robots that choose by themselves miscoordinate."""
         return self.failure_mean is not None
 
     @property
     def warning(self) -> str | None:
         """What a user has to know before relying on the words, None if there is nothing."""
         if self.failure_mean is None or self.failure_worst is None:
-            return None
+            return _UNKNOWN if self.fails_unknown else None
         return (
             "this is no coordination language: robots that choose by themselves under its "
             f"sentences fail in {percent(self.failure_mean)} of all runs, and in "
@@ -43,12 +51,15 @@ class Tolerance:
 
     def data(self) -> dict[str, Any]:
         """Return what is claimed, as a language file holds it."""
-        return {key: value for key, value in asdict(self).items() if value is not None}
+        claims = asdict(self)
+        del claims["fails_unknown"]
+        return {key: value for key, value in claims.items() if value is not None}
 
 
 def tolerance_data(tolerance: Tolerance | None) -> dict[str, Any]:
     """The key ``tolerance`` of a JSON object, where there is anything to say."""
-    return {} if tolerance is None else {"tolerance": tolerance.data()}
+    data = {} if tolerance is None else tolerance.data()
+    return {"tolerance": data} if data else {}
 
 
 def percent(share: float) -> str:

@@ -77,7 +77,10 @@ class Language:
     @property
     def tolerance(self) -> Tolerance | None:
         """What may go wrong, or be longer, under these words; None: nothing."""
-        return self.provenance.tolerance
+        known = self.provenance.tolerance
+        if self.guarantee.coordination_language or (known is not None and known.may_fail):
+            return known
+        return replace(known or Tolerance(), fails_unknown=True)
 
     @property
     def may_fail(self) -> bool:

@@ -126,22 +126,36 @@ class Plans:
         node = self.space.nodes_on(self.start, path)[-1]
         rest: list[tuple[int, ...]] = []
         for _ in range(left):
-            edges = self.space.out_edges(node)
-            labels = self.space.labels[edges.start : edges.stop]
-            found = np.flatnonzero(rests(self.space.model, labels))
-            if not len(found):
+            edge = self._rest(node)
+            if edge is None:
                 return None
-            edge = edges.start + int(found[0])
             rest.append(self.space.labels_of(edge))
             node = self.space.target_of(edge)
         return (*plan, *rest)
 
     def without_rest(self, plan: Plan) -> Plan:
-        """A plan without the steps at its end in which every robot rests."""
-        if not self.space.model.slack:
+        """A plan without the rest at its end that `padded` adds.
+
+        Where robots have several ways to do nothing only the first one is left out, so that
+        different plans stay different.
+        """
+        path = self.space.path_with(self.start, plan) if self.space.model.slack else None
+        if path is None:
             return plan
-        busy = np.flatnonzero(~rests(self.space.model, np.array(plan).reshape(len(plan), -1)))
-        return plan[: int(busy[-1]) + 1] if len(busy) else ()
+        length = len(plan)
+        for edge, node in zip(
+            reversed(path), reversed(self.space.nodes_on(self.start, path)[:-1]), strict=True
+        ):
+            if edge != self._rest(node):
+                break
+            length -= 1
+        return plan[:length]
+
+    def _rest(self, node: int) -> int | None:
+        """The first edge from a node in which every robot rests, None if there is none."""
+        edges = self.space.out_edges(node)
+        found = np.flatnonzero(rests(self.space.model, self.space.labels[edges.start : edges.stop]))
+        return edges.start + int(found[0]) if len(found) else None
 
     def sample(self, number: int, seed: int) -> Iterator[Plan]:
         """Plans drawn uniformly and independently; the same seed draws the same plans."""

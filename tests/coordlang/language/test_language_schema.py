@@ -134,6 +134,7 @@ WRONG: list[Change] = [
     lambda d: d.update(tolerance={"failure_mean": "5/66", "failure_worst": 0.5}),
     lambda d: d.update(tolerance={"slack": -1}),
     lambda d: d.update(tolerance={"slack": 0.5}),
+    lambda d: d.update(tolerance={"slack": 10**30}),
     lambda d: d.update(tolerance=[]),
 ]
 #: What only the reader can refuse.

@@ -143,6 +143,45 @@ def test_commands_warn_of_words_that_are_too_few(coordlang: Command, tmp_path: P
     assert library.say(path, *SQUARE, plan).tolerance == library.load_language(path).tolerance
 
 
+@pytest.mark.parametrize("tolerance", [None, {}])
+def test_a_file_that_does_not_say_how_often_robots_fail_warns_as_well(
+    tolerance: dict[str, float] | None, coordlang: Command, tmp_path: Path
+) -> None:
+    path, page = silent(tmp_path / "l.json", tolerance), tmp_path / "page.html"
+    plan = tmp_path / "plan"
+    plan.write_text(coordlang("plans", *SQUARE, "--max", 1).out)
+    for command in (
+        ["say", path, *SQUARE, plan],
+        ["understand", path, *SQUARE, "w0"],
+        ["plan", path, *SQUARE, "w0"],
+        ["explain", path, *SQUARE],
+        ["export", path, *SQUARE, "w0", "--to", "bt"],
+        ["report", path, *SQUARE, "-o", page],
+    ):
+        found = coordlang(*command)
+        assert found.code == 0, command
+        assert "may fail, and its file does not say how often" in found.err, command
+    assert "does not say how often" in page.read_text()
+    assert coordlang("choices", path, *SQUARE, "w0").code == 1  # it miscoordinates
+    assert "tolerance" not in library.say(path, *SQUARE, plan).data()
+    library.load_language(path).save(path)
+    assert library.load_language(path).may_fail
+
+
+def test_choices_under_wrong_words_within_slack_are_refuted(
+    coordlang: Command, tmp_path: Path
+) -> None:
+    """The file says that plans may be longer, and not that robots may fail."""
+    path = silent(tmp_path / "l.json", {"slack": 1})
+    data = json.loads(path.read_text())
+    del data["guarantee"]["coordination_language"]
+    data["guarantee"]["proved_minimal"] = True
+    path.write_text(json.dumps(data))
+    found = coordlang("choices", path, *SQUARE, "w0")
+    assert found.code == 1
+    assert "the file holds no coordination language" in found.err
+
+
 def test_choices_under_words_that_are_too_few_are_not_guaranteed(
     coordlang: Command, tmp_path: Path
 ) -> None:

@@ -189,3 +189,30 @@ def test_what_is_no_slack_is_refused(slack: object) -> None:
 def test_seeing_slack_needs_some() -> None:
     with pytest.raises(UsageError, match="belongs to --slack"):
         ModelOptions(sees_slack=True)
+
+
+BEEPING = """(define (domain beeping) (:types robot) (:predicates (on ?r - robot))
+(:action light :agent ?r - robot :parameters () :precondition () :effect (on ?r))
+(:action wait :agent ?r - robot :parameters () :precondition () :effect (and))
+(:action beep :agent ?r - robot :parameters () :precondition () :effect (and)))"""
+
+
+def test_different_plans_stay_different_without_their_rest(tmp_path: Path) -> None:
+    """Who rests by waiting or by beeping has several plans: only the first way is left out."""
+    domain, problem = tmp_path / "domain.pddl", tmp_path / "problem.pddl"
+    domain.write_text(BEEPING)
+    problem.write_text(
+        "(define (problem p) (:domain beeping) (:objects r1 r2 - robot) (:init) (:goal (on r1)))"
+    )
+    found = load(domain, [problem], ModelOptions(slack=2))
+    plans = Plans.of(search(found.model, found.tasks[0]))
+    short = {plans.without_rest(plan) for plan in plans}
+    assert len(short) == plans.count > 10
+    assert {len(plan) for plan in short} == {1, 2, 3}
+    assert {plans.padded(plan) for plan in short} == set(plans)
+
+
+@pytest.mark.parametrize("slack", [1_000_001, 10**30])
+def test_slack_beyond_any_memory_is_refused(slack: int) -> None:
+    with pytest.raises(UsageError, match="more than 1,000,000 joint steps"):
+        ModelOptions(slack=slack)
