@@ -13,6 +13,7 @@ from coordlang.evaluation.experiments import (
     navigation,
     planning_cost,
     scenario,
+    silence,
     table1,
 )
 from coordlang.evaluation.lab.recipe import Recipe
@@ -28,5 +29,6 @@ RECIPES: Mapping[str, Recipe] = {
         game.RECIPE,
         delays.RECIPE,
         scenario.RECIPE,
+        silence.RECIPE,
     )
 }

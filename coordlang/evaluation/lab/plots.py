@@ -283,3 +283,70 @@ def histograms(
             axes.sharey(found[0])
         found[0].set_ylabel(unit)
         return figure
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """Points that belong together, with the text that stands beside the last one."""
+
+    label: str
+    x: Sequence[float]
+    y: Sequence[float]
+
+
+def curves(
+    rows: Sequence[tuple[str, Sequence[tuple[str, Sequence[Curve]]]]],
+    x_label: str,
+    *,
+    integers: bool,
+) -> Figure:
+    """Draw curves in panels side by side, each with a legend of its own.
+
+    Parameters
+    ----------
+    rows
+        For each row the label of its y axes, and the title and the curves of each panel; all rows
+        have the same panels.
+    x_label
+        The label of the x axes.
+    integers
+        Whether x are integers, each of which is labelled.
+    """
+    panels = len(rows[0][1])
+    with drawing(4.3 * panels, 3.7 * len(rows), panels, len(rows)) as (figure, found):
+        every = [(unit, *panel) for unit, row in rows for panel in row]
+        for number, (axes, (unit, title, shown)) in enumerate(zip(found, every, strict=True)):
+            _draw_curves(axes, shown)
+            if number < panels:
+                axes.set_title(title, fontsize=10)
+            if number % panels == 0:
+                axes.set_ylabel(unit)
+            if number >= panels * (len(rows) - 1):
+                axes.set_xlabel(x_label)
+            axes.set_ylim(bottom=0)
+            if integers:
+                axes.set_xticks(range(1, max(int(max(curve.x)) for curve in shown) + 1))
+            else:
+                axes.set_xlim(left=0)
+            axes.legend(loc="upper right", fontsize=8)
+        return figure
+
+
+def _draw_curves(axes: Axes, shown: Sequence[Curve]) -> None:
+    """Draw curves, told apart by colour and marker, and by dashes where there are many."""
+    looks = list({hue: (hue, shape) for hue, shape in MARKERS.values()}.values())
+    for number, curve in enumerate(shown):
+        hue, shape = looks[number % len(looks)]
+        axes.plot(
+            curve.x,
+            curve.y,
+            color=hue,
+            marker=shape,
+            markersize=6,
+            markeredgecolor="white",
+            markeredgewidth=0.6,
+            linewidth=1.5,
+            linestyle="-" if number < len(looks) else "--",
+            label=curve.label,
+            clip_on=False,
+        )

@@ -63,7 +63,7 @@ def test_units_have_names_of_their_own(tmp_path: Path) -> None:
     # Each on grids and on worlds that are none.
     grids = {
         name: {
-            u.parameters.get("world", "grid") in {w.name for w in OTHERS}
+            u.parameters.get("world", u.key.split("/")[0]) in {w.name for w in OTHERS}
             for u in recipe.units(whole)
         }
         for name, recipe in RECIPES.items()
