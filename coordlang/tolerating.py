@@ -27,6 +27,7 @@ from coordlang.vocabulary.greedy import greedy
 from coordlang.vocabulary.hidden_slack import hidden_differences
 from coordlang.vocabulary.job import Assignment, Job
 from planners.errors import UsageError
+from planners.messages import echoed
 from planners.pieces.processes import Processes
 from planners.pieces.work import Runner
 from planners.search.portions import require_room
@@ -49,16 +50,17 @@ class WordLimit:
     Raises
     ------
     UsageError
-        For less than one word.
+        For what is no number of words, one or more.
     """
 
     words: int
     worst: bool = False
 
     def __post_init__(self) -> None:
-        if self.words < 1:
+        is_number = isinstance(self.words, int) and not isinstance(self.words, bool)
+        if not is_number or self.words < 1:
             raise UsageError(
-                f"a language has a word at least, not {self.words}",
+                f"a language has a word at least, not {echoed(str(self.words))}",
                 remedy="--words 1 is silence.",
             )
 

@@ -240,3 +240,9 @@ def test_a_function_gives_words_too() -> None:
     assert library.build(*SQUARE, tasks="all", words=1).failures.mean == Fraction(5, 66)
     verified = build_language(all_tasks("grid", "gw1-2x2"), "minimal")
     assert verified.failures.mean == 0
+
+
+@pytest.mark.parametrize("words", [0, -1, 2.5, "2", True])
+def test_what_is_no_number_of_words_is_refused(words: object) -> None:
+    with pytest.raises(library.UsageError, match="a language has a word at least, not"):
+        library.build(*SQUARE, words=words)  # type: ignore[arg-type]
