@@ -22,7 +22,8 @@ from coordlang.tasks.candidates import Candidates, require_solvable
 from coordlang.tolerance.failures import Failures
 from coordlang.verification.by_definition import Verdict
 from coordlang.verification.pieces import verify_candidates
-from coordlang.vocabulary.few_words import FewWords, few_words
+from coordlang.vocabulary.few_words import few_words
+from coordlang.vocabulary.fewest_failures import FewWords
 from coordlang.vocabulary.greedy import greedy
 from coordlang.vocabulary.hidden_slack import hidden_differences
 from coordlang.vocabulary.job import Assignment, Job

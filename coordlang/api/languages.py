@@ -54,7 +54,7 @@ from coordlang.tolerance.failure import TooManyToCount
 from coordlang.tolerance.failures import NONE, Failures, failures_under
 from coordlang.tolerating import WordLimit, build_few_words
 from coordlang.verification.pieces import verify_candidates
-from coordlang.vocabulary.few_words import FewWords
+from coordlang.vocabulary.fewest_failures import FewWords
 from planners.errors import ProvedImpossible, UsageError
 from planners.loading import ModelOptions
 

@@ -29,9 +29,10 @@ from coordlang.required.miscoordination import Inseparable
 from coordlang.symmetry.group import symmetry_group
 from coordlang.tasks.candidates import Candidates
 from coordlang.tolerance.bits import plan_bits, sentence_bits
-from coordlang.vocabulary.few_words import FewWordsSettings, few_words
+from coordlang.vocabulary.few_words import few_words
 from coordlang.vocabulary.flexibility_bound import bits_bounds
 from coordlang.vocabulary.job import Assignment
+from coordlang.vocabulary.word_annealing import FewWordsSettings
 from planners.search.plan_space import PlanSpace
 
 #: Worlds besides the rows of Table 1; those of three robots last.

@@ -20,7 +20,9 @@ from coordlang.tasks.candidates import Candidates
 from coordlang.tolerance.failure import failure_probability
 from coordlang.tolerance.plan_table import plan_table
 from coordlang.vocabulary import few_words as module
-from coordlang.vocabulary.few_words import canonical, few_words, partitions
+from coordlang.vocabulary.few_words import few_words, partitions
+from coordlang.vocabulary.fewest_failures import canonical
+from coordlang.vocabulary.word_annealing import FewWordsSettings
 from tests.support import naive
 from tests.support.candidates import on_graph
 from tests.support.command import Command
@@ -158,7 +160,7 @@ def test_words_for_plans_that_are_too_many_to_list(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(module, "_TASKS", 0)
     candidates = own_task("grid", "corners-4x4")
     states = states_on_plans(candidates.spaces).tolist()
-    settings = module.FewWordsSettings(least_moves=150, most_moves=150, coolings=1)
+    settings = FewWordsSettings(least_moves=150, most_moves=150, coolings=1)
     found = few_words(candidates.spaces, states, len(candidates.rows), 2, seed=1, settings=settings)
     assert 0 < found.failures.mean < found.silence.mean / 2
 
