@@ -74,7 +74,7 @@ def asked(python: str, planner: str, folder: Path, limit: int) -> dict[str, Any]
         text = out.read()
     count, cost = re.search(r"Number of plans: (\d+)", text), re.search(r"Plan cost: (\d+)", text)
     return {
-        "seconds": round(usage.ru_utime + usage.ru_stime, 1),
+        "seconds": round(usage.ru_utime + usage.ru_stime, 2),
         "memory": usage.ru_maxrss // 1024,
         "plans": int(count[1]) if count and cost else None,
         "cost": int(cost[1]) if count and cost else None,
