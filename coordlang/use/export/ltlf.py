@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from coordlang.explanation.cover import Conjunction
 from coordlang.use.export.membership import membership
-from coordlang.use.sentence.slack import refuse_slack
+from coordlang.use.sentence.slack import refuse_seen_slack
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.joint.model import show
 from planners.pddl.lifted import Atom
@@ -45,9 +45,9 @@ def export_ltlf(task_language: TaskLanguage, words: Sequence[int]) -> SentenceFo
 
     A plan has the sentence w0 w1 .. wk exactly if it is in w0 for a while, then in w1, and so on,
     and in wk to the end: ``w0 & (w0 U (w1 & (w1 U .. G(wk))))``.  Raises `NoPlanFits` if no optimal
-    plan does, and `UsageError` for plans within slack.
+    plan does, and `UsageError` for words that see slack.
     """
-    refuse_slack(task_language.model, "--to ltlf")
+    refuse_seen_slack(task_language.model, "--to ltlf")
     task_language.plans_with(words)  # raises where no plan has the sentence
     terms = membership(task_language, apart=False).terms
     used = sorted(set(words))

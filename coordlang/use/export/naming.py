@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 from coordlang.explanation.cover import Conjunction
 from coordlang.explanation.variables import truth
@@ -30,6 +31,7 @@ def named_by_words(
     plain: ClassicalTask,
     labels: Sequence[Sequence[RobotLabel]],
     tests: Membership,
+    steps: int | None = None,
 ) -> ClassicalTask:
     """The plain task in which states are named by their words and the sentence is followed.
 
@@ -45,13 +47,15 @@ def named_by_words(
         For each of its actions the labels that robots take in it.
     tests
         Which states belong to which word.
+    steps
+        The most joint steps; None: any number.
 
     Returns
     -------
     ClassicalTask
         The actions of ``plain`` in their order, then those that name and follow.
     """
-    facts = _NamingFacts(task_language, words, plain, tests)
+    facts = _NamingFacts(task_language, words, plain, tests, steps)
     within = [
         facts.within(action, chosen) for action, chosen in zip(plain.actions, labels, strict=True)
     ]
@@ -74,6 +78,7 @@ class _NamingFacts:
         words: Sequence[int],
         plain: ClassicalTask,
         tests: Membership,
+        steps: int | None,
     ) -> None:
         self.model, self.words = task_language.model, words
         self.names = task_language.partition.words
@@ -93,6 +98,9 @@ class _NamingFacts:
         self.named = {word: self.add(f"(named {self.names[word]})") for word in sorted(set(words))}
         self.said = [self.add(f"(said {n})") for n in range(1, len(words) + 1)]
         self.init |= {self.between, self.said[0]}
+        #: The joint steps that were taken, where they are counted.
+        self.taken = [self.add(f"(taken {n})") for n in range(steps + 1)] if steps else []
+        self.init |= {*self.taken[:1]}
 
     def add(self, text: str) -> int:
         """Add a fact."""
@@ -153,7 +161,21 @@ class _NamingFacts:
                         (self.named[after], said),
                     )
                 )
-        return found
+        return [counted for action in found for counted in self._counted(action)]
+
+    def _counted(self, action: ClassicalAction) -> list[ClassicalAction]:
+        """An action after a joint step, once for each number of steps where they are counted."""
+        if not self.taken:
+            return [action]
+        return [
+            _free(
+                f"{action.name} after step {number}",
+                (*action.preconditions, (before, True)),
+                (*action.adds, after),
+                (*action.deletes, before),
+            )
+            for number, (before, after) in enumerate(pairwise(self.taken), 1)
+        ]
 
     def goal(self, plain: ClassicalTask) -> tuple[Condition, ...]:
         """The whole sentence is passed, and the last state is named.

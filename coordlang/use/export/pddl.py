@@ -18,6 +18,10 @@ Why its optimal plans are exactly the plans with the sentence, one to one:
    Then each plan of that cost is an optimal plan of the task, passes only through states on optimal
    plans of the task, and by 2 it has the sentence.
 
+With slack the sentence is followed at most as many times as joint steps are allowed.  Then every
+plan, not only the optimal ones, is a plan within the slack that has the sentence, with all, some or
+none of its rest at the end.
+
 States elsewhere never matter to optimal plans, so this needs no list of all states, and holds for
 tasks that the language does not cover, too.  A plan of higher cost follows the sentence as far as
 it stays in states that the language maps.
@@ -31,7 +35,8 @@ from dataclasses import dataclass
 
 from coordlang.use.export.membership import membership
 from coordlang.use.export.naming import RobotLabel, named_by_words
-from coordlang.use.sentence.slack import refuse_slack
+from coordlang.use.sentence.guided_search import plan_under_sentence
+from coordlang.use.sentence.slack import refuse_seen_slack
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.classical import (
     ClassicalAction,
@@ -148,19 +153,23 @@ def export_pddl(
     Raises
     ------
     UsageError
-        Under ``strips_only``, where actions without costs do not count joint steps.
+        Under ``strips_only``, where actions without costs do not count joint steps; with slack,
+        for words that see it, and where more than joint steps counts.
     NoPlanFits
         If no optimal plan has the sentence.
     """
-    refuse_slack(task_language.model, "--to pddl")
+    _require_slack_told(task_language.model)
     space, model = task_language.plans_with(words), task_language.model
     makespan, second = space.cost_of(0)
+    steps = makespan if model.slack else None
+    if model.slack:
+        makespan, second = plan_under_sentence(task_language, words).cost
     start = space.starts[0]
     task = PlanningTask("task", space.rows[space.state[start]], space.goals[space.goal[start]])
-    plain = compile_classical(model, task, limit, longest=max(1, makespan))
+    plain = compile_classical(model, task, limit, longest=max(1, steps or makespan))
     labels = [_labels(model, plain, action) for action in plain.actions]
     tests = membership(task_language)
-    named = named_by_words(task_language, words, plain, labels, tests)
+    named = named_by_words(task_language, words, plain, labels, tests, steps)
     labels += [()] * (len(named.actions) - len(labels))
     if strips_only:
         _require_steps_counted(plain, model)
@@ -177,6 +186,18 @@ def export_pddl(
         cost=plain.step_cost * makespan + second,
         terms=tests.size,
     )
+
+
+def _require_slack_told(model: JointModel) -> None:
+    """Raise `UsageError` where slack cannot be said by counting joint steps."""
+    refuse_seen_slack(model, "--to pddl")
+    if model.slack and model.cost != "makespan":
+        raise UsageError(
+            f"--to pddl counts the joint steps of plans within slack, and --cost {model.cost} "
+            "counts more",
+            remedy="Build the language with --cost makespan; `coordlang understand`, `plan` and "
+            "`choices` give its plans.",
+        )
 
 
 def _require_steps_counted(plain: ClassicalTask, model: JointModel) -> None:

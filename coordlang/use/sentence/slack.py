@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What speaks of optimal plans alone refuses languages for plans within slack."""
+"""What speaks of the facts of a problem alone refuses words that see what is left of the slack."""
 
 from __future__ import annotations
 
@@ -7,14 +7,15 @@ from planners.errors import UsageError
 from planners.joint.model import JointModel
 
 
-def refuse_slack(model: JointModel, what: str) -> None:
-    """Raise `UsageError` if plans may take more than the least makespan.
+def refuse_seen_slack(model: JointModel, what: str) -> None:
+    """Raise `UsageError` if words depend on how much is left of the slack.
 
     ``what`` is what cannot say so.
     """
-    if model.slack:
+    if model.slack_facts:
         raise UsageError(
-            f"{what} finds plans of least makespan, and this language is for plans within slack "
-            f"{model.slack}",
-            remedy="`coordlang understand`, `plan` and `choices` give them.",
+            f"{what} speaks of the facts of the problem, and the words of this language see how "
+            "much is left of the slack",
+            remedy="`coordlang understand`, `plan` and `choices` give its plans, or build one "
+            "without --words-see-slack.",
         )

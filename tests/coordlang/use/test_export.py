@@ -12,10 +12,10 @@ import re
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
-from itertools import islice
+from itertools import islice, product
 from pathlib import Path
 from random import Random
 from types import ModuleType
@@ -24,6 +24,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from coordlang.api.language_inputs import read_task_language
+from coordlang.api.languages import build
+from coordlang.api.options import GivenOptions
 from coordlang.building import build_language
 from coordlang.explanation.cover import Conjunction
 from coordlang.language.sentences import sentence
@@ -35,8 +38,8 @@ from coordlang.use.export.membership import membership
 from coordlang.use.export.pddl import PddlExport, export_pddl, plan_names
 from coordlang.use.sentence.fitting_plans import NoPlanFits
 from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
-from planners.classical import action_names
-from planners.errors import BadInput, ProvedImpossible
+from planners.classical import ClassicalTask, action_names
+from planners.errors import BadInput, ProvedImpossible, UsageError
 from planners.joint.model import show
 from planners.pddl import read_domain, read_problem
 from planners.search.plans import Plan, Plans
@@ -564,3 +567,75 @@ def test_other_planners_find_exactly_the_plans_that_fit(
         assert row.agrees, row
         assert row.kstar == row.graph == row.listing, row
         assert row.fast_downward == row.cost, row
+
+
+# Within slack.
+
+WITHIN_SLACK = [
+    ("three-cells", 1),
+    pytest.param("three-cells", 2, marks=pytest.mark.thorough),
+    pytest.param("t-map", 1, marks=pytest.mark.thorough),
+]
+
+
+def within_slack(folder: str, slack: int, **given: Any) -> TaskLanguage:
+    """Three words for the plans within slack of a shipped problem; they may be inseparable."""
+    domain, problem = (DOMAINS / folder / f"{name}.pddl" for name in ("domain", "problem"))
+    built = build(domain, problem, slack=slack, words=3, seed=1, **given)
+    return read_task_language(built.language, domain, problem, None, GivenOptions.of())
+
+
+def every_plan(task: ClassicalTask) -> Iterator[tuple[int, ...]]:
+    """All sequences of actions that lead from the initial state to the goal."""
+    todo: list[tuple[tuple[int, ...], frozenset[int]]] = [((), task.init)]
+    while todo:
+        plan, state = todo.pop()
+        if all((fact in state) == wanted for fact, wanted in task.goal):
+            yield plan
+        for number, action in enumerate(task.actions):
+            if all((fact in state) == wanted for fact, wanted in action.preconditions):
+                todo.append(((*plan, number), state.difference(action.deletes).union(action.adds)))
+
+
+@pytest.mark.parametrize(("folder", "slack"), WITHIN_SLACK)
+def test_every_plan_within_slack_has_the_sentence(folder: str, slack: int) -> None:
+    """All of them, with all, some or none of the steps at rest at the end."""
+    task_language = within_slack(folder, slack)
+    sentences = by_sentence(task_language)
+    assert len(sentences) > 1
+    for words, plans in sentences.items():
+        of_task = Plans.of(task_language.space, task_language.task)
+        wanted = {
+            plan[:end]
+            for plan in plans
+            for end in range(len(of_task.without_rest(plan)), len(plan) + 1)
+        }
+        for limit in FORMS.values():
+            exported = export_pddl(task_language, words, limit)
+            names = action_names(exported.classical)
+            found = [
+                exported.joint_plan([names[n] for n in plan])
+                for plan in every_plan(exported.classical)
+            ]
+            assert Counter(found) == Counter(wanted)
+            assert exported.cost == min(map(len, wanted))
+
+
+def test_the_formula_within_slack() -> None:
+    task_language = within_slack("three-cells", 1)
+    sentences = by_sentence(task_language)
+    for words, (other, plans) in product(sentences, sentences.items()):
+        exported = export_ltlf(task_language, words)
+        for plan in plans:
+            states = symbols_in(task_language, plan, exported.symbols)
+            assert true_at(parse(exported.formula), states, 0) == (other == words)
+
+
+def test_slack_that_pddl_cannot_say_is_refused() -> None:
+    seen = within_slack("three-cells", 1, words_see_slack=True)
+    for export in (export_pddl, export_ltlf):
+        with pytest.raises(UsageError, match="see how much is left of the slack"):
+            export(seen, [0])
+    dear = within_slack("three-cells", 1, cost="makespan+actions")
+    with pytest.raises(UsageError, match="counts the joint steps"):
+        export_pddl(dear, [0])
