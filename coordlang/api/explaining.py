@@ -102,8 +102,9 @@ class WordsExplained(Presented):
         default = self.used.language.default
         if not self.mapped.word.size:
             return "\n".join([*lines, f"No state is mapped: the word is always {default}."])
+        meant = "plan within the slack" if self.used.model.slack else "optimal plan"
         lines.append(
-            f"Exact in all {counted(sum(self.mapped.states), 'mapped state')}. No optimal plan of "
+            f"Exact in all {counted(sum(self.mapped.states), 'mapped state')}. No {meant} of "
             f"these tasks leaves them; elsewhere the word is {default}."
         )
         return "\n".join([*lines, *self._proof()])

@@ -52,12 +52,16 @@ class NotOptimal(Refuted):
         Its cost above the optimal one: (steps, second component).
     reason
         How much too expensive it is and where it leaves all optimal plans, in words.
+    slack
+        The joint steps more that plans may take.
     """
 
-    def __init__(self, step: int, excess: tuple[int, int], reason: str) -> None:
+    def __init__(self, step: int, excess: tuple[int, int], reason: str, slack: int = 0) -> None:
+        meant = f"within slack {slack}" if slack else "optimal"
+        option = f" --slack {slack}" if slack else ""
         super().__init__(
-            f"this plan is not optimal: {reason}",
-            remedy="`coordlang plans DOMAIN PROBLEM` writes the optimal plans.",
+            f"this plan is not {meant}: {reason}",
+            remedy=f"`coordlang plans DOMAIN PROBLEM{option}` writes the plans that are.",
         )
         self.step = step
         self.excess = excess
@@ -236,8 +240,9 @@ def _not_optimal(
             f"{robot} {text or 'idles'}"
             for robot, text in zip(model.robots, plan[step], strict=True)
         )
-        reason = f"{wrong}; with step {step + 1} ({doing}) it leaves all optimal plans, at {state}"
-    return NotOptimal(step, excess, reason)
+        kept = "plans within it" if model.slack else "optimal plans"
+        reason = f"{wrong}; with step {step + 1} ({doing}) it leaves all {kept}, at {state}"
+    return NotOptimal(step, excess, reason, model.slack)
 
 
 def _steps(number: int) -> str:

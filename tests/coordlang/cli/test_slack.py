@@ -76,7 +76,9 @@ def test_a_plan_that_takes_too_long_is_refused(made: Path, coordlang: Command) -
     plan.write_text(library.plans(*CORNERS, slack=2).ipc(longer))
     outcome = coordlang("say", made, *CORNERS, plan)
     assert outcome.code == 1
-    assert "it takes 6 steps, and with slack 1 5 are allowed, as 4 are enough" in outcome.err
+    assert "not within slack 1: it takes 6 steps, and with slack 1 5 are allowed" in outcome.err
+    assert "5 are allowed, as 4 are enough" in outcome.err
+    assert "plans DOMAIN PROBLEM --slack 1`" in outcome.err
 
 
 def test_robots_may_choose_for_themselves(made: Path) -> None:
@@ -112,6 +114,7 @@ def test_commands_that_follow(made: Path, coordlang: Command, tmp_path: Path) ->
     sentence = library.say(made, *CORNERS, plan=plan).sentences[0]
     explained = coordlang("explain", made, *CORNERS, "--task")
     assert explained.code == 0
+    assert "No plan within the slack of these tasks" in " ".join(explained.out.split())
     assert "has 514 plans within slack 1, of at most 5 steps" in explained.out
     trees = tmp_path / "trees.xml"
     assert coordlang("export", made, *CORNERS, sentence, "--to", "bt", "-o", trees).code == 0
