@@ -14,7 +14,7 @@ of docs/concepts.md).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,15 +59,10 @@ def flexibility_bounds(
     Floats
         (tasks), in the order of the spaces.
     """
-    bounds: list[float] = []
-    for space, required in zip(spaces, requires, strict=True):
-        counted = counts(space)
-        for start in space.starts.tolist():
-            plans = Plans(space, start, counted)
-            if not required[start] or plans.count > most_plans:
-                bounds.append(float(min(plans.count, MANY)))
-            else:
-                bounds.append(_average_box(list(plans), most_boxes))
+    bounds = [
+        float(min(count, MANY)) if sizes is None else float(sum(sizes) / count)
+        for count, sizes in _boxes_by_task(spaces, requires, most_plans, most_boxes)
+    ]
     return np.array(bounds, np.float64)
 
 
@@ -90,22 +85,26 @@ def bits_bounds(
     spaces, requires, most_plans, most_boxes
         As in `flexibility_bounds`; the bound of a task with more plans is 0.
     """
-    bounds: list[float] = []
+    bounds = [
+        0.0 if sizes is None else float(np.log2(count / np.array(sizes, np.float64)).mean())
+        for count, sizes in _boxes_by_task(spaces, requires, most_plans, most_boxes)
+    ]
+    return np.array(bounds, np.float64)
+
+
+def _boxes_by_task(
+    spaces: Sequence[PlanSpace], requires: Sequence[Bools], most_plans: int, most_boxes: int
+) -> Iterator[tuple[int, list[int] | None]]:
+    """For each task the number of its plans and, of each, the size of its largest box.
+
+    No sizes (None) where no coordination is required, or there are too many plans.
+    """
     for space, required in zip(spaces, requires, strict=True):
         counted = counts(space)
         for start in space.starts.tolist():
             plans = Plans(space, start, counted)
-            if not required[start] or plans.count > most_plans:
-                bounds.append(0.0)
-            else:
-                sizes = np.array(_box_sizes(list(plans), most_boxes), np.float64)
-                bounds.append(float(np.log2(plans.count / sizes).mean()))
-    return np.array(bounds, np.float64)
-
-
-def _average_box(plans: Sequence[Plan], most_boxes: int) -> float:
-    """The size of the largest box with a plan in it, averaged over the plans."""
-    return float(sum(_box_sizes(plans, most_boxes)) / len(plans))
+            is_unbounded = not required[start] or plans.count > most_plans
+            yield plans.count, None if is_unbounded else _box_sizes(list(plans), most_boxes)
 
 
 def _box_sizes(plans: Sequence[Plan], most_boxes: int) -> list[int]:
