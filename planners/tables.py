@@ -45,6 +45,17 @@ def spans(sizes: NDArray[np.float64], most: int) -> Iterator[slice]:
         start = end
 
 
+def different(numbers: Ints) -> Ints:
+    """The different numbers, sorted.
+
+    `numpy.unique` alone loads the package of masked arrays to ask whether they are masked.
+    """
+    ordered = np.sort(numbers)
+    fresh = np.ones(len(ordered), np.bool_)
+    fresh[1:] = ordered[1:] != ordered[:-1]
+    return ordered[fresh]
+
+
 def unique_rows(rows: Rows) -> tuple[Rows, NDArray[np.int64]]:
     """The different rows, sorted, and for each input row its number among them."""
     if rows.shape[1] == 1:

@@ -151,7 +151,7 @@ class StepClauses:
         stage = self._stage[clause]
         possible[option[stage < 0]] = False
         found = {}
-        for later in np.unique(stage[stage >= 0]).tolist():
+        for later in np.flatnonzero(np.bincount(stage[stage >= 0])).tolist():
             here = stage == later
             first = np.searchsorted(option[here], np.arange(len(row) + 1))
             found[later] = Waiting(first, clause[here])

@@ -26,7 +26,7 @@ from planners.search.reachable import PIECES, PieceSizes, Space
 from planners.search.slack import explore_within, require_rest, seeing, seen_rows
 from planners.search.state_variables import state_variables
 from planners.search.unreachable import searched
-from planners.tables import Bools, Ints, Rows, ranges, unique_rows
+from planners.tables import Bools, Ints, Rows, different, ranges, unique_rows
 
 #: Where fewer than one in so many states are new, only the joint steps into these are looked at.
 _FEW = 8
@@ -126,7 +126,7 @@ def _backward(
         source, target = below.source[live], below.target[live]
         cost = below.cost[live]
         through = cost + value[target]
-        here = np.unique(source)
+        here = different(source)
         np.minimum.at(value, source, through)
         tight = np.flatnonzero(through == value[source])
         into = node[target[tight]]
