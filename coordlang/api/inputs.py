@@ -9,7 +9,6 @@ from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
 from coordlang.api.options import GivenOptions
-from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
 from coordlang.tasks.listed import ListedTask
 from coordlang.tasks.task_file import TASKS, read_task_file, tasks_from_data
 from planners.errors import Position, UsageError
@@ -20,6 +19,7 @@ from planners.pddl.lifted import Domain, Problem
 
 if TYPE_CHECKING:
     from coordlang.language.words import Language
+    from coordlang.tasks.candidates import Candidates
 
 File = str | PathLike[str]
 #: A domain file, a parsed domain, or domain and problems together (`coordlang.load`).
@@ -51,6 +51,8 @@ class PlanningInput:
         self, tasks: TasksSource | None, options: ModelOptions, *, skip_unsolvable: bool = False
     ) -> Candidates:
         """Return the candidate tasks that ``tasks`` names; for None the problems' own."""
+        from coordlang.tasks.candidates import all_pairs, from_listed, from_problems
+
         if tasks is None:
             return from_problems(
                 self.domain, self.problems, options, skip_unsolvable=skip_unsolvable

@@ -6,9 +6,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from os import fspath
-from typing import Any, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
-from coordlang.api.feasibility import feasibility
 from coordlang.api.inputs import (
     DomainSource,
     File,
@@ -21,16 +20,14 @@ from coordlang.api.optimal_plans import OptimalPlans
 from coordlang.api.options import GivenOptions, ModelKeywords, require_one_of
 from coordlang.api.presenting import Presented
 from planners.cache import search
-from planners.inspection import Inspection
-from planners.inspection import inspect as inspect_instance
 from planners.loading import PlanningInstance
 from planners.notebook import counted, html_table
-from planners.pddl.pddl_text import domain_text, problem_text
 from planners.search.guides import GUIDES
 from planners.search.optimal_plans import search as bounded_search
 from planners.search.plans import Plans
-from planners.search.reachable import count as count_reachable
-from planners.writing import write_texts
+
+if TYPE_CHECKING:  # what inspects is not loaded where plans are counted
+    from planners.inspection import Inspection
 
 #: The most columns of the names on the left.
 _WIDEST_NAME = 30
@@ -116,6 +113,8 @@ class Inspected(Presented):
         return html_table((), self._lines())
 
     def _lines(self) -> list[tuple[str, str]]:
+        from coordlang.api.feasibility import feasibility
+
         found = self.inspection
         none_named = {"error": "not allowed (--unowned)"}
         lines = [
@@ -185,6 +184,11 @@ def inspect(
         A folder for what was read, as ``domain.pddl`` and ``problem.pddl``: of factored files, one
         domain and one problem in place of them all.
     """
+    from planners.inspection import inspect as inspect_instance
+    from planners.pddl.pddl_text import domain_text, problem_text
+    from planners.search.reachable import count as count_reachable
+    from planners.writing import write_texts
+
     loaded = read_instance(domain, problem, factored, GivenOptions.of(**model))
     size = None
     if states:

@@ -118,9 +118,12 @@ def kept_plans(function: CommandFunction) -> CommandFunction:
         from planners.limits import require_libraries
 
         require_libraries()  # before what imports them
-        from planners.cache import Folder, default_folder, keeping_plans
+        if no_cache:
+            return function(**arguments)
+        from planners.cache import keeping_plans
+        from planners.cache.folder import Folder, default_folder
 
-        place = None if no_cache else default_folder()
+        place = default_folder()
         with keeping_plans(None if place is None else Folder(place)):
             return function(**arguments)
 

@@ -13,7 +13,8 @@ import numpy as np
 from coordlang.required.miscoordination import Miscoordination, miscoordination
 from coordlang.tolerance.failures import NONE, Failures, failures
 from coordlang.tolerance.sampled import FailureEstimate
-from planners.cache import Folder, keeping_plans, search, shared_folder
+from planners.cache import keeping_plans, search, shared_folder
+from planners.cache.folder import Folder
 from planners.joint.model import JointModel, PlanningTask
 from planners.loading import PlanningInstance
 from planners.pieces.work import Runner, Table, Work, digest, tables

@@ -7,12 +7,14 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-from planners.cache.folder import Folder
-from planners.cache.plan_spaces import as_table, key_of, model_digest, plan_space
 from planners.joint.model import JointModel, PlanningTask
 from planners.search import optimal_plans
 from planners.search.plan_space import PlanSpace
+
+if TYPE_CHECKING:  # what reads and writes files is loaded where plans are kept
+    from planners.cache.folder import Folder
 
 
 @dataclass(slots=True)
@@ -23,6 +25,8 @@ class _Cache:
     digests: dict[int, tuple[JointModel, str]] = field(default_factory=dict)
 
     def key(self, model: JointModel, task: PlanningTask) -> str:
+        from planners.cache.plan_spaces import key_of, model_digest
+
         found = self.digests.get(id(model))
         if found is None:
             found = self.digests[id(model)] = model, model_digest(model)
@@ -62,6 +66,8 @@ def search(model: JointModel, task: PlanningTask) -> PlanSpace:
     used = _USED.get()
     if used is None:
         return optimal_plans.search(model, task)
+    from planners.cache.plan_spaces import as_table, plan_space
+
     key = used.key(model, task)
     table = used.folder.read(key)
     if table is not None:

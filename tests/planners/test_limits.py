@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -331,3 +332,18 @@ def test_combinations_that_do_not_fit_are_not_made() -> None:
         OutOfMemory, match="3 of 3 robots have 24 combinations of subactions in 1 state: about"
     ):
         search(loaded.model, loaded.tasks[0])
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
+def test_what_linux_says_of_memory_is_what_psutil_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    import psutil
+
+    from planners import limits as module
+
+    assert module.address_space() == pytest.approx(psutil.Process().memory_info().vms, rel=0.02)
+    left = psutil.virtual_memory().available
+    assert module._machine_memory_left() == pytest.approx(left, rel=0.1)
+    for name in ("_MEMORY_OF_MACHINE", "_MEMORY_OF_PROCESS"):
+        monkeypatch.setattr(module, name, Path("/nowhere"))
+    assert module.address_space() == pytest.approx(psutil.Process().memory_info().vms, rel=0.02)
+    assert module._machine_memory_left() == pytest.approx(left, rel=0.1)

@@ -244,6 +244,24 @@ def test_help_is_light() -> None:
     assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime >= before
 
 
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
+def test_plans_of_small_tasks_load_little() -> None:
+    """What counts the plans of a small task starts no thread and loads only what it uses."""
+    files = [str(DOMAINS / "grid" / f"{name}.pddl") for name in ("domain", "corners-4x4")]
+    code = (
+        f"import os, sys; sys.argv = ['coordlang', 'plans', *{files}, '--count', '--no-cache']\n"
+        "from coordlang.__main__ import main\n"
+        "try: main()\n"
+        "finally: print([m for m in ('tarski', 'psutil', 'numpy.ma', 'pysat', 'networkx', 'scipy', 'rich', 'zipfile', "
+        "'coordlang.tasks.candidates') if m in sys.modules], len(os.listdir('/proc/self/task')), file=sys.stderr)"
+    )
+    environment = {k: v for k, v in os.environ.items() if k != "OPENBLAS_NUM_THREADS"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment
+    )
+    assert (done.stdout, done.stderr) == ("236\n", "[] 1\n")
+
+
 def test_commands_are_all_listed(coordlang: Command) -> None:
     from coordlang.cli.group import COMMANDS
 

@@ -19,7 +19,8 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from planners.cache import Folder, default_folder, keeping_plans, search, searching, shared_folder
+from planners.cache import keeping_plans, search, searching, shared_folder
+from planners.cache.folder import Folder, default_folder
 from planners.cache.plan_spaces import as_table, key_of, model_digest, plan_space
 from planners.errors import BadInput, Note, ProvedImpossible
 from planners.joint.model import Cost, PlanningTask
