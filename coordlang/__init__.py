@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from coordlang.api.planning import load as load
     from coordlang.api.planning import plans as plans
     from coordlang.api.robot_choices import choices as choices
+    from coordlang.api.simulating import simulate as simulate
     from coordlang.api.speaking import plan as plan
     from coordlang.api.speaking import say as say
     from coordlang.api.speaking import understand as understand
@@ -71,6 +72,7 @@ _DEFINED_IN = {
     "coordlang.api.lifting": ("lift", "ground"),
     "coordlang.api.speaking": ("say", "understand", "plan"),
     "coordlang.api.robot_choices": ("choices",),
+    "coordlang.api.simulating": ("simulate",),
     "coordlang.api.explaining": ("explain",),
     "coordlang.api.exporting": ("export",),
     "coordlang.language.words": ("Language",),
@@ -125,6 +127,7 @@ __all__ = [
     "plan",
     "plans",
     "say",
+    "simulate",
     "time_limit",
     "understand",
     "verify",

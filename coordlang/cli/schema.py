@@ -17,6 +17,7 @@ SCHEMAS = {
     "certificate": "coordlang.certificate.file",
     "lifted": "coordlang.lifted.file",
     "choices": "coordlang.use.choices.record",
+    "simulation": "coordlang.use.simulation.record",
     "plans": "planners.search.plan_file",
     "coordinates": "coordlang.coordinates",
     "error": "coordlang.cli.error_object",

@@ -21,11 +21,11 @@ from coordlang.explanation.lifted_words import LiftedWords
 from coordlang.explanation.text import term_text
 from coordlang.explanation.words import all_covers, mapped_states
 from coordlang.language.words import Language
+from coordlang.places.world import World, find_world
 from coordlang.report.layout import graph_layout, spread
 from coordlang.report.places import place_layout
 from coordlang.report.shown import Selection
 from coordlang.report.task import Tables, TaskPart, task_data, task_summary
-from coordlang.report.world import World, find_world
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.joint.model import JointModel, own_text
 from planners.joint.states import split_atoms

@@ -12,8 +12,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from coordlang.coordinates import Point
+from coordlang.places.world import World, find_world
 from coordlang.report.places import place_layout
-from coordlang.report.world import World, find_world
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import UsageError
 from planners.search.plans import Plans

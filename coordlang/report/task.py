@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from coordlang.language.partition import Partition
+from coordlang.places.world import World
 from coordlang.report.graph import Graph, ShownSentences, plan_graph, shown_sentences
 from coordlang.report.played import Played, play
 from coordlang.report.shown import ShownTask
-from coordlang.report.world import World
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.tasks.listed import goal_text
 from coordlang.tolerance.failure import TooManyToCount, failure_probability

@@ -16,6 +16,7 @@ from tests.support.domains import ROOT
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 #: Distributions whose packages have other names.
 PACKAGES: dict[str, set[str]] = {
+    "ir-sim": {"irsim"},
     "python-sat": {"pysat"},
     "unified-planning": {"unified_planning"},
     "up-fast-downward": set(),  # an engine that unified-planning finds by itself
@@ -50,7 +51,9 @@ def test_dependencies_are_those_that_are_imported() -> None:
     listed = [re.split(r"[^\w-]", line)[0] for line in PROJECT["dependencies"]]
     assert listed == sorted(listed)
     declared = {package for name in listed for package in PACKAGES.get(name, {name})}
-    extra = {re.split(r"[^\w-]", line)[0] for line in PROJECT["optional-dependencies"]["cluster"]}
+    optional = PROJECT["optional-dependencies"]
+    named = [re.split(r"[^\w-]", line)[0] for line in (*optional["cluster"], *optional["sim"])]
+    extra = {package for name in named for package in PACKAGES.get(name, {name})}
     assert extra <= used  # imported where it is used only
     assert declared == used - extra - OWN - set(sys.stdlib_module_names)
 

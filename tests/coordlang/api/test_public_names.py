@@ -32,6 +32,7 @@ FUNCTIONS = {
     "load_language",
     "lift",
     "ground",
+    "simulate",
 }
 
 

@@ -27,11 +27,15 @@ from coordlang.use.choices.choices import choices
 from coordlang.use.choices.file import to_bytes
 from coordlang.use.choices.monitor import Monitor, MonitorError
 from coordlang.use.sentence.task_language import languages_in_tasks
+from coordlang.use.simulation.record import read_simulation
+from coordlang.use.simulation.record import to_bytes as simulated_bytes
 from planners.errors import BadInput
 from planners.search.plan_file import read_plans, to_json
 from planners.search.plans import Plans
 from tests.support.command import Command
 from tests.support.domains import DOMAINS, ROOT, all_tasks
+
+T_MAP = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
 
 
 @cache
@@ -76,6 +80,11 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any
             ).language
         ).decode(),
         "choices": to_bytes(choices(task, words)).decode(),
+        "simulation": simulated_bytes(
+            api.simulate(
+                api.build(*T_MAP, method="greedy").language, *T_MAP, without=True, seed=1
+            ).record
+        ).decode(),
         "plans": json.dumps(to_json(plans, [plans.unrank(0)])),
         "coordinates": json.dumps({"coordinates": {"a": [0, 0], "b": [1, 0.5]}}),
     }
@@ -87,6 +96,7 @@ READ: dict[str, Callable[[Path], object]] = {
     "certificate": read_certificate,
     "lifted": read_lifted,
     "choices": lambda path: Monitor.read(str(path), "r1"),
+    "simulation": read_simulation,
     "plans": lambda path: read_plans(path, all_tasks("three-cells").model),
     "coordinates": read_coordinates,
 }
@@ -114,6 +124,11 @@ WRONG: list[tuple[str, Callable[[dict[str, Any]], object]]] = [
     ("choices", lambda d: d.pop("choices")),
     ("choices", lambda d: d["choices"][0].pop("states")),
     ("choices", lambda d: d["choices"][0]["states"][0].update(next=[])),
+    ("simulation", lambda d: d.update(version=2)),
+    ("simulation", lambda d: d.pop("runs")),
+    ("simulation", lambda d: d["runs"][0].pop("late")),
+    ("simulation", lambda d: d["runs"][0].update(deadlock=0)),
+    ("simulation", lambda d: d["runs"][0]["poses"]["r1"].append([0, 0])),
     ("plans", lambda d: d.pop("plans")),
     ("plans", lambda d: d["plans"][0].update(actions="(move r1 a b)")),
     ("plans", lambda d: d["plans"][0]["actions"][0].append(5)),

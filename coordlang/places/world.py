@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-from coordlang.report.locations import LocationPredicate, Locations, find_locations
+from coordlang.places.locations import LocationPredicate, Locations, find_locations
 from planners.grounding import GroundAction
 from planners.joint.model import JointModel, show
 from planners.pddl.lifted import TRUE, Atom

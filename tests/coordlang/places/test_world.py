@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from coordlang.report.world import World, find_world
+from coordlang.places.world import World, find_world
 from planners.loading import PlanningInstance, load
 from planners.search.reachable import explore
 from tests.support.domains import DOMAINS

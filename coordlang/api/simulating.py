@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Robots in a simulator, under a sentence or without one: ``simulate``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Unpack
+
+import msgspec
+
+from coordlang.api.grounding import CoordinatesSource, coordinates_of
+from coordlang.api.inputs import DomainSource, File, ProblemSource, read_planning
+from coordlang.api.language_inputs import LanguageSource, language_for
+from coordlang.api.options import GivenOptions, ModelKeywords, require_seed
+from coordlang.api.presenting import Presented
+from coordlang.api.speaking import SentenceSource
+from coordlang.language.tolerance import Tolerance
+from coordlang.use.sentence.best_sentence import best_sentence
+from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
+from coordlang.use.simulation.floor import floor_of
+from coordlang.use.simulation.record import RunRecord, SimulationRecord, to_bytes
+from coordlang.use.simulation.runs import record_of, runs_of
+from coordlang.use.simulation.settings import Settings
+from coordlang.use.simulation.simulator import require_simulator
+from coordlang.use.simulation.team import Agreement, Mission, mission
+from planners.errors import UsageError
+from planners.limits import run_until_stopped
+from planners.writing import write_atomically
+
+#: Called with the number of runs done, and of all.
+RunProgress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, repr=False)
+class Simulated(Presented):
+    """Runs of robots in a simulator.
+
+    ``record`` holds all of it; ``stopped`` is the error that ended the work before all runs were
+    done, None without one.
+    """
+
+    record: SimulationRecord
+    tolerance: Tolerance | None = None
+    stopped: BaseException | None = None
+
+    @property
+    def runs(self) -> list[RunRecord]:
+        """The runs."""
+        return self.record.runs
+
+    @property
+    def covered(self) -> bool:
+        """Whether the language guarantees the task."""
+        return self.record.covered
+
+    @cached_property
+    def counts(self) -> dict[str, int]:
+        """In how many runs all arrived, some collided, nobody moved any more, and were late."""
+        return {
+            "runs": len(self.runs),
+            "arrived": sum(run.arrived for run in self.runs),
+            "collisions": sum(run.collisions > 0 for run in self.runs),
+            "deadlocks": sum(run.deadlock for run in self.runs),
+            "late": sum(run.late > 0 for run in self.runs),
+            "messages": sum(run.messages for run in self.runs),
+        }
+
+    def facts(self) -> Mapping[str, object]:
+        """Return the main facts, as a notebook shows them."""
+        return {"sentence": self.record.sentence, "step": self.record.step, **self.counts}
+
+    def data(self) -> dict[str, Any]:
+        """Return the record as JSON data."""
+        found: dict[str, Any] = msgspec.to_builtins(self.record)
+        return found
+
+    def save(self, path: File) -> None:
+        """Write the record as JSON."""
+        write_atomically(path, to_bytes(self.record))  # type: ignore[arg-type]
+
+
+def simulate(
+    language: LanguageSource,
+    domain: DomainSource | None = None,
+    problem: ProblemSource | None = None,
+    *,
+    sentence: SentenceSource | None = None,
+    without: bool = False,
+    plan: bool = False,
+    runs: int = 1,
+    seed: int = 0,
+    step: str = "clock",
+    cell: float = 1.0,
+    radius: float | None = None,
+    noise: float = 0.1,
+    lidar: bool = True,
+    coordinates: CoordinatesSource | None = None,
+    factored: File | None = None,
+    progress: RunProgress | None = None,
+    **model: Unpack[ModelKeywords],
+) -> Simulated:
+    """Let simulated robots with wheels do a task, each by its own logic.
+
+    Every robot knows the task, the language, the sentence, and so its own choices, and draws one of
+    its own subplans.
+
+    Parameters
+    ----------
+    language, domain, problem, factored, **model
+        As in `verify`, with one problem.
+    sentence
+        ``"w1 w0"`` or ``("w1", "w0")``; by default that which leaves most plans open.
+    without, plan
+        In place of a sentence: each robot follows an optimal plan of its own; or all follow one.
+    runs, seed
+        How many runs; they have the seeds ``seed``, ``seed + 1``, ..
+    step
+        How robots keep step: ``"clock"``, ``"barrier"`` (before each step) or ``"word"`` (a barrier
+        before each word).
+    cell, radius
+        Metres for one unit of coordinates, and the robots' radius in metres (a fifth of ``cell``).
+    noise
+        The standard deviation of what wheels do, as a share of what they are told.
+    lidar
+        Whether robots stop before what they see straight ahead.
+    coordinates
+        Where places lie, as in `report`; by default those of a file ``coordinates.json`` beside the
+        problem, else what names such as ``c2-3`` say.
+    progress
+        Called with the number of runs done, and of all.
+
+    Raises
+    ------
+    UsageError
+        If ir-sim is not installed (``pip install 'coordlang[sim]'``), or options contradict.
+    BadInput
+        If it is not known where the places lie, or where the robots are.
+    NoPlanFits
+        If no optimal plan has the sentence.
+    """
+    settings = Settings(
+        step, cell, cell / 5 if radius is None else radius, noise=noise, lidar=lidar
+    )
+    agreement = _agreement(sentence, without, plan)
+    require_seed(seed)
+    if runs < 1:
+        raise UsageError(f"--runs {runs}: expected 1 or more", remedy="Say 1.")
+    require_simulator()
+    files = read_planning(domain, [problem], factored, GivenOptions.of(**model), most=1)
+    known = coordinates_of(coordinates, files.problems[0])
+    read, position = language_for(language, files, coordinates=known)
+    used = language_in_task(read, files.domain, files.problems[0], files.options_of(read), position)
+    prepared = _prepared(used, agreement, sentence)
+    floor = floor_of(prepared.world, known, cell)
+    done: list[RunRecord] = []
+
+    def work() -> None:
+        for finished in runs_of(prepared, floor, settings, runs, seed):
+            done.append(finished)
+            if progress is not None:
+                progress(len(done), runs)
+
+    stopped = run_until_stopped(work)
+    if stopped is not None and not done:
+        raise stopped
+    return Simulated(record_of(prepared, floor, settings, done), used.tolerance, stopped)
+
+
+def _agreement(sentence: SentenceSource | None, without: bool, plan: bool) -> Agreement:
+    if (sentence is not None) + without + plan > 1:
+        raise UsageError(
+            "--sentence, --without and --plan exclude each other",
+            remedy="Say what the robots have agreed on: a sentence, nothing, or a whole plan.",
+        )
+    if without:
+        return "nothing"
+    return "plan" if plan else "sentence"
+
+
+def _prepared(used: TaskLanguage, agreement: Agreement, sentence: SentenceSource | None) -> Mission:
+    words: Sequence[int] = ()
+    if agreement == "sentence":
+        given = sentence is not None
+        words = (
+            used.words_of(sentence or ()) if given else best_sentence(used, ["most-plans"]).words
+        )
+    return mission(used, agreement, words)

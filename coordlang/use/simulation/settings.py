@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a run is made with: sizes, speeds, noise, and the way to keep step."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from coordlang.use.simulation.pace import PACES
+from coordlang.use.simulation.tracking import Drive
+from planners.errors import UsageError
+
+#: Noise of the position that a robot believes in, in metres for each unit of `Settings.noise`.
+POSITION_NOISE = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How robots are built and keep step.
+
+    Attributes
+    ----------
+    step
+        The way to keep step: ``clock``, ``barrier`` or ``word``.
+    cell
+        Metres for one unit of the coordinates of places.
+    radius
+        The radius of a robot, in metres.
+    speed, turn
+        Its greatest speed (m/s) and rate of turning (rad/s).
+    noise
+        The standard deviation of what wheels do, as a share of what they are told, drawn anew in
+        each tick; a tenth of it, in metres and in radians, is that of where a robot believes to be.
+    lidar
+        Whether robots stop before what a lidar sees straight ahead.
+    tick
+        Seconds between two looks at sensors and commands to wheels.
+    """
+
+    step: str = "clock"
+    cell: float = 1.0
+    radius: float = 0.2
+    speed: float = 1.0
+    turn: float = 3.0
+    noise: float = 0.1
+    lidar: bool = True
+    tick: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Raise `UsageError` for what no robot can be built with."""
+        if self.step not in PACES:
+            raise UsageError(
+                f"--step {self.step}: there is no such way to keep step",
+                remedy=f"Say {', '.join(PACES[:-1])} or {PACES[-1]}.",
+            )
+        for name in ("cell", "radius", "speed", "turn", "tick"):
+            value = getattr(self, name)
+            if not 0 < value < math.inf:
+                raise UsageError(
+                    f"{name} {value:g}: expected a length, speed or time above 0",
+                    remedy="Leave it out for the usual value.",
+                )
+        if not 0 <= self.noise <= 1:
+            raise UsageError(
+                f"--noise {self.noise:g}: expected a share from 0 to 1",
+                remedy="Say 0 for wheels that do what they are told.",
+            )
+
+    @property
+    def drive(self) -> Drive:
+        """The robots' wheels."""
+        return Drive(self.speed, self.turn)
+
+    @property
+    def clearance(self) -> float:
+        """How near to its middle a robot lets come what is straight ahead, in metres."""
+        return min(self.radius + 0.15 * self.cell, 0.45 * self.cell)
+
+    def period(self, longest: float) -> float:
+        """Seconds that a joint step takes whose longest way has this length: whole ticks."""
+        return round(math.ceil(self.drive.period(longest) / self.tick) * self.tick, 6)

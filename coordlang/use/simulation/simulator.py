@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The simulator: discs with two driven wheels between walls, by ir-sim, without a window.
+
+ir-sim moves the robots, with noise on what their wheels are told, says which of them touch
+something, and casts the rays of their lidars.  Robots that touch something stand still for the rest
+of the run.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import tempfile
+from collections.abc import Mapping
+from contextlib import redirect_stdout
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from coordlang.use.simulation.floor import Floor
+from coordlang.use.simulation.settings import Settings
+from coordlang.use.simulation.tracking import Pose, Velocity
+from planners.errors import UsageError
+
+#: Beams of a lidar, and the angle that they cover, in radians.
+_BEAMS, _ANGLE = 13, 2.2
+#: What a lidar sees beside its robot's way within this many metres counts as in its way.
+_BESIDE = 0.02
+
+
+def require_simulator() -> Any:
+    """Return the class of ir-sim's worlds.
+
+    Raises
+    ------
+    UsageError
+        If ir-sim is not installed.
+    """
+    import matplotlib
+
+    backend = matplotlib.get_backend()
+    try:
+        with redirect_stdout(StringIO()):  # it says there which windows it cannot open
+            from irsim.env.env_base import EnvBase
+    except ImportError:
+        raise UsageError(
+            "simulating needs the package ir-sim, which is not installed",
+            remedy="Install it: pip install 'coordlang[sim]'.",
+        ) from None
+    matplotlib.use(backend)  # importing it chooses another one
+    return EnvBase
+
+
+class Simulator:
+    """A world with robots, which time passes in tick by tick.
+
+    Parameters
+    ----------
+    floor
+        Its places and walls.
+    poses
+        Where each robot is at the start.
+    settings
+        Sizes, noise and the length of a tick.
+    seed
+        Of the noise on the wheels.
+    """
+
+    def __init__(
+        self, floor: Floor, poses: Mapping[str, Pose], settings: Settings, seed: int
+    ) -> None:
+        self._settings = settings
+        self._environment = _environment(_world(floor, poses, settings), seed)
+        self._robots = {robot.name: robot for robot in self._environment.robot_list}
+        for robot in self._robots.values():
+            robot.sensors = []  # lidars are asked for, not cast in every tick
+
+    def tick(self, velocities: Mapping[str, Velocity]) -> None:
+        """Let a tick pass in which the wheels are told these velocities."""
+        self._environment.step({name: list(told) for name, told in velocities.items()})
+
+    def pose(self, robot: str) -> Pose:
+        """Return where a robot is, exactly."""
+        x, y, heading = self._robots[robot].state[:3, 0].tolist()
+        return x, y, heading
+
+    def ahead(self, robot: str) -> float:
+        """Return how far ahead of a robot's middle its lidar sees something in its way."""
+        own = self._robots[robot]
+        own.lidar.step(own.state[0:3])
+        scan = own.lidar.get_scan()
+        found = math.inf
+        hits = zip(own.lidar.angle_list, scan["ranges"], scan["valid"], strict=True)
+        for angle, length, is_hit in hits:
+            beside = abs(length * math.sin(angle))
+            if is_hit and beside < self._settings.radius + _BESIDE:
+                found = min(found, float(length * math.cos(angle)))
+        return found
+
+    def touching(self) -> set[tuple[str, str]]:
+        """Return the pairs that touch: robots by name, and ``wall``; the smaller one first."""
+        found = set()
+        for name, robot in self._robots.items():
+            for other in robot.collision_obj:
+                what = "wall" if other.name.startswith("wall ") else other.name
+                found.add((min(name, what), max(name, what)))
+        return found
+
+
+def _environment(world: dict[str, Any], seed: int) -> Any:
+    """Return ir-sim's world; it reads one from a file only."""
+    simulator = require_simulator()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "world.yaml")
+        path.write_text(json.dumps(world))  # which is YAML, too
+        return simulator(str(path), headless=True, log_level="CRITICAL", seed=seed)
+
+
+def _world(floor: Floor, poses: Mapping[str, Pose], settings: Settings) -> dict[str, Any]:
+    spread = settings.noise**2
+    drive = settings.drive
+    lidar = {
+        "type": "lidar2d",
+        "range_max": 2 * settings.cell,
+        "angle_range": _ANGLE,
+        "number": _BEAMS,
+    }
+    robots = [
+        {
+            "name": name,
+            "kinematics": {
+                "name": "diff",
+                "noise": settings.noise > 0,
+                "alpha": [spread, 0, spread, spread],
+            },
+            "shape": {"name": "circle", "radius": settings.radius},
+            "state": list(pose),
+            "vel_max": [drive.speed, drive.turn],
+            "vel_min": [-drive.speed, -drive.turn],
+            "sensors": [lidar],
+        }
+        for name, pose in poses.items()
+    ]
+    walls = [
+        {
+            "name": f"wall {number}",
+            "shape": {"name": "linestring", "vertices": [list(wall[:2]), list(wall[2:])]},
+            "state": [0, 0, 0],
+        }
+        for number, wall in enumerate(floor.walls)
+    ]
+    world = {"step_time": settings.tick, "collision_mode": "stop"}
+    return {"world": world, "robot": robots, "obstacle": walls}

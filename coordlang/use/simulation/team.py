@@ -1,0 +1,254 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What each robot is given before a run: its choices, and how far in the sentence they lead.
+
+Under a sentence that is the robot's own choices, which it can work out from language, task and
+sentence.  For comparison all robots follow one whole plan, or each an optimal plan of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from random import Random
+from typing import Any, Literal
+
+from coordlang.places.world import World, find_world
+from coordlang.use.choices.choices import choices
+from coordlang.use.choices.file import to_data
+from coordlang.use.choices.monitor import FORMAT, IDLE, VERSION, Monitor
+from coordlang.use.sentence.task_language import TaskLanguage
+from coordlang.use.simulation.pace import OwnWords
+from planners.errors import BadInput
+from planners.joint.model import JointModel
+from planners.search.plan_space import PlanSpace
+from planners.search.plans import Plan, Plans
+
+#: What the robots have agreed on: a sentence, a whole plan, or nothing.
+Agreement = Literal["sentence", "plan", "nothing"]
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What one robot is given for one run: a monitor of its own, and its words."""
+
+    monitor: Monitor
+    words: OwnWords | None
+
+
+@dataclass(frozen=True, slots=True)
+class Mission:
+    """A task, what the robots have agreed on, and where they are.
+
+    Attributes
+    ----------
+    task_language
+        The language and the task.
+    agreement
+        What is agreed on.
+    sentence
+        The word numbers of the sentence, empty for another agreement.
+    world
+        Where things are, and what moves.
+    starts, goals
+        The place of each robot at the start and at the end of the plans; where plans differ, of
+        the first one.
+    leads
+        For each robot the place that each of its subactions leads to.
+    steps
+        The length of the plans in joint steps.
+    """
+
+    task_language: TaskLanguage
+    agreement: Agreement
+    sentence: tuple[int, ...]
+    world: World
+    starts: Mapping[str, str]
+    goals: Mapping[str, str]
+    leads: Mapping[str, Mapping[str, str]]
+    steps: int
+    _plans: Plans
+    _given: Mapping[str, Given]
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The robots, in the order of joint actions."""
+        return self.task_language.model.robots
+
+    def team(self, seed: int) -> dict[str, Given]:
+        """Return what each robot is given in the run with this seed."""
+        if self.agreement == "sentence":
+            return {
+                name: Given(given.monitor.copy(), given.words)
+                for name, given in self._given.items()
+            }
+        model = self.task_language.model
+        if self.agreement == "plan":
+            plan = self._drawn(f"{seed} plan")
+            words = self._words_on(plan)
+            return {
+                name: _following(name, _own(model, plan, robot), words)
+                for robot, name in enumerate(self.robots)
+            }
+        return {
+            name: _following(name, _own(model, self._drawn(f"{seed} plan {name}"), robot), None)
+            for robot, name in enumerate(self.robots)
+        }
+
+    def mixes(self, subplans: Mapping[str, Sequence[str | None]]) -> bool:
+        """Say whether subplans of all robots, done in step, are an optimal plan of the task."""
+        model = self.task_language.model
+        numbers = [
+            [model.label_number(robot, text) for text in subplans[name]]
+            for robot, name in enumerate(self.robots)
+        ]
+        steps = [tuple(step) for step in zip(*numbers, strict=True)]
+        found = [step for step in steps if None not in step]
+        return len(found) == self.steps and (
+            self._plans.space.path_with(self._plans.start, found) is not None
+        )
+
+    def _drawn(self, seed: str) -> Plan:
+        return self._plans.unrank(Random(seed).randrange(self._plans.count))
+
+    def _words_on(self, plan: Plan) -> tuple[int, ...]:
+        """Return how many words are passed before each step of a plan and at its end."""
+        space, start = self._plans.space, self._plans.start
+        path = space.path_with(start, plan)
+        assert path is not None, "it was drawn from this space"
+        word = self.task_language.word[space.nodes_on(start, path)].tolist()
+        passed = [0]
+        for before, after in pairwise(word):
+            passed.append(passed[-1] + (before != after))
+        return tuple(passed)
+
+
+def mission(
+    task_language: TaskLanguage, agreement: Agreement, sentence: Sequence[int] = ()
+) -> Mission:
+    """Prepare the robots for runs of a task.
+
+    Raises
+    ------
+    NoPlanFits
+        If no optimal plan has the sentence.
+    BadInput
+        If no atom says where a robot is.
+    """
+    model, space = task_language.model, task_language.space
+    plans = Plans.of(space, task_language.task)
+    path = space.nodes_on(task_language.start, space.first_path(task_language.start))
+    states = [model.codec.decode(space.rows[space.state[node]]) for node in path]
+    world = find_world(model, states)
+    given: dict[str, Given] = {}
+    if agreement == "sentence":
+        found = choices(task_language, sentence)
+        for robot, name in enumerate(model.robots):
+            words = own_words(found.fits, task_language, robot)
+            given[name] = Given(Monitor(to_data(found, [robot]), name), words)
+    return Mission(
+        task_language,
+        agreement,
+        tuple(sentence),
+        world,
+        _starts(world, model.robots, states[0]),
+        _robots_in(world, model.robots, states[-1]),
+        {name: _leads(world, space, robot) for robot, name in enumerate(model.robots)},
+        space.cost_of(task_language.task)[0],
+        plans,
+        given,
+    )
+
+
+def own_words(fits: PlanSpace, task_language: TaskLanguage, robot: int) -> OwnWords:
+    """How far in the sentence a robot may be after each of its own beginnings.
+
+    Subset construction over the plans with the sentence: a state is the set of nodes in which they
+    can be after the same own subactions.
+    """
+    model = task_language.model
+    word = task_language.partition.word_of(fits.rows)[fits.state]
+    passed = {int(fits.starts[0]): 0}
+    first = frozenset(passed)
+    numbers, moves, words = {first: 0}, [], []
+    for nodes in _growing(numbers):
+        targets: dict[str, set[int]] = {}
+        for node in sorted(nodes):
+            for edge in fits.out_edges(node):
+                text = model.label_text(robot, fits.labels_of(edge)[robot]) or IDLE
+                target = fits.target_of(edge)
+                passed[target] = passed[node] + int(word[target] != word[node])
+                targets.setdefault(text, set()).add(target)
+        words.append(max(passed[node] for node in nodes))
+        moves.append(
+            {
+                text: numbers.setdefault(frozenset(found), len(numbers))
+                for text, found in sorted(targets.items())
+            }
+        )
+    return OwnWords(moves, words)
+
+
+def _growing(numbers: dict[frozenset[int], int]) -> Iterator[frozenset[int]]:
+    """The keys of a dictionary that grows meanwhile, in the order of their numbers."""
+    done = 0
+    while done < len(numbers):
+        waiting = list(numbers)[done:]
+        done = len(numbers)
+        yield from waiting
+
+
+def _own(model: JointModel, plan: Plan, robot: int) -> list[str | None]:
+    return [model.label_text(robot, step[robot]) for step in plan]
+
+
+def _following(robot: str, subactions: Sequence[str | None], words: Sequence[int] | None) -> Given:
+    """What a robot is given that has one subplan: a choices file without a choice."""
+    steps = [text or IDLE for text in subactions]
+    states: list[dict[str, Any]] = [
+        {"step": number, "left": 1, "next": {text: number + 1}, "true": [], "unknown": []}
+        for number, text in enumerate(steps)
+    ]
+    states.append({"step": len(steps), "left": 1, "next": {}, "true": [], "unknown": []})
+    entry = {
+        "robot": robot,
+        "steps": len(steps),
+        "subplans": 1,
+        "atoms": "own",
+        "facts": [],
+        "others": [],
+        "states": states,
+    }
+    data = {"format": FORMAT, "version": VERSION, "sentence": "", "choices": [entry]}
+    moves = [{text: number + 1} for number, text in enumerate(steps)]
+    own = None if words is None else OwnWords([*moves, {}], words)
+    return Given(Monitor(data, robot), own)
+
+
+def _starts(world: World, robots: Sequence[str], state: Sequence[str]) -> dict[str, str]:
+    located = _robots_in(world, robots, state)
+    lost = [name for name in robots if name not in located]
+    if lost:
+        raise BadInput(
+            f"no atom says where {' and '.join(lost)} is at the start",
+            remedy="Simulate a domain whose robots move from place to place.",
+        )
+    return located
+
+
+def _robots_in(world: World, robots: Sequence[str], state: Sequence[str]) -> dict[str, str]:
+    """The places of the robots in a state."""
+    located = world.located(state)
+    return {name: located[name] for name in robots if name in located}
+
+
+def _leads(world: World, space: PlanSpace, robot: int) -> dict[str, str]:
+    """The place to which each of a robot's subactions on the plans leads, by its text."""
+    model = space.model
+    found = {}
+    for label in sorted(set(space.robot_labels(robot).tolist())):
+        text = model.label_text(robot, label)
+        for thing, place in world.moves(model, robot, label):
+            if text is not None and thing == model.robots[robot]:
+                found[text] = place
+    return found

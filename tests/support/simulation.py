@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Missions on shipped maps, each prepared once in a process."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from coordlang.building import build_language
+from coordlang.use.sentence.best_sentence import best_sentence
+from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
+from coordlang.use.simulation.floor import Floor, floor_of
+from coordlang.use.simulation.settings import Settings
+from coordlang.use.simulation.team import Agreement, Mission, mission
+from tests.support.domains import own_task, read
+
+
+@cache
+def language_of_task(folder: str, stem: str = "problem") -> TaskLanguage:
+    """The smallest language of a shipped problem's own task, in that task."""
+    built = build_language(own_task(folder, stem), "minimal")
+    return language_in_task(built.language, *read(folder, stem))
+
+
+@cache
+def mission_of(folder: str, stem: str = "problem", agreement: Agreement = "sentence") -> Mission:
+    """A mission in a shipped problem; a sentence is the one that leaves most plans open."""
+    used = language_of_task(folder, stem)
+    words = best_sentence(used, ["most-plans"]).words if agreement == "sentence" else ()
+    return mission(used, agreement, words)
+
+
+def floor_for(of: Mission, settings: Settings | None = None) -> Floor:
+    return floor_of(of.world, {}, (settings or Settings()).cell)
