@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lifted actions -> ground actions.
 
-clingo finds the reachable arguments, we evaluate the rest exactly.
+Tarski finds the reachable arguments, we evaluate the rest exactly.
 """
 
 from planners.grounding.actions import GroundAction, GroundEffect

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Check that a relaxed model is closed: that no rule derives an atom which it lacks.
 
-The check shares no code with clingo and its program, which find the model.  A set of atoms that
-holds the initial ones and is closed contains the least such set, so nothing reachable is missing.
+The check shares no code with Tarski and clingo, which find the model.  A set of atoms that holds
+the initial ones and is closed contains the least such set, so nothing reachable is missing.
 """
 
 from __future__ import annotations

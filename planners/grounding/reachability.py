@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The arguments with which each action can ever be applied.
 
-They are found by a reachability program (clingo; Helmert 2009, section 6), as Tarski writes it.
+They are found by Tarski's reachability program (clingo).
 
-Its rules are a relaxed core of the domain: types as static predicates, the positive atoms of each
-conjunctive precondition, and add effects.  What is left out (negation, disjunction, quantifiers,
-inequality, other robots' actions) only makes the answer larger; `planners.grounding.instantiate`
-evaluates it exactly.  The program is Datalog without negation, so clingo's grounder alone finds its
-least model; that nothing is missing in it is checked (`planners.grounding.closure`).
+Tarski gets a relaxed core of the domain: one sort, types as static predicates, the positive atoms
+of each conjunctive precondition, and add effects.  What is left out (negation, disjunction,
+quantifiers, inequality, other robots' actions) only makes the answer larger;
+`planners.grounding.instantiate` evaluates it exactly.  The program that Tarski makes of it is
+Datalog without negation, so clingo's grounder alone finds its least model; that nothing is missing
+in it is checked (`planners.grounding.closure`).
 """
 
 from __future__ import annotations
@@ -18,13 +19,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from math import prod
 from threading import current_thread, main_thread
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from planners.errors import CoordlangError, OutOfMemory
 from planners.grounding.closure import Arguments, RelaxedModel, require_closed
 from planners.limits import memory_left
 from planners.pddl.formula_tree import required_atoms
-from planners.pddl.lifted import Atom, Domain, Schema, Variable
+from planners.pddl.lifted import Atom, Domain, Formula, Schema, Variable
 from planners.pddl.robots import natural
 
 if TYPE_CHECKING:
@@ -36,8 +37,6 @@ _LONG_JOIN = 10**8
 #: Bytes that an instance of a schema takes at least, in clingo and here.
 _INSTANCE = 150
 _VARIABLE = re.compile(r"\bV\d+\b")
-#: What holds in every model: clingo has ground the program.
-_GOAL = "goal"
 
 
 def reachable_arguments(
@@ -68,17 +67,21 @@ def reachable_arguments(
     CoordlangError
         If clingo does not ground the program, or not all of it (`require_closed`).
     """
+    from tarski.reachability import create_reachability_lp
+
     init = list(init)
     _require_memory(domain, objects)
-    program = _Program(domain, objects)
+    core = _Core(domain, objects)
     for atom in init:
-        program.add_initial(atom)
+        core.add_initial(atom)
     for schema in domain.schemas:
-        program.add_schema(schema)
-    rules = [_interruptible(rule, len(objects)) for rule in program.rules]
-    model = program.translated(_least_model(rules))
+        core.add_action(schema)
+    program, _ = create_reachability_lp(core.problem)
+    model = core.translated(
+        _least_model([_interruptible(rule, len(objects)) for rule in program.rules])
+    )
     require_closed(model, domain, objects, init)
-    number = {name: n for n, name in enumerate(program.objects.values())}
+    number = {name: n for n, name in enumerate(core.objects.values())}
     return {
         name: sorted(instances, key=lambda args: [number[a] for a in args])
         for name, instances in model.instances.items()
@@ -131,7 +134,7 @@ def _least_model(rules: Sequence[str]) -> dict[str, list[Arguments]]:
             remedy="Install clingo again (`pip install --force-reinstall clingo`).",
         ) from error
     atoms = control.symbolic_atoms
-    if not any(atoms.by_signature(_GOAL, 0)):
+    if not any(atoms.by_signature("goal", 0)):
         raise CoordlangError(
             "clingo's grounding of the reachability program is not complete",
             remedy="Install clingo again (`pip install --force-reinstall clingo`).",
@@ -214,88 +217,109 @@ def _signals_into(arrived: list[int]) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-class _Program:
-    """The rules, with names of our own that no user's name can clash with.
+class _Core:
+    """The Tarski problem, with names of our own that no user's name can clash with."""
 
-    An object is ``o0``, ``o1``, ..; ``p0(o1,o2)`` is an atom, ``t0(o1)`` says that an object is of
-    some types, ``a0(o1,o2)`` is an instance of a schema.
-    """
+    def __init__(self, domain: Domain, objects: dict[str, tuple[str, ...]]) -> None:
+        import tarski.fstrips as fs
+        from tarski import language
+        from tarski.syntax import land, top
 
-    def __init__(self, domain: Domain, objects: Mapping[str, tuple[str, ...]]) -> None:
+        self._fs, self._land, self._top = fs, land, top
         self._domain = domain
-        self._symbol = {name: f"o{n}" for n, name in enumerate(sorted(objects, key=natural))}
-        self.objects = {symbol: name for name, symbol in self._symbol.items()}
-        self._types_of = {
+        self._lang = language("core", theories=[])
+        self._sort = self._lang.Object
+        self.problem: Any = fs.create_fstrips_problem(self._lang, "task", "core")
+        self.problem.goal = top
+        self._symbols: dict[tuple[str, int], Any] = {}
+        self._types: dict[tuple[str, ...], Any] = {}
+        self._constants: dict[str, Any] = {}
+        self.objects: dict[str, str] = {}
+        for number, name in enumerate(sorted(objects, key=natural)):
+            symbol = f"o{number}"
+            self._constants[name] = self._lang.constant(symbol, self._sort)
+            self.objects[symbol] = name
+        self._object_types = {
             name: frozenset(t for own in types for t in domain.supertypes(own))
             for name, types in objects.items()
         }
-        self._predicates: dict[tuple[str, int], str] = {}
-        self._types: dict[tuple[str, ...], str] = {}
-        self._schemas: dict[str, str] = {}
-        self.rules = [f"{_GOAL}."]
+        self.actions: dict[str, str] = {}
 
     def add_initial(self, atom: Atom) -> None:
-        self._add(self._atom(atom, self._symbol))
+        symbol = self._predicate(atom.predicate, len(atom.args))
+        self.problem.init.add(symbol, *(self._constants[a] for a in atom.args))
 
-    def add_schema(self, schema: Schema) -> None:
-        values = dict(self._symbol)
-        body = self._declared(schema.parameters, values)
-        body += [self._atom(atom, values) for atom in required_atoms(schema.precondition)]
-        symbol = self._schemas[schema.name] = f"a{len(self._schemas)}"
-        instance = _applied(symbol, [values[parameter.name] for parameter in schema.parameters])
-        self._add(instance, *body)
+    def add_action(self, schema: Schema) -> None:
+        variables: dict[str, Any] = {}
+        body = self._declare(schema.parameters, variables)
+        body += self._positive(schema.precondition, variables)
+        effects = []
         for effect in schema.effects:
             if not effect.adds:
                 continue
-            # A variable that only the effect has is universal: the rule quantifies it.
-            inner = dict(values)
-            condition = self._declared(effect.variables, inner, len(schema.parameters))
-            condition += [self._atom(atom, inner) for atom in required_atoms(effect.condition)]
-            self._add(self._atom(effect.atom, inner), instance, *condition)
+            # A variable that only the effect has is universal: the program's rule quantifies it.
+            inner = dict(variables)
+            condition = self._declare(effect.variables, inner, always=True)
+            condition += self._positive(effect.condition, inner)
+            effects.append(self._fs.AddEffect(self._atom(effect.atom, inner), self._all(condition)))
+        symbol = f"a{len(self.actions)}"
+        self.actions[schema.name] = symbol
+        parameters = [variables[p.name] for p in schema.parameters]
+        self.problem.action(symbol, parameters, self._all(body), effects)
 
     def translated(self, found: Mapping[str, Iterable[Arguments]]) -> RelaxedModel:
-        """The least model in the names of the domain."""
+        """The model of Tarski's program in the names of the domain."""
 
         def named(predicate: str) -> set[Arguments]:
             return {tuple([self.objects[o] for o in args]) for args in found.get(predicate, ())}
 
         return RelaxedModel(
-            atoms={key: named(symbol) for key, symbol in self._predicates.items()},
-            instances={name: named(symbol) for name, symbol in self._schemas.items()},
+            atoms={key: named(f"atom_{symbol.name}") for key, symbol in self._symbols.items()},
+            instances={name: named(f"action_{symbol}") for name, symbol in self.actions.items()},
         )
 
-    def _add(self, head: str, *body: str) -> None:
-        self.rules.append(f"{head} :- {', '.join(body)}." if body else f"{head}.")
+    def _predicate(self, name: str, arity: int) -> Any:
+        key = (name, arity)
+        if key not in self._symbols:
+            self._symbols[key] = self._lang.predicate(
+                f"p{len(self._symbols)}", *[self._sort] * arity
+            )
+        return self._symbols[key]
 
-    def _declared(
-        self, variables: Iterable[Variable], values: dict[str, str], known: int = 0
-    ) -> list[str]:
-        """Clingo's variables for ours, entered into ``values``, and the atoms of their types.
+    def _declare(
+        self, variables: Iterable[Variable], into: dict[str, Any], *, always: bool = False
+    ) -> list[Any]:
+        """Tarski variables for ours, and the atoms that hold them to their types.
 
-        ``known`` are the variables that are declared around these.
+        Tarski itself restricts parameters to objects; other variables need an atom ``always``.
         """
         atoms = []
-        for number, variable in enumerate(variables, known):
-            values[variable.name] = f"V{number}"
-            atoms.append(_applied(self._type(variable.types), [values[variable.name]]))
+        for variable in variables:
+            term = self._lang.variable(f"v{len(into)}", self._sort)
+            into[variable.name] = term
+            if always or "object" not in variable.types:
+                atoms.append(self._type(variable.types)(term))
         return atoms
 
-    def _type(self, types: tuple[str, ...]) -> str:
-        """The predicate of the objects that belong to one of the types."""
+    def _type(self, types: tuple[str, ...]) -> Any:
         key = tuple(sorted(types))
         if key not in self._types:
-            self._types[key] = f"t{len(self._types)}"
-            for name, own in self._types_of.items():
-                if not own.isdisjoint(key):
-                    self._add(_applied(self._types[key], [self._symbol[name]]))
+            symbol = self._lang.predicate(f"t{len(self._types)}", self._sort)
+            self._types[key] = symbol
+            for name, own in self._object_types.items():
+                if own & set(key):
+                    self.problem.init.add(symbol, self._constants[name])
         return self._types[key]
 
-    def _atom(self, atom: Atom, values: Mapping[str, str]) -> str:
-        key = (atom.predicate, len(atom.args))
-        symbol = self._predicates.setdefault(key, f"p{len(self._predicates)}")
-        return _applied(symbol, [values[a] for a in atom.args])
+    def _atom(self, atom: Atom, variables: dict[str, Any]) -> Any:
+        symbol = self._predicate(atom.predicate, len(atom.args))
+        return symbol(*(variables[a] if a[0] == "?" else self._constants[a] for a in atom.args))
 
+    def _positive(self, formula: Formula, variables: dict[str, Any]) -> list[Any]:
+        """The atoms that the formula surely requires."""
+        return [self._atom(atom, variables) for atom in required_atoms(formula)]
 
-def _applied(predicate: str, args: Sequence[str]) -> str:
-    """``p(o1,o2)``, and without arguments ``p``."""
-    return f"{predicate}({','.join(args)})" if args else predicate
+    def _all(self, atoms: list[Any]) -> Any:
+        if not atoms:
+            return self._top
+        return atoms[0] if len(atoms) == 1 else self._land(*atoms, flat=True)

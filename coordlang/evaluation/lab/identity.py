@@ -13,7 +13,7 @@ from pathlib import Path
 from coordlang.evaluation.lab.recipe import Settings, Unit
 
 #: Packages whose versions are recorded with each result.
-_PACKAGES = ("coordlang", "clingo", "numpy", "python-sat")
+_PACKAGES = ("coordlang", "numpy", "python-sat", "tarski")
 #: Below `coordlang`: what only renders results.
 _RENDERING = (
     "cli",

@@ -252,7 +252,7 @@ def test_plans_of_small_tasks_load_little() -> None:
         f"import os, sys; sys.argv = ['coordlang', 'plans', *{files}, '--count', '--no-cache']\n"
         "from coordlang.__main__ import main\n"
         "try: main()\n"
-        "finally: print([m for m in ('tarski', 'psutil', 'numpy.ma', 'pysat', 'networkx', 'scipy', 'rich', 'zipfile', "
+        "finally: print([m for m in ('psutil', 'numpy.ma', 'pysat', 'networkx', 'scipy', 'rich', 'zipfile', "
         "'coordlang.tasks.candidates') if m in sys.modules], len(os.listdir('/proc/self/task')), file=sys.stderr)"
     )
     environment = {k: v for k, v in os.environ.items() if k != "OPENBLAS_NUM_THREADS"}

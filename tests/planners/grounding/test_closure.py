@@ -108,28 +108,12 @@ def test_conditions_with_constants_repeated_variables_and_more_types() -> None:
     assert set(found["go"]) == instances["go"] != set()
 
 
-def test_inner_variables_hide_outer_ones() -> None:
-    domain, problem = read(
-        """(define (domain d) (:types robot place)
-        (:predicates (at ?r - robot ?p - place) (way ?a ?b) (seen ?a ?b))
-        (:action go :agent ?r - robot :parameters (?p ?q - place)
-         :precondition (and (at ?r ?p) (way ?p ?q))
-         :effect (and (forall (?q ?p - place) (when (way ?p ?q) (seen ?q ?p)))
-                      (at ?r ?q) (not (at ?r ?p)))))""",
-        """(define (problem p) (:domain d) (:objects r1 r2 - robot a b c - place)
-        (:init (at r1 a) (at r2 b) (way a b) (way b c)) (:goal (seen c b)))""",
-    )
-    found = reachable_arguments(domain, problem.objects, sorted(problem.init, key=str))
-    _, instances = least_model(domain, problem)
-    assert set(found["go"]) == instances["go"] != set()
-
-
 def test_a_grounder_that_leaves_something_out_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
     real = reachability._least_model
 
     def less(rules: Any) -> Any:
         found = real(rules)
-        found["a0"].pop()
+        found["action_a0"].pop()
         return found
 
     monkeypatch.setattr(reachability, "_least_model", less)
