@@ -10,7 +10,7 @@ import numpy as np
 from planners.errors import UsageError
 from planners.joint.model import JointModel, PlanningTask
 from planners.search.bounds import relaxed
-from planners.search.layers import Guide
+from planners.search.guide import Guide
 from planners.search.plan_formula import may_be_exact
 from planners.search.projections import Projections
 from planners.search.state_variables import StateVariable

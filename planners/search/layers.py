@@ -8,7 +8,7 @@ all optimal plans are in the layers (Proposition 16 of docs/concepts.md).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -20,17 +20,14 @@ from planners.joint.model import JointModel, Options, PlanningTask, Steps
 from planners.search.bounds import FAR
 from planners.search.cost_limit import CostLimit
 from planners.search.exact_bound import ExactBound, exact_bound
+from planners.search.guide import Guide
 from planners.search.reachable import PieceSizes
 from planners.search.state_table import Packing, StateTable
 from planners.search.state_variables import StateVariable
 from planners.search.unreachable import searched
+from planners.search.ways_on import mostly_lead
 from planners.tables import Ints, Rows
 
-#: A table of states -> lower bounds on the joint steps left, `FAR` where the goal is out of reach.
-Bound = Callable[[Rows], Ints]
-#: Choices after which a robot's own variables need at most so many joint steps more, and the least
-#: number of steps that some other choice needs.
-InTime = Callable[[Rows, Options, int], tuple[Options, int]]
 _NEVER = np.iinfo(np.int32).max
 #: In place of the layer of a state: no optimal plan passes through it.
 _LEFT_OUT = -1
@@ -42,6 +39,8 @@ _FORMULA, _STEPS = 50_000, 20
 #: Combinations of labels, for each joint step that is tried without exact bounds, that are not even
 #: composed.
 _TOO_MANY = 10
+#: As many times more joint steps may be composed to see that no solver needs to be asked.
+_TRIED = 4
 #: How a round ended: the goal was met, or more joint steps were composed than are tried without
 #: exact bounds.
 _MET, _GROWN = -1, -2
@@ -55,22 +54,6 @@ _LIMITS = 10
 _SAMPLE, _MOSTLY = 64, 0.9
 #: Bytes of the states that joint steps lead to, composed at a time.
 _BYTES = 1 << 28
-
-
-@dataclass(frozen=True, slots=True)
-class Guide:
-    """What a search is bounded by; ``name`` is what messages call it.
-
-    Where nothing is known (``bound`` None) all states are searched, in one round.  ``exact``: once
-    the search has grown, a SAT solver finds the optimal cost and what leads to it.  ``cost_left``
-    is a lower bound on the second cost component that is left.
-    """
-
-    name: str
-    bound: Bound | None = None
-    in_time: InTime | None = None
-    exact: bool = False
-    cost_left: Bound | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,10 +178,15 @@ class BoundedSearch:
         return found == _MET
 
     def _bounded_exactly(self) -> int:
-        """Ask the solver for the optimal cost; what the next round is bounded by."""
+        """Ask the solver for the optimal cost, if it may pay; what the next round is bounded by."""
+        most = _TRIED * self._probe
         self._share = 0
         at_least = self.bound if self.bound < FAR - 1 else 0
         depth = len(self.layers.states) - 1
+        if self._model.cost == "makespan" and at_least:
+            left = at_least - depth
+            if mostly_lead(self._model, self._task.goal, self._guide, self._last(), left, most):
+                return at_least
         self._exact = exact_bound(
             self._model,
             self._task,
