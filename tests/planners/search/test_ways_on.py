@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planners.search import layers
+from planners.search.exact_bound import exact_bound
 from planners.search.guides import guide_for
 from planners.search.optimal_plans import distances, search_with_effort
 from planners.search.plans import counts
@@ -48,16 +48,15 @@ def test_on_open_grids_no_solver_is_asked(monkeypatch: pytest.MonkeyPatch) -> No
     loaded = world_of("grid", "corners-8x8").loaded
     model, task = loaded.model, loaded.tasks[0]
     asked: list[int] = []
-    real = layers.exact_bound
 
     def noting(*args: Any) -> Any:
         asked.append(1)
-        return real(*args)
+        return exact_bound(*args)
 
-    monkeypatch.setattr(layers, "exact_bound", noting)
+    monkeypatch.setattr("planners.search.layers.exact_bound", noting)
     plans, effort = search_with_effort(model, task, PieceSizes(probe=400))
     assert (counts(plans)[int(plans.starts[0])], effort.rounds, asked) == (8_383_608, 2, [])
-    monkeypatch.setattr(layers, "mostly_lead", lambda *_: False)
+    monkeypatch.setattr("planners.search.layers.mostly_lead", lambda *_: False)
     again, _ = search_with_effort(model, task, PieceSizes(probe=400))
     assert asked == [1]
     assert np.array_equal(again.labels, plans.labels)
