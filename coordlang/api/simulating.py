@@ -20,13 +20,14 @@ from coordlang.language.tolerance import Tolerance
 from coordlang.use.sentence.best_sentence import best_sentence
 from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
 from coordlang.use.simulation.floor import floor_of
-from coordlang.use.simulation.record import RunRecord, SimulationRecord, to_bytes
+from coordlang.use.simulation.record import RunRecord, SimulationRecord, WishRecord, to_bytes
 from coordlang.use.simulation.runs import record_of, runs_of
 from coordlang.use.simulation.settings import Settings
 from coordlang.use.simulation.simulator import require_simulator
 from coordlang.use.simulation.team import Agreement, Mission, mission
 from planners.errors import UsageError
 from planners.limits import run_until_stopped
+from planners.messages import echoed
 from planners.writing import write_atomically
 
 #: Called with the number of runs done, and of all.
@@ -96,6 +97,8 @@ def simulate(
     radius: float | None = None,
     noise: float = 0.1,
     lidar: bool = True,
+    human: str | None = None,
+    visit: Sequence[str] = (),
     coordinates: CoordinatesSource | None = None,
     factored: File | None = None,
     progress: RunProgress | None = None,
@@ -125,6 +128,12 @@ def simulate(
         The standard deviation of what wheels do, as a share of what they are told.
     lidar
         Whether robots stop before what they see straight ahead.
+    human
+        A human whom only lidars see: a place, ``"random"`` (a place drawn for each run), or
+        ``"walking"``.
+    visit
+        What robots come to want on the way, each ``"ROBOT:STEP:PLACE"``: a robot that has done so
+        many steps visits the place if its choices allow it.
     coordinates
         Where places lie, as in `report`; by default those of a file ``coordinates.json`` beside the
         problem, else what names such as ``c2-3`` say.
@@ -141,7 +150,12 @@ def simulate(
         If no optimal plan has the sentence.
     """
     settings = Settings(
-        step, cell, cell / 5 if radius is None else radius, noise=noise, lidar=lidar
+        step,
+        cell,
+        cell / 5 if radius is None else radius,
+        noise=noise,
+        lidar=lidar,
+        human=human,
     )
     agreement = _agreement(sentence, without, plan)
     require_seed(seed)
@@ -154,10 +168,11 @@ def simulate(
     used = language_in_task(read, files.domain, files.problems[0], files.options_of(read), position)
     prepared = _prepared(used, agreement, sentence)
     floor = floor_of(prepared.world, known, cell)
+    wishes = [_wish(prepared, text) for text in visit]
     done: list[RunRecord] = []
 
     def work() -> None:
-        for finished in runs_of(prepared, floor, settings, runs, seed):
+        for finished in runs_of(prepared, floor, settings, runs, seed, wishes):
             done.append(finished)
             if progress is not None:
                 progress(len(done), runs)
@@ -165,7 +180,8 @@ def simulate(
     stopped = run_until_stopped(work)
     if stopped is not None and not done:
         raise stopped
-    return Simulated(record_of(prepared, floor, settings, done), used.tolerance, stopped)
+    record = record_of(prepared, floor, settings, done, wishes)
+    return Simulated(record, used.tolerance, stopped)
 
 
 def _agreement(sentence: SentenceSource | None, without: bool, plan: bool) -> Agreement:
@@ -177,6 +193,17 @@ def _agreement(sentence: SentenceSource | None, without: bool, plan: bool) -> Ag
     if without:
         return "nothing"
     return "plan" if plan else "sentence"
+
+
+def _wish(prepared: Mission, text: str) -> WishRecord:
+    robot, _, rest = text.partition(":")
+    step, _, place = rest.partition(":")
+    if robot not in prepared.robots or not step.isdecimal() or not place:
+        raise UsageError(
+            f"--visit {echoed(text)}: expected ROBOT:STEP:PLACE",
+            remedy=f"As in {prepared.robots[0]}:0:{min(prepared.world.places)}.",
+        )
+    return WishRecord(robot, int(step), prepared.atom_at(robot, place))
 
 
 def _prepared(used: TaskLanguage, agreement: Agreement, sentence: SentenceSource | None) -> Mission:

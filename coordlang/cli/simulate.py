@@ -76,6 +76,17 @@ from planners.notebook import counted
 )
 @click.option("--no-lidar", is_flag=True, help="Robots do not stop before what is ahead of them.")
 @click.option(
+    "--human",
+    metavar="PLACE|random|walking",
+    help="A human whom only lidars see: in a place, in one drawn for each run, or walking about.",
+)
+@click.option(
+    "--visit",
+    multiple=True,
+    metavar="ROBOT:STEP:PLACE",
+    help="This robot comes to want to visit a place when it has done so many steps.",
+)
+@click.option(
     "--coordinates",
     type=FILE,
     metavar="FILE",
@@ -101,6 +112,8 @@ def command(
     radius: float | None,
     noise: float,
     no_lidar: bool,
+    human: str | None,
+    visit: tuple[str, ...],
     coordinates: str | None,
     output: str | None,
     as_json: bool,
@@ -131,6 +144,8 @@ def command(
             radius=radius,
             noise=noise,
             lidar=not no_lidar,
+            human=human,
+            visit=visit,
             coordinates=coordinates,
             progress=lambda done, number: show(done, number, "runs"),
             **model,

@@ -40,17 +40,23 @@ class EventRecord(msgspec.Struct, frozen=True, omit_defaults=True):
 
     time: _Seconds
     kind: Annotated[
-        Literal["collision", "stopped", "missed", "word", "deadlock", "arrived"],
+        Literal["collision", "stopped", "missed", "word", "detour", "deadlock", "arrived"],
         Meta(
             description="collision: robots touch each other, a wall or the human; stopped: a robot "
             "stands before what its lidar sees; missed: a robot was not there when a step began by "
-            "the clock; word: a robot told that it may have come to a word; deadlock: nobody moves "
-            "any more; arrived: all steps of all robots are done."
+            "the clock; word: a robot told that it may have come to a word; detour: a robot asked "
+            "its choices whether it can visit an atom or keep out of a place; deadlock: nobody "
+            "moves any more; arrived: all steps of all robots are done."
         ),
     ]
     robots: Annotated[list[str], Meta(description="The robots that it concerns.")]
     touched: Annotated[
         str | None, Meta(description="What a robot collided with that is no robot: wall, human.")
+    ] = None
+    visit: Annotated[str | None, Meta(description="The atom that a detour visits.")] = None
+    avoid: Annotated[str | None, Meta(description="The place that a detour avoids.")] = None
+    granted: Annotated[
+        bool | None, Meta(description="Whether the detour can be had; then the robot makes it.")
     ] = None
     steps: Annotated[
         dict[str, int], Meta(description="How many steps each robot has done by then.")
@@ -63,6 +69,14 @@ class EventRecord(msgspec.Struct, frozen=True, omit_defaults=True):
         dict[str, list[str]],
         Meta(description="The place of each robot; under way the place left and the one ahead."),
     ] = {}
+
+
+class WishRecord(msgspec.Struct, frozen=True):
+    """What a robot comes to want on the way: to visit an atom."""
+
+    robot: Annotated[str, Meta(description="The robot.")]
+    step: Annotated[_Count, Meta(description="How many steps it has done by then.")]
+    visit: Annotated[str, Meta(description="The atom.")]
 
 
 class RunRecord(msgspec.Struct, frozen=True):
@@ -135,6 +149,11 @@ class SimulationRecord(msgspec.Struct, frozen=True):
     radius: Annotated[float, Meta(description="The radius of a robot in metres.", gt=0)]
     noise: Annotated[float, Meta(description="The noise of wheels, as a share.", ge=0)]
     lidar: Annotated[bool, Meta(description="Whether robots stop before what they see ahead.")]
+    human: Annotated[
+        str | None,
+        Meta(description="The place of a human, random or walking; null: there was none."),
+    ]
+    wishes: Annotated[list[WishRecord], Meta(description="What robots came to want on the way.")]
     places: Annotated[
         dict[str, tuple[float, float]],
         Meta(description="Place -> the point of its middle in metres, x to the right and y up."),

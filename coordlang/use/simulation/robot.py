@@ -9,6 +9,7 @@ monitor only, and numbers and texts are all that goes in and out.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from random import Random
@@ -69,12 +70,19 @@ class Sensed:
         where there is none, None where it did not look.
     heard
         The messages of the tick before.
+    strangers
+        What the lidar sees that is neither on the map nor a robot: (metres, radians from straight
+        ahead); looked for before a step is chosen.
+    wanted
+        Atoms that the robot is to visit, if it can, from now on.
     """
 
     time: float
     pose: Pose
     ahead: float | None
-    heard: tuple[Message, ...]
+    heard: tuple[Message, ...] = ()
+    strangers: tuple[tuple[float, float], ...] = ()
+    wanted: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +119,18 @@ class OwnStep:
     end: float | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class Detour:
+    """What a robot asked of its choices on the way: to visit an atom, or to avoid a place.
+
+    ``granted`` says whether it could be had; then the robot has committed to it.
+    """
+
+    visit: str | None
+    avoid: str | None
+    granted: bool
+
+
 class Robot:
     """One robot.
 
@@ -144,6 +164,7 @@ class Robot:
     ) -> None:
         self.name = name
         self.steps: list[OwnStep] = []
+        self.detours: list[Detour] = []
         self._monitor, self._body, self._pace, self._period = monitor, body, pace, period
         self._random, self._words, self._word_state = random, words, 0
         self._progress = Progress()
@@ -165,6 +186,11 @@ class Robot:
         return self._progress.words
 
     @property
+    def looks_around(self) -> bool:
+        """Whether it is about to choose a step, and has to be told what it sees."""
+        return not self._is_underway and not self._monitor.finished
+
+    @property
     def looks_ahead(self) -> bool:
         """Whether it drives, and has to be told what is in its way."""
         return self._is_underway and self.steps[-1].place is not None and not self._is_turning
@@ -183,6 +209,7 @@ class Robot:
         """Take a tick: hear, go on with the step under way or begin the next one, and drive."""
         self._pace.hears(sensed.heard)
         if not self._is_underway:
+            self._look_around(sensed)
             if self._monitor.finished or not self._pace.may_begin(self._progress, sensed.time):
                 return Act()
             self._begin(sensed)
@@ -192,6 +219,32 @@ class Robot:
         if step.place is None:
             return Act()
         return self._drive(self._body.points[step.place], step, sensed)
+
+    def _look_around(self, sensed: Sensed) -> None:
+        """Commit to what is wanted, and to keep out of places that somebody stands in."""
+        for atom in sensed.wanted:
+            granted = bool(self._monitor.can(visit=atom))
+            if granted:
+                self._monitor.commit(visit=atom)
+            self.detours.append(Detour(atom, None, granted))
+        met = {self._place_of(stranger, sensed.pose) for stranger in sensed.strangers}
+        for place in sorted(met):
+            known = {detour.avoid for detour in self.detours}
+            ways = [text for text, led in sorted(self._body.leads.items()) if led == place]
+            if place in known or not ways:
+                continue
+            granted = bool(self._monitor.can(never=ways))
+            if granted:
+                self._monitor.commit(never=ways)
+            self.detours.append(Detour(None, place, granted))
+
+    def _place_of(self, stranger: tuple[float, float], pose: Pose) -> str:
+        """The place nearest to what the lidar sees, behind the surface that it sees."""
+        length = stranger[0] + self._body.cell / 10
+        angle = pose[2] + stranger[1]
+        at = pose[0] + length * math.cos(angle), pose[1] + length * math.sin(angle)
+        away = {name: math.dist(at, point) for name, point in self._body.points.items()}
+        return min(sorted(away), key=away.__getitem__)
 
     @property
     def _is_underway(self) -> bool:

@@ -4,13 +4,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from random import Random
 
+from coordlang.coordinates import Point
 from coordlang.use.simulation.floor import Floor
+from coordlang.use.simulation.human import Human
 from coordlang.use.simulation.pace import Message, pace_of
-from coordlang.use.simulation.record import EventRecord, RunRecord, StepRecord
+from coordlang.use.simulation.record import EventRecord, RunRecord, StepRecord, WishRecord
 from coordlang.use.simulation.robot import Act, Body, OwnStep, Robot, Sensed
 from coordlang.use.simulation.settings import POSITION_NOISE, Settings
 from coordlang.use.simulation.simulator import Simulator
@@ -19,11 +21,19 @@ from coordlang.use.simulation.tracking import Pose
 
 #: A run ends when no step has begun or ended for so many periods: nobody will move any more.
 PATIENCE = 4
+#: And with somebody walking about for so many.
+WITH_WALKER = 12
 #: Seconds between two poses of the record.
 INTERVAL = 0.2
 
 
-def run(mission: Mission, floor: Floor, settings: Settings, seed: int) -> RunRecord:
+def run(
+    mission: Mission,
+    floor: Floor,
+    settings: Settings,
+    seed: int,
+    wishes: Sequence[WishRecord] = (),
+) -> RunRecord:
     """Let the robots do a task once.
 
     The same seed gives the same run.  O(robots * ticks).
@@ -38,8 +48,11 @@ def run(mission: Mission, floor: Floor, settings: Settings, seed: int) -> RunRec
         How robots are built and keep step.
     seed
         Of every choice and of all noise.
+    wishes
+        What robots come to want on the way.
     """
     going = _Going.of(mission, floor, settings, seed)
+    going.wishes = tuple(wishes)
     while not going.has_ended:
         going.tick()
     return going.record()
@@ -56,6 +69,11 @@ class _Going:
     robots: Mapping[str, Robot]
     simulator: Simulator
     sensing: Mapping[str, Random]
+    human: Human | None
+    wishes: tuple[WishRecord, ...] = ()
+    wished: set[WishRecord] = field(default_factory=set)
+    asked: dict[str, int] = field(default_factory=dict)
+    human_at: list[Point] = field(default_factory=list)
     ticks: int = 0
     heard: tuple[Message, ...] = ()
     messages: int = 0
@@ -98,8 +116,14 @@ class _Going:
             for name, place in mission.starts.items()
         }
         sensing = {name: Random(f"{seed} sensors {name}") for name in robots}
-        simulator = Simulator(floor, poses, settings, seed)
-        return cls(mission, settings, seed, period, robots, simulator, sensing)
+        human = None
+        if settings.human is not None:
+            taken = {*mission.starts.values(), *mission.goals.values()}
+            random = Random(f"{seed} human")
+            human = Human.of(settings.human, floor, taken, settings.cell, random)
+        standing = floor.points[human.place] if human is not None else None
+        simulator = Simulator(floor, poses, settings, seed, standing)
+        return cls(mission, settings, seed, period, robots, simulator, sensing, human)
 
     @property
     def time(self) -> float:
@@ -114,7 +138,13 @@ class _Going:
     @property
     def has_ended(self) -> bool:
         """Whether all are there, or nobody will move any more."""
-        return self.has_arrived or self.time - self.last_change > PATIENCE * self.period
+        return self.has_arrived or self.time - self.last_change > self.patience
+
+    @property
+    def patience(self) -> float:
+        """Seconds without a step after which nobody will move any more."""
+        walks = self.human is not None and self.human.walks
+        return (WITH_WALKER if walks else PATIENCE) * self.period
 
     def tick(self) -> None:
         """Let a tick pass: sense, choose, tell, move."""
@@ -128,7 +158,7 @@ class _Going:
         changes = sum(len(robot.steps) + robot.done for robot in self.robots.values())
         if changes > self.steps_known:
             self.steps_known, self.last_change = changes, self.time
-        self.simulator.tick(velocities)
+        self.simulator.tick(velocities, self._walk())
         self.ticks += 1
         self._see_collisions()
 
@@ -153,6 +183,7 @@ class _Going:
             subplans=subplans,
             steps=[_step(name, step) for name, step in self._steps()],
             events=self.events,
+            human=self.human_at,
             poses={name: [_rounded(pose) for pose in poses] for name, poses in self.poses.items()},
         )
 
@@ -179,7 +210,31 @@ class _Going:
         ahead: float | None = math.inf
         if self.settings.lidar:
             ahead = self.simulator.ahead(name) if robot.looks_ahead else None
-        return Sensed(self.time, pose, ahead, heard)
+        strangers: tuple[tuple[float, float], ...] = ()
+        if self.human is not None and robot.looks_around:
+            strangers = self.simulator.strangers(name)
+        return Sensed(self.time, pose, ahead, heard, strangers, self._wanted(name, robot))
+
+    def _wanted(self, name: str, robot: Robot) -> tuple[str, ...]:
+        """What a robot comes to want now."""
+        if not robot.looks_around:
+            return ()
+        now = [
+            wish
+            for wish in self.wishes
+            if wish.robot == name and wish.step <= robot.done and wish not in self.wished
+        ]
+        self.wished.update(now)
+        return tuple(wish.visit for wish in now)
+
+    def _walk(self) -> tuple[float, float]:
+        """How the human walks."""
+        if self.human is None or not self.human.walks:
+            return 0.0, 0.0
+        robots = [self.simulator.pose(name)[:2] for name in self.robots]
+        return self.human.velocity(
+            self.simulator.human(), robots, 2 * self.settings.radius + 0.3 * self.settings.cell
+        )
 
     def _take(self, name: str, robot: Robot, act: Act) -> None:
         """Take in what a robot does: its messages, and what is worth an event."""
@@ -188,6 +243,11 @@ class _Going:
         for message in act.messages:
             if message.kind == "word":
                 self._event("word", [name])
+        for detour in robot.detours[self.asked.get(name, 0) :]:
+            self._event(
+                "detour", [name], visit=detour.visit, avoid=detour.avoid, granted=detour.granted
+            )
+        self.asked[name] = len(robot.detours)
         if act.is_stopped and not self.stopped.get(name):
             self._event("stopped", [name])
         self.stopped[name] = act.is_stopped
@@ -205,7 +265,7 @@ class _Going:
             robots = [name for name in pair if name in self.robots]
             others = [name for name in pair if name not in self.robots]
             self.collided.update(robots)
-            self._event("collision", robots, others[0] if others else None)
+            self._event("collision", robots, touched=others[0] if others else None)
         self.touching = touching
 
     def _keep_poses(self) -> None:
@@ -213,19 +273,22 @@ class _Going:
         if self.ticks % every == 0:
             for name in self.robots:
                 self.poses.setdefault(name, []).append(self.simulator.pose(name))
+            if self.human is not None:
+                x, y = self.simulator.human()
+                self.human_at.append((round(x, 3), round(y, 3)))
 
-    def _event(self, kind: str, robots: list[str], touched: str | None = None) -> None:
+    def _event(self, kind: str, robots: list[str], **further: object) -> None:
         self.events.append(
             EventRecord(
                 time=self.time,
                 kind=kind,  # type: ignore[arg-type]
                 robots=robots,
-                touched=touched,
                 steps={name: robot.done for name, robot in self.robots.items()},
                 words={name: robot.words for name, robot in self.robots.items()}
                 if self.mission.agreement != "nothing"
                 else {},
                 places={name: self._places(name) for name in self.robots},
+                **further,  # type: ignore[arg-type]
             )
         )
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from coordlang.tasks.candidates import describe
 from coordlang.use.simulation.floor import Floor, require_room
-from coordlang.use.simulation.record import FORMAT, VERSION, RunRecord, SimulationRecord
+from coordlang.use.simulation.record import FORMAT, VERSION, RunRecord, SimulationRecord, WishRecord
 from coordlang.use.simulation.run import INTERVAL, run
 from coordlang.use.simulation.settings import Settings
 from coordlang.use.simulation.simulator import require_simulator
@@ -15,7 +15,12 @@ from coordlang.use.simulation.team import Mission
 
 
 def runs_of(
-    mission: Mission, floor: Floor, settings: Settings, number: int, seed: int = 0
+    mission: Mission,
+    floor: Floor,
+    settings: Settings,
+    number: int,
+    seed: int = 0,
+    wishes: Sequence[WishRecord] = (),
 ) -> Iterator[RunRecord]:
     """Run a mission so many times, with the seeds ``seed``, ``seed + 1``, ..
 
@@ -27,11 +32,15 @@ def runs_of(
     require_room(floor, settings.radius)
     require_simulator()
     for further in range(number):
-        yield run(mission, floor, settings, seed + further)
+        yield run(mission, floor, settings, seed + further, wishes)
 
 
 def record_of(
-    mission: Mission, floor: Floor, settings: Settings, runs: Sequence[RunRecord]
+    mission: Mission,
+    floor: Floor,
+    settings: Settings,
+    runs: Sequence[RunRecord],
+    wishes: Sequence[WishRecord] = (),
 ) -> SimulationRecord:
     """Put runs together with what they were made with."""
     used = mission.task_language
@@ -53,6 +62,8 @@ def record_of(
         radius=settings.radius,
         noise=settings.noise,
         lidar=settings.lidar,
+        human=settings.human,
+        wishes=list(wishes),
         places={name: (round(x, 6), round(y, 6)) for name, (x, y) in sorted(floor.points.items())},
         walls=list(floor.walls),
         goals=dict(mission.goals),

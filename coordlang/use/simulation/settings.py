@@ -33,6 +33,9 @@ class Settings:
         each tick; a tenth of it, in metres and in radians, is that of where a robot believes to be.
     lidar
         Whether robots stop before what a lidar sees straight ahead.
+    human
+        The place of a human that nobody but a lidar knows of, ``random`` for a place drawn for each
+        run, ``walking`` for one who walks about; None for nobody.
     tick
         Seconds between two looks at sensors and commands to wheels.
     """
@@ -44,6 +47,7 @@ class Settings:
     turn: float = 3.0
     noise: float = 0.1
     lidar: bool = True
+    human: str | None = None
     tick: float = 0.1
 
     def __post_init__(self) -> None:
@@ -64,6 +68,12 @@ class Settings:
             raise UsageError(
                 f"--noise {self.noise:g}: expected a share from 0 to 1",
                 remedy="Say 0 for wheels that do what they are told.",
+            )
+
+        if self.human is not None and not self.lidar:
+            raise UsageError(
+                "--human: without a lidar no robot sees a human",
+                remedy="Leave out --no-lidar.",
             )
 
     @property

@@ -17,13 +17,18 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
+from coordlang.coordinates import Point
 from coordlang.use.simulation.floor import Floor
 from coordlang.use.simulation.settings import Settings
 from coordlang.use.simulation.tracking import Pose, Velocity
 from planners.errors import UsageError
 
+#: The name of the human.
+HUMAN = "human"
 #: Beams of a lidar, and the angle that they cover, in radians.
-_BEAMS, _ANGLE = 13, 2.2
+_BEAMS, _ANGLE = 61, 2 * math.pi
+#: What a lidar sees within this many metres of the human's surface is the human.
+_SURFACE = 0.05
 #: What a lidar sees beside its robot's way within this many metres counts as in its way.
 _BESIDE = 0.02
 
@@ -64,20 +69,38 @@ class Simulator:
         Sizes, noise and the length of a tick.
     seed
         Of the noise on the wheels.
+    human
+        Where a human stands; None for nobody.
     """
 
     def __init__(
-        self, floor: Floor, poses: Mapping[str, Pose], settings: Settings, seed: int
+        self,
+        floor: Floor,
+        poses: Mapping[str, Pose],
+        settings: Settings,
+        seed: int,
+        human: Point | None = None,
     ) -> None:
         self._settings = settings
-        self._environment = _environment(_world(floor, poses, settings), seed)
+        self._environment = _environment(_world(floor, poses, settings, human), seed)
         self._robots = {robot.name: robot for robot in self._environment.robot_list}
+        others = self._environment.obstacle_list
+        self._human = next((other for other in others if other.name == HUMAN), None)
         for robot in self._robots.values():
             robot.sensors = []  # lidars are asked for, not cast in every tick
 
-    def tick(self, velocities: Mapping[str, Velocity]) -> None:
-        """Let a tick pass in which the wheels are told these velocities."""
-        self._environment.step({name: list(told) for name, told in velocities.items()})
+    def tick(self, velocities: Mapping[str, Velocity], walk: tuple[float, float]) -> None:
+        """Let a tick pass in which the wheels are told these velocities, and the human walks."""
+        told = {name: list(velocity) for name, velocity in velocities.items()}
+        if self._human is not None:
+            told[HUMAN] = list(walk)
+        self._environment.step(told)
+
+    def human(self) -> Point:
+        """Return where the human is."""
+        assert self._human is not None, "nobody is there"
+        x, y = self._human.state[:2, 0].tolist()
+        return x, y
 
     def pose(self, robot: str) -> Pose:
         """Return where a robot is, exactly."""
@@ -86,19 +109,37 @@ class Simulator:
 
     def ahead(self, robot: str) -> float:
         """Return how far ahead of a robot's middle its lidar sees something in its way."""
+        found = math.inf
+        for length, angle in self._scan(robot):
+            beside = abs(length * math.sin(angle))
+            if beside < self._settings.radius + _BESIDE and math.cos(angle) > 0:
+                found = min(found, length * math.cos(angle))
+        return found
+
+    def strangers(self, robot: str) -> tuple[tuple[float, float], ...]:
+        """Return what a robot's lidar sees of the human: (metres, radians from straight ahead).
+
+        The map tells walls from it, and robots carry a mark.
+        """
+        x, y, heading = self.pose(robot)
+        surface = self._settings.radius + _SURFACE
+        found = []
+        for length, angle in self._scan(robot):
+            at = x + length * math.cos(heading + angle), y + length * math.sin(heading + angle)
+            if math.dist(at, self.human()) < surface:
+                found.append((length, angle))
+        return tuple(found)
+
+    def _scan(self, robot: str) -> list[tuple[float, float]]:
+        """Return the hits of a robot's lidar: (metres, radians from straight ahead)."""
         own = self._robots[robot]
         own.lidar.step(own.state[0:3])
         scan = own.lidar.get_scan()
-        found = math.inf
-        hits = zip(own.lidar.angle_list, scan["ranges"], scan["valid"], strict=True)
-        for angle, length, is_hit in hits:
-            beside = abs(length * math.sin(angle))
-            if is_hit and beside < self._settings.radius + _BESIDE:
-                found = min(found, float(length * math.cos(angle)))
-        return found
+        rays = zip(scan["ranges"].tolist(), own.lidar.angle_list.tolist(), strict=True)
+        return [ray for ray, is_hit in zip(rays, scan["valid"], strict=True) if is_hit]
 
     def touching(self) -> set[tuple[str, str]]:
-        """Return the pairs that touch: robots by name, and ``wall``; the smaller one first."""
+        """Return the pairs that touch: robots by name, ``human`` and ``wall``, in order."""
         found = set()
         for name, robot in self._robots.items():
             for other in robot.collision_obj:
@@ -116,7 +157,9 @@ def _environment(world: dict[str, Any], seed: int) -> Any:
         return simulator(str(path), headless=True, log_level="CRITICAL", seed=seed)
 
 
-def _world(floor: Floor, poses: Mapping[str, Pose], settings: Settings) -> dict[str, Any]:
+def _world(
+    floor: Floor, poses: Mapping[str, Pose], settings: Settings, human: Point | None
+) -> dict[str, Any]:
     spread = settings.noise**2
     drive = settings.drive
     lidar = {
@@ -141,7 +184,7 @@ def _world(floor: Floor, poses: Mapping[str, Pose], settings: Settings) -> dict[
         }
         for name, pose in poses.items()
     ]
-    walls = [
+    walls: list[dict[str, Any]] = [
         {
             "name": f"wall {number}",
             "shape": {"name": "linestring", "vertices": [list(wall[:2]), list(wall[2:])]},
@@ -149,5 +192,14 @@ def _world(floor: Floor, poses: Mapping[str, Pose], settings: Settings) -> dict[
         }
         for number, wall in enumerate(floor.walls)
     ]
+    if human is not None:
+        walls.append(
+            {
+                "name": HUMAN,
+                "kinematics": {"name": "omni"},
+                "shape": {"name": "circle", "radius": settings.radius},
+                "state": [*human, 0],
+            }
+        )
     world = {"step_time": settings.tick, "collision_mode": "stop"}
     return {"world": world, "robot": robots, "obstacle": walls}

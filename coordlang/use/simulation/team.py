@@ -19,8 +19,9 @@ from coordlang.use.choices.file import to_data
 from coordlang.use.choices.monitor import FORMAT, IDLE, VERSION, Monitor
 from coordlang.use.sentence.task_language import TaskLanguage
 from coordlang.use.simulation.pace import OwnWords
-from planners.errors import BadInput
+from planners.errors import BadInput, UsageError
 from planners.joint.model import JointModel
+from planners.messages import echoed
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
 
@@ -87,13 +88,30 @@ class Mission:
             plan = self._drawn(f"{seed} plan")
             words = self._words_on(plan)
             return {
-                name: _following(name, _own(model, plan, robot), words)
+                name: self._following(name, _own(model, plan, robot), words)
                 for robot, name in enumerate(self.robots)
             }
         return {
-            name: _following(name, _own(model, self._drawn(f"{seed} plan {name}"), robot), None)
+            name: self._following(name, _own(model, self._drawn(f"{seed} plan {name}"), robot))
             for robot, name in enumerate(self.robots)
         }
+
+    def atom_at(self, robot: str, place: str) -> str:
+        """Return the atom that says that a robot is in a place.
+
+        Raises
+        ------
+        UsageError
+            If there is none.
+        """
+        for text, role in sorted(self.world.roles.items()):
+            if role == ("at", robot, place):
+                return text
+        raise UsageError(
+            f"no atom says that {echoed(robot)} is in {echoed(place)}",
+            remedy=f"Robots are {', '.join(self.robots)}; places are called as "
+            f"{self.starts[self.robots[0]]} is.",
+        )
 
     def mixes(self, subplans: Mapping[str, Sequence[str | None]]) -> bool:
         """Say whether subplans of all robots, done in step, are an optimal plan of the task."""
@@ -107,6 +125,44 @@ class Mission:
         return len(found) == self.steps and (
             self._plans.space.path_with(self._plans.start, found) is not None
         )
+
+    def _following(
+        self, robot: str, subactions: Sequence[str | None], words: Sequence[int] | None = None
+    ) -> Given:
+        """What a robot is given that has one subplan: a choices file without a choice.
+
+        It knows in which place it is, and nothing else.
+        """
+        texts = self.task_language.model.codec.facts.texts
+        own = [text for text in texts if self.world.role(text)[:2] == ("at", robot)]
+        number = {self.world.role(text)[2]: fact for fact, text in enumerate(own)}
+        place, states = self.starts[robot], list[dict[str, Any]]()
+        for step, text in enumerate([*subactions, None]):
+            following = {text or IDLE: step + 1} if step < len(subactions) else {}
+            states.append(
+                {
+                    "step": step,
+                    "left": 1,
+                    "next": following,
+                    "true": [number[place]],
+                    "unknown": [],
+                }
+            )
+            place = self.leads[robot].get(text or IDLE, place)
+        entry = {
+            "robot": robot,
+            "steps": len(subactions),
+            "subplans": 1,
+            "atoms": "own",
+            "facts": own,
+            "others": [text for text in texts if text not in own],
+            "states": states,
+        }
+        data = {"format": FORMAT, "version": VERSION, "sentence": "", "choices": [entry]}
+        if words is None:
+            return Given(Monitor(data, robot), None)
+        moves = [dict(state["next"]) for state in states]
+        return Given(Monitor(data, robot), OwnWords(moves, words))
 
     def _drawn(self, seed: str) -> Plan:
         return self._plans.unrank(Random(seed).randrange(self._plans.count))
@@ -200,29 +256,6 @@ def _growing(numbers: dict[frozenset[int], int]) -> Iterator[frozenset[int]]:
 
 def _own(model: JointModel, plan: Plan, robot: int) -> list[str | None]:
     return [model.label_text(robot, step[robot]) for step in plan]
-
-
-def _following(robot: str, subactions: Sequence[str | None], words: Sequence[int] | None) -> Given:
-    """What a robot is given that has one subplan: a choices file without a choice."""
-    steps = [text or IDLE for text in subactions]
-    states: list[dict[str, Any]] = [
-        {"step": number, "left": 1, "next": {text: number + 1}, "true": [], "unknown": []}
-        for number, text in enumerate(steps)
-    ]
-    states.append({"step": len(steps), "left": 1, "next": {}, "true": [], "unknown": []})
-    entry = {
-        "robot": robot,
-        "steps": len(steps),
-        "subplans": 1,
-        "atoms": "own",
-        "facts": [],
-        "others": [],
-        "states": states,
-    }
-    data = {"format": FORMAT, "version": VERSION, "sentence": "", "choices": [entry]}
-    moves = [{text: number + 1} for number, text in enumerate(steps)]
-    own = None if words is None else OwnWords([*moves, {}], words)
-    return Given(Monitor(data, robot), own)
 
 
 def _starts(world: World, robots: Sequence[str], state: Sequence[str]) -> dict[str, str]:
