@@ -151,10 +151,10 @@ def _unless_refuted(plans: FixedPlans, literals: Literals, effort: int) -> bool:
 
 def _shortest(formula: PlanFormula, task: PlanningTask, at_least: int) -> Plan:
     makespan = at_least
-    while not formula.solvable(task.init, makespan):
+    while (plan := formula.plan(task.init, makespan)) is None:
         formula.spend(_EASY * makespan + formula.clauses_of_step)
         makespan += 1
-    return formula.labels_chosen(makespan)
+    return plan
 
 
 def _used(plans: FixedPlans, model: JointModel, plan: Plan, effort: int) -> list[list[Bools]]:

@@ -8,6 +8,7 @@ every state how many steps lead from it to the goal.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, suppress
 
 import numpy as np
 
@@ -16,10 +17,13 @@ from planners.joint.model import FullState, Goal, JointModel
 from planners.sat import split_clauses
 from planners.search.fixed_plans import FixedPlans
 from planners.search.mutexes import Pair
-from planners.search.questions import Literals, Plan, Questions
+from planners.search.questions import Literals, OutOfEffort, Plan, Questions
 from planners.search.state_variables import StateVariable
 from planners.search.step_formula import clauses_of, step_formula
 from planners.tables import Ints, Rows
+
+#: Conflicts for a question, after which it is asked of a solver of its own.
+_SOON = 1_000
 
 
 class PlanFormula(Questions):
@@ -95,6 +99,18 @@ class PlanFormula(Questions):
     def solvable(self, row: Rows, steps: int) -> bool:
         """Whether a plan of exactly so many steps leads from a state to the goal."""
         return self.holds(self._begun(row, steps))
+
+    def plan(self, row: Rows, steps: int) -> Plan | None:
+        """A plan of exactly so many steps from a state to the goal, if there is one.
+
+        What is not decided soon is asked of a solver that knows of no other beginning.
+        """
+        with suppress(OutOfEffort), self.at_most(_SOON):
+            return self.labels_chosen(steps) if self.solvable(row, steps) else None
+        with closing(self.with_units(self._begun(row, steps))) as alone:
+            found = alone.holds([])
+            self.left = alone.left
+            return alone.chosen(self._first(steps), self._sizes) if found else None
 
     def _begun(self, row: Rows, steps: int) -> Literals:
         """Literals that say: so many steps are taken, from this state on."""

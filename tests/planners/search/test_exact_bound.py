@@ -18,9 +18,11 @@ from planners.search.cheapest import label_costs, least_cost
 from planners.search.exact_bound import ExactBound, exact_bound
 from planners.search.mutexes import mutexes
 from planners.search.plan_formula import PlanFormula
+from planners.search.questions import OutOfEffort
 from planners.search.reachable import PIECES
 from planners.search.state_variables import state_variables
 from planners.search.step_formula import TooManyClauses
+from planners.tables import Rows
 from tests.support import blind_search
 from tests.support.random_instances import random_instance
 
@@ -165,3 +167,53 @@ def test_literals_of_the_least_cost_hold_in_the_cheapest_plans_of_many_models() 
     met = cheapest_compared(range(7_000, 8_500))
     print(dict(met))
     assert min(met["one cost"], met["more costs"]) >= 50
+
+
+def reached(model: JointModel, task: PlanningTask, plan: Labels) -> bool:
+    """Whether a plan, step by step, ends in a goal state."""
+    rows = task.init[None, :]
+    for labels in plan:
+        steps = model.successors(rows)
+        rows = steps.result[(steps.labels == labels).all(axis=1)]
+        assert len(rows) == 1
+    return bool(model.holds(task.goal, rows)[0])
+
+
+def undecided(self: PlanFormula, row: Rows, steps: int) -> bool:
+    """What `PlanFormula.solvable` does with a hard question."""
+    raise OutOfEffort
+
+
+@pytest.mark.parametrize("hard", [False, True])
+def test_a_solver_that_knows_one_state_says_what_the_other_says(
+    hard: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of every small number of steps; blind search knows the least one that is enough."""
+    solvable = PlanFormula.solvable
+    if hard:
+        monkeypatch.setattr(PlanFormula, "solvable", undecided)
+    met: Counter[bool] = Counter()
+    for seed in range(60):
+        loaded = small(seed)
+        if loaded is None:
+            continue
+        task, model = loaded.tasks[0], loaded.model
+        try:
+            least = blind_search.search(model, task).cost_of(0)[0]
+        except (ProvedImpossible, BadInput):
+            least = None
+        variables = state_variables(model, task.init)
+        pairs = partial(mutexes, model, task.init)
+        try:
+            formula = PlanFormula(model, task.goal, variables, pairs, PIECES.effort)
+        except TooManyClauses:
+            continue
+        with closing(formula):
+            for steps in range(5):
+                plan = formula.plan(task.init, steps)
+                assert (plan is not None) == solvable(formula, task.init, steps)
+                assert plan is None or (len(plan) == steps and reached(model, task, tuple(plan)))
+                assert plan is None or (least is not None and least <= steps)
+                assert plan is not None or steps != least
+                met[plan is not None] += 1
+    assert min(met[True], met[False]) >= 20
