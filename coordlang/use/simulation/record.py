@@ -118,6 +118,10 @@ class RunRecord(msgspec.Struct, frozen=True):
         dict[str, list[_Pose]],
         Meta(description="Robot -> its poses, one each ``interval``: x, y (metres), heading."),
     ]
+    nearest: Annotated[
+        float | None,
+        Meta(description="The least distance of two robots' middles in metres; null: no two."),
+    ] = None
     human: Annotated[
         list[tuple[float, float]], Meta(description="Where the human was; empty without one.")
     ] = []

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 from random import Random
 
 from coordlang.coordinates import Point
@@ -80,6 +81,7 @@ class _Going:
     touching: set[tuple[str, str]] = field(default_factory=set)
     collided: set[str] = field(default_factory=set)
     collisions: int = 0
+    nearest: float = math.inf
     stopped: dict[str, bool] = field(default_factory=dict)
     missed: dict[str, int] = field(default_factory=dict)
     last_change: float = 0.0
@@ -161,6 +163,7 @@ class _Going:
         self.simulator.tick(velocities, self._walk())
         self.ticks += 1
         self._see_collisions()
+        self._see_distances()
 
     def record(self) -> RunRecord:
         """Return the record of the run that has ended."""
@@ -180,6 +183,7 @@ class _Going:
             seconds=seconds,
             arrived=has_arrived,
             mixes=self.mission.mixes(subplans),
+            nearest=None if math.isinf(self.nearest) else round(self.nearest, 3),
             subplans=subplans,
             steps=[_step(name, step) for name, step in self._steps()],
             events=self.events,
@@ -267,6 +271,11 @@ class _Going:
             self.collided.update(robots)
             self._event("collision", robots, touched=others[0] if others else None)
         self.touching = touching
+
+    def _see_distances(self) -> None:
+        middles = [self.simulator.pose(name)[:2] for name in self.robots]
+        for one, other in combinations(middles, 2):
+            self.nearest = min(self.nearest, math.dist(one, other))
 
     def _keep_poses(self) -> None:
         every = max(1, round(INTERVAL / self.settings.tick))

@@ -85,7 +85,7 @@ class Mission:
             }
         model = self.task_language.model
         if self.agreement == "plan":
-            plan = self._drawn(f"{seed} plan")
+            plan = self.agreed_plan(seed)
             words = self._words_on(plan)
             return {
                 name: self._following(name, _own(model, plan, robot), words)
@@ -95,6 +95,10 @@ class Mission:
             name: self._following(name, _own(model, self._drawn(f"{seed} plan {name}"), robot))
             for robot, name in enumerate(self.robots)
         }
+
+    def agreed_plan(self, seed: int) -> Plan:
+        """Return the plan that all robots follow in the run with this seed if they agree on one."""
+        return self._drawn(f"{seed} plan")
 
     def atom_at(self, robot: str, place: str) -> str:
         """Return the atom that says that a robot is in a place.
