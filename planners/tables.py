@@ -8,12 +8,15 @@ in.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 #: Numbers of things: states, nodes, edges, labels.
 Ints = NDArray[np.int64]
+#: Numbers of which many are kept, in as few bytes as they need.
+Numbers = NDArray[np.integer[Any]]
 #: Truth values.
 Bools = NDArray[np.bool_]
 #: States as rows of 64-bit blocks, (states, blocks).
@@ -43,17 +46,6 @@ def spans(sizes: NDArray[np.float64], most: int) -> Iterator[slice]:
         end = max(start + 1, int(np.searchsorted(ends, before + most, side="right")))
         yield slice(start, end)
         start = end
-
-
-def different(numbers: Ints) -> Ints:
-    """The different numbers, sorted.
-
-    `numpy.unique` alone loads the package of masked arrays to ask whether they are masked.
-    """
-    ordered = np.sort(numbers)
-    fresh = np.ones(len(ordered), np.bool_)
-    fresh[1:] = ordered[1:] != ordered[:-1]
-    return ordered[fresh]
 
 
 def unique_rows(rows: Rows) -> tuple[Rows, NDArray[np.int64]]:

@@ -68,6 +68,8 @@ class ComposingStepper:
             for j in range(len(robots))
             for i in range(j)
         }
+        #: Pairs of robots some of whose labels may not meet.
+        self._apart = {pair for pair, table in self.tables.items() if not table.all()}
         self._robot = [
             _Subactions(own, codec, evaluator, number, cost)
             for number, own in enumerate(subactions)
@@ -83,13 +85,9 @@ class ComposingStepper:
 
         Of ``options`` only, some of the `choices`, if they are given.
         """
-        chosen = self.choices(rows) if options is None else options
-        possible = [self._possible(robot, rows, *own) for robot, own in enumerate(chosen)]
-        sizes = np.ones(len(rows))
-        for own in possible:
-            sizes *= np.diff(own.first)
-        parts = [self._compose(rows, possible, span) for span in spans(sizes, self.piece)] or [
-            self._compose(rows, possible, slice(0, 0))
+        parts = [
+            Steps(source, labels, *self._apply(rows, source, labels))
+            for source, labels in self._pieces(rows, options)
         ]
         return Steps(
             np.concatenate([p.source for p in parts]),
@@ -97,6 +95,33 @@ class ComposingStepper:
             np.concatenate([p.result for p in parts]),
             np.concatenate([p.cost for p in parts]),
         )
+
+    def chosen(self, rows: Rows, options: Options | None = None) -> tuple[Ints, Labels]:
+        """The joint steps as `steps` gives them, without what they lead to: sources and labels."""
+        parts = list(self._pieces(rows, options))
+        if len(parts) == 1:
+            return parts[0]
+        return np.concatenate([p for p, _ in parts]), np.concatenate([p for _, p in parts])
+
+    @property
+    def effects(self) -> list[tuple[Rows, Rows]] | None:
+        """For each robot what its labels add and what they delete, both (labels, fact blocks).
+
+        None where the effects of some label depend on the state or the step.
+        """
+        if any(robot.conditional for robot in self._robot):
+            return None
+        return [(robot.adds, robot.deletes) for robot in self._robot]
+
+    def _pieces(self, rows: Rows, options: Options | None) -> Iterator[tuple[Ints, Labels]]:
+        """At least one piece."""
+        chosen = self.choices(rows) if options is None else options
+        possible = [self._possible(robot, rows, *own) for robot, own in enumerate(chosen)]
+        sizes = np.ones(len(rows))
+        for own in possible:
+            sizes *= np.diff(own.first)
+        for span in list(spans(sizes, self.piece)) or [slice(0, 0)]:
+            yield self._compose(rows, possible, span)
 
     def choices(self, rows: Rows) -> Options:
         """For each robot the labels whose conditions on the state hold, by state.
@@ -218,32 +243,40 @@ class ComposingStepper:
             waiting = {stage: open_.only(possible) for stage, open_ in waiting.items()}
         return _Options(first, label, waiting)
 
-    def _compose(self, rows: Rows, options: Sequence[_Options], span: slice) -> Steps:
+    def _compose(self, rows: Rows, options: Sequence[_Options], span: slice) -> tuple[Ints, Labels]:
         source = np.arange(span.start, span.stop)
-        chosen = np.zeros((0, len(source)), np.int64)
-        option = chosen
+        # By robot, its option and its label in each combination so far.
+        option: list[Ints] = []
+        chosen: list[Ints] = []
+
+        def keep(fits: Bools) -> None:
+            nonlocal source
+            if not fits.all():
+                kept = np.flatnonzero(fits)
+                source = source[kept]
+                option[:] = [own[kept] for own in option]
+                chosen[:] = [own[kept] for own in chosen]
+
         for j, own in enumerate(options):
             counts = own.first[source + 1] - own.first[source]
             self._require_room(int(counts.sum()), j, len(rows[span]))
             mine = ranges(own.first[source], counts)
-            source = np.repeat(source, counts)
-            option = np.vstack((np.repeat(option, counts, axis=1), mine))
-            chosen = np.vstack((np.repeat(chosen, counts, axis=1), own.label[mine]))
-            fits = np.ones(len(source), np.bool_)
+            each = np.repeat(np.arange(len(source)), counts)
+            source = source[each]
+            option[:] = [*(before[each] for before in option), mine]
+            chosen[:] = [*(before[each] for before in chosen), own.label[mine]]
             for i in range(j):
-                fits &= self.tables[i, j][chosen[i], chosen[j]]
-            source, option, chosen = source[fits], option[:, fits], chosen[:, fits]
+                if (i, j) in self._apart:
+                    keep(self.tables[i, j][chosen[i], chosen[j]])
             for i, others in enumerate(options[: j + 1]):
                 if j in others.waiting:
                     clauses = self._robot[i].clauses
-                    fits = ~clauses.unmet(others.waiting[j], option[i], chosen)
-                    source, option, chosen = source[fits], option[:, fits], chosen[:, fits]
-        labels = chosen.T.astype(np.int32)
+                    keep(~clauses.unmet(others.waiting[j], option[i], chosen))
+        labels = np.stack(chosen, axis=1, dtype=np.int32, casting="same_kind")
         fits = np.ones(len(source), np.bool_)
         for i, robot in enumerate(self._robot):
             robot.drop_unmet(fits, i, rows, source, labels)
-        source, labels = source[fits], np.ascontiguousarray(labels[fits])
-        return Steps(source, labels, *self._apply(rows, source, labels))
+        return (source, labels) if fits.all() else (source[fits], labels[fits])
 
     def _require_room(self, combinations: int, robot: int, states: int) -> None:
         """Stop before combinations with one more robot's labels take more memory than there is."""

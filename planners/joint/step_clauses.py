@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planners.joint.conditions import Evaluator
 from planners.joint.states import test_bits
@@ -157,7 +156,7 @@ class StepClauses:
             found[later] = Waiting(first, clause[here])
         return possible, found
 
-    def unmet(self, waiting: Waiting, option: Ints, chosen: NDArray[np.int64]) -> Bools:
+    def unmet(self, waiting: Waiting, option: Ints, chosen: Sequence[Ints] | Ints) -> Bools:
         """For each item whether a clause of its ``option`` is not met by the labels chosen.
 
         ``chosen`` (robots, items); robots that have not chosen yet are not looked at.
@@ -168,7 +167,11 @@ class StepClauses:
         literal, pair = self._steps.of(clause)
         robot, label, value = (column[literal] for column in self._steps.columns)
         met = np.zeros(len(clause), np.bool_)
-        met[pair[(chosen[robot, item[pair]] == label) == value]] = True
+        said = np.empty(len(pair), np.int64)
+        for number, own in enumerate(chosen):
+            there = np.flatnonzero(robot == number)
+            said[there] = own[item[pair[there]]]
+        met[pair[(said == label) == value]] = True
         unmet = np.zeros(len(option), np.bool_)
         unmet[item[~met]] = True
         return unmet

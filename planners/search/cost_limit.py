@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from planners.search.bounds import FAR
-from planners.tables import Bools, Ints, Rows
+from planners.tables import Bools, Ints, Numbers, Rows
 
 
 class CostLimit:
@@ -52,6 +52,6 @@ class CostLimit:
         self.beyond = min(self.beyond, int(least[~good].min(initial=FAR)))
         return good
 
-    def pay(self, source: Ints, target: Ints, cost: Ints) -> None:
+    def pay(self, source: Numbers, target: Numbers, cost: Numbers) -> None:
         """Take these joint steps."""
         np.minimum.at(self._paid, target, self._paid[source] + cost)

@@ -21,12 +21,13 @@ from planners.search.bounds import FAR
 from planners.search.cost_limit import CostLimit
 from planners.search.exact_bound import ExactBound, exact_bound
 from planners.search.guide import Guide
+from planners.search.packed_steps import PackedSteps
 from planners.search.reachable import PieceSizes
 from planners.search.state_table import Packing, StateTable
 from planners.search.state_variables import StateVariable
 from planners.search.unreachable import searched
 from planners.search.ways_on import mostly_lead
-from planners.tables import Ints, Rows
+from planners.tables import Bools, Ints, Numbers, Rows
 
 _NEVER = np.iinfo(np.int32).max
 #: In place of the layer of a state: no optimal plan passes through it.
@@ -58,12 +59,23 @@ _BYTES = 1 << 28
 
 @dataclass(frozen=True, slots=True)
 class Edges:
-    """Joint steps between two layers, states by their numbers in the table."""
+    """Joint steps between two layers, by source, states by their numbers in the table."""
 
-    source: Ints
-    target: Ints
-    labels: Labels
-    cost: Ints
+    source: Numbers
+    target: Numbers
+    labels: Numbers
+    cost: Numbers
+
+    def only(self, kept: Bools) -> Edges:
+        """Some of them."""
+        if kept.all():
+            return self
+        some = np.flatnonzero(kept)
+        return Edges(self.source[some], self.target[some], self.labels[some], self.cost[some])
+
+    def compact(self) -> Edges:
+        """The same in as few bytes as the largest numbers need: there are many more than states."""
+        return Edges(*map(_narrow, (self.source, self.target, self.labels, self.cost)))
 
 
 @dataclass(slots=True)
@@ -110,7 +122,9 @@ class BoundedSearch:
     ) -> None:
         self._model, self._task, self._guide, self._pieces = model, task, guide, pieces
         self._variables = variables
-        self.table = StateTable(Packing(model.codec, variables))
+        packing = Packing(model.codec, variables)
+        self.table = StateTable(packing)
+        self._packed = PackedSteps.of(model, packing, variables)
         #: Per state the lower bound, and the layer that it was met in, in this round.
         self._h: NDArray[np.int32] = np.zeros(0, np.int32)
         self._depth: NDArray[np.int32] = np.zeros(0, np.int32)
@@ -244,7 +258,7 @@ class BoundedSearch:
             good = exact.may_pass(self._ways.to(new, depth))
         self._depth[new[~good]] = _LEFT_OUT
         kept = good[number]
-        return Edges(edges.source[kept], edges.target[kept], edges.labels[kept], edges.cost[kept])
+        return edges.only(kept)
 
     @property
     def asked_solver(self) -> bool:
@@ -280,8 +294,8 @@ class BoundedSearch:
         parts: list[Edges] = []
         beyond = FAR
         for numbers, steps, low in self._steps(states, depth):
-            target = self._numbers(steps.result)
-            h = self._h[target].astype(np.int64)
+            target = self._reached(steps)
+            h = self._h[target]
             late = h > self.bound - depth
             beyond = min(beyond, low + depth, int(h[late].min(initial=FAR)) + depth)
             source = numbers[steps.source]
@@ -289,10 +303,11 @@ class BoundedSearch:
                 late |= ~self._costs.within(source, target, steps.cost)
             into = target[~late]
             self._depth[into] = np.minimum(self._depth[into], depth)
-            kept = np.flatnonzero(~late & (self._depth[target] == depth))
-            parts.append(Edges(source[kept], target[kept], steps.labels[kept], steps.cost[kept]))
+            edges = Edges(source, target, steps.labels, steps.cost)
+            edges = edges.only(~late & (self._depth[target] == depth))
+            parts.append(edges.compact())
             if self._costs is not None:
-                self._costs.pay(source[kept], target[kept], steps.cost[kept])
+                self._costs.pay(edges.source, edges.target, edges.cost)
         return _joined(parts, self._model), beyond
 
     def _steps(self, states: Ints, depth: int) -> Iterator[tuple[Ints, Steps, int]]:
@@ -321,7 +336,10 @@ class BoundedSearch:
                 raise _GrownError
             numbers = states[start : start + size]
             rows = self.table.rows(numbers)
-            steps = self._model.successors(rows, only)
+            if self._packed is None:
+                steps = self._model.successors(rows, only)
+            else:
+                steps = self._packed.successors(rows, self.table.packed(numbers), only)
             self.layers.composed += len(steps)
             if self._share and len(steps) > self._probe:
                 raise _GrownError  # bounds of so many states take long
@@ -329,19 +347,31 @@ class BoundedSearch:
             start += size
             size = max(1, min(self._pieces.states, int(most * size / max(1, len(steps)))))
 
+    def _reached(self, steps: Steps) -> Ints:
+        """The numbers of the states that joint steps lead to."""
+        if self._packed is None:
+            return self._numbers(steps.result)
+        numbers, fresh = self.table.add_packed(steps.result)
+        new = numbers[fresh]
+        self._enter(new, self.table.rows(new))
+        return numbers
+
     def _numbers(self, rows: Rows) -> Ints:
         """The numbers of states, with bounds for those that are new."""
         numbers, fresh = self.table.add(rows)
+        self._enter(numbers[fresh], rows[fresh])
+        return numbers
+
+    def _enter(self, new: Ints, rows: Rows) -> None:
+        """Bound states that are new."""
         grown = len(self.table) - len(self._h)
         if grown > 0:
             more = np.full(max(grown, len(self._h)), _NEVER, np.int32)
             self._h = np.concatenate((self._h, more))
             self._depth = np.concatenate((self._depth, more))
-        new = np.flatnonzero(fresh)
-        self._h[numbers[new]] = self._guide.bound(rows[new]) if self._guide.bound else 0
+        self._h[new] = self._guide.bound(rows) if self._guide.bound else 0
         if self._costs is not None:
-            self._costs.enter(numbers[new], rows[new])
-        return numbers
+            self._costs.enter(new, rows)
 
 
 class _Ways:
@@ -374,7 +404,7 @@ class _Ways:
         best = order[np.searchsorted(number[order], np.arange(len(new)))]
         self._paid[new], self._source[new] = paid[best], edges.source[best]
         self._labels[new] = edges.labels[best]
-        return new, number
+        return new.astype(np.int64), number
 
     def to(self, states: Ints, depth: int) -> Labels:
         """The ways to some states of a layer, as labels: (states, depth, robots)."""
@@ -393,13 +423,20 @@ def _combinations(options: Options) -> float:
     return float(counts.sum())
 
 
+def _narrow(numbers: Numbers) -> Numbers:
+    """The same numbers, none of which is negative, in the smallest unsigned type."""
+    return numbers.astype(np.min_scalar_type(int(numbers.max(initial=0))))
+
+
 def _joined(parts: Sequence[Edges], model: JointModel) -> Edges:
-    none = np.zeros(0, np.int64)
-    labels = np.zeros((0, len(model.robots)), np.int32)
-    every = [Edges(none, none, labels, none), *parts]
+    if not parts:
+        none = np.zeros(0, np.int64)
+        return Edges(none, none, np.zeros((0, len(model.robots)), np.int32), none)
+    if len(parts) == 1:
+        return parts[0]
     return Edges(
         *(
-            np.concatenate([getattr(part, name) for part in every])
+            np.concatenate([getattr(part, name) for part in parts])
             for name in ("source", "target", "labels", "cost")
         )
     )

@@ -15,18 +15,17 @@ from itertools import pairwise
 import numpy as np
 
 from planners.errors import ProvedImpossible
-from planners.joint.conditions import Labels
 from planners.joint.model import Goal, JointModel, PlanningTask
 from planners.limits import reaching
 from planners.search.exact_bound import SMALLER
 from planners.search.guides import guide_for
-from planners.search.layers import BoundedSearch, Layers
+from planners.search.layers import BoundedSearch, Edges, Layers
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, PieceSizes, Space
 from planners.search.slack import explore_within, require_rest, seeing, seen_rows
 from planners.search.state_variables import state_variables
 from planners.search.unreachable import searched
-from planners.tables import Bools, Ints, Rows, different, ranges, unique_rows
+from planners.tables import Bools, Ints, Numbers, Rows, ranges, unique_rows
 
 #: Where fewer than one in so many states are new, only the joint steps into these are looked at.
 _FEW = 8
@@ -119,45 +118,57 @@ def _backward(
     node = np.full(len(layers.table), -1)
     tables = [_numbered(layers.table.rows(goals), goals, node)]
     best = [np.zeros(len(goals), np.int64)]
-    edges: list[tuple[Ints, Ints, Labels, Ints]] = []
+    counts = [np.zeros(len(goals), np.int64)]
+    edges: list[Edges] = []
     for depth in range(layers.makespan, 0, -1):
         below = layers.edges[depth - 1] or forward.edges_into(depth)
-        live = np.flatnonzero(node[below.target] >= 0)
-        source, target = below.source[live], below.target[live]
-        cost = below.cost[live]
-        through = cost + value[target]
-        here = different(source)
-        np.minimum.at(value, source, through)
-        tight = np.flatnonzero(through == value[source])
-        into = node[target[tight]]
+        layers.edges[depth - 1] = None  # they are many, and not needed again
+        below = below.only(node[below.target] >= 0)
+        first = _runs(below.source)
+        here = below.source[first].astype(np.int64)
+        through = value[below.target] + below.cost
+        value[here] = np.minimum.reduceat(through, first)
+        below = below.only(through == value[below.source])
+        into = node[below.target]
         node[layers.states[depth]] = -1
-        rows = _numbered(layers.table.rows(here), here, node)
-        begin = node[source[tight]]
-        order = np.argsort(begin, kind="stable")
+        tables.append(_numbered(layers.table.rows(here), here, node))
+        first = _runs(below.source)
+        number = np.empty(len(here), np.int64)
+        number[node[here]] = np.arange(len(here))  # the source at each place of the table
+        count = np.diff(first, append=len(below.source))[number]
+        order = ranges(first[number], count)
         edges.append(
-            (begin[order], into[order], below.labels[live[tight]][order], cost[tight][order])
+            Edges(below.source, into[order], below.labels[order], below.cost[order]).compact()
         )
-        tables.append(rows)
-        best.append(value[here[np.argsort(node[here])]])
+        counts.append(count)
+        best.append(value[here[number]])
     offsets = np.cumsum([0, *(len(t) for t in tables)])
-    source = np.concatenate([e[0] + offsets[k + 1] for k, e in enumerate(edges)] or [_none()])
     graph = PlanSpace(
         model=model,
         rows=np.concatenate(tables),
         state=np.arange(offsets[-1]),
         goal=np.zeros(offsets[-1], np.int64),
         layer=np.repeat(np.arange(len(tables)), np.diff(offsets)),
-        first=np.searchsorted(source, np.arange(offsets[-1] + 1)),
-        target=np.concatenate([e[1] + offsets[k] for k, e in enumerate(edges)] or [_none()]),
+        first=np.cumsum(np.concatenate([[0], *counts])),
+        target=np.concatenate([_none(), *(e.target + offsets[k] for k, e in enumerate(edges))]),
         labels=np.concatenate(
-            [e[2] for e in edges] or [np.zeros((0, len(model.robots)), np.int32)]
+            [np.zeros((0, len(model.robots)), np.int32), *(e.labels for e in edges)],
+            dtype=np.int32,
+            casting="unsafe",
         ),
-        cost=np.concatenate([e[3] for e in edges] or [_none()]),
+        cost=np.concatenate([_none(), *(e.cost for e in edges)]),
         goals=(task.goal,),
         starts=np.array([offsets[-2]]),
         second=best[-1][:1],
     )
     return _sort_states(graph).reduced()
+
+
+def _runs(numbers: Numbers) -> Ints:
+    """Where each run of equal numbers begins."""
+    fresh = np.ones(len(numbers), np.bool_)
+    fresh[1:] = numbers[1:] != numbers[:-1]
+    return np.flatnonzero(fresh)
 
 
 def _numbered(rows: Rows, states: Ints, node: Ints) -> Rows:

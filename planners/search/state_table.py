@@ -14,6 +14,8 @@ from planners.tables import Bools, Ints, Rows
 
 #: Numbers of states in the hash table; -1: the slot is free.
 _Slots = NDArray[np.int32]
+#: States for which room is made at a time: few of them are new, mostly.
+_AT_ONCE = 1 << 17
 _MULTIPLIER = np.uint64(0x9E3779B97F4A7C15)
 
 
@@ -43,6 +45,8 @@ class Packing:
         self._inside = np.zeros(len(codec.facts), np.bool_)
         self._block = np.zeros(len(codec.facts), np.int64)
         self._code = np.zeros(len(codec.facts), np.uint64)
+        #: Per fact all bits of its variable, or its own.
+        self._field = np.zeros(len(codec.facts), np.uint64)
         #: (block, shift, mask, facts by the number of the value).
         self._fields: list[tuple[int, np.uint64, np.uint64, Ints]] = []
         for facts, width, (place, shift) in zip(fields, widths, places, strict=False):
@@ -50,11 +54,13 @@ class Packing:
             self._inside[own], self._block[own] = True, place
             self._code[own] = np.arange(len(own), dtype=np.uint64) << np.uint64(shift)
             self._fields.append((place, np.uint64(shift), np.uint64((1 << width) - 1), own))
+            self._field[own] = np.uint64((1 << width) - 1 << shift)
         #: (block, shift) of the facts by themselves, and their numbers.
         rest = np.flatnonzero(~self._inside).tolist()
         self._single = list(zip(rest, places[len(fields) :], strict=True))
         for fact, (place, shift) in self._single:
             self._block[fact], self._code[fact] = place, np.uint64(1 << shift)
+            self._field[fact] = self._code[fact]
         owner = np.full(len(codec.facts), -1)
         for number, facts in enumerate(fields):
             owner[list(facts)] = number
@@ -70,6 +76,26 @@ class Packing:
         result[:, self._blocks :] = rows[:, self._codec.fact_blocks :]
         self._require_one_value(true)
         return result
+
+    def changes(self, adds: Rows, deletes: Rows) -> tuple[Rows, Rows]:
+        """What adding and deleting facts does to packed states: the bits that go, those that come.
+
+        ``adds`` and ``deletes`` (changes, fact blocks) are masks; what is both is added.  A fact of
+        a variable that is added takes the place of the variable's value; that one is deleted which
+        is no longer true then is not looked at (`planners.search.state_variables`).
+        """
+        added, deleted = TrueFacts.of(adds), TrueFacts.of(deletes)
+        gone, come = (np.zeros((len(adds), self.width), np.uint64) for _ in range(2))
+        for block in range(self._blocks):
+            here = self._block == block
+            field = np.where(here, self._field, np.uint64(0))
+            alone = np.where(self._inside, np.uint64(0), field)
+            gone[:, block] = added.reduced(np.bitwise_or, field, 0)
+            gone[:, block] |= deleted.reduced(np.bitwise_or, alone, 0)
+            come[:, block] = added.reduced(
+                np.bitwise_or, np.where(here, self._code, np.uint64(0)), 0
+            )
+        return gone, come
 
     def _require_one_value(self, true: TrueFacts) -> None:
         """Each variable has one fact that is true: as many as variables, and no two of one."""
@@ -117,13 +143,26 @@ class StateTable:
         """The rows of states."""
         return self._packing.rows(self._rows[numbers])
 
+    def packed(self, numbers: Ints) -> Rows:
+        """The packed rows of states."""
+        return self._rows[numbers]
+
     def add(self, rows: Rows) -> tuple[Ints, Bools]:
         """The numbers of states, and which of them are new; equal new ones count once as new."""
         different, number = _different(rows)
-        found, fresh = self._add(self._packing.packed(rows[different]))
+        found, fresh = self.add_packed(self._packing.packed(rows[different]))
         new = np.zeros(len(rows), np.bool_)
         new[different] = fresh
         return found[number], new
+
+    def add_packed(self, packed: Rows) -> tuple[Ints, Bools]:
+        """As `add`, of packed rows; they may be equal."""
+        parts = [self._add(packed[k : k + _AT_ONCE]) for k in range(0, len(packed), _AT_ONCE)]
+        if len(parts) == 1:
+            return parts[0]
+        none = np.zeros(0, np.int64), np.zeros(0, np.bool_)
+        found = [none, *parts]
+        return np.concatenate([n for n, _ in found]), np.concatenate([new for _, new in found])
 
     def _add(self, packed: Rows) -> tuple[Ints, Bools]:
         self._make_room(len(packed))
