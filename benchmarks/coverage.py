@@ -3,6 +3,7 @@
 
     python benchmarks/coverage.py [--limit SECONDS] [--kept FILE] [--cost COST] [--first N]
                                   [--heuristic NAME] [ROW ..]
+    python benchmarks/coverage.py --table NAME [--limit SECONDS] [--kept FILE] [--markdown] [ROW ..]
     python benchmarks/coverage.py --list
 
 Rows are the problems of the twelve CoDMAP domains in ../shared/data (``--first N`` of each, the
@@ -14,7 +15,13 @@ seconds (60).  Columns: CPU seconds to load and to search, the least makespan an
 component, the exact number of optimal plans and the nodes of their graph; the states that the
 search met and what a state takes in its table, the joint steps that it composed, in how many
 rounds and by which bound; the process's peak memory.  With ``--kept`` lines are kept in a file, and
-rows that it has are printed from there: a long run can be resumed.
+rows that it has are printed from there: a long run can be resumed.  A row is kept with its cost and
+heuristic, so that one file does for all, and with the version of the project that it is of.
+
+``--table`` names a table of docs/coverage.md, ``all`` prints one after the other: `codmap`,
+`makespan`, `blind` and `blind-makespan` (the first three problems of each domain), and `grids`.
+With ``--markdown`` they are printed as they stand there, with how many rows are solved and the
+versions that they are of.
 """
 
 from __future__ import annotations
@@ -22,10 +29,13 @@ from __future__ import annotations
 import argparse
 import json
 import resource
+import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
-from functools import partial
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
 from time import process_time
 from typing import TYPE_CHECKING, Any
@@ -62,6 +72,47 @@ CORNERS = (
 )
 AGENTS = (2, 3, 4)
 SCENARIOS = SHARED / "mapf"
+#: The columns of docs/coverage.md, and whether they are numbers.
+PAGE = (
+    ("row", False),
+    ("CPU s", True),
+    ("optimal cost", True),
+    ("optimal plans", True),
+    ("nodes", True),
+    ("states", True),
+    ("joint steps", True),
+    ("bound", False),
+    ("MB", True),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """How rows are searched: the problems of each domain (0: grids), the cost, the heuristic."""
+
+    title: str
+    first: int
+    cost: str
+    heuristic: str = "auto"
+
+    def rows(self) -> list[str]:
+        """The rows that are asked for."""
+        return list(codmap(self.first)) if self.first else grids()
+
+    def key(self, name: str) -> str:
+        """What a row is kept as."""
+        return f"{name} ({self.cost}, {self.heuristic})"
+
+
+TABLES = {
+    "codmap": Asked("CoDMAP, makespan+actions", 10, "makespan+actions"),
+    "makespan": Asked("CoDMAP, the first three, makespan", 3, "makespan"),
+    "blind": Asked(
+        "CoDMAP, the first three, makespan+actions, blind", 3, "makespan+actions", "blind"
+    ),
+    "blind-makespan": Asked("CoDMAP, the first three, makespan, blind", 3, "makespan", "blind"),
+    "grids": Asked("Robots on grids, makespan", 0, "makespan"),
+}
 
 
 def codmap(first: int) -> dict[str, tuple[Path, Path]]:
@@ -77,6 +128,11 @@ def codmap(first: int) -> dict[str, tuple[Path, Path]]:
 
 def rows(first: int) -> list[str]:
     """The names of all rows."""
+    return [*(codmap(first) if SHARED.is_dir() else ()), *grids()]
+
+
+def grids() -> list[str]:
+    """The names of the rows of robots on grids."""
     corners = [f"corners {side}x{side}, {robots} robots" for side, robots in CORNERS]
     if not SHARED.is_dir():
         return corners
@@ -85,14 +141,20 @@ def rows(first: int) -> list[str]:
         for path in sorted(SCENARIOS.glob("*.scen"))
         for agents in AGENTS
     ]
-    known = {path.stem.split("-random")[0] for path in SCENARIOS.glob("*.scen")}
+    known = {map_of(path).stem for path in SCENARIOS.glob("*.scen")}
     far = [
         f"{path.stem}, {robots} far apart"
         for path in sorted(SCENARIOS.glob("*.map"))
         if path.stem not in known
         for robots in AGENTS
     ]
-    return [*codmap(first), *corners, *scenarios, *far]
+    return [*corners, *scenarios, *far]
+
+
+def map_of(scenario: Path) -> Path:
+    """The map that a scenario's agents are on, as its first line with an agent names it."""
+    name = scenario.read_text().splitlines()[1].split("\t")[1]
+    return scenario.parent / Path(name).name
 
 
 def load(name: str, cost: str) -> PlanningInstance:
@@ -115,8 +177,7 @@ def scenario(name: str) -> PlanningInstance:
     """The first agents of a scenario."""
     stem, agents = name.removesuffix(" agents").rsplit(", ", 1)
     file = SCENARIOS / f"{stem}.scen"
-    map_name = file.read_text().splitlines()[1].split("\t")[1]
-    return on_map(SCENARIOS / Path(map_name).name, file, int(agents))
+    return on_map(map_of(file), file, int(agents))
 
 
 def far_apart(name: str) -> PlanningInstance:
@@ -188,12 +249,26 @@ def one(name: str, cost: str, heuristic: str) -> dict[str, Any]:
     }
 
 
-def measured(name: str, limit: int, cost: str, heuristic: str = "auto") -> dict[str, Any]:
+@cache
+def project() -> str:
+    """The version of this checkout: its commit, with a plus where files were changed."""
+    here = Path(__file__).parent
+    commit, changed = (
+        subprocess.run(
+            ["git", *command], cwd=here, capture_output=True, text=True, check=True
+        ).stdout
+        for command in (("rev-parse", "--short", "HEAD"), ("status", "--porcelain", "-uno"))
+    )
+    return commit.strip() + "+" * bool(changed)
+
+
+def measured(name: str, limit: int, asked: Asked) -> dict[str, Any]:
     """The figures of a row from a process of its own."""
-    how = ("--cost", cost, "--limit", str(limit), "--heuristic", heuristic)
+    how = ("--cost", asked.cost, "--limit", str(limit), "--heuristic", asked.heuristic)
     arguments = (__file__, "--one", name, *how)
     done = run_python(arguments, most=20 * limit)
-    figures: dict[str, Any] = {"row": name, **done.data, "memory": done.memory}
+    figures: dict[str, Any] = {"row": asked.key(name), "version": project(), "limit": limit}
+    figures |= {**done.data, "memory": done.memory}
     if "plans" not in figures:
         last = (done.errors.strip().splitlines() or [""])[-1]
         out_of_memory = "Memory" in last or "bad_alloc" in last
@@ -201,18 +276,49 @@ def measured(name: str, limit: int, cost: str, heuristic: str = "auto") -> dict[
     return figures
 
 
-def cells(figures: dict[str, Any]) -> Iterator[object]:
+def cells(name: str, figures: dict[str, Any]) -> Iterator[object]:
     """The line of a row."""
-    yield figures["row"]
+    yield name
     if "failed" in figures:
         yield from (None, figures["failed"][:20], *[None] * (len(COLUMNS) - 3))
         return
-    plans = figures["plans"]
     yield from (figures[key] for key in ("load", "search", "makespan", "second"))
-    yield plans if plans < 10**15 else f"{plans:.3e}"
+    yield plans_text(figures["plans"])
     yield from (figures["nodes"], figures["states"])
     yield round(figures["state_bytes"] / figures["states"], 1)
     yield from (figures[key] for key in ("steps", "rounds", "bound", "memory"))
+
+
+def plans_text(plans: int) -> str:
+    """A number of plans, rounded where it is large."""
+    return f"{plans:,}" if plans < 10**15 else f"{plans:.3e}"
+
+
+def page_line(name: str, figures: dict[str, Any]) -> str:
+    """The line of a row in docs/coverage.md."""
+    name = name.removeprefix("corners ").replace(" far apart", " robots far apart")
+    texts = [name, "", figures.get("failed", ""), *[""] * (len(PAGE) - 3)]
+    if "failed" not in figures:
+        get = figures.__getitem__
+        texts = [name, f"{get('load') + get('search'):.1f}", f"{get('makespan')}, {get('second')}"]
+        texts += [plans_text(get("plans"))]
+        texts += [f"{get(key):,}" for key in ("nodes", "states", "steps")]
+        texts += [get("bound"), str(get("memory"))]
+    return f"| {' | '.join(texts)} |".replace("  ", " ")
+
+
+def print_page(asked: Asked, limit: int, found: Sequence[tuple[str, dict[str, Any]]]) -> None:
+    """Print a table as Markdown, how many rows are solved, and the versions that they are of."""
+    solved = [name for name, figures in found if "plans" in figures]
+    print(f"### {asked.title}: {len(solved)} of {len(found)} solved in {limit} CPU s\n")
+    if asked.first:
+        by_domain = Counter(name.split("/")[0] for name in solved)
+        print(f"{', '.join(f'{domain} {n}' for domain, n in by_domain.items())}.\n")
+    versions = Counter(figures.get("version", "unknown") for _, figures in found)
+    print("Versions:", ", ".join(f"`{v}` ({n} rows)" for v, n in sorted(versions.items())), "\n")
+    print(f"| {' | '.join(head for head, _ in PAGE)} |")
+    print(f"|{'|'.join('--:' if number else '---' for _, number in PAGE)}|")
+    print(*(page_line(*row) for row in found), sep="\n", end="\n\n")
 
 
 def main() -> None:
@@ -220,6 +326,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("rows", nargs="*", metavar="ROW", help="beginnings of rows' names")
     parser.add_argument("--list", action="store_true", help="the names of all rows")
+    parser.add_argument("--table", choices=[*TABLES, "all"], help="a table of docs/coverage.md")
+    parser.add_argument("--markdown", action="store_true", help="print it as it stands there")
     parser.add_argument("--first", type=int, default=10, metavar="N", help="problems of a domain")
     parser.add_argument("--limit", type=int, default=60, metavar="SECONDS", help="CPU seconds (60)")
     parser.add_argument("--cost", default="makespan+actions", help="of CoDMAP's tasks")
@@ -232,16 +340,31 @@ def main() -> None:
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
         print(json.dumps(one(given.one, given.cost, given.heuristic)))
         return
-    names = [n for n in rows(given.first) if not given.rows or n.startswith(tuple(given.rows))]
     if given.list:
-        print(*names, sep="\n")
+        print(*rows(given.first), sep="\n")
         return
-    known, table, solved = KeptRows(given.kept), PrintedTable(*COLUMNS), 0
-    for name in names:
-        figures = known.get(name, partial(measured, name, given.limit, given.cost, given.heuristic))
-        solved += "plans" in figures
-        table.print(*cells(figures))
-    print(f"{solved} of {len(names)} solved")
+    known = KeptRows(given.kept)
+    for asked, names in chosen(given):
+        found = []
+        table = None if given.markdown else PrintedTable(*COLUMNS)
+        for name in names:
+            work = partial(measured, name, given.limit, asked)
+            found.append((name, known.get(asked.key(name), work)))
+            if table is not None:
+                table.print(*cells(*found[-1]))
+        if given.markdown:
+            print_page(asked, given.limit, found)
+        else:
+            print(f"{sum('plans' in f for _, f in found)} of {len(found)} solved")
+
+
+def chosen(given: argparse.Namespace) -> Iterator[tuple[Asked, list[str]]]:
+    """What the arguments ask for, and the names of its rows."""
+    own = Asked("Rows as asked for", given.first, given.cost, given.heuristic)
+    tables = {"all": list(TABLES.values()), None: [own]}
+    for asked in tables.get(given.table) or [TABLES[given.table]]:
+        names = asked.rows() if given.table else rows(given.first)
+        yield asked, [n for n in names if not given.rows or n.startswith(tuple(given.rows))]
 
 
 if __name__ == "__main__":

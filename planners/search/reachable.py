@@ -39,7 +39,7 @@ class PieceSizes:
 
     states: int = 20_000
     steps: int = 4_000_000
-    kept: int = 30_000_000
+    kept: int = 40_000_000
     pairs: int = 2_000_000
     probe: int = 100_000
     effort: int = 5_000_000

@@ -15,7 +15,7 @@ from planners.tables import Bools, Ints, Rows
 #: Numbers of states in the hash table; -1: the slot is free.
 _Slots = NDArray[np.int32]
 #: States for which room is made at a time: few of them are new, mostly.
-_AT_ONCE = 1 << 17
+_AT_ONCE = 1 << 15
 _MULTIPLIER = np.uint64(0x9E3779B97F4A7C15)
 
 
