@@ -424,8 +424,11 @@ def _combinations(options: Options) -> float:
 
 
 def _narrow(numbers: Numbers) -> Numbers:
-    """The same numbers, none of which is negative, in the smallest unsigned type."""
-    return numbers.astype(np.min_scalar_type(int(numbers.max(initial=0))))
+    """The same numbers, none of which is negative, in the smallest signed type.
+
+    Unsigned 64-bit numbers and signed ones would add up to floats.
+    """
+    return numbers.astype(np.min_scalar_type(-1 - int(numbers.max(initial=0))))
 
 
 def _joined(parts: Sequence[Edges], model: JointModel) -> Edges:

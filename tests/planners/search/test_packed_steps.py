@@ -10,6 +10,7 @@ import pytest
 
 from planners.joint.model import JointModel
 from planners.search import packed_steps, state_table
+from planners.search.layers import Edges
 from planners.search.packed_steps import PackedSteps
 from planners.search.state_table import Packing, StateTable
 from planners.search.state_variables import StateVariable, state_variables
@@ -79,6 +80,16 @@ def test_steps_that_may_clash_are_not_packed(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(packed_steps, "_PAIRS", 10)
     assert PackedSteps.of(model, packing, [replace(both, changes={})]) is None
     assert PackedSteps.of(model, packing, [first, second]) is not None
+
+
+@pytest.mark.parametrize("most", [0, 127, 128, 32_767, 32_768, 2**31 - 1, 2**31, 2**53])
+def test_joint_steps_are_kept_in_few_bytes_and_stay_whole_numbers(most: int) -> None:
+    numbers = np.array([0, 1, most])
+    edges = Edges(numbers, numbers, numbers[:, None], numbers).compact()
+    for kept in (edges.source, edges.target, edges.labels[:, 0], edges.cost):
+        assert (kept + np.ones(1, np.int64)).tolist() == [1, 2, most + 1]
+        assert (kept + np.ones(1, np.int64)).dtype == np.int64
+        assert kept.itemsize == next(size for size in (1, 2, 4, 8) if most < 2 ** (8 * size - 1))
 
 
 def test_packed_states_are_entered_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
