@@ -10,7 +10,7 @@ import numpy as np
 from planners.errors import UsageError
 from planners.joint.model import JointModel, PlanningTask
 from planners.search.bounds import relaxed
-from planners.search.guide import Guide
+from planners.search.guide import Bound, Guide
 from planners.search.plan_formula import may_be_exact
 from planners.search.projections import Projections
 from planners.search.state_variables import StateVariable
@@ -39,7 +39,7 @@ def guide_for(
     start = task.init[None, :]
     if name == "auto" and not max(hmax(start)[0], projections.value(start)[0]):
         return Guide("blind", exact=may_be_exact(model))
-    if name == "auto" and _as_good(model, task, projections):
+    if name == "auto" and _as_good(model, task, projections, hmax):
         return Guide(
             "projections", projections.value, projections.in_time, may_be_exact(model), cost_left
         )
@@ -51,15 +51,14 @@ def guide_for(
     return Guide("relaxed", both, projections.in_time, exact, cost_left)
 
 
-def _as_good(model: JointModel, task: PlanningTask, projections: Projections) -> bool:
+def _as_good(model: JointModel, task: PlanningTask, projections: Projections, hmax: Bound) -> bool:
     """Whether the projections say as much as h^max in the first states of the search.
 
     No, where robots have so many joint steps there that not even these are composed.
     """
     rows = task.init[None, :]
     for _ in range(2):
-        bound = relaxed(model, task.goal)(rows)
-        if (projections.value(rows) < bound).any():
+        if (projections.value(rows) < hmax(rows)).any():
             return False
         rows = rows[:20]
         if model.stepper.most_steps(model.codec.facts_part(rows)) > _STEPS:
