@@ -9,6 +9,7 @@ A question that is not decided with some effort is answered with yes: more is se
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -28,11 +29,13 @@ from planners.search.questions import Literals, OutOfEffort, Plan
 from planners.search.reachable import PieceSizes
 from planners.search.state_variables import StateVariable
 from planners.search.step_formula import TooManyClauses
-from planners.tables import Bools, Rows
+from planners.tables import Bools, Ints, Rows
 
 #: States that are asked for to see whether exact bounds pay, and the share on optimal plans above
 #: which they do not.
 _SAMPLE, _MOST = 50, 0.5
+#: Ways that were asked for last, of which so many may pass that no more are asked for.
+_RECENT = 200
 #: What a makespan that is refuted at once costs for each of its steps, in conflicts; the clauses of
 #: one step more are counted, too: of a task without plan there would be ever more.
 _EASY = 20
@@ -53,23 +56,27 @@ class ExactBound:
     #: Conflicts for one question.
     effort: int
 
-    def may_pass(self, ways: Labels) -> Bools:
-        """Which beginnings of plans, as labels (ways, steps, robots), some optimal plan has.
+    def may_pass(self, ways: Labels, enough: float = 1) -> Bools:
+        """Which beginnings of plans, as labels (ways, steps, robots), some optimal plan may have.
 
-        An optimal plan passes through a state iff one begins with a cheapest way to it.
+        An optimal plan passes through a state iff one begins with a cheapest way to it.  Of the
+        ways that no answer refuted those that are asked for come in a random order; where more
+        than the share ``enough`` of the last ones pass, the others are taken to pass, too.
         """
         asked = (ways + self.plans.firsts(ways.shape[1])).reshape(len(ways), -1)
         columns = np.ascontiguousarray(asked.T)
         passes = np.ones(len(ways), np.bool_)
-        for way, literals in enumerate(asked.tolist()):
-            if passes[way] and not _unless_refuted(self.plans, literals, self.effort):
+        recent: deque[bool] = deque(maxlen=_RECENT)
+        for way in np.random.default_rng(0).permutation(len(ways)).tolist():
+            if not passes[way]:
+                continue
+            literals = asked[way].tolist()
+            recent.append(_unless_refuted(self.plans, literals, self.effort))
+            if not recent[-1]:
                 # What is refuted is part of other ways, too.
-                core = np.flatnonzero(np.isin(asked[way], self.plans.core_of(literals)))
-                same = passes & (columns[core[-1]] == asked[way, core[-1]])
-                alike = np.flatnonzero(same)
-                for column in core[:-1]:
-                    alike = alike[columns[column, alike] == asked[way, column]]
-                passes[alike] = False
+                passes &= ~_has(columns, asked[way], self.plans.core_of(literals))
+            elif len(recent) == _RECENT and sum(recent) > enough * _RECENT:
+                break
         return passes
 
     def only(self, depth: int, rows: Rows, options: Options) -> Options:
@@ -147,6 +154,16 @@ def _unless_refuted(plans: FixedPlans, literals: Literals, effort: int) -> bool:
             return plans.holds(literals)
     except OutOfEffort:
         return True
+
+
+def _has(columns: Ints, way: Ints, core: Literals) -> Bools:
+    """Which ways (labels, ways) have the same labels as this one, of those in a core."""
+    alike = np.arange(columns.shape[1])
+    for place in np.flatnonzero(np.isin(way, core))[::-1]:
+        alike = alike[columns[place, alike] == way[place]]
+    found = np.zeros(columns.shape[1], np.bool_)
+    found[alike] = True
+    return found
 
 
 def _shortest(formula: PlanFormula, task: PlanningTask, at_least: int) -> Plan:

@@ -53,6 +53,8 @@ _LIMITS = 10
 #: States of a layer that are asked for first, and the share of them on optimal plans above which
 #: the others are not asked for.
 _SAMPLE, _MOSTLY = 64, 0.9
+#: The same share, of those that were asked for last and that no earlier answer refuted.
+_NEARLY_ALL = 0.95
 #: Bytes of the states that joint steps lead to, composed at a time.
 _BYTES = 1 << 28
 
@@ -255,7 +257,7 @@ class BoundedSearch:
         elif passes.mean() > _MOSTLY:
             return edges
         else:
-            good = exact.may_pass(self._ways.to(new, depth))
+            good = exact.may_pass(self._ways.to(new, depth), _NEARLY_ALL)
         self._depth[new[~good]] = _LEFT_OUT
         kept = good[number]
         return edges.only(kept)
