@@ -154,7 +154,11 @@ def _environment(world: dict[str, Any], seed: int) -> Any:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "world.yaml")
         path.write_text(json.dumps(world))  # which is YAML, too
-        return simulator(str(path), headless=True, log_level="CRITICAL", seed=seed)
+        environment = simulator(str(path), headless=True, log_level="CRITICAL", seed=seed)
+    # It logs nothing from here on.  Left to the garbage collector, that may come while the next
+    # world begins to log, and both wait for the other's lock for ever.
+    environment.logger.close()
+    return environment
 
 
 def _world(

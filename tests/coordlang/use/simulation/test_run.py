@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import gc
 import math
+from threading import Thread
 
 import msgspec
 import pytest
@@ -80,3 +82,21 @@ def test_robots_without_lidar_collide_where_others_stop() -> None:
         assert event.robots == ["r1", "r2"]
         assert not run_.deadlock
         assert not run_.arrived
+
+
+def test_a_world_that_is_garbage_does_not_hold_up_the_next_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What ends with a world is not left to the collector, which may come while one begins."""
+    formatter = pytest.importorskip("loguru._better_exceptions").ExceptionFormatter
+    begin = formatter.__init__
+
+    def begins(self: object, *args: object, **options: object) -> None:
+        gc.collect()
+        begin(self, *args, **options)
+
+    monkeypatch.setattr(formatter, "__init__", begins)
+    again = Thread(target=lambda: runs("t-map", "plan", Settings(), 2), daemon=True)
+    again.start()
+    again.join(60)
+    assert not again.is_alive()
