@@ -95,6 +95,34 @@ def require_room(floor: Floor, radius: float) -> None:
         )
 
 
+def outlines(walls: Sequence[Wall]) -> list[list[Point]]:
+    """Draw walls that touch at their ends without lifting the pen, every wall there and back.
+
+    A simulator looks at each thing in each tick, so that a few long ones are cheaper than many.
+    """
+    ways: dict[Point, list[Point]] = {}
+    for x1, y1, x2, y2 in walls:
+        ways.setdefault((x1, y1), []).append((x2, y2))
+        ways.setdefault((x2, y2), []).append((x1, y1))
+    drawn: set[frozenset[Point]] = set()
+    found = []
+    for start in sorted(ways):
+        line, path = [start], [start]
+        while path:
+            here = path[-1]
+            left = [there for there in ways[here] if frozenset((here, there)) not in drawn]
+            if left:
+                drawn.add(frozenset((here, left[0])))
+                path.append(left[0])
+            else:
+                path.pop()
+            if path:
+                line.append(path[-1])
+        if len(line) > 1:
+            found.append(line)
+    return found
+
+
 def _points(
     places: Sequence[str], links: Sequence[tuple[str, str]], known: Mapping[str, Point]
 ) -> Mapping[str, Point]:

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from coordlang.coordinates import Point
-from coordlang.use.simulation.floor import Floor
+from coordlang.use.simulation.floor import Floor, outlines
 from coordlang.use.simulation.settings import Settings
 from coordlang.use.simulation.tracking import Pose, Velocity
 from planners.errors import UsageError
@@ -191,10 +191,10 @@ def _world(
     walls: list[dict[str, Any]] = [
         {
             "name": f"wall {number}",
-            "shape": {"name": "linestring", "vertices": [list(wall[:2]), list(wall[2:])]},
+            "shape": {"name": "linestring", "vertices": [list(point) for point in outline]},
             "state": [0, 0, 0],
         }
-        for number, wall in enumerate(floor.walls)
+        for number, outline in enumerate(outlines(floor.walls))
     ]
     if human is not None:
         walls.append(

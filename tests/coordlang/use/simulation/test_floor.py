@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 
 from coordlang.places.world import Link, World
-from coordlang.use.simulation.floor import floor_of, require_room
+from coordlang.use.simulation.floor import floor_of, outlines, require_room
 from planners.errors import BadInput, UsageError
 from tests.support.simulation import floor_for, mission_of
 
@@ -48,6 +50,15 @@ def test_places_without_coordinates_are_an_error() -> None:
     towns = world(("depot", "town"), ("depot", "town"))
     with pytest.raises(BadInput, match=r"not known: depot, town(.|\n)*--coordinates"):
         floor_of(towns, {}, 1.0)
+
+
+@pytest.mark.parametrize("folder", ["t-map", "corridor"])
+def test_outlines_draw_every_wall_and_nothing_else(folder: str) -> None:
+    walls = floor_for(mission_of(folder)).walls
+    lines = outlines(walls)
+    assert len(lines) == 1, "the walls around one floor are connected"
+    drawn = {frozenset(pair) for line in lines for pair in pairwise(line)}
+    assert drawn == {frozenset((wall[:2], wall[2:])) for wall in walls}
 
 
 def test_robots_that_are_too_large_are_an_error() -> None:
