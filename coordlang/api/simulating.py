@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from os import fspath
+from pathlib import Path
 from typing import Any, Unpack
 
 import msgspec
@@ -21,6 +23,7 @@ from coordlang.use.sentence.best_sentence import best_sentence
 from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
 from coordlang.use.simulation.floor import floor_of
 from coordlang.use.simulation.record import RunRecord, SimulationRecord, WishRecord, to_bytes
+from coordlang.use.simulation.recording import KINDS, recorded
 from coordlang.use.simulation.runs import record_of, runs_of
 from coordlang.use.simulation.settings import Settings
 from coordlang.use.simulation.simulator import require_simulator
@@ -77,9 +80,43 @@ class Simulated(Presented):
         found: dict[str, Any] = msgspec.to_builtins(self.record)
         return found
 
-    def save(self, path: File) -> None:
-        """Write the record as JSON."""
-        write_atomically(path, to_bytes(self.record))  # type: ignore[arg-type]
+    def save(self, path: File, seed: int | None = None) -> None:
+        """Write the record (``.json``), or one run as a film or a sheet of frames.
+
+        The name's ending says which: ``.gif``, ``.mp4`` or ``.png``; ``seed`` is that of the run,
+        by default of the first one.
+
+        Raises
+        ------
+        UsageError
+            For another ending, and where there is no such run.
+        """
+        write_atomically(fspath(path), written(self.record, fspath(path), seed))
+
+
+def kind_of(path: str) -> str:
+    """Return the ending of a file's name; `UsageError` for one that is not written."""
+    kind = Path(path).suffix.lower()
+    if kind != ".json" and kind not in KINDS:
+        raise UsageError(
+            f"{echoed(path)}: it is not known what to write there",
+            remedy=f"End the name in .json, {', '.join(KINDS)}.",
+        )
+    return kind
+
+
+def written(record: SimulationRecord, path: str, seed: int | None = None) -> bytes:
+    """Return what a file of this name holds: the record, or a recording of a run."""
+    kind = kind_of(path)
+    if kind == ".json":
+        return to_bytes(record)
+    found = [run for run in record.runs if seed is None or run.seed == seed]
+    if not found:
+        raise UsageError(
+            f"there is no run with seed {seed}",
+            remedy=f"There are {', '.join(str(run.seed) for run in record.runs[:8])}.",
+        )
+    return recorded(record, found[0], kind)
 
 
 def simulate(

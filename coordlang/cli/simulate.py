@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import click
 
 import coordlang
@@ -11,20 +13,27 @@ from coordlang.cli.exit_codes import UNPROVED, code_of_interrupt
 from coordlang.cli.failure import why_stopped
 from coordlang.cli.files import (
     FILE,
+    FOLDER,
     PlanningFiles,
     beside,
     check_outputs,
-    language_argument,
-    planning_files,
 )
-from coordlang.cli.shared_options import ModelKeywords, kept_plans, limits, model_options
-from coordlang.cli.terminal import bar, covered_code
+from coordlang.cli.shared_options import kept_plans, limits, model_options
+from coordlang.cli.terminal import bar, covered_code, working
 from planners.notebook import counted
+
+if TYPE_CHECKING:
+    from coordlang.api.simulating import Simulated
 
 
 @click.command(name="simulate")
-@language_argument
-@planning_files("DOMAIN PROBLEM", most=1)
+@click.argument("files", nargs=-1, type=FILE, metavar="LANGUAGE DOMAIN PROBLEM")
+@click.option(
+    "--factored",
+    type=FOLDER,
+    metavar="DIR",
+    help="In place of DOMAIN and PROBLEM: the folder of each robot's own domain and problem file.",
+)
 @click.option(
     "--sentence",
     metavar="SENTENCE",
@@ -93,78 +102,101 @@ from planners.notebook import counted
     help="Where places lie (default: coordinates.json beside PROBLEM, else what names say).",
 )
 @click.option(
-    "-o", "--output", type=FILE, metavar="FILE", help="Write the record of the runs (.json) here."
+    "-o",
+    "--output",
+    "outputs",
+    multiple=True,
+    type=FILE,
+    metavar="FILE",
+    help="Write the record (.json), or a recording of one run (.gif, .mp4, a sheet as .png).",
+)
+@click.option(
+    "--shown", type=int, metavar="SEED", help="The run that is recorded (default: the first)."
+)
+@click.option(
+    "--replay",
+    type=FILE,
+    metavar="RECORD",
+    help="Simulate nothing: record a run of this .json file; without LANGUAGE DOMAIN PROBLEM.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the record as one JSON object.")
 @model_options
 @kept_plans
 @limits
 def command(
-    language: str,
-    pddl: PlanningFiles,
-    sentence: str | None,
-    without: bool,
-    plan: bool,
-    runs: int,
-    seed: int,
-    step: str,
-    cell: float,
-    radius: float | None,
-    noise: float,
-    no_lidar: bool,
-    human: str | None,
-    visit: tuple[str, ...],
-    coordinates: str | None,
-    output: str | None,
+    files: tuple[str, ...],
+    factored: str | None,
+    outputs: tuple[str, ...],
+    shown: int | None,
+    replay: str | None,
     as_json: bool,
-    model: ModelKeywords,
+    no_lidar: bool,
+    coordinates: str | None,
+    **options: Any,
 ) -> int:
     """Let robots with wheels do the task of PROBLEM in a simulator.
 
     Each robot draws its own choices under a sentence of LANGUAGE.  What comes of it is counted:
     collisions, deadlocks, late arrivals, messages.  Needs `pip install 'coordlang[sim]'`.
     """
-    from coordlang.use.simulation.record import to_bytes
+    from coordlang.api.simulating import Simulated, kind_of
+    from coordlang.use.simulation.record import read_simulation, to_bytes
 
+    for path in outputs:
+        kind_of(path)
+    language, pddl = _read_files(files, factored, is_replay=replay is not None)
     places = [coordinates] if coordinates else map(beside, pddl.problems)
-    check_outputs([("-o", output)], [language, *pddl.paths, *places])
-    with bar() as show:
-        found = coordlang.simulate(
-            language,
-            pddl.domain,
-            pddl.problem,
-            factored=pddl.factored,
-            sentence=sentence,
-            without=without,
-            plan=plan,
-            runs=runs,
-            seed=seed,
-            step=step,
-            cell=cell,
-            radius=radius,
-            noise=noise,
-            lidar=not no_lidar,
-            human=human,
-            visit=visit,
-            coordinates=coordinates,
-            progress=lambda done, number: show(done, number, "runs"),
-            **model,
+    check_outputs(
+        [(f"-o {number}", path) for number, path in enumerate(outputs, 1)],
+        [language, replay, *pddl.paths, *places],
+    )
+    if replay is not None:
+        found = Simulated(read_simulation(replay))
+    else:
+        model = options.pop("model")
+        with bar() as show:
+            found = coordlang.simulate(
+                language,
+                pddl.domain,
+                pddl.problem,
+                factored=factored,
+                lidar=not no_lidar,
+                coordinates=coordinates,
+                progress=lambda done, number: show(done, number, "runs"),
+                **options,
+                **model,
+            )
+    _write(found, outputs, shown)
+    echo(to_bytes(found.record).decode() if as_json else _summary(found.counts), nl=not as_json)
+    return _exit_code(found, options["runs"])
+
+
+def _read_files(
+    files: tuple[str, ...], factored: str | None, *, is_replay: bool
+) -> tuple[str, PlanningFiles]:
+    """Return the language and the planning files; empty for a replay, which reads none of them."""
+    wanted = 0 if is_replay else 1 if factored else 3
+    if len(files) != wanted or (is_replay and factored):
+        raise click.UsageError(
+            "expected LANGUAGE DOMAIN PROBLEM, or LANGUAGE --factored DIR, or --replay RECORD alone"
         )
-    text = to_bytes(found.record).decode()
-    if output == "-" or as_json:
-        echo(text, nl=False)
-    if output is not None and output != "-":
-        found.save(output)
-    if output != "-" and not as_json:
-        echo(_summary(found.counts))
+    language = files[0] if files else ""
+    return language, PlanningFiles(files[1:], factored)
+
+
+def _write(found: Simulated, outputs: tuple[str, ...], shown: int | None) -> None:
+    with working("drawing") as say:
+        for path in outputs:
+            say(f"writing {path}")
+            found.save(path, shown)
+
+
+def _exit_code(found: Simulated, runs: int) -> int:
     code = covered_code(found.covered, found.tolerance)
     if found.stopped is None:
         return code
-    echo(
-        f"coordlang: {why_stopped(found.stopped)}; {counted(len(found.runs), 'run')} of {runs} "
-        "done",
-        err=True,
-    )
+    done = counted(len(found.runs), "run")
+    echo(f"coordlang: {why_stopped(found.stopped)}; {done} of {runs} done", err=True)
     if isinstance(found.stopped, KeyboardInterrupt):
         return code_of_interrupt(found.stopped)
     return UNPROVED

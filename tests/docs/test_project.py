@@ -16,6 +16,7 @@ from tests.support.domains import ROOT
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 #: Distributions whose packages have other names.
 PACKAGES: dict[str, set[str]] = {
+    "imageio-ffmpeg": {"imageio_ffmpeg"},
     "ir-sim": {"irsim"},
     "python-sat": {"pysat"},
     "unified-planning": {"unified_planning"},

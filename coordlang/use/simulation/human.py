@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from random import Random
 
@@ -44,16 +44,22 @@ class Human:
 
     @classmethod
     def of(
-        cls, wanted: str, floor: Floor, taken: Iterable[str], cell: float, random: Random
+        cls,
+        wanted: str,
+        floor: Floor,
+        starts: Collection[str],
+        goals: Collection[str],
+        cell: float,
+        random: Random,
     ) -> Human:
-        """Put a human on the floor, in no place that is ``taken`` unless it is named.
+        """Put a human on the floor; where no robot starts or ends, unless the place is named.
 
         Raises
         ------
         UsageError
-            If there is no such place, or none is left.
+            If there is no such place, a robot starts there, or none is left.
         """
-        places = sorted(set(floor.points) - {*taken})
+        places = sorted(set(floor.points) - {*starts, *goals})
         if wanted in (STANDING_SOMEWHERE, WALKING):
             if not places:
                 raise UsageError(
@@ -61,6 +67,11 @@ class Human:
                     remedy="Leave out --human.",
                 )
             place = random.choice(places)
+        elif wanted in starts:
+            raise UsageError(
+                f"--human {echoed(wanted)}: a robot starts in this place",
+                remedy=f"Say another place, or {STANDING_SOMEWHERE}.",
+            )
         elif wanted in floor.points:
             place = wanted
         else:

@@ -10,11 +10,14 @@ import msgspec
 from msgspec import Meta
 
 from coordlang.use.simulation.floor import Wall
-from planners.errors import Position
+from planners.errors import BadInput, Position
 from planners.files import FileFormat, read_bytes
 
 FORMAT = "coordlang/simulation"
 VERSION = 1
+
+#: Places, walls and poses lie within so many metres.
+_LARGEST = 1e6
 
 _Seconds = Annotated[float, Meta(description="Seconds since the start of the run.", ge=0)]
 _Count = Annotated[int, Meta(ge=0)]
@@ -33,6 +36,13 @@ class StepRecord(msgspec.Struct, frozen=True):
     end: Annotated[
         float | None, Meta(description="Seconds since the start; null: it was never done.")
     ]
+    words: Annotated[
+        int | None,
+        Meta(
+            description="How many words of the sentence the robot has passed then, at most; null "
+            "before that, and without a sentence."
+        ),
+    ] = None
 
 
 class EventRecord(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -188,6 +198,31 @@ def read_simulation(path: str | Path) -> SimulationRecord:
     Raises
     ------
     BadInput
-        For a file that is none.
+        For a file that is none, or whose runs do not have a pose of every robot at every time.
     """
-    return SIMULATION.decode(read_bytes(path), Position(str(path)))
+    position = Position(str(path))
+    record = SIMULATION.decode(read_bytes(path), position)
+    for run in record.runs:
+        if wrong := _wrong(record, run):
+            raise BadInput(
+                f"the run with seed {run.seed}: {wrong}",
+                position=position,
+                remedy="Write the record again: `coordlang simulate .. -o FILE.json`.",
+            )
+    return record
+
+
+def _wrong(record: SimulationRecord, run: RunRecord) -> str | None:
+    """Say why a run cannot be played, None if it can."""
+    lengths = {len(run.poses.get(name, ())) for name in record.robots}
+    if run.human:
+        lengths.add(len(run.human))
+    if len(lengths) != 1 or 0 in lengths:
+        return "there is not one pose of each robot at each time"
+    named = {step.robot for step in run.steps}.union(*(event.robots for event in run.events))
+    if not named <= {*record.robots}:
+        return "it speaks of robots that are not listed"
+    points = [(x, y) for poses in run.poses.values() for x, y, _ in poses] + run.human
+    if not all(abs(x) < _LARGEST and abs(y) < _LARGEST for x, y in points):
+        return f"poses lie between {-_LARGEST:g} and {_LARGEST:g}"
+    return None

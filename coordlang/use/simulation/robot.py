@@ -109,7 +109,7 @@ class OwnStep:
     """A step of a robot: its number from 0, the subaction (None: idle), its times in seconds.
 
     ``place`` is where it leads, None for a step in which the robot stays; ``end`` is None while it
-    is under way.
+    is under way.  ``words`` of the sentence are passed then, at most; None without a sentence.
     """
 
     number: int
@@ -117,6 +117,7 @@ class OwnStep:
     place: str | None
     begin: float
     end: float | None = None
+    words: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,12 +266,13 @@ class Robot:
         return self._pace.is_common or sensed.time >= step.begin + self._period
 
     def _finish(self, step: OwnStep, sensed: Sensed) -> tuple[Message, ...]:
-        self.steps[-1] = replace(step, end=sensed.time)
         before = self._progress
         words = before.words
         if self._words is not None:
             self._word_state = self._words.moves[self._word_state][step.subaction or IDLE]
             words = max(words, self._words.words[self._word_state])
+        known = None if self._words is None else words
+        self.steps[-1] = replace(step, end=sensed.time, words=known)
         self._progress = replace(before, steps=before.steps + 1, words=words, done=sensed.time)
         told = self._pace.told(before, self._progress)
         return tuple(Message(self.name, kind, number) for kind, number in told)

@@ -120,9 +120,14 @@ class _Going:
         sensing = {name: Random(f"{seed} sensors {name}") for name in robots}
         human = None
         if settings.human is not None:
-            taken = {*mission.starts.values(), *mission.goals.values()}
-            random = Random(f"{seed} human")
-            human = Human.of(settings.human, floor, taken, settings.cell, random)
+            human = Human.of(
+                settings.human,
+                floor,
+                list(mission.starts.values()),
+                list(mission.goals.values()),
+                settings.cell,
+                Random(f"{seed} human"),
+            )
         standing = floor.points[human.place] if human is not None else None
         simulator = Simulator(floor, poses, settings, seed, standing)
         return cls(mission, settings, seed, period, robots, simulator, sensing, human)
@@ -312,7 +317,9 @@ class _Going:
 
 
 def _step(robot: str, step: OwnStep) -> StepRecord:
-    return StepRecord(robot, step.number, step.subaction, step.place, step.begin, step.end)
+    return StepRecord(
+        robot, step.number, step.subaction, step.place, step.begin, step.end, step.words
+    )
 
 
 def _rounded(pose: Pose) -> Pose:

@@ -85,6 +85,34 @@ def test_a_time_limit_keeps_the_runs_that_are_done(language: Path, coordlang: Co
     assert "of 1000 done" in outcome.err
 
 
+def test_a_record_is_drawn_again(language: Path, coordlang: Command, tmp_path: Path) -> None:
+    record, sheet, again = (tmp_path / name for name in ("runs.json", "sheet.png", "again.png"))
+    options = ("--runs", "2", "--shown", "1", "-o", record, "-o", sheet)
+    assert coordlang("simulate", language, *T_MAP, *options).code == 0
+    replayed = coordlang("simulate", "--replay", record, "--shown", "1", "-o", again, "--json")
+    assert replayed.code == 0
+    assert json.loads(replayed.out) == json.loads(record.read_text())
+    assert again.read_bytes() == sheet.read_bytes()
+    assert coordlang("simulate", "--replay", record, "--shown", "5", "-o", again).code == 2
+    assert again.read_bytes() == sheet.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("language.json",), "expected LANGUAGE DOMAIN PROBLEM"),
+        (("--replay", "runs.json", "language.json"), "--replay RECORD alone"),
+        (("--replay", "runs.json", "-o", "run.txt"), "End the name in .json, .gif, .mp4, .png"),
+        (("--replay", "runs.json", "-o", "no/run.gif"), "cannot be written"),
+        (("--replay", "runs.json", "-o", "a.gif", "-o", "a.gif"), "name the same file"),
+    ],
+)
+def test_usage(arguments: tuple[str, ...], message: str, coordlang: Command) -> None:
+    outcome = coordlang("simulate", *arguments)
+    assert outcome.code == 2
+    assert message in outcome.err
+
+
 def test_places_need_coordinates(coordlang: Command, tmp_path: Path) -> None:
     files = (DOMAINS / "three-cells" / "domain.pddl", DOMAINS / "three-cells" / "problem.pddl")
     language = tmp_path / "language.json"

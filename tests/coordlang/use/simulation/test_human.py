@@ -76,7 +76,7 @@ def test_under_a_whole_plan_a_detour_can_be_had_only_if_it_is_on_it() -> None:
 
 def test_a_walker_goes_along_links_and_turns_back_before_robots() -> None:
     floor = floor_for(mission_of("corridor"))
-    human = Human.of("walking", floor, (), 1.0, Random(4))
+    human = Human.of("walking", floor, (), (), 1.0, Random(4))
     at = floor.points[human.place]
     seen = set()
     for _ in range(2000):
@@ -97,11 +97,13 @@ def test_a_walker_goes_along_links_and_turns_back_before_robots() -> None:
 def test_an_unknown_place_is_an_error(human: str) -> None:
     floor = floor_for(mission_of("t-map"))
     with pytest.raises(UsageError, match="there is no such place"):
-        Human.of(human, floor, (), 1.0, Random(0))
+        Human.of(human, floor, (), (), 1.0, Random(0))
 
 
 def test_a_human_needs_a_place_that_is_free() -> None:
     floor = floor_for(mission_of("t-map"))
-    assert Human.of("random", floor, sorted(floor.points)[1:], 1.0, Random(0)).place == "c0-1"
+    assert Human.of("random", floor, sorted(floor.points)[1:], (), 1.0, Random(0)).place == "c0-1"
     with pytest.raises(UsageError, match="no place for a human"):
-        Human.of("random", floor, floor.points, 1.0, Random(0))
+        Human.of("random", floor, ["c1-1"], list(floor.points), 1.0, Random(0))
+    with pytest.raises(UsageError, match="a robot starts in this place"):
+        Human.of("c1-1", floor, ["c1-1"], (), 1.0, Random(0))
