@@ -23,6 +23,8 @@ from planners.notebook import counted
 
 if TYPE_CHECKING:
     from coordlang.coordinates import Point
+    from coordlang.use.simulation.record import SimulationRecord
+    from planners.pddl.lifted import Domain
 
 
 @click.command(name="report")
@@ -47,6 +49,13 @@ if TYPE_CHECKING:
     "first PROBLEM, else by their names, else laid out).",
 )
 @click.option(
+    "--run",
+    "run_file",
+    type=FILE,
+    metavar="RUN.json",
+    help="Also play these runs of `coordlang simulate -o RUN.json`.",
+)
+@click.option(
     "--planviz",
     "with_planviz",
     is_flag=True,
@@ -62,6 +71,7 @@ def command(
     output: str,
     tasks_shown: int,
     coordinates: str | None,
+    run_file: str | None,
     with_planviz: bool,
     seed: int,
     model: ModelKeywords,
@@ -80,13 +90,14 @@ def command(
     from planners.writing import write_atomically
 
     places = coordinates if coordinates is not None else str(_beside(pddl))
-    inputs = [language, *pddl.paths, places]
+    inputs = [language, *pddl.paths, places, *([run_file] if run_file else [])]
     beside = _planviz_paths(output) if with_planviz else []
     check_outputs([("-o", output), *(("--planviz", path) for path in beside)], inputs)
     files = read_planning(pddl.domain, pddl.problems, pddl.factored, GivenOptions.of(**model))
     known = _coordinates(coordinates, pddl)
     read, position = language_for(language, files, coordinates=known)
     check_source(read, files.domain, files.problems, position)
+    simulated = _simulated(run_file, files.domain)
     with working("drawing the page"):
         report = make_report(
             read,
@@ -97,6 +108,7 @@ def command(
             options=files.options_of(read),
             coordinates=known,
             position=position,
+            simulated=simulated,
         )
         shown_plan = planviz(report.first, known) if with_planviz else None
     if output == "-":
@@ -110,6 +122,19 @@ def command(
     place = "stdout" if output == "-" else visible(output)
     warn_of_failures(read.tolerance)
     echo(f"{shown}, {len(report.html):,} bytes, written to {place}", err=output == "-")
+
+
+def _simulated(path: str | None, domain: Domain) -> SimulationRecord | None:
+    """The runs that the page is to play."""
+    from coordlang.report.simulated import require_of
+    from coordlang.use.simulation.record import read_simulation
+    from planners.errors import Position
+
+    if path is None:
+        return None
+    record = read_simulation(path)
+    require_of(record, domain, Position(path))
+    return record
 
 
 def _planviz_paths(output: str) -> list[str]:

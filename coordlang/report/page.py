@@ -18,8 +18,10 @@ from coordlang.language.tolerance import percent
 from coordlang.language.words import Language
 from coordlang.report.data import MOST_PLACES, page_data
 from coordlang.report.shown import select_tasks
+from coordlang.report.simulated import simulated_data, summary
 from coordlang.report.task import task_part
 from coordlang.use.sentence.task_language import TaskLanguage
+from coordlang.use.simulation.record import SimulationRecord
 from planners.errors import OutOfMemory, Position
 from planners.loading import ModelOptions
 from planners.pddl.lifted import Domain, Problem
@@ -54,6 +56,7 @@ def make_report(
     position: Position | None = None,
     largest: int = LARGEST,
     most_places: int = MOST_PLACES,
+    simulated: SimulationRecord | None = None,
 ) -> Report:
     """Render the report of a language; the same arguments give the same bytes.
 
@@ -72,6 +75,8 @@ def make_report(
         Bytes that a page has at most.
     most_places
         With more places no map is drawn.
+    simulated
+        Runs to be played on the page.
 
     Raises
     ------
@@ -92,7 +97,9 @@ def make_report(
     )
     while True:
         data = page_data(language, selection, parts, coordinates, most_places, lifted)
-        html = _render(language, domain, problems, data, seed)
+        if simulated is not None:
+            data["simulated"] = simulated_data(simulated)
+        html = _render(language, domain, problems, data, seed, simulated)
         if len(html) <= largest:
             candidates = int(language.provenance.tasks.get("count", 0))
             return Report(html, len(parts), candidates, parts[0].shown.language)
@@ -110,6 +117,7 @@ def _render(
     problems: Sequence[Problem],
     data: Mapping[str, Any],
     seed: int,
+    simulated: SimulationRecord | None,
 ) -> bytes:
     import jinja2
     from markupsafe import Markup
@@ -134,6 +142,7 @@ def _render(
         may_fail=language.may_fail,
         warning=language.tolerance.warning if language.tolerance else None,
         slack=language.tolerance.slack if language.tolerance else None,
+        simulated=simulated and summary(simulated, len(data["simulated"]["runs"])),
         about=_about(language, domain, problems, data, seed),
         formula=_formula,
         counted=counted,

@@ -9,6 +9,8 @@ from coordlang.building import build_language
 from coordlang.use.sentence.best_sentence import best_sentence
 from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
 from coordlang.use.simulation.floor import Floor, floor_of
+from coordlang.use.simulation.record import SimulationRecord
+from coordlang.use.simulation.runs import record_of, runs_of
 from coordlang.use.simulation.settings import Settings
 from coordlang.use.simulation.team import Agreement, Mission, mission
 from tests.support.domains import own_task, read
@@ -31,3 +33,12 @@ def mission_of(folder: str, stem: str = "problem", agreement: Agreement = "sente
 
 def floor_for(of: Mission, settings: Settings | None = None) -> Floor:
     return floor_of(of.world, {}, (settings or Settings()).cell)
+
+
+def recorded(
+    folder: str, agreement: Agreement, settings: Settings, number: int
+) -> SimulationRecord:
+    """Runs in a shipped problem's own task, as a record."""
+    of = mission_of(folder, agreement=agreement)
+    floor = floor_for(of, settings)
+    return record_of(of, floor, settings, list(runs_of(of, floor, settings, number)))

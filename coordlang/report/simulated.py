@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A record of simulated runs, as a page plays it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from coordlang.language.provenance import domain_sha256
+from coordlang.use.simulation.record import EventRecord, RunRecord, SimulationRecord
+from planners.errors import BadInput, Position
+from planners.joint.model import own_text
+from planners.pddl.lifted import Domain
+
+#: Poses of all robots in all runs that a page holds; at least one run is in it.
+MOST_POSES = 20_000
+
+_AGREED = {
+    "sentence": "All robots know the sentence {sentence}, and each draws its own choices under it.",
+    "plan": "All robots follow one whole plan.",
+    "nothing": "Nothing is agreed: each robot follows an optimal plan of its own.",
+}
+_STEPS = {
+    "clock": "A common clock begins the joint steps",
+    "barrier": "Before each joint step robots wait until all have done the one before",
+    "word": "Robots wait for each other before each word only",
+}
+
+
+def require_of(record: SimulationRecord, domain: Domain, position: Position) -> None:
+    """Raise `BadInput` if runs are of another domain, or if there are none."""
+    if record.domain.get("sha256") != domain_sha256(domain):
+        raise BadInput(
+            "these runs are of another domain",
+            position=position,
+            remedy="Give the domain that `coordlang simulate` was given.",
+        )
+    if not record.runs:
+        raise BadInput(
+            "there is no run in this record",
+            position=position,
+            remedy="Make one with `coordlang simulate .. -o RUN.json`.",
+        )
+
+
+def summary(record: SimulationRecord, shown: int) -> str:
+    """Return what stands above the player of runs, of which so many are in the page."""
+    agreed = _AGREED[record.agreement].format(sentence=record.sentence)
+    some = "" if shown == len(record.runs) else f" The first {shown} of {len(record.runs)} runs."
+    return (
+        f"{agreed} {_STEPS[record.step]}; noise {100 * record.noise:g} %, discs of "
+        f"{record.radius:g} m, cells of {record.cell:g} m. Task: {record.task}.{some}"
+    )
+
+
+def simulated_data(record: SimulationRecord) -> dict[str, Any]:
+    """Return the runs of a record as JSON data, as many as there is room for.
+
+    Of a run: ``poses`` by robot, ``steps`` by robot (begin, end, text), ``events`` (time, text,
+    whether it is a bad one).
+    """
+    shown: list[dict[str, Any]] = []
+    poses = 0
+    for found in record.runs:
+        poses += sum(map(len, found.poses.values()))
+        if shown and poses > MOST_POSES:
+            break
+        shown.append(_run(found, record.robots))
+    return {
+        "robots": record.robots,
+        "makespan": record.makespan,
+        "interval": record.interval,
+        "cell": record.cell,
+        "radius": record.radius,
+        "places": record.places,
+        "walls": record.walls,
+        "goals": record.goals,
+        "runs": shown,
+    }
+
+
+def _run(found: RunRecord, robots: Sequence[str]) -> dict[str, Any]:
+    steps = {
+        robot: [
+            [step.begin, step.end, own_text(step.subaction, robot) if step.subaction else "idles"]
+            for step in found.steps
+            if step.robot == robot
+        ]
+        for robot in robots
+    }
+    return {
+        "seed": found.seed,
+        "arrived": found.arrived,
+        "late": found.late,
+        "collisions": found.collisions,
+        "end": found.seconds,
+        "poses": [
+            [[round(x, 2), round(y, 2), round(heading, 2)] for x, y, heading in found.poses[robot]]
+            for robot in robots
+        ],
+        "human": [[round(x, 2), round(y, 2)] for x, y in found.human],
+        "steps": [steps[robot] for robot in robots],
+        "events": [
+            [event.time, _told(event), event.kind in ("collision", "deadlock", "missed")]
+            for event in found.events
+        ],
+    }
+
+
+def _told(event: EventRecord) -> str:
+    who = " and ".join(event.robots)
+    match event.kind:
+        case "collision":
+            return f"{who} touches {event.touched}" if event.touched else f"{who} collide"
+        case "stopped":
+            return f"{who} stands before something"
+        case "missed":
+            return f"{who} is not there when a step begins"
+        case "word":
+            return f"{who} may have come to word {event.words[who] + 1} of the sentence"
+        case "detour":
+            return _detour(who, event)
+        case "deadlock":
+            return "nobody moves any more"
+    return "all have arrived"
+
+
+def _detour(who: str, event: EventRecord) -> str:
+    what = f"visit {event.visit}" if event.visit else f"keep out of {event.avoid}"
+    return f"{who} wants to {what}: {'its choices allow it' if event.granted else 'impossible'}"
