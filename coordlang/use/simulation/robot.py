@@ -46,6 +46,8 @@ class Body:
         The length that counts as one place, in metres.
     clearance
         It stands still where something is nearer straight ahead, in metres from its middle.
+    reaction
+        It drives so slowly that it would come as near as that in so many seconds.
     """
 
     drive: Drive
@@ -53,6 +55,7 @@ class Body:
     leads: Mapping[str, str]
     cell: float
     clearance: float
+    reaction: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -289,9 +292,10 @@ class Robot:
         velocity = driven(sensed.pose, target, drive)
         if sensed.ahead is None:
             return Act()
-        if sensed.ahead < self._body.clearance:
+        room = (sensed.ahead - self._body.clearance) / self._body.reaction
+        if room <= 0:
             return Act((0.0, velocity[1]), is_stopped=True)
-        return Act(velocity)
+        return Act((min(velocity[0], room), velocity[1]))
 
 
 def drawn(monitor: Monitor, random: Random) -> str | None:

@@ -102,6 +102,7 @@ class _Going:
                     mission.leads[name],
                     settings.cell,
                     settings.clearance,
+                    settings.reaction,
                 ),
                 pace_of(settings.step, mission.robots, period),
                 period,

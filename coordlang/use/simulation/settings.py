@@ -84,7 +84,16 @@ class Settings:
     @property
     def clearance(self) -> float:
         """How near to its middle a robot lets come what is straight ahead, in metres."""
-        return min(self.radius + 0.15 * self.cell, 0.45 * self.cell)
+        return self.radius + 0.03 * self.cell
+
+    @property
+    def reaction(self) -> float:
+        """Seconds in which a robot would come as near as that to what is ahead.
+
+        Three ticks: two robots that come head on take at most two thirds of what is between them
+        in a tick, and so never touch.
+        """
+        return 3 * self.tick
 
     def period(self, longest: float) -> float:
         """Seconds that a joint step takes whose longest way has this length: whole ticks."""

@@ -6,10 +6,13 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from coordlang.use.simulation.record import read_simulation
+from coordlang.use.simulation import runs
+from coordlang.use.simulation.record import RunRecord, read_simulation
+from coordlang.use.simulation.run import run
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
 
@@ -32,15 +35,15 @@ def test_json_has_what_is_promised(language: Path, coordlang: Command, tmp_path:
     )
     assert outcome.code == 0, outcome.err
     data = json.loads(outcome.out)
-    assert [run["seed"] for run in data["runs"]] == [3, 4]
-    for run in data["runs"]:
-        assert (run["collisions"], run["deadlock"], run["late"], run["messages"]) == (
+    assert [one["seed"] for one in data["runs"]] == [3, 4]
+    for one in data["runs"]:
+        assert (one["collisions"], one["deadlock"], one["late"], one["messages"]) == (
             0,
             False,
             0,
             0,
         )
-        assert run["seconds"] > 0
+        assert one["seconds"] > 0
     assert json.loads(record.read_text()) == data
     assert read_simulation(record).agreement == "sentence"
 
@@ -83,6 +86,22 @@ def test_a_time_limit_keeps_the_runs_that_are_done(language: Path, coordlang: Co
     assert outcome.code == 3
     assert 0 < len(json.loads(outcome.out)["runs"]) < 1000
     assert "of 1000 done" in outcome.err
+
+
+def test_an_interrupt_keeps_the_runs_that_are_done(
+    language: Path, coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*arguments: Any) -> RunRecord:
+        if arguments[3] == 2:
+            raise KeyboardInterrupt
+        return run(*arguments)
+
+    monkeypatch.setattr(runs, "run", interrupted)
+    record = tmp_path / "runs.json"
+    outcome = coordlang("simulate", language, *T_MAP, "--runs", "9", "-o", record)
+    assert outcome.code == 130
+    assert "interrupted; 2 runs of 9 done" in outcome.err
+    assert [one.seed for one in read_simulation(record).runs] == [0, 1]
 
 
 def test_a_record_is_drawn_again(language: Path, coordlang: Command, tmp_path: Path) -> None:

@@ -76,8 +76,10 @@ def test_robots_without_lidar_collide_where_others_stop() -> None:
     blind = runs("t-map", "nothing", Settings(lidar=False, noise=0.0), 6)
     crashed = [run for run in blind if run.collisions]
     assert crashed
+    for run_ in blind:
+        assert run_.nearest is not None
+        assert (run_.nearest < 2 * 0.2) == (run_.collisions > 0), "by the discs' distance, too"
     for run_ in crashed:
-        assert nearest(run_) < 2 * 0.2 + 0.2, "seen by the distance of the discs, too"
         (event, *_) = [event for event in run_.events if event.kind == "collision"]
         assert event.robots == ["r1", "r2"]
         assert not run_.deadlock

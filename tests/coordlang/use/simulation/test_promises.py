@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Under a sentence nobody collides, waits in vain or comes late: many runs on many maps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from coordlang.building import build_language
+from coordlang.movingai import planning_files, read_map
+from coordlang.tasks.candidates import from_problems
+from coordlang.use.sentence.best_sentence import best_sentence
+from coordlang.use.sentence.task_language import language_in_task
+from coordlang.use.simulation.record import RunRecord
+from coordlang.use.simulation.run import run
+from coordlang.use.simulation.settings import Settings
+from coordlang.use.simulation.team import Mission, mission
+from planners.pddl import read_domain, read_problem
+from tests.support.domains import SHARED
+from tests.support.simulation import floor_for, mission_of
+
+#: From row, column to row, column.
+Ways = list[tuple[int, int, int, int]]
+
+
+def on_map(map_file: Path, ways: Ways, folder: Path) -> Mission:
+    """Robots on a map in movingai format, under the sentence that leaves most plans open."""
+    grid = read_map(map_file)
+    lines = [
+        f"0\tm\t{grid.width}\t{grid.height}\t{column}\t{row}\t{last_column}\t{last_row}\t1"
+        for row, column, last_row, last_column in ways
+    ]
+    scenario = folder / "ways.scen"
+    scenario.write_text("\n".join(["version 1", *lines, ""]))
+    for name, text in planning_files(map_file, scenario, len(ways)).items():
+        (folder / name).write_text(text)
+    domain = read_domain(folder / "domain.pddl")
+    problem = read_problem(folder / f"ways-{len(ways)}.pddl", domain)
+    language = build_language(from_problems(domain, [problem]), "greedy").language
+    used = language_in_task(language, domain, problem)
+    return mission(used, "sentence", best_sentence(used, ["most-plans"]).words)
+
+
+def broken(of: Mission, settings: Settings, runs: int) -> list[RunRecord]:
+    """The runs in which something went wrong."""
+    floor = floor_for(of, settings)
+    found = [run(of, floor, settings, seed) for seed in range(runs)]
+    return [one for one in found if one.collisions or one.deadlock or one.late or not one.arrived]
+
+
+@pytest.mark.parametrize("step", ["clock", "barrier"])
+def test_four_robots_of_the_greatest_radius_rotate(step: str, tmp_path: Path) -> None:
+    """Each enters the place that another one leaves, at a right angle: as near as it gets."""
+    grid = tmp_path / "ring.map"
+    grid.write_text("type octile\nheight 2\nwidth 2\nmap\n..\n..\n")
+    ring = [(0, 0, 0, 1), (0, 1, 1, 1), (1, 1, 1, 0), (1, 0, 0, 0)]
+    found = on_map(grid, ring, tmp_path)
+    assert broken(found, Settings(step=step, radius=0.25), 4) == []
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("step", ["clock", "barrier"])
+@pytest.mark.parametrize(
+    "problem", ["t-map/problem", "corridor/problem", "grid/gwb7-3x5", "grid/three-robots-3x3"]
+)
+def test_shipped_maps(problem: str, step: str) -> None:
+    assert broken(mission_of(*problem.split("/")), Settings(step=step), 20) == []
+
+
+@pytest.mark.thorough
+@pytest.mark.foreign
+@pytest.mark.skipif(
+    not SHARED.is_dir(), reason=f"the inputs that others wrote are not here: {SHARED}"
+)
+@pytest.mark.parametrize("step", ["clock", "barrier"])
+@pytest.mark.parametrize(
+    ("name", "ways"),
+    [
+        ("highways-8-8", [(3, 0, 3, 7), (3, 7, 3, 0)]),
+        ("highways-8-8", [(3, 0, 3, 7), (3, 7, 3, 0), (0, 3, 7, 4)]),
+        ("maze-11-11", [(1, 1, 4, 9), (4, 9, 1, 1)]),
+    ],
+)
+def test_maps_of_others(name: str, ways: Ways, step: str, tmp_path: Path) -> None:
+    found = on_map(SHARED / "mapf" / f"{name}.map", ways, tmp_path)
+    assert broken(found, Settings(step=step), 10) == []
