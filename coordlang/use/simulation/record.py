@@ -53,10 +53,10 @@ class EventRecord(msgspec.Struct, frozen=True, omit_defaults=True):
         Literal["collision", "stopped", "missed", "word", "detour", "deadlock", "arrived"],
         Meta(
             description="collision: robots touch each other, a wall or the human; stopped: a robot "
-            "stands before what its lidar sees; missed: a robot was not there when a step began by "
-            "the clock; word: a robot told that it may have come to a word; detour: a robot asked "
-            "its choices whether it can visit an atom or keep out of a place; deadlock: nobody "
-            "moves any more; arrived: all steps of all robots are done."
+            "stands before what its lidar sees, told once in a step; missed: a robot was not there "
+            "when a step began by the clock; word: a robot told that it may have come to a word; "
+            "detour: a robot asked its choices whether it can visit an atom or keep out of a "
+            "place; deadlock: nobody moves any more; arrived: all steps of all robots are done."
         ),
     ]
     robots: Annotated[list[str], Meta(description="The robots that it concerns.")]

@@ -82,7 +82,7 @@ class _Going:
     collided: set[str] = field(default_factory=set)
     collisions: int = 0
     nearest: float = math.inf
-    stopped: dict[str, bool] = field(default_factory=dict)
+    stopped: dict[str, int] = field(default_factory=dict)
     missed: dict[str, int] = field(default_factory=dict)
     last_change: float = 0.0
     steps_known: int = 0
@@ -258,9 +258,9 @@ class _Going:
                 "detour", [name], visit=detour.visit, avoid=detour.avoid, granted=detour.granted
             )
         self.asked[name] = len(robot.detours)
-        if act.is_stopped and not self.stopped.get(name):
+        if act.is_stopped and self.stopped.get(name) != robot.done:
+            self.stopped[name] = robot.done  # once in a step
             self._event("stopped", [name])
-        self.stopped[name] = act.is_stopped
         if self.settings.step == "clock" and robot.steps:
             step = robot.steps[-1]
             missed = round(step.begin / self.period) - step.number

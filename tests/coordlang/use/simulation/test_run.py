@@ -102,3 +102,18 @@ def test_a_world_that_is_garbage_does_not_hold_up_the_next_one(
     again.start()
     again.join(60)
     assert not again.is_alive()
+
+
+def test_within_a_word_robots_get_out_of_step() -> None:
+    """Why a barrier for each word is not enough: the same choices, done in step, are a plan."""
+    mission = mission_of("t-map", method="minimal")
+    assert len(mission.sentence) == 1, "there is no barrier at all"
+    found = [run(mission, floor_for(mission), Settings(step="word"), seed) for seed in range(6)]
+    broken = [run_ for run_ in found if not run_.arrived]
+    assert broken
+    for run_ in broken:
+        assert run_.mixes
+        (event, *_) = [event for event in run_.events if event.kind in ("stopped", "collision")]
+        assert len(set(event.steps.values())) > 1, "one robot is ahead of the other"
+        stopped = [event for event in run_.events if event.kind == "stopped"]
+        assert len(stopped) == len({(*e.robots, e.steps[e.robots[0]]) for e in stopped})
