@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
@@ -49,14 +50,32 @@ def broken(of: Mission, settings: Settings, runs: int) -> list[RunRecord]:
     return [one for one in found if one.collisions or one.deadlock or one.late or not one.arrived]
 
 
-@pytest.mark.parametrize("step", ["clock", "barrier"])
-def test_four_robots_of_the_greatest_radius_rotate(step: str, tmp_path: Path) -> None:
-    """Each enters the place that another one leaves, at a right angle: as near as it gets."""
-    grid = tmp_path / "ring.map"
+@pytest.fixture(scope="module")
+def ring(tmp_path_factory: pytest.TempPathFactory) -> Mission:
+    """Four robots in a square, each of which takes the place of the next one in one step."""
+    folder = tmp_path_factory.mktemp("ring")
+    grid = folder / "ring.map"
     grid.write_text("type octile\nheight 2\nwidth 2\nmap\n..\n..\n")
-    ring = [(0, 0, 0, 1), (0, 1, 1, 1), (1, 1, 1, 0), (1, 0, 0, 0)]
-    found = on_map(grid, ring, tmp_path)
-    assert broken(found, Settings(step=step, radius=0.25), 4) == []
+    return on_map(grid, [(0, 0, 0, 1), (0, 1, 1, 1), (1, 1, 1, 0), (1, 0, 0, 0)], folder)
+
+
+@pytest.mark.parametrize("step", ["clock", "barrier"])
+def test_four_robots_of_the_greatest_radius_rotate(step: str, ring: Mission) -> None:
+    """Each enters the place that another one leaves, at a right angle: as near as it gets."""
+    assert broken(ring, Settings(step=step, radius=0.25), 4) == []
+
+
+def test_robots_drive_off_together_however_far_each_has_to_turn(ring: Mission) -> None:
+    settings = Settings(noise=0.0)
+    for seed in range(3):
+        found = run(ring, floor_for(ring), settings, seed)
+        turns = {round(abs(poses[0][2] - poses[-1][2]), 1) for poses in found.poses.values()}
+        assert len(turns) > 1
+        left = {
+            next(at for at, pose in enumerate(poses) if math.dist(pose[:2], poses[0][:2]) > 0.05)
+            for poses in found.poses.values()
+        }
+        assert len(left) == 1, "they leave their places at one time"
 
 
 @pytest.mark.thorough
