@@ -130,20 +130,23 @@ def test_every_command(
     name: str, loader: tuple[Path, Path, str, Path], coordlang: Command, tmp_path: Path
 ) -> None:
     folder, language, sentence, plan = loader
+    points = tmp_path / "points.json"
     before: dict[str, tuple[object, ...]] = {
         "say": (language, plan),
         "ground": (tmp_path / "lifted.json",),
         "plan": (language, sentence),
         **dict.fromkeys(("understand", "choices", "export"), (language, sentence)),
-        **dict.fromkeys(("verify", "explain", "report"), (language,)),
+        **dict.fromkeys(("verify", "explain", "report", "simulate"), (language,)),
     }
     output = {
         "build": ("-o", tmp_path / "l.json"),
         "lift": ("-o", tmp_path / "l.json"),
         "ground": ("-o", tmp_path / "l.json", "--tasks", "own"),
         "report": ("-o", tmp_path / "page.html"),
+        "simulate": ("--coordinates", points),
         "tasks": ("--start", "(a_pos robot1 ?)", "-o", tmp_path / "tasks.json"),
     }
+    points.write_text('{"coordinates": {"l1": [0, 0], "l2": [1, 0], "l3": [2, 0]}}')
     if name == "ground":
         door.lift(factored=folder, jobs=1).save(tmp_path / "lifted.json")
     arguments = (*before.get(name, ()), "--factored", folder, *output.get(name, ()))
