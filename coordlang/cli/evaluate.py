@@ -88,7 +88,7 @@ def command(
     """Run experiments of the paper and set their results beside the paper's own.
 
     NAME is table1, communication, flexibility, planning_cost, navigation, game, delays, scenario,
-    silence, or all.
+    silence, simulation, or all.
     A run that was stopped or killed goes on where it was when it is started again.
     """
     from coordlang.evaluation.experiments.registry import RECIPES

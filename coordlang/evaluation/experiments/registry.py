@@ -14,6 +14,7 @@ from coordlang.evaluation.experiments import (
     planning_cost,
     scenario,
     silence,
+    simulation,
     table1,
 )
 from coordlang.evaluation.lab.recipe import Recipe
@@ -30,5 +31,6 @@ RECIPES: Mapping[str, Recipe] = {
         delays.RECIPE,
         scenario.RECIPE,
         silence.RECIPE,
+        simulation.RECIPE,
     )
 }

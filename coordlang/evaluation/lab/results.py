@@ -136,13 +136,13 @@ class Results:
         """Return the records (by experiment/key) of the units that need not be run again.
 
         A unit that ran out of time under a smaller limit than ``settings.unit_limit`` is run again,
-        and so is one that ran out of memory.
+        and so is one that ran out of memory, or for which something was ``absent``.
         """
         lines = {name: self.lines(name) for name in sorted({unit.experiment for unit in units})}
         found = {}
         for unit in units:
             line = lines[unit.experiment].get(identity(unit, settings))
-            if line is None or line["status"] == "out of memory":
+            if line is None or line["status"] == "out of memory" or "absent" in line["result"]:
                 continue
             if line["status"] == "out of time" and line["unit_limit"] < settings.unit_limit:
                 continue

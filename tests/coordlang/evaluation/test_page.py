@@ -40,8 +40,8 @@ def test_the_page_is_what_the_results_say() -> None:
 
 
 def test_the_results_are_of_a_whole_run(tmp_path: Path) -> None:
-    """Every piece of work with its default parameters, of the files as they are, and of one state
-    of the code.
+    """Every piece of work with its default parameters, of the files as they are, and each
+    experiment of one state of the code.
     """
     lines = all_lines()
     for name, recipe in RECIPES.items():
@@ -49,9 +49,8 @@ def test_the_results_are_of_a_whole_run(tmp_path: Path) -> None:
             (unit.key, dict(unit.parameters)) for unit in recipe.units(Settings(DOMAINS, tmp_path))
         ]
         assert [(line["key"], line["parameters"]) for line in lines[name]] == wanted
-    every = [line for found in lines.values() for line in found]
-    assert len({line["code"] for line in every}) == 1
-    for line in every:
+        assert len({line["code"] for line in lines[name]}) == 1
+    for line in (line for found in lines.values() for line in found):
         for file, digest in line["inputs"].items():
             assert file_hash(DOMAINS / file) == digest, (
                 f"{file} has changed: run the evaluation again"
