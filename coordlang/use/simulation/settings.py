@@ -10,7 +10,7 @@ from coordlang.use.simulation.pace import PACES
 from coordlang.use.simulation.tracking import Drive
 from planners.errors import UsageError
 
-#: Noise of the position that a robot believes in, in metres for each unit of `Settings.noise`.
+#: Noise of the position that a robot believes in, in metres for each unit of ``Settings.noise``.
 POSITION_NOISE = 0.1
 
 
