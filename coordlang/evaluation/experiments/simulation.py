@@ -51,8 +51,14 @@ from coordlang.use.simulation.team import Agreement
 from planners.errors import UsageError
 from planners.search.plans import Plans
 
-#: What robots have agreed on, and how they keep step: without a sentence there is no word.
-_PACES: Mapping[Agreement, Sequence[str]] = {"sentence": PACES, "nothing": PACES[:2]}
+#: How robots drive: by each way to keep step, and where no lidar stops who was about to collide.
+_BLIND = "clock, no lidar"
+_WAYS = {**{pace: How(step=pace) for pace in PACES}, _BLIND: How(step="clock", lidar=False)}
+#: What robots have agreed on, and how they drive then: without a sentence there is no word.
+_DRIVEN: Mapping[Agreement, Sequence[str]] = {
+    "sentence": tuple(_WAYS),
+    "nothing": tuple(way for way in _WAYS if way != "word"),
+}
 #: Warehouses, with the layout and the method of the language.
 _WAREHOUSES = (
     ("open 3x3", "across", "minimal"),
@@ -60,8 +66,6 @@ _WAREHOUSES = (
     ("open 4x4", "along", "greedy"),
     ("ring 3x4", "across", "minimal"),
 )
-#: Of so many samples one is run: a run takes a third of a second or more.
-_SHARE = 8
 #: Steps that r1 has done when the place becomes interesting.
 _LEARNED = 3
 
@@ -69,7 +73,7 @@ _LEARNED = 3
 def units(settings: Settings) -> list[Unit]:
     """List a unit for each floor and agreement, for each warehouse, and for the detour."""
     floors = ("T-map, 2 robots", "handover, 2 robots") if settings.quick else tuple(FLOORS)
-    runs = -(-settings.samples // _SHARE)
+    runs = settings.samples
     found = []
     for name in floors:
         floor = FLOORS[name]
@@ -111,15 +115,15 @@ def _run_floor(unit: Unit, settings: Settings) -> Result:
         return {"absent": f"the map {floor.foreign}"}
     language, tasks = tasks_of(floor, settings)
     found: dict[Agreement, dict[str, list[tuple[Said, RunRecord]]]] = {
-        agreement: {pace: [] for pace in paces} for agreement, paces in _PACES.items()
+        agreement: {way: [] for way in ways} for agreement, ways in _DRIVEN.items()
     }
     for number in range(unit.parameters["runs"]):
         random = Random(f"{settings.seed} {floor.key} {number}")
         one = said(tasks[random.randrange(len(tasks))], random)
-        for agreement, by_pace in found.items():
+        for agreement, by_way in found.items():
             prepared = one.mission(agreement)
-            for pace, runs in by_pace.items():
-                record = drive(prepared, How(step=pace), number, dict(floor.known))
+            for way, runs in by_way.items():
+                record = drive(prepared, _WAYS[way], number, dict(floor.known))
                 runs.append((one, record))
     return {
         "words": len(language.words),
@@ -127,8 +131,8 @@ def _run_floor(unit: Unit, settings: Settings) -> Result:
         "tasks": len(tasks),
         "map": map_hash(floor, settings),
         **{
-            agreement: {pace: counted(runs) for pace, runs in by_pace.items()}
-            for agreement, by_pace in found.items()
+            agreement: {way: counted(runs) for way, runs in by_way.items()}
+            for agreement, by_way in found.items()
         },
     }
 
@@ -244,12 +248,12 @@ freely within a word. A run ends well if all arrive in time and nobody touches a
 _FLOORS = """\
 Tasks that require coordination, drawn uniformly, on shipped maps and on a maze of others (read,
 not shipped). *Sentence*: that of a plan drawn uniformly. *Nothing*: each robot follows an optimal
-plan of its own. *Joint model*: runs in which the robots' own subplans, done in step, are an
-optimal plan: what joint steps promise. *Agree*: runs that end well exactly if they are. *Late*:
-runs, and how many joint steps together. *Messages* and simulated *seconds* are of one run on
-average, *nearest* is the least distance of two robots' middles in metres over all runs; discs
-touch at 0.4 m. The simulator moves robots and nothing else: that they stand at different doors of
-*handover* is seen by the joint model alone."""
+plan of its own. *No lidar*: nothing stops robots that are about to collide. *Joint model*: runs in
+which the robots' own subplans, done in step, are an optimal plan: what joint steps promise.
+*Agree*: runs that end well exactly if they are. *Late*: runs, and how many joint steps together.
+*Messages* and simulated *seconds* are of one run on average, *nearest* is the least distance of two
+robots' middles in metres over all runs; discs touch at 0.4 m. The simulator moves robots and
+nothing else: that they stand at different doors of *handover* is seen by the joint model alone."""
 
 _HUMAN = """\
 A human stands in a cell that is no corner, drawn uniformly, and only lidars see that, up to two
@@ -273,10 +277,10 @@ def _floor_blocks(floors: Sequence[Record]) -> list[str | Figure]:
 
 def _floor_table(floors: Sequence[Record]) -> str:
     rows = [
-        _floor_row(record, agreement, pace)
+        _floor_row(record, agreement, way)
         for record in floors
-        for agreement, paces in _PACES.items()
-        for pace in paces
+        for agreement, ways in _DRIVEN.items()
+        for way in ways
     ]
     runs = floors[0].parameters["runs"]
     head = (
@@ -295,10 +299,10 @@ def _floor_table(floors: Sequence[Record]) -> str:
     return table(head, rows)
 
 
-def _floor_row(record: Record, agreement: Agreement, pace: str) -> list[object]:
-    r = record.result[agreement][pace]
+def _floor_row(record: Record, agreement: Agreement, way: str) -> list[object]:
+    r = record.result[agreement][way]
     return [
-        f"{record.parameters['floor']}, {agreement}, {pace}",
+        f"{record.parameters['floor']}, {agreement}, {way}",
         record.result["words"] if agreement == "sentence" else None,
         r["well"],
         r["collisions"],
@@ -314,7 +318,7 @@ def _floor_row(record: Record, agreement: Agreement, pace: str) -> list[object]:
 
 def _computed(floors: Sequence[Record]) -> str:
     """How many seconds of processor time a run takes on each floor."""
-    ways = sum(map(len, _PACES.values()))
+    ways = sum(map(len, _DRIVEN.values()))
     told = (
         f"{record.parameters['floor']} {record.cpu / record.parameters['runs'] / ways:.2f}"
         for record in floors
@@ -341,19 +345,19 @@ def _point(result: Mapping[str, Any]) -> tuple[float, float, float]:
 
 
 def _ends(floors: Sequence[Record]) -> list[str]:
-    """How runs ended, by what was agreed and pace by pace, with one that ended badly."""
+    """How runs ended, by what was agreed and way by way, with one that ended badly."""
     found = []
-    for pace in PACES:
-        bad = [(record, end) for record in floors for end in record.result["sentence"][pace]["bad"]]
-        text = f"**With a sentence, {_KEPT[pace]}**: {_summed(floors, 'sentence', pace)}."
-        why = f" {_WORDS}" if pace == "word" and bad else ""
+    for way in _WAYS:
+        bad = [(record, end) for record in floors for end in record.result["sentence"][way]["bad"]]
+        text = f"**With a sentence, {_KEPT[way]}**: {_summed(floors, 'sentence', way)}."
+        why = f" {_WORDS}" if way == "word" and bad else ""
         found.append(text + why + (f" For instance {_told(*bad[0])}" if bad else ""))
-    told = (f"{_KEPT[pace]} {_summed(floors, 'nothing', pace)}" for pace in _PACES["nothing"])
+    told = (f"{_KEPT[way]} {_summed(floors, 'nothing', way)}" for way in _DRIVEN["nothing"])
     return [*found, f"**With nothing agreed**: {'; '.join(told)}."]
 
 
-def _summed(floors: Sequence[Record], agreement: Agreement, pace: str) -> str:
-    results = [record.result[agreement][pace] for record in floors]
+def _summed(floors: Sequence[Record], agreement: Agreement, way: str) -> str:
+    results = [record.result[agreement][way] for record in floors]
     runs, well, touched, agree = (
         sum(result[what] for result in results) for what in ("runs", "well", "collisions", "agree")
     )
@@ -372,6 +376,7 @@ _KEPT = {
     "clock": "by a common clock",
     "barrier": "with a barrier before each step",
     "word": "with a barrier before each word only",
+    _BLIND: "by a common clock and without a lidar",
 }
 
 

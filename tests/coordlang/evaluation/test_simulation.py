@@ -21,7 +21,7 @@ from tests.support.domains import DOMAINS
 from tests.support.simulation import language_of_task
 
 
-def settings_in(folder: Path, samples: int = 8) -> Settings:
+def settings_in(folder: Path, samples: int = 1) -> Settings:
     return Settings(DOMAINS, folder, samples=samples, quick=True)
 
 
@@ -133,11 +133,11 @@ def test_three_robots_on_the_t_map_need_no_word() -> None:
 
 def test_what_is_absent_is_said_and_run_when_it_is_there(tmp_path: Path) -> None:
     floor = FLOORS["maze 11x11, 2 robots"]
-    elsewhere = Settings(tmp_path / "a" / "domains", tmp_path, samples=8)
+    elsewhere = Settings(tmp_path / "a" / "domains", tmp_path, samples=1)
     assert not foreign_map(floor, elsewhere).exists()
     unit = next(
         unit
-        for unit in simulation.units(Settings(DOMAINS, tmp_path, samples=8))
+        for unit in simulation.units(Settings(DOMAINS, tmp_path, samples=1))
         if unit.key == floor.key
     )
     result = simulation.run(unit, elsewhere)
@@ -182,7 +182,7 @@ def test_units_are_reproducible_and_the_section_shows_them(tmp_path: Path) -> No
 
 @pytest.mark.thorough
 def test_the_detour_is_made_and_the_other_robot_does_the_same(tmp_path: Path) -> None:
-    settings = Settings(DOMAINS, tmp_path, samples=8)
+    settings = Settings(DOMAINS, tmp_path, samples=1)
     (unit,) = (unit for unit in simulation.units(settings) if unit.key == "detour")
     result = simulation.run(unit, settings)
     for pace in ("clock", "barrier"):
