@@ -9,8 +9,11 @@ import pty
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+from generate import problem_text, scenario
+from gridmap import open_grid
 
 from coordlang.cli import terminal
 from tests.support.domains import DOMAINS, ROOT
@@ -83,8 +86,10 @@ def test_how_far_the_work_got() -> None:
     assert "searching .. 1 s" in shown or "searching .. 2 s" in shown
 
 
-def test_how_far_a_search_got() -> None:
-    files = [str(DOMAINS / "grid" / name) for name in ("domain.pddl", "corners-8x8.pddl")]
+def test_how_far_a_search_got(tmp_path: Path) -> None:
+    problem = tmp_path / "corners.pddl"  # a second of search, for there to be something to show
+    problem.write_text(problem_text(scenario("corners", open_grid(6, 6), robots=3), "grid"))
+    files = [str(DOMAINS / "grid" / "domain.pddl"), str(problem)]
     arguments = ["plans", *files, "--count", "--no-cache", "--heuristic", "blind"]
     code = CODE.split("with terminal.working")[0] + (
         "from coordlang.__main__ import main\n"
