@@ -215,7 +215,9 @@ def _run_detour(unit: Unit, settings: Settings) -> Result:
 
 def _passes(found: RunRecord) -> bool:
     """Say whether r1 was in the place of interest."""
-    return any(step.place == PLACE and step.end is not None for step in found.steps)
+    return any(
+        step.robot == "r1" and step.place == PLACE and step.end is not None for step in found.steps
+    )
 
 
 def section(records: Sequence[Record]) -> Section:
@@ -238,32 +240,34 @@ def section(records: Sequence[Record]) -> Section:
 
 
 _DEFINITION = """\
-Discs of 0.2 m with two driven wheels, in cells of 1 m, with 10 % noise on what their wheels do
-and on where they believe to be, and a lidar ahead, in ir-sim: `coordlang simulate`. Every robot
-has logic of its own: it knows the task, the language and the sentence, and draws uniformly among
-its own choices. A *clock* begins each joint step at the same time for all; a *barrier* opens when
-all have told that they have done the step before; with barriers before *words* only, robots run
-freely within a word. A run ends well if all arrive in time and nobody touches anything."""
+Discs of 0.2 m with two driven wheels, in cells of 1 m, in ir-sim: `coordlang simulate`. What their
+wheels do has 10 % noise; where they believe to be is right but for a standard deviation of 1 cm and
+0.01 rad. Lidars look all around; robots stop for what is ahead. Every robot has logic of its own:
+it knows the task, the language and the sentence, and draws uniformly among its own choices. A
+*clock* begins each joint step at the same time for all; a *barrier* opens when all have told that
+they have done the step before; with barriers before *words* only, robots run freely within a word.
+A run ends well if all arrive in time and nobody touches anything."""
 
 _FLOORS = """\
-Tasks that require coordination, drawn uniformly, on shipped maps and on a maze of others (read,
-not shipped). *Sentence*: that of a plan drawn uniformly. *Nothing*: each robot follows an optimal
-plan of its own. *No lidar*: nothing stops robots that are about to collide. *Joint model*: runs in
-which the robots' own subplans, done in step, are an optimal plan: what joint steps promise.
-*Agree*: runs that end well exactly if they are. *Late*: runs, and how many joint steps together.
-*Messages* and simulated *seconds* are of one run on average, *nearest* is the least distance of two
-robots' middles in metres over all runs; discs touch at 0.4 m. The simulator moves robots and
-nothing else: that they stand at different doors of *handover* is seen by the joint model alone."""
+Tasks that require coordination, drawn uniformly, on shipped maps and on a maze of others (read, not
+shipped). *Sentence*: that of a plan drawn uniformly. *Nothing*: each robot follows an optimal plan
+of its own. *No lidar*: nothing stops robots that are about to collide. *Joint model*: runs in which
+the robots' own subplans, done in step, are an optimal plan: what joint steps promise. *Agree*: runs
+that end well exactly if they are. *Late*: runs, and how many joint steps together, where a joint
+step is a period of the clock, in which the longest way takes its time: who keeps step in another
+way has some to spare. *Messages* and simulated *seconds* are of one run on average, *nearest* is
+the least distance of two robots' middles in metres over all runs; discs touch at 0.4 m. The
+simulator moves robots and nothing else: that they stand at different doors of *handover* is seen by
+the joint model alone, so that its runs that end well are no evidence, with nothing agreed."""
 
 _HUMAN = """\
 A human stands in a cell that is no corner, drawn uniformly, and only lidars see that, up to two
-cells ahead. The tasks are the legs of deliveries, as in the section on navigation, drawn
-uniformly, with the same plan for *plan* and *sentence*, by the clock. *Floor*: runs that end
-well, of robots with wheels; a robot that sees the human asks its choices (`coordlang.use`
-monitor) for a way that avoids the cell. *Joint model*: the same tasks, plans and cells in joint
-steps, where all know of the human before they start. In brackets 95 % intervals (Wilson). *Only
-there*: runs that end well in the joint model and not on the floor; *only here*: the other way
-round."""
+cells away. The tasks are the legs of deliveries, as in the section on navigation, drawn uniformly,
+with the same plan for *plan* and *sentence*, by the clock. *Floor*: runs that end well, of robots
+with wheels; a robot that sees the human asks its choices (`coordlang.use` monitor) for a way that
+avoids the cell. *Joint model*: the same tasks, plans and cells in joint steps, where all know of
+the human before they start. In brackets 95 % intervals (Wilson). *Only there*: runs that end well
+in the joint model and not on the floor; *only here*: the other way round."""
 
 
 def _floor_blocks(floors: Sequence[Record]) -> list[str | Figure]:

@@ -64,6 +64,12 @@ class Settings:
                     f"{name} {value:g}: expected a length, speed or time above 0",
                     remedy="Leave it out for the usual value.",
                 )
+        if self.radius < self.speed * self.tick:
+            raise UsageError(
+                f"robots with a radius of {self.radius:g} m are too small: in a tick they drive "
+                f"{self.speed * self.tick:g} m, so that two could pass through each other unseen",
+                remedy="Use a larger --radius, and a larger --cell where it does not fit.",
+            )
         if not 0 <= self.noise <= 1:
             raise UsageError(
                 f"--noise {self.noise:g}: expected a share from 0 to 1",

@@ -61,6 +61,8 @@ def test_a_summary_for_people(language: Path, coordlang: Command) -> None:
         (("--without", "--plan"), 2, "exclude each other"),
         (("--sentence", "w9"), 31, "is no word of this language"),
         (("--radius", "0.4"), 2, "too large"),
+        (("--radius", "0.05"), 2, "pass through each other unseen"),
+        (("--cell", "0.3"), 2, "too small"),
         (("--cell", "-1"), 2, "above 0"),
         (("--human", "nowhere"), 2, "there is no such place"),
         (("--human", "random", "--no-lidar"), 2, "no robot sees"),
