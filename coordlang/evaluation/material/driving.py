@@ -12,9 +12,9 @@ from coordlang.coordinates import Point
 from coordlang.language.sentences import Sentence, sentence
 from coordlang.tasks.candidates import describe
 from coordlang.use.sentence.task_language import TaskLanguage
-from coordlang.use.simulation.floor import floor_of, require_room
+from coordlang.use.simulation.floor import floor_of
 from coordlang.use.simulation.record import RunRecord, WishRecord
-from coordlang.use.simulation.run import run
+from coordlang.use.simulation.runs import runs_of
 from coordlang.use.simulation.settings import Settings
 from coordlang.use.simulation.team import Agreement, Mission, mission
 from planners.search.plans import Plan, Plans
@@ -58,8 +58,8 @@ def drive(
 ) -> RunRecord:
     """Let robots do a mission once; ``known`` are coordinates that names do not say."""
     floor = floor_of(prepared.world, known or {}, how.cell)
-    require_room(floor, how.radius)
-    return run(prepared, floor, how, seed, wishes)
+    [found] = runs_of(prepared, floor, how, 1, seed, wishes)
+    return found
 
 
 def is_well(found: RunRecord) -> bool:

@@ -28,6 +28,11 @@ WITH_WALKER = 12
 INTERVAL = 0.2
 
 
+def ticks_of_interval(settings: Settings) -> int:
+    """How many ticks there are from one pose of the record to the next."""
+    return max(1, round(INTERVAL / settings.tick))
+
+
 def run(
     mission: Mission,
     floor: Floor,
@@ -179,7 +184,7 @@ class _Going:
         if has_arrived or is_stuck:
             self._event("arrived" if has_arrived else "deadlock", list(self.robots))
         subplans = {name: robot.subplan() for name, robot in self.robots.items()}
-        steps = round(math.ceil(seconds / self.period - 1e-6))
+        steps = math.ceil(seconds / self.period - 1e-6)
         return RunRecord(
             seed=self.seed,
             collisions=self.collisions,
@@ -284,8 +289,7 @@ class _Going:
             self.nearest = min(self.nearest, math.dist(one, other))
 
     def _keep_poses(self) -> None:
-        every = max(1, round(INTERVAL / self.settings.tick))
-        if self.ticks % every == 0:
+        if self.ticks % ticks_of_interval(self.settings) == 0:
             for name in self.robots:
                 self.poses.setdefault(name, []).append(self.simulator.pose(name))
             if self.human is not None:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from coordlang.tasks.candidates import describe
 from coordlang.use.simulation.floor import Floor, require_room
 from coordlang.use.simulation.record import FORMAT, VERSION, RunRecord, SimulationRecord, WishRecord
-from coordlang.use.simulation.run import INTERVAL, run
+from coordlang.use.simulation.run import run, ticks_of_interval
 from coordlang.use.simulation.settings import Settings
 from coordlang.use.simulation.simulator import require_simulator
 from coordlang.use.simulation.team import Mission
@@ -57,7 +57,7 @@ def record_of(
         step=settings.step,  # type: ignore[arg-type]
         makespan=mission.steps,
         period=settings.period(floor.longest),
-        interval=max(1, round(INTERVAL / settings.tick)) * settings.tick,
+        interval=ticks_of_interval(settings) * settings.tick,
         cell=settings.cell,
         radius=settings.radius,
         noise=settings.noise,
