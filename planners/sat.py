@@ -8,11 +8,17 @@ from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from typing import Any, Literal
 
+import numpy as np
+
 from planners.signals import postponed_signals
+from planners.tables import Ints
+
+#: Clauses that are lists of numbers at a time, for these take far more memory.
+_BLOCK = 1 << 16
 
 #: The solvers in use.  None of MapleChrono and MapleCM: they take SIGALRM for themselves, below
 #: Python, so that no time limit would be heard any more.
-SolverName = Literal["cadical153", "glucose4", "maplesat", "minisat22"]
+SolverName = Literal["cadical153", "glucose4", "glucose42", "maplesat", "minisat22"]
 
 
 def sat_solver(name: SolverName, clauses: Iterable[Sequence[int]] = ()) -> Any:
@@ -65,28 +71,29 @@ def simplified(clauses: array[int], kept: Sequence[int]) -> list[list[int]]:
     kept
         Variables; others may be eliminated, and every one of them may be left without a clause.
     """
-    from pysat.process import Processor
+    from pysat.solvers import Cadical153
 
-    listed = list(split_clauses(clauses))
-    with postponed_signals():
-        processor = Processor(bootstrap_with=listed)
-        try:
-            found = processor.process(freeze=list(kept))
-        finally:
-            processor.delete()
-    assert found.status, "clauses that a model was found of were refuted"
-    return list(found.clauses)
+    # Not by pysat's Processor, which copies every number of the clauses that it found.
+    with postponed_signals(), Cadical153() as solver:
+        for clause in split_clauses(clauses):
+            solver.add_clause(clause)
+        _, found = solver.process(freeze=list(kept))
+    assert [] not in found, "clauses that a model was found of were refuted"
+    return list(found)
 
 
-def split_clauses(clauses: Iterable[int]) -> Iterator[list[int]]:
-    """The clauses of a formula in which 0 follows each."""
-    clause: list[int] = []
-    for literal in clauses:
-        if literal:
-            clause.append(literal)
-        else:
-            yield clause
-            clause = []
+def split_clauses(clauses: array[int] | Ints, block: int = _BLOCK) -> Iterator[list[int]]:
+    """The clauses of a formula in which 0 follows each; ``block`` are listed at a time."""
+    literals = np.asarray(clauses)
+    ends = np.flatnonzero(literals == 0)
+    begin = 0
+    for start in range(0, len(ends), block):
+        some = ends[start : start + block]
+        listed = literals[begin : some[-1]].tolist()
+        first = begin
+        for end in some.tolist():
+            yield listed[begin - first : end - first]
+            begin = end + 1
 
 
 @cache

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -53,14 +54,15 @@ class FixedPlans(Questions):
 
     def _take(self, clauses: Sequence[Sequence[int]], labels: Ints) -> None:
         """Clauses with the labels' variables first, and others that occur after them."""
-        number = {variable: k for k, variable in enumerate(labels.tolist(), start=1)}
-        for clause in clauses:
-            renamed = []
-            for literal in clause:
-                variable = number.setdefault(abs(literal), len(number) + 1)
-                renamed.append(variable if literal > 0 else -variable)
-            self.add(renamed)
-        self.variables = len(number)
+        sizes = np.fromiter(map(len, clauses), np.int64, len(clauses))
+        literals = np.fromiter(chain.from_iterable(clauses), np.int64, int(sizes.sum()))
+        variables = np.abs(literals)
+        number = np.zeros(int(max(variables.max(initial=0), labels.max(initial=0))) + 1, np.int64)
+        number[labels] = np.arange(1, len(labels) + 1)
+        others, first = np.unique(variables[number[variables] == 0], return_index=True)
+        self.variables = len(labels) + len(others)
+        number[others[np.argsort(first)]] = np.arange(len(labels) + 1, self.variables + 1)
+        self.add_all(np.insert(np.sign(literals) * number[variables], np.cumsum(sizes), 0))
 
     def so_far(self) -> str:
         """What is asked just now, for messages."""

@@ -14,7 +14,6 @@ import numpy as np
 
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import FullState, Goal, JointModel
-from planners.sat import split_clauses
 from planners.search.fixed_plans import FixedPlans
 from planners.search.mutexes import Pair
 from planners.search.questions import Literals, OutOfEffort, Plan, Questions
@@ -59,6 +58,8 @@ class PlanFormula(Questions):
         self._flat: Ints = np.array(
             [k for clause in self._step.clauses for k in (*clause, 0)], np.int64
         )
+        #: Where each of them begins.
+        self._begins: Ints = np.flatnonzero(np.append(0, self._flat[:-1]) == 0)
         for clause in _goal_clauses(model, goal):
             self.add(clause)
 
@@ -83,8 +84,7 @@ class PlanFormula(Questions):
         moved = np.sign(self._flat) * np.where(
             number <= size, number + base, number - size + following
         )
-        for clause in split_clauses(moved.tolist()):
-            self.add([-active, *clause])
+        self.add_all(np.insert(moved, self._begins, -active))
         self._base.append(base)
         self._active.append(active)
         self._steps += 1

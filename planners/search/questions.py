@@ -13,9 +13,10 @@ import numpy as np
 from planners.sat import SolverName, sat_solver, solve_slice, split_clauses
 from planners.tables import Ints
 
-#: Hard questions and many easy ones: Glucose takes about half as long as MiniSat for the hard ones.
-#: Its version 4.2 is often faster and sometimes much slower: depot pfile17 was no longer solved.
-SOLVER: SolverName = "glucose4"
+#: Hard questions and many easy ones: Glucose takes about half as long as MiniSat for the hard ones,
+#: and its version 4.2 half as long as 4.1 for the hardest (the least cost in elevators p07, 23 s for
+#: 40).  CaDiCaL refutes some makespans sooner, and takes much longer to find the least cost.
+SOLVER: SolverName = "glucose42"
 #: Conflicts between two looks at the limits.
 _SLICE = 2_000
 
@@ -62,6 +63,12 @@ class Questions:
         self.clauses.append(0)
         self._solver.add_clause(clause)
 
+    def add_all(self, clauses: array[int] | Ints) -> None:
+        """Add clauses, each followed by 0."""
+        self.clauses.frombytes(np.asarray(clauses, np.intc).tobytes())
+        for clause in split_clauses(clauses):
+            self._solver.add_clause(clause)
+
     def with_units(self, literals: Sequence[int]) -> Questions:
         """The same formula, where these literals are true, in a solver of its own.
 
@@ -69,8 +76,7 @@ class Questions:
         from them is simplified away, and is in no clause that it learns.
         """
         found = Questions(self.left, self.variables)
-        for clause in split_clauses(self.clauses):
-            found.add(clause)
+        found.add_all(self.clauses)
         found.require(literals)
         return found
 

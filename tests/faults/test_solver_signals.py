@@ -83,13 +83,13 @@ def interrupt_often(solver: SolverName, times: int) -> None:
     assert set(codes) <= {0, 70}  # 70: the second signal came after the first was caught
 
 
-@pytest.mark.parametrize("solver", ["cadical153", "glucose4"])
+@pytest.mark.parametrize("solver", ["cadical153", "glucose42"])
 def test_interrupts_while_solvers_work(solver: SolverName) -> None:
     interrupt_often(solver, 5)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("solver", ["cadical153", "glucose4", "maplesat"])
+@pytest.mark.parametrize("solver", ["cadical153", "glucose42", "maplesat"])
 def test_many_interrupts_while_solvers_work(solver: SolverName) -> None:
     interrupt_often(solver, 400)
 
@@ -114,14 +114,14 @@ def test_a_time_limit_is_heard_after_a_solver(solver: SolverName) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGALRM])
-@pytest.mark.parametrize("solver", ["cadical153", "glucose4", "maplesat"])
+@pytest.mark.parametrize("solver", ["cadical153", "glucose42", "maplesat"])
 def test_a_solver_is_freed_once(
     solver: SolverName, number: signal.Signals, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The signal comes when the solver has been freed, and python-sat has not noted it yet."""
     import pysolvers
 
-    name = {"glucose4": "glucose41"}.get(solver, solver) + "_del"
+    name = {"glucose42": "glucose421"}.get(solver, solver) + "_del"
     free = getattr(pysolvers, name)
 
     def freed(*arguments: object) -> None:
@@ -142,12 +142,12 @@ def test_a_solver_is_freed_once(
     assert said[number] in ended.err
 
 
-@pytest.mark.parametrize("solver", ["cadical153", "glucose4", "maplesat"])
+@pytest.mark.parametrize("solver", ["cadical153", "glucose42", "maplesat"])
 def test_no_solver_is_left_by_longjmp(solver: SolverName, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its third argument says whether it takes SIGINT."""
     import pysolvers
 
-    name = {"glucose4": "glucose41"}.get(solver, solver) + "_solve_lim"
+    name = {"glucose42": "glucose421"}.get(solver, solver) + "_solve_lim"
     solve, given = getattr(pysolvers, name), []
 
     def noted(*arguments: object) -> object:

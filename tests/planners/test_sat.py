@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 from array import array
+from contextlib import closing
 from itertools import product
 
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planners.sat import sat_solver, simplified
+from planners.sat import sat_solver, simplified, split_clauses
+from planners.search.questions import Questions
 
 VARIABLES = 6
 literal = st.integers(1, VARIABLES).flatmap(lambda v: st.sampled_from((v, -v)))
@@ -55,3 +57,29 @@ def test_variables_that_are_not_kept_go() -> None:
     chain = [[-k, k + 1] for k in range(1, 50)]
     found = simplified(flat(chain), [1, 50])
     assert {abs(lit) for clause in found for lit in clause} == {1, 50}
+
+
+@given(st.lists(st.lists(literal, max_size=4), max_size=9), st.integers(1, 4))
+def test_clauses_are_split_at_zeros(clauses: list[list[int]], block: int) -> None:
+    assert list(split_clauses(flat(clauses), block)) == clauses
+
+
+@given(formula)
+def test_clauses_that_are_added_at_once_say_the_same_as_one_by_one(
+    clauses: list[list[int]],
+) -> None:
+    with closing(Questions(100, VARIABLES)) as one, closing(Questions(100, VARIABLES)) as many:
+        for clause in clauses:
+            one.add(clause)
+        many.add_all(flat(clauses))
+        assert many.clauses == one.clauses
+        assert many.holds([]) == one.holds([]) == bool(kept_values(clauses, []))
+
+
+def test_a_simplified_formula_is_as_python_sat_writes_it() -> None:
+    """Without its `Processor`, which copies all clauses."""
+    from pysat.process import Processor
+
+    chain = [[-k, k + 1, 60] for k in range(1, 50)]
+    found = Processor(bootstrap_with=chain).process(freeze=[1, 50])
+    assert simplified(flat(chain), [1, 50]) == found.clauses
