@@ -29,12 +29,13 @@ from coordlang.tasks.candidates import Candidates
 from planners.limits import time_limit
 
 FURTHER = ("open-2x6", "open-3x4", "open-3x5", "open-4x4", "ring-4x5")
-FIGURES = ("rounds", "equivariant_rounds", "counterexamples", "walks", "clauses")
+FIGURES = ("rounds", "abstract_rounds", "equivariant_rounds", "counterexamples", "walks", "clauses")
 COLUMNS = (
     ("row", 9),
     ("seed", 4),
     ("words", 7),
     ("rounds", 7),
+    ("abstract", 8),
     ("equiv.", 7),
     ("tuples", 8),
     ("walks", 6),

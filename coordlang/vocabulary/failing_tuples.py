@@ -133,19 +133,9 @@ class FailingTuples:
             if sum(len(shorter.rows) for shorter in found) >= enough:
                 break
             for to in self._images if images is None else images:
-                rows = np.flatnonzero(_agree(word[to], table.by_step))
+                rows = np.flatnonzero(agree(word[to], table.by_step))
                 if len(rows):
                     found.append(Agreeing(length, to, rows))
-        return found
-
-    def still_agreeing(self, word: Ints, some: Sequence[Agreeing]) -> list[Agreeing]:
-        """Those of some images of tuples to which a partition gives one sentence."""
-        found = []
-        for known in some:
-            by_step = self._tables[known.length].by_step[:, :, known.rows]
-            rows = known.rows[_agree(word[known.to], by_step)]
-            if len(rows):
-                found.append(Agreeing(known.length, known.to, rows))
         return found
 
     def codes(
@@ -160,12 +150,15 @@ class FailingTuples:
         """
         total = sum(len(found.rows) for found in agreeing)
         tables = []
-        for found in agreeing:
-            rows = found.rows
-            share = max(1, len(rows) * most // max(total, most))
-            if share < len(rows):
-                rows = random.permutation(rows)[:share]
-            sequences = self.sequences(found, rows)
+        for _, together in groupby(agreeing, key=lambda found: found.length):
+            parts = []
+            for found in together:
+                rows = found.rows
+                share = max(1, len(rows) * most // max(total, most))
+                if share < len(rows):
+                    rows = random.permutation(rows)[:share]
+                parts.append(self.sequences(found, rows))
+            sequences = np.concatenate(parts)
             pairs = _pairs(sequences, word[sequences], self.states)
             tables.append(pairs[(pairs != -2).all(axis=1)])
         width = max(table.shape[1] for table in tables)
@@ -254,10 +247,15 @@ def _keys(states: Ints) -> Ints:
     return key
 
 
-def _agree(word: Ints, by_step: Ints) -> Bools:
-    """Whether the words of all sequences (length, robots, tuples) are one sentence; rarely wrong.
+def agree(word: Ints, by_step: Ints) -> Bools:
+    """(tuples) whether all sequences of each have one sentence; rarely true where they have not.
 
-    If they are, the answer is always true.
+    Parameters
+    ----------
+    word
+        (states) the word of each state number.
+    by_step
+        (length, robots, tuples) the states.
     """
     named = word.astype(np.uint64) + np.uint64(1)
     before = named[by_step[0]]

@@ -10,15 +10,15 @@ gets far go on with more moves.  **What is not found proves nothing about number
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from coordlang.symmetry.subgroups import WordAction, group_table
 from coordlang.vocabulary.clause_table import ClauseTable
-from coordlang.vocabulary.failing_tuples import Agreeing
 from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.orbit_words import OrbitWords
+from coordlang.vocabulary.recent_tuples import RecentTuples
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.tabu import TabuSearch
 from planners.tables import Ints
@@ -126,25 +126,6 @@ def _keep_the_farthest(runners: list[_Runner]) -> list[_Runner]:
     return runners[:_KEPT]
 
 
-@dataclass(slots=True)
-class _Recent:
-    """Failing tuples that agreed under some partition: asked first, for they often do again."""
-
-    _rows: dict[tuple[int, int], tuple[Ints, Ints]] = field(default_factory=dict)
-
-    def add(self, agreeing: Sequence[Agreeing]) -> None:
-        """Remember tuples."""
-        for found in agreeing:
-            key = (found.length, id(found.to))
-            _, rows = self._rows.get(key, (found.to, found.rows))
-            self._rows[key] = found.to, np.union1d(rows, found.rows)
-
-    def all(self) -> list[Agreeing]:
-        """What is remembered, short tuples first."""
-        ordered = sorted(self._rows.items(), key=lambda item: item[0][0])
-        return [Agreeing(length, to, rows) for (length, _), (to, rows) in ordered]
-
-
 class _Runner:
     """The search in one kind of partition.
 
@@ -162,7 +143,7 @@ class _Runner:
         self._refuter, self._kind, self._images = refuter, kind, images
         self._random = np.random.default_rng(seed)
         self._search: TabuSearch | None = None
-        self._table, self._recent = ClauseTable(kind, images), _Recent()
+        self._table, self._recent = ClauseTable(kind, images), RecentTuples(refuter, _ENOUGH)
         self.depth = self.rounds = self.moves = 0
 
     def lag(self) -> tuple[int, int]:
@@ -172,7 +153,8 @@ class _Runner:
     def forget(self) -> None:
         """Give back what the search holds: it will begin again."""
         self._search = None
-        self._table, self._recent = ClauseTable(self._kind, self._images), _Recent()
+        self._table = ClauseTable(self._kind, self._images)
+        self._recent = RecentTuples(self._refuter, _ENOUGH)
 
     def run(self, effort: Effort) -> Ints | None:
         """The words of a language, None if none was found with an effort."""
@@ -182,7 +164,7 @@ class _Runner:
         search, pool = self._search, self._refuter.pool
         before, self.rounds, self.depth = search.moves, 0, 0
         while self.rounds < effort.rounds:
-            agreeing = self._agreeing(search.word)
+            agreeing = self._recent.agreeing(search.word, self._images)
             if not agreeing:
                 return search.word
             self.rounds += 1
@@ -194,15 +176,6 @@ class _Runner:
             self.depth += 1
         self.moves = search.moves - before
         return None
-
-    def _agreeing(self, word: Ints) -> list[Agreeing]:
-        """Failing tuples that a partition does not tell apart; none if it is a language."""
-        pool = self._refuter.pool
-        known = pool.still_agreeing(word, self._recent.all())
-        if not known:
-            known = self._refuter.agreeing(word, self._images, _ENOUGH)
-            self._recent.add(known)
-        return known
 
     def _shake(self, search: TabuSearch) -> None:
         """Change some of the words at random."""

@@ -21,10 +21,10 @@ import numpy as np
 
 from coordlang.language.warping import Clause
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
+from coordlang.vocabulary.abstractions import abstractions
 from coordlang.vocabulary.contained import ContainedInstance, parts
-from coordlang.vocabulary.equivariant import EquivariantSearch
+from coordlang.vocabulary.from_above import LOCAL_FROM, SearchFromAbove
 from coordlang.vocabulary.job import Assignment, Evidence, Job, Outcome
-from coordlang.vocabulary.local_search import LocalSearch
 from coordlang.vocabulary.merging import merged
 from coordlang.vocabulary.necessary_clauses import NecessaryClauses
 from coordlang.vocabulary.partitions import Partitions, Refutation
@@ -35,11 +35,10 @@ from coordlang.vocabulary.separating import short_separating_search
 from planners.errors import OutOfMemory
 from planners.limits import run_until_stopped
 from planners.search.plan_space import PlanSpace
+from planners.tables import Ints
 
 #: Combinations of plans' next steps up to which separating words are looked for first.
 _SEPARATING_COMBINATIONS = 4_000_000
-#: States from which on words are also looked for by local search and by merging.
-_LOCAL_FROM = 200
 
 
 def minimal(job: Job) -> Outcome:
@@ -93,8 +92,8 @@ class _Search:
         self.refuting = Refutation(1, self.known.evidence, 1)  # any clause refutes one word
         self._partitions: Partitions | None = None
         self._refuter: Refuter | None = None
-        self._equivariant: EquivariantSearch | None = None
-        self._local: LocalSearch | None = None
+        self._abstractions: list[Ints] = []
+        self._above: SearchFromAbove | None = None
         self._contained: list[ContainedInstance] = []
         self._rounds = 0
 
@@ -130,15 +129,13 @@ class _Search:
         }
         if self._refuter is not None:
             figures |= {"counterexamples": len(self._refuter.pool), "walks": self._refuter.walks}
-        if self._equivariant is not None:
-            figures |= {"equivariant_rounds": self._equivariant.rounds}
-        if self._local is not None:
-            figures |= {"local_rounds": self._local.rounds, "local_moves": self._local.moves}
+        if self._above is not None:
+            figures |= self._above.figures()
         return figures
 
     def close(self) -> None:
         """Give back what the solvers hold."""
-        for part in (self._partitions, self._equivariant, *self._contained):
+        for part in (self._partitions, self._above, *self._contained):
             if part is not None:
                 part.close()
 
@@ -146,49 +143,62 @@ class _Search:
         if self._refuter is None:
             candidates, job = self._job.candidates, self._job
             self.known.group = symmetry_group(candidates)
+            self._abstractions = abstractions(candidates, job.states)
             self._refuter = Refuter(
-                candidates.spaces, self.known.group, len(candidates.rows), job.seed, job.progress
+                candidates.spaces,
+                self.known.group,
+                len(candidates.rows),
+                job.seed,
+                job.progress,
+                self._first_words(),
             )
             self._contained = [
                 ContainedInstance(part, job.seed) for part in parts(candidates, self.known.group)
             ]
         return self._refuter
 
+    def _first_words(self) -> Ints | None:
+        """The words that are refuted first: one word, or an abstraction if robots are many.
+
+        Under one word all plans of a task have one sentence: of three robots far too many tuples.
+        """
+        if len(self._job.candidates.model.robots) <= 2:
+            return None
+        states = len(self._job.states)
+        fine = (a for a in self._abstractions if len(np.unique(a)) ** 2 >= states)
+        return next(fine, None)
+
     def _close_bounds(self) -> None:
-        """Decide numbers of words until the bounds meet: from below, and from above by symmetry."""
-        states, refuter = self._job.states, self._prepare()
-        equivariant = self._equivariant = EquivariantSearch(states, refuter)
-        if len(states) > _LOCAL_FROM:
-            self._local = LocalSearch(states, refuter, self._job.seed)
+        """Decide numbers of words until the bounds meet: from below by proof, and from above."""
+        job, refuter = self._job, self._prepare()
+        above = self._above = SearchFromAbove(job.states, refuter, self._abstractions, job.seed)
         budget = SolverBudget()
         while self.lower < self._upper:
             if not self._decide(self.lower, budget):
-                self._descend(equivariant)
+                while self.lower < self._upper and self._descend(above):
+                    pass
                 budget = budget.doubled()
 
-    def _descend(self, equivariant: EquivariantSearch) -> None:
-        """Look for a language with fewer words: equivariant ones by SAT, and by local search.
+    def _descend(self, above: SearchFromAbove) -> bool:
+        """Look for a language with fewer words; whether one was found.
 
         What is not found is no bound: only `Refutation` is.
         """
         # The number that is not refuted yet is tried last: mostly there is no such language.
-        least = min(self.lower + 1, self._upper - 1)
-        size = isqrt(least * self._upper)
-        while size < self._upper:
-            self._job.progress(
-                f"symmetric words: trying {size}, {self.lower} to {self._upper} needed"
-            )
-            found = equivariant.find(size)
-            if found is None and self._local is not None:
-                self._job.progress(
-                    f"local search: trying {size}, {self.lower} to {self._upper} needed"
-                )
-                found = self._local.find(size, equivariant.undecided(size))
+        before = self._upper
+        least = min(self.lower + 1, before - 1)
+        size = isqrt(least * before)
+        while size < before:
+            found = above.find(size, self._report_above)
             if found is not None:
                 self._take(found)
                 self._merge_words()
-                return
-            size = (size + self._upper + 1) // 2
+                return self._upper < before
+            size = (size + before + 1) // 2
+        return False
+
+    def _report_above(self, what: str) -> None:
+        self._job.progress(f"{what}, {self.lower} to {self._upper} needed")
 
     def _merge_words(self) -> None:
         """Merge words of the best language as long as it stays one; small ones have none to spare.
@@ -196,7 +206,7 @@ class _Search:
         What is known is verified before: time may be over.
         """
         states, best = self._job.states, self.best
-        if best is None or len(states) <= _LOCAL_FROM:
+        if best is None or len(states) <= LOCAL_FROM:
             return
         fewer = None
         for fewer in merged(best, states, self._prepare(), self._job.seed):

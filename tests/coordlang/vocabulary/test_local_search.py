@@ -20,6 +20,8 @@ from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.symmetry.subgroups import GroupTable, WordAction, group_table
 from coordlang.tasks.candidates import Candidates
 from coordlang.verification.by_definition import verify
+from coordlang.vocabulary import from_above
+from coordlang.vocabulary.abstract_words import AbstractSearch
 from coordlang.vocabulary.clause_table import ClauseTable
 from coordlang.vocabulary.equivariant import EquivariantSearch
 from coordlang.vocabulary.job import Assignment
@@ -262,8 +264,11 @@ def test_what_is_not_found_raises_no_bound(monkeypatch: pytest.MonkeyPatch, find
         return None if finds == "nothing" else find(search, size, kinds)
 
     module = sys.modules["coordlang.vocabulary.minimal"]
-    monkeypatch.setattr(module, "_LOCAL_FROM", 0)
+    monkeypatch.setattr(from_above, "LOCAL_FROM", 0)
+    monkeypatch.setattr(module, "LOCAL_FROM", 0)
+    monkeypatch.setattr(from_above, "_AHEAD", 0)
     monkeypatch.setattr(module, "SolverBudget", partial(SolverBudget, rounds=1))
+    monkeypatch.setattr(AbstractSearch, "find", lambda self, size: None)
     monkeypatch.setattr(EquivariantSearch, "find", lambda self, size: None)
     monkeypatch.setattr(LocalSearch, "find", told)
     built = build_language(all_tasks("grid", "gw2-2x3"), "minimal")
@@ -279,7 +284,9 @@ def test_words_of_what_is_found_are_merged(monkeypatch: pytest.MonkeyPatch) -> N
     job = build_language(all_tasks("grid", "gw2-2x3"), "greedy").job
     apart = {state: number for number, state in enumerate(job.states)}
     module = sys.modules["coordlang.vocabulary.minimal"]
-    monkeypatch.setattr(module, "_LOCAL_FROM", 0)
+    monkeypatch.setattr(module, "LOCAL_FROM", 0)
+    monkeypatch.setattr(from_above, "_AHEAD", 0)
+    monkeypatch.setattr(AbstractSearch, "find", lambda self, size: None)
     monkeypatch.setattr(module, "SolverBudget", partial(SolverBudget, rounds=1))
     monkeypatch.setattr(EquivariantSearch, "find", lambda self, size: apart)
     verified: list[Assignment] = []
