@@ -249,9 +249,9 @@ def _seen_from(
 
 def _cross(one: Bools, other: Bools) -> bool:
     """Whether both sides of one cut meet both sides of another."""
-    return bool(
-        (one & other).any() and (one & ~other).any() and (~one & other).any()
-    ) and not bool((one | other).all())
+    return bool((one & other).any() and (one & ~other).any() and (~one & other).any()) and not bool(
+        (one | other).all()
+    )
 
 
 def _numbered(columns: Ints | Bools) -> Ints:
