@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
 from typing import Any, Literal
 
@@ -49,16 +50,30 @@ def solve_slice(solver: Any, conflicts: int, assumptions: Sequence[int] = ()) ->
     at SIGINT by ``longjmp`` from wherever it is, the allocation of memory included, and would leave
     its handler behind: then the process crashes or hangs.
     """
+    solver.conf_budget(conflicts)
+    with _deaf():
+        answer = solver.solve_limited(assumptions=list(assumptions))
+    return None if answer is None else bool(answer)
+
+
+def propagates(solver: Any, assumptions: Sequence[int]) -> bool:
+    """Whether unit propagation meets no conflict; signals are heard as by `solve_slice`."""
+    with _deaf():
+        good, _ = solver.propagate(assumptions=list(assumptions))
+    return bool(good)
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Solvers take no signals inside, as they take none in another thread."""
     from pysat.solvers import MainThread
 
-    solver.conf_budget(conflicts)
     own = MainThread.check
-    MainThread.check = staticmethod(lambda: False)  # it takes no signals in another thread
+    MainThread.check = staticmethod(lambda: False)
     try:
-        answer = solver.solve_limited(assumptions=list(assumptions))
+        yield
     finally:
         MainThread.check = staticmethod(own)
-    return None if answer is None else bool(answer)
 
 
 def simplified(clauses: array[int], kept: Sequence[int]) -> list[list[int]]:

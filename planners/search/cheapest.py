@@ -29,8 +29,6 @@ from planners.tables import Ints
 _FIRST = 300_000
 #: The largest cost of one action that is counted.
 _COST = 8
-#: Conflicts for the question whether a core needs a second action, too.
-_EASY = 1_000
 
 
 def cheapest(
@@ -141,7 +139,7 @@ class _Sums:
         if len(core) > 1:
             together = _Sum(self._plans.counter(core))
             place = 1
-            while place < len(together.at_least) and self._must(together.at_least[place]):
+            while place < len(together.at_least) and self._plans.must(together.at_least[place]):
                 place += 1
             self._assume(together, place)
 
@@ -149,14 +147,6 @@ class _Sums:
         """Assume that a sum is no larger than this."""
         if place < len(total.at_least):
             self.open[total.at_least[place]] = (total, place)
-
-    def _must(self, larger: int) -> bool:
-        """Whether a sum must be larger, where that is seen at once."""
-        try:
-            with self._plans.at_most(_EASY):
-                return not self._plans.holds([-larger])
-        except OutOfEffort:
-            return False
 
 
 def least_cost(plans: FixedPlans, model: JointModel, task: PlanningTask) -> Literals:

@@ -141,7 +141,6 @@ def _bound(
     if model.cost != "makespan":
         plan, cheap = cheapest(plans, model, task, plan)
         plans.require(cheap)
-    plans.simplify()
     plans.without_limit()
     used = _used(plans, model, plan, effort)
     plans.simplify()

@@ -10,12 +10,12 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from planners.sat import SolverName, sat_solver, solve_slice, split_clauses
+from planners.sat import SolverName, propagates, sat_solver, solve_slice, split_clauses
 from planners.tables import Ints
 
 #: Hard questions and many easy ones: Glucose takes about half as long as MiniSat for the hard ones,
-#: and its version 4.2 half as long as 4.1 for the hardest (the least cost in elevators p07, 23 s for
-#: 40).  CaDiCaL refutes some makespans sooner, and takes much longer to find the least cost.
+#: and its version 4.2 half as long as 4.1 for the hardest (least cost in elevators p07: 23 s, 40).
+#: CaDiCaL refutes some makespans sooner, and takes much longer to find the least cost.
 SOLVER: SolverName = "glucose42"
 #: Conflicts between two looks at the limits.
 _SLICE = 2_000
@@ -128,6 +128,10 @@ class Questions:
             if answer is not None:
                 return answer
             self.spend(effort)
+
+    def must(self, literal: int) -> bool:
+        """Whether a literal must be true, where that is seen by unit propagation."""
+        return not propagates(self._solver, [-literal])
 
     def chosen(self, first: Ints, sizes: Sequence[int]) -> Plan:
         """In the model of the last answer, of each run of variables the first that is true.

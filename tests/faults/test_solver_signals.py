@@ -18,7 +18,7 @@ from coordlang.building import build_language
 from coordlang.vocabulary.sat import PartitionProblem
 from planners.errors import OutOfTime
 from planners.limits import time_left, time_limit
-from planners.sat import SolverName, sat_solver, solve_slice
+from planners.sat import SolverName, propagates, sat_solver, solve_slice
 from planners.signals import Interruptions
 from tests.support.command import Outcome
 from tests.support.domains import DOMAINS, all_tasks
@@ -158,6 +158,25 @@ def test_no_solver_is_left_by_longjmp(solver: SolverName, monkeypatch: pytest.Mo
     with sat_solver(solver, [[1, 2], [-1]]) as sat:
         assert solve_slice(sat, 10) is True
         assert solve_slice(sat, 10, [-2]) is False
+    assert given == [0, 0]
+
+
+def test_no_solver_is_left_by_longjmp_from_unit_propagation(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its fourth argument says whether it takes SIGINT."""
+    import pysolvers
+
+    propagate, given = pysolvers.glucose421_propagate, []
+
+    def noted(*arguments: object) -> object:
+        given.append(arguments[3])
+        return propagate(*arguments)
+
+    monkeypatch.setattr(pysolvers, "glucose421_propagate", noted)
+    with sat_solver("glucose42", [[1, 2], [-1, 3], [-1, -3, 4]]) as sat:
+        assert propagates(sat, [1])
+        assert not propagates(sat, [1, -4])
     assert given == [0, 0]
 
 
