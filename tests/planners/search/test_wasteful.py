@@ -124,6 +124,8 @@ def wrong_pairs(loaded: PlanningInstance) -> tuple[list[str], Counter[str]]:
     if not met["pairs"]:
         return wrong, met
     step: dict[tuple[bytes, tuple[int, ...]], bytes] = {}
+    #: What is true in a state, whatever robots did before: some models remember that.
+    facts: dict[bytes, bytes] = {}
 
     def out_of(states: Rows) -> Rows:
         found = model.successors(states)
@@ -131,6 +133,7 @@ def wrong_pairs(loaded: PlanningInstance) -> tuple[list[str], Counter[str]]:
             found.source.tolist(), found.labels.tolist(), found.result, strict=True
         ):
             step[states[source].tobytes(), tuple(labels)] = result.tobytes()
+            facts[result.tobytes()] = model.codec.facts_part(result[None, :]).tobytes()
         return unique_rows(found.result)[0]
 
     states = some_states(model, task.init)
@@ -148,12 +151,12 @@ def wrong_pairs(loaded: PlanningInstance) -> tuple[list[str], Counter[str]]:
                     met["steps"] += 1
                     paid = costs[robot][one[robot]] + costs[robot][two[robot]]
                     idle = (*two[:robot], 0, *two[robot + 1 :])
-                    if not any(
-                        step.get((step[start, (*one[:robot], label, *one[robot + 1 :])], idle))
-                        == end
+                    instead = [
+                        step.get((step[start, first], idle))
                         for label in np.flatnonzero(costs[robot] < paid).tolist()
-                        if (start, (*one[:robot], label, *one[robot + 1 :])) in step
-                    ):
+                        if (start, first := (*one[:robot], label, *one[robot + 1 :])) in step
+                    ]
+                    if facts[end] not in {facts[other] for other in instead if other is not None}:
                         names = model.labels[robot]
                         wrong.append(f"{names[one[robot]]} {names[two[robot]]}")
     return wrong, met
