@@ -10,7 +10,7 @@ or None, which carries nothing else.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -31,7 +31,9 @@ _AT_ONCE, _ENOUGH = 300, 900
 #: All failing tuples are asked where fewer of the recent ones agree.
 _FEW = 100
 #: What may be spent on an abstraction at first: refuted partitions, conflicts for each of them.
-_FIRST = SolverBudget(rounds=50, conflicts=2_000)
+_FIRST = SolverBudget(rounds=60, conflicts=20_000)
+#: Abstractions that are looked at with this effort: as many again have half of it, and so on.
+_FOREMOST = 2
 #: A solver that is quick on many easy problems with many solutions.
 _SOLVER: SolverName = "minisat22"
 
@@ -73,16 +75,20 @@ class AbstractSearch:
     def find(self, size: int) -> Assignment | None:
         """A language with at most ``size`` words, None if none was found with some effort.
 
-        The next call with this size goes on, and spends more.
+        The next call with this size goes on, and spends more.  Coarse abstractions that are not
+        decided have more of it than fine ones.
         """
         budget = self._budgets.get(size, _FIRST)
         self._budgets[size] = budget.doubled()
+        undecided = 0
         for problem in self._problems:
             if problem.refuted >= size:
                 continue
+            rounds = budget.rounds >> undecided // _FOREMOST
             try:
-                word = self._of(problem, size, budget)
+                word = self._of(problem, size, replace(budget, rounds=rounds))
             except Undecided:
+                undecided += 1
                 continue
             problem.by_size.drop(size)
             if word is not None:

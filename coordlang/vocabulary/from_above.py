@@ -19,7 +19,7 @@ from planners.tables import Ints
 #: States from which on words are also looked for by local search.
 LOCAL_FROM = 200
 #: Refuted partitions by which abstractions are ahead of the other searches.
-_AHEAD = 1_000
+_AHEAD = 3_000
 
 
 class SearchFromAbove:

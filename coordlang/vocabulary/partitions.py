@@ -107,7 +107,7 @@ class Partitions:
         return problem
 
     def _start_up_to_symmetry(self, size: int, known: Sequence[Clause]) -> PartitionProblem:
-        problem = self._start(size, known, "glucose4")
+        problem = self._start(size, known, "glucose42")
         pairs = most_frequent_pairs(known, _COMPARED_PAIRS)
         problem.add_lex_leaders(self._permutations, pairs)
         return problem
