@@ -29,6 +29,8 @@ from planners.tables import Bools, Ints
 _VARIABLES, _VALUES = 12, 200
 #: Coordinates that values may have: more are those of a ring, of which each says next to nothing.
 _COORDINATES = 3
+#: States beyond which nothing is looked for.
+_STATES = 20_000
 #: A distance between values that nothing joins.
 _FAR = np.iinfo(np.int64).max
 
@@ -168,13 +170,13 @@ def abstractions(candidates: Candidates, states: Sequence[int]) -> list[Ints]:
         (states of the table) the number of the abstract state of each.  All of them merge
         some of the states that matter, and no two are the same.
     """
-    if not len(candidates.rows):
+    if not 0 < len(candidates.rows) <= _STATES:
         return []
     variables = _variables(candidates)
     mine = np.array(states)
     found: dict[bytes, Ints] = {}
     for columns in _chosen(variables):
-        classes = _numbered(np.stack([column.astype(np.int64) for column in columns]))
+        classes = _numbered(columns)
         here = _numbered(classes[None, mine])
         if 0 < here.max() < len(mine) - 1:
             found.setdefault(here.tobytes(), classes)
@@ -254,10 +256,14 @@ def _cross(one: Bools, other: Bools) -> bool:
     )
 
 
-def _numbered(columns: Ints | Bools) -> Ints:
-    """(n) the number of each column of a table (rows, n), equal ones alike, in order of meeting."""
-    _, first, number = np.unique(columns, axis=1, return_index=True, return_inverse=True)
+def _numbered(columns: Sequence[Ints | Bools] | Ints | Bools) -> Ints:
+    """(n) a number for each position of some columns (n): equal ones alike, in order of meeting."""
+    number = np.zeros(len(columns[0]), np.int64)
+    for column in columns:
+        own, values = column.astype(np.int64), int(column.max()) + 2
+        _, number = np.unique(number * values + own + 1, return_inverse=True)
+    _, first, number = np.unique(number, return_index=True, return_inverse=True)
     rank = np.empty(len(first), np.int64)
     rank[np.argsort(first)] = np.arange(len(first))
-    found: Ints = rank[number.ravel()]
+    found: Ints = rank[number]
     return found
