@@ -3,12 +3,13 @@
 
     python benchmarks/exact.py [ROW ..] [--time-limit SECONDS] [--seeds N] [--kept FILE]
 
-Rows are those of Table 1, ``open-RxC`` and ``ring-RxC`` (two robots, all pairs of states).  The
-columns: words, with the proved bound where that is smaller (7..8); refuted partitions (*rounds*),
-and of equivariant words; failing tuples up to symmetry; walks of a part of the tasks; clauses;
-wall and CPU seconds of the whole build; and the load of the machine over the last minute.  Every
-number of words is that of a language verified by definition.  ``--kept`` keeps rows that are done
-in a file, so that a run that was killed goes on; the time limit is for each row and seed.
+Rows are those of Table 1, ``open-RxC`` and ``ring-RxC`` (two robots, all pairs of states), and
+``open-RxC-N`` (N robots).  The columns: words, with the proved bound where that is smaller (7..8);
+refuted partitions (*rounds*), of abstract states and of equivariant words; failing tuples up to
+symmetry; walks of a part of the tasks; clauses; wall and CPU seconds of the whole build; and the
+load of the machine over the last minute.  Every number of words is that of a language verified by
+definition.  ``--kept`` keeps rows that are done in a file, so that a run that was killed goes on;
+the time limit is for each row and seed.
 """
 
 from __future__ import annotations

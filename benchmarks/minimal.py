@@ -10,7 +10,7 @@ clauses and the symmetries of the model. Where the paper has an exact value (GW1
 in brackets. The time limit is for each method and row.
 
 Further rows on demand: ``open-RxC`` and ``ring-RxC``, two robots on an open grid or on its border,
-all pairs of states:
+all pairs of states; ``open-RxC-N`` with N robots:
 
     python benchmarks/minimal.py open-2x5 open-3x4 ring-4x4 --methods minimal --time-limit 600
 """
@@ -119,10 +119,11 @@ def inputs(wanted: list[str]) -> Iterator[tuple[str, str, Candidates]]:
             exact = f" ({paper.exact})" if paper.exact else ""
             yield row.name, f"{paper.words}{exact}", row.candidates(DOMAINS)
     for name in wanted:
-        if match := re.fullmatch(r"(open|ring)-(\d+)x(\d+)", name):
+        if match := re.fullmatch(r"(open|ring)-(\d+)x(\d+)(?:-(\d))?", name):
             make = {"open": open_grid, "ring": ring}[match[1]]
             domain = read_domain(DOMAINS / "grid" / "domain.pddl")
-            text = problem_text(scenario(name, make(int(match[2]), int(match[3]))), "grid")
+            floor, robots = make(int(match[2]), int(match[3])), int(match[4] or 2)
+            text = problem_text(scenario(name, floor, robots), "grid")
             yield name, "-", all_pairs(domain, [parse_problem(Source(name, text), domain)])
 
 
