@@ -81,5 +81,5 @@ def test_a_simplified_formula_is_as_python_sat_writes_it() -> None:
     from pysat.process import Processor
 
     chain = [[-k, k + 1, 60] for k in range(1, 50)]
-    found = Processor(bootstrap_with=chain).process(freeze=[1, 50])
+    found = Processor(bootstrap_with=chain).process(rounds=3, freeze=[1, 50])
     assert simplified(flat(chain), [1, 50]) == found.clauses
