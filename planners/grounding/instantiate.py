@@ -149,19 +149,21 @@ class _Grounder:
         ``acting`` are the robots whose precondition this is: a negative step atom never speaks of
         them.
         """
-        match f:
-            case Not(part):
-                return self.formula(part, binding, not positive, acting)
-            case And(parts) | Or(parts):
-                kind = And if isinstance(f, And) == positive else Or
-                ground = (self.formula(part, binding, positive, acting) for part in parts)
-                return self._interned.joined(kind, ground)
-            case Forall() | Exists():
-                return self._quantifier(f, binding, positive, acting)
-            case StepAtom(action, args):
-                values = tuple([binding.get(a, a) for a in args])
-                return self._step_atom(action, values, positive, acting)
-        return self._state_literal(f, binding, positive)
+        # Asked for each node of each action: `match` takes longer.
+        if isinstance(f, Atom):
+            return self._state_literal(f, binding, positive)
+        if isinstance(f, Not):
+            return self.formula(f.part, binding, not positive, acting)
+        if isinstance(f, And | Or):
+            kind = And if isinstance(f, And) == positive else Or
+            ground = (self.formula(part, binding, positive, acting) for part in f.parts)
+            return self._interned.joined(kind, ground)
+        if isinstance(f, StepAtom):
+            values = tuple([binding.get(a, a) for a in f.args])
+            return self._step_atom(f.action, values, positive, acting)
+        if isinstance(f, Truth | Equal):
+            return self._state_literal(f, binding, positive)
+        return self._quantifier(f, binding, positive, acting)
 
     def _quantifier(
         self, f: Forall | Exists, binding: Binding, positive: bool, acting: tuple[int, ...]
