@@ -133,7 +133,7 @@ class FailingTuples:
             if sum(len(shorter.rows) for shorter in found) >= enough:
                 break
             for to in self._images if images is None else images:
-                rows = np.flatnonzero(agree(word[to], table.by_step))
+                rows = agreeing_rows(word[to], table.by_step)
                 if len(rows):
                     found.append(Agreeing(length, to, rows))
         return found
@@ -245,6 +245,36 @@ def _keys(states: Ints) -> Ints:
         code ^= code >> np.uint64(29)
     key: Ints = (code.sum(axis=1, dtype=np.uint64) * multiplier).view(np.int64)
     return key
+
+
+def agreeing_rows(word: Ints, by_step: Ints) -> Ints:
+    """The tuples all of whose sequences have one sentence; rarely others.
+
+    Most have two sequences that part at once, on their first step or their last one.
+
+    Parameters
+    ----------
+    word
+        (states) the word of each state number.
+    by_step
+        (length, robots, tuples) the states; the sequences of a tuple begin in one state.
+    """
+    if len(by_step) < 2:
+        return np.arange(by_step.shape[2])
+    begin = word.take(by_step[0, 0])
+    rows = np.flatnonzero(_part_later(begin, word.take(by_step[1])))
+    end, before = (word.take(by_step[step].take(rows, axis=1)) for step in (-1, -2))
+    rows = rows[(end == end[0]).all(axis=0) & _part_later(end[0], before)]
+    return rows[agree(word, by_step.take(rows, axis=2))]
+
+
+def _part_later(shared: Ints, beside: Ints) -> Bools:
+    """(tuples) whether sequences from a shared word may agree, by their words (robots) beside it.
+
+    Of two sequences that agree one stays in the word, or both go on to the same one.
+    """
+    still = beside == shared
+    return ((beside == beside[0]) | still | still[0]).all(axis=0)
 
 
 def agree(word: Ints, by_step: Ints) -> Bools:

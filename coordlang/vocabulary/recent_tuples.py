@@ -9,7 +9,7 @@ from itertools import groupby
 
 import numpy as np
 
-from coordlang.vocabulary.failing_tuples import Agreeing, agree
+from coordlang.vocabulary.failing_tuples import Agreeing, agreeing_rows
 from coordlang.vocabulary.refuter import Refuter
 from planners.tables import Ints
 
@@ -61,7 +61,7 @@ class RecentTuples:
     def _still_agreeing(self, word: Ints) -> Iterator[Agreeing]:
         """Those to which a partition gives one sentence, short ones first."""
         for length, table in sorted(self._tables.items()):
-            image, row = table.source[:, agree(word, table.by_step)]
+            image, row = table.source[:, agreeing_rows(word, table.by_step)]
             for number in np.unique(image).tolist():
                 yield Agreeing(length, self._images[number], row[image == number])
 

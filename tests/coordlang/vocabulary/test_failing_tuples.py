@@ -8,13 +8,15 @@ from random import Random
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from coordlang.language.sentences import sentence
 from coordlang.language.warping import separation_clause
 from coordlang.required.choices import Choices
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.vocabulary.counterexamples import many_counterexamples
-from coordlang.vocabulary.failing_tuples import FailingTuples
+from coordlang.vocabulary.failing_tuples import FailingTuples, agreeing_rows
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 from tests.support.domains import all_tasks
@@ -62,6 +64,23 @@ def test_tuples_agree_iff_their_plans_have_one_sentence(robots: int | None, seed
     assert answers[True] >= 5
     if robots:
         assert answers[False] >= 5
+
+
+@given(st.integers(2, 4), st.integers(1, 7), st.integers(1, 5), st.integers(0, 2**32 - 1))
+def test_rows_that_agree_are_those_of_all_steps(
+    robots: int, length: int, words: int, seed: int
+) -> None:
+    """Looking at the first step and the last one first leaves none out."""
+    random = np.random.default_rng(seed)
+    by_step = random.integers(6, size=(length, robots, 40))
+    by_step[0] = by_step[0, 0]
+    if seed % 2:
+        by_step[-1] = by_step[-1, 0]
+    word = random.integers(words, size=6)
+    expected = [
+        row for row in range(40) if has_one_sentence(by_step[:, :, row].T.tolist(), word.tolist())
+    ]
+    assert agreeing_rows(word, by_step).tolist() == expected
 
 
 def test_images_under_symmetries_are_known() -> None:
