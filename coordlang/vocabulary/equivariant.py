@@ -12,27 +12,30 @@ docs/concepts.md).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 
 import numpy as np
 
 from coordlang.symmetry.subgroups import GroupTable, WordAction, cycle_type, group_table
-from coordlang.vocabulary.failing_tuples import Agreeing
 from coordlang.vocabulary.job import Assignment
+from coordlang.vocabulary.recent_tuples import RecentTuples
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import Undecided, satisfiable
 from planners.sat import SolverName, sat_solver
+from planners.tables import Ints
 
 #: Subgroups that are looked at, and maps to permutations of words for each of them.
 _SUBGROUPS, _ACTIONS = 60, 60
 #: Maps for which it is tried whether the single symmetries allow them, for each subgroup.
 _TRIED = 600
-#: Failing tuples that are told apart when the first partition of a kind is refuted, and at most:
-#: most kinds are refuted by few.
-_FIRST, _AT_ONCE = 10, 100
-#: Refuted partitions after which a search is given up for now.
-_PASS = 1_000
+#: Clauses that are taken of a refuted partition, before their images; and failing tuples after
+#: which longer ones are not looked for.
+_AT_ONCE, _ENOUGH = 100, 300
+#: All failing tuples are asked where fewer of the recent ones agree.
+_FEW = 100
+#: Kinds that are looked at with this effort: as many again have half of it, and so on.
+_FOREMOST = 3
 #: A solver that is quick on many easy problems with many solutions.
 _SOLVER: SolverName = "minisat22"
 
@@ -41,8 +44,8 @@ _SOLVER: SolverName = "minisat22"
 class Effort:
     """What may be spent on each kind of partition: refuted partitions, conflicts for each."""
 
-    rounds: int = 25
-    conflicts: int = 1_000
+    rounds: int = 50
+    conflicts: int = 2_000
 
     def doubled(self) -> Effort:
         """Twice as much of both."""
@@ -50,7 +53,7 @@ class Effort:
 
 
 #: What is spent to see that one symmetry cannot act on words in some way.
-_PROBE = Effort(rounds=5, conflicts=200)
+_PROBE = Effort(rounds=10, conflicts=200)
 
 
 @dataclass(slots=True)
@@ -59,13 +62,14 @@ class _Kind:
 
     action: WordAction
     problem: _Orbits | None = None
+    recent: RecentTuples | None = None
     rounds: int = 0
 
     def close(self) -> None:
         """Give back what the solver holds."""
         if self.problem is not None:
             self.problem.close()
-            self.problem = None
+            self.problem = self.recent = None
 
 
 @dataclass(slots=True)
@@ -79,6 +83,11 @@ class _Kinds:
     undecided: list[_Kind] = field(default_factory=list)
     effort: Effort = field(default_factory=Effort)
 
+    def next_effort(self) -> Effort:
+        """What may be spent on the next one: less after several that were not decided."""
+        rounds = self.effort.rounds >> len(self.undecided) // _FOREMOST
+        return replace(self.effort, rounds=rounds)
+
 
 class EquivariantSearch:
     """Looks for languages among equivariant partitions.
@@ -89,10 +98,13 @@ class EquivariantSearch:
         Numbers of the states that need words.
     refuter
         Tells what is wrong with a partition.
+    seed
+        Of what is drawn at random: which clauses are taken.
     """
 
-    def __init__(self, states: Sequence[int], refuter: Refuter) -> None:
+    def __init__(self, states: Sequence[int], refuter: Refuter, seed: int) -> None:
         self._states, self._refuter = states, refuter
+        self._random = np.random.default_rng(seed)
         self._group = group_table(refuter.pool.images)
         every = frozenset(range(len(self._group.elements)))
         subgroups = self._group.subgroups(every, _SUBGROUPS)
@@ -100,19 +112,26 @@ class EquivariantSearch:
         # Large ones first: they are quick.  All partitions are what the others look at.
         self._subgroups = some[:0:-1] or some
         self._kinds: dict[int, _Kinds] = {}
-        self.rounds = self.pairs = self.conflicts = 0
+        self.rounds = 0
 
-    def find(self, size: int) -> Assignment | None:
+    def find(self, size: int, rounds: int) -> Assignment | None:
         """A language with at most ``size`` words, None if none was found with some effort.
 
         The next call with this size goes on, and spends more on what was looked at before.
+
+        Parameters
+        ----------
+        size
+            The number of words.
+        rounds
+            The search is given up for now after so many refuted partitions.
         """
         kinds = self._of_size(size)
-        until = self.rounds + _PASS
+        until = self.rounds + rounds
         while kinds.open and self.rounds < until:
             kind = kinds.open.pop(0)
             try:
-                found = self._of_kind(kind, size, kinds.effort)
+                found = self._of_kind(kind, size, kinds.next_effort())
             except Undecided:
                 kinds.undecided.append(kind)
                 continue
@@ -187,39 +206,24 @@ class EquivariantSearch:
             kind.problem = _Orbits.of(self._states, self._group, kind.action, size)
             if kind.problem is None:
                 return None
-        problem = kind.problem
-        before = problem.conflicts
+            kind.recent = RecentTuples(self._refuter, _ENOUGH, _FEW)
+        problem, recent = kind.problem, kind.recent
+        assert recent is not None
         word = np.zeros(len(self._group.elements[0]), np.int64)
         images = self._group.right_cosets(frozenset(kind.action.words))
-        try:
-            while kind.rounds < effort.rounds:
-                most = min(_AT_ONCE, _FIRST * 2**kind.rounds)
-                partition = problem.solve(effort.conflicts)
-                if partition is None:
-                    return None
-                word[list(partition)] = list(partition.values())
-                agreeing = self._refuter.agreeing(word, images, most)
-                if not agreeing:
-                    return partition
-                kind.rounds += 1
-                self.rounds += 1
-                for sequences in self._chosen(agreeing, most):
-                    problem.tell_apart(sequences)
-                    self.pairs += 1
-        finally:
-            self.conflicts += problem.conflicts - before
+        while kind.rounds < effort.rounds:
+            partition = problem.solve(effort.conflicts)
+            if partition is None:
+                return None
+            word[list(partition)] = list(partition.values())
+            agreeing = recent.agreeing(word, images)
+            if not agreeing:
+                return partition
+            kind.rounds += 1
+            self.rounds += 1
+            codes = self._refuter.pool.codes(word, agreeing, _AT_ONCE, self._random)
+            problem.separate_one_of_each(codes, images)
         raise Undecided
-
-    def _chosen(self, agreeing: Sequence[Agreeing], most: int) -> list[list[list[int]]]:
-        """State sequences of some of the tuples: short ones, evenly over symmetries."""
-        share = -(-most // max(1, len({id(found.to) for found in agreeing})))
-        chosen: list[list[list[int]]] = []
-        for found in agreeing:
-            if len(chosen) >= most:
-                break
-            rows = found.rows[:: -(-len(found.rows) // share)]
-            chosen += self._refuter.pool.sequences(found, rows).tolist()
-        return chosen
 
 
 class _Orbits:
@@ -234,7 +238,7 @@ class _Orbits:
         self._last = self._last_word = 0
         self._word: dict[int, dict[int, int]] = {}
         self._orbit_of_pair: dict[tuple[int, int], int] = {}
-        self._elements: list[list[int]] = []
+        self._elements: list[Ints] = []
 
     @classmethod
     def of(
@@ -242,8 +246,8 @@ class _Orbits:
     ) -> _Orbits | None:
         """The problem; None if some state, which symmetries fix, could have no word."""
         problem = cls(size)
+        problem._elements = [group.elements[h] for h in action.subgroup]
         elements = {h: group.elements[h].tolist() for h in action.subgroup}
-        problem._elements = list(elements.values())
         for state in states:
             if state in problem._word:
                 continue
@@ -259,16 +263,11 @@ class _Orbits:
         problem._last_word = problem._last
         return problem
 
-    @property
-    def conflicts(self) -> int:
-        """Conflicts of the solver so far."""
-        return int(self._solver.accum_stats()["conflicts"])
-
     def solve(self, conflicts: int) -> dict[int, int] | None:
         """A partition of this kind, None if none is left.  Raises `Undecided`."""
         if not satisfiable(self._solver, conflicts=conflicts):
             return None
-        # The variables of words were made first, and are few among those of told sequences.
+        # The variables of words were made first, and are few among those of pairs.
         true = {v for v in self._solver.get_model()[: self._last_word] if v > 0}
         return {s: next(w for w, v in own.items() if v in true) for s, own in self._word.items()}
 
@@ -276,31 +275,27 @@ class _Orbits:
         """Give back what the solver holds."""
         self._solver.delete()
 
-    def tell_apart(self, sequences: Sequence[Sequence[int]]) -> None:
-        """Require that not all of these sequences of states have one sentence.
+    def separate_one_of_each(self, clauses: Ints, images: Sequence[Ints]) -> None:
+        """Require that one pair of each clause has different words, and of each clause's images.
 
-        A variable for each cell that a warping path reaches, and one of the last cells unreached.
+        Parameters
+        ----------
+        clauses
+            (clauses, pairs) codes ``a * states + b`` of pairs, -1 for none.
+        images
+            (states) symmetries: with the subgroup of this kind they give the whole group.
         """
-        ends = [self._end_reached(sequences[0], other) for other in sequences[1:]]
-        self._solver.add_clause([-end for end in ends])
+        every = np.unique(np.concatenate([self._orbits_of(clauses, to) for to in images]), axis=0)
+        states = len(images[0])
+        for row in every.tolist():
+            pairs = (divmod(code, states) for code in dict.fromkeys(row) if code >= 0)
+            self._solver.add_clause([self._separated(a, b) for a, b in pairs])
 
-    def _end_reached(self, u: Sequence[int], v: Sequence[int]) -> int:
-        """A variable that is true if a warping path joins two sequences."""
-        reached: dict[tuple[int, int], list[int]] = {(-1, -1): []}
-        for i, a in enumerate(u):
-            for j, b in enumerate(v):
-                before = [c for c in ((i - 1, j - 1), (i - 1, j), (i, j - 1)) if c in reached]
-                if not before:
-                    continue
-                if (a == b and reached[before[0]] == []) and (i, j) != (len(u) - 1, len(v) - 1):
-                    reached[i, j] = []
-                    continue
-                variable = self._new()
-                reached[i, j] = [-variable]
-                apart = [] if a == b else [self._separated(a, b)]
-                for cell in before:
-                    self._solver.add_clause([*reached[cell], *apart, variable])
-        return -reached[len(u) - 1, len(v) - 1][0]
+    def _orbits_of(self, clauses: Ints, to: Ints) -> Ints:
+        """Images of clauses, each with the first pair of the orbit in place of each pair."""
+        images = [_images(clauses, element[to]) for element in self._elements]
+        found: Ints = np.sort(np.minimum.reduce(images), axis=1)
+        return found
 
     def _separated(self, a: int, b: int) -> int:
         """A variable that is true only where two states, and their images, have different words."""
@@ -309,7 +304,7 @@ class _Orbits:
             return known
         variable = self._new()
         for to in self._elements:
-            x, y = to[a], to[b]
+            x, y = int(to[a]), int(to[b])
             self._orbit_of_pair[x, y] = self._orbit_of_pair[y, x] = variable
         first, second = self._word[a], self._word[b]
         for word in first.keys() & second.keys():
@@ -325,3 +320,10 @@ class _Orbits:
     def _new(self) -> int:
         self._last += 1
         return self._last
+
+
+def _images(clauses: Ints, to: Ints) -> Ints:
+    """The codes of clauses' images under a symmetry; see `_Orbits.separate_one_of_each`."""
+    states = len(to)
+    a, b = to[clauses // states], to[clauses % states]
+    return np.where(clauses < 0, -1, np.minimum(a, b) * states + np.maximum(a, b))

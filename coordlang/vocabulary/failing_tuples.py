@@ -30,6 +30,8 @@ _RETURNED = 800
 _LEAST = 20
 #: Tuples whose warping paths are looked for, for each clause that is returned.
 _WARPED = 10
+#: Tuples, for each partition, that are compared together: some megabytes.
+_TOGETHER = 300_000
 #: An odd multiplier: sentences that are equal have equal codes, others nearly never.
 _MULTIPLIER = 0x9E3779B97F4A7C15
 #: Cost of a cell that no warping path of equal words passes.
@@ -129,13 +131,15 @@ class FailingTuples:
             Longer tuples are left out once there are so many.
         """
         found: list[Agreeing] = []
+        looked_at = self._images if images is None else images
+        words = np.stack([word[to] for to in looked_at])
         for length, table in sorted(self._tables.items()):
             if sum(len(shorter.rows) for shorter in found) >= enough:
                 break
-            for to in self._images if images is None else images:
-                rows = agreeing_rows(word[to], table.by_step)
-                if len(rows):
-                    found.append(Agreeing(length, to, rows))
+            image, row = agreeing_rows(words, table.by_step)
+            numbers, first = np.unique(image, return_index=True)
+            for number, rows in zip(numbers.tolist(), np.split(row, first[1:]), strict=False):
+                found.append(Agreeing(length, looked_at[number], rows))
         return found
 
     def codes(
@@ -247,34 +251,53 @@ def _keys(states: Ints) -> Ints:
     return key
 
 
-def agreeing_rows(word: Ints, by_step: Ints) -> Ints:
+def agreeing_rows(words: Ints, by_step: Ints) -> tuple[Ints, Ints]:
     """The tuples all of whose sequences have one sentence; rarely others.
 
     Most have two sequences that part at once, on their first step or their last one.
 
     Parameters
     ----------
-    word
-        (states) the word of each state number.
+    words
+        (partitions, states) the word of each state number, in some partitions.
     by_step
         (length, robots, tuples) the states; the sequences of a tuple begin in one state.
+
+    Returns
+    -------
+    Ints, Ints
+        The partitions, in their order, and the tuples.
     """
-    if len(by_step) < 2:
-        return np.arange(by_step.shape[2])
-    begin = word.take(by_step[0, 0])
-    rows = np.flatnonzero(_part_later(begin, word.take(by_step[1])))
-    end, before = (word.take(by_step[step].take(rows, axis=1)) for step in (-1, -2))
-    rows = rows[(end == end[0]).all(axis=0) & _part_later(end[0], before)]
-    return rows[agree(word, by_step.take(rows, axis=2))]
+    tuples = max(1, by_step.shape[2])
+    together = max(1, _TOGETHER // tuples)
+    parts = [
+        _agreeing_rows(words[first : first + together].astype(np.int32), by_step)
+        for first in range(0, len(words), together)
+    ]
+    partitions = [some + n * together for n, (some, _) in enumerate(parts)]
+    return np.concatenate(partitions), np.concatenate([rows for _, rows in parts])
+
+
+def _agreeing_rows(words: Ints, by_step: Ints) -> tuple[Ints, Ints]:
+    """See `agreeing_rows`, for a few partitions."""
+    begin, beside = (words.take(states, axis=1) for states in (by_step[0, 0], by_step[1]))
+    partition, rows = np.nonzero(_part_later(begin, beside.swapaxes(0, 1)))
+    word, offset = words.ravel(), partition * words.shape[1]
+    end, before = (word.take(by_step[step].take(rows, axis=1) + offset) for step in (-1, -2))
+    kept = np.flatnonzero((end == end[0]).all(axis=0) & _part_later(end[0], before))
+    partition, rows, offset = partition[kept], rows[kept], offset[kept]
+    kept = np.flatnonzero(agree(word, by_step.take(rows, axis=2) + offset))
+    return partition[kept], rows[kept]
 
 
 def _part_later(shared: Ints, beside: Ints) -> Bools:
-    """(tuples) whether sequences from a shared word may agree, by their words (robots) beside it.
+    """Whether sequences from a shared word may agree, by their words (robots, ..) beside it.
 
     Of two sequences that agree one stays in the word, or both go on to the same one.
     """
     still = beside == shared
-    return ((beside == beside[0]) | still | still[0]).all(axis=0)
+    later: Bools = ((beside == beside[0]) | still | still[0]).all(axis=0)
+    return later
 
 
 def agree(word: Ints, by_step: Ints) -> Bools:

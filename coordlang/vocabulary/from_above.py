@@ -18,8 +18,10 @@ from planners.tables import Ints
 
 #: States from which on words are also looked for by local search.
 LOCAL_FROM = 200
-#: Refuted partitions by which abstractions are ahead of the other searches.
-_AHEAD = 3_000
+#: Refuted partitions that symmetric words may take the first time that a number of words is tried.
+_FIRST = 500
+#: Refuted partitions by which the other searches are ahead of local search.
+_AHEAD = 6_000
 
 
 class SearchFromAbove:
@@ -41,25 +43,38 @@ class SearchFromAbove:
         self, states: Sequence[int], refuter: Refuter, abstractions: Sequence[Ints], seed: int
     ) -> None:
         self._abstract = AbstractSearch(abstractions, states, refuter, seed)
-        self._equivariant = EquivariantSearch(states, refuter)
+        self._equivariant = EquivariantSearch(states, refuter, seed)
         self._local = LocalSearch(states, refuter, seed) if len(states) > LOCAL_FROM else None
+        self._passes: dict[int, int] = {}
 
     def find(self, size: int, progress: Callable[[str], None]) -> Assignment | None:
         """A language with at most ``size`` words, None if none was found with some effort.
 
-        Abstractions are asked first.  The others go on when they have done much less than these.
+        Abstractions are asked first, then symmetric words.  Local search goes on when it has done
+        much less than these.
         """
         progress(f"words of abstract states: trying {size}")
         found = self._abstract.find(size)
-        spent = self._abstract.rounds
-        over = self._abstract.is_over(size)
-        if found is None and (over or self._equivariant.rounds + _AHEAD <= spent):
+        if found is None:
             progress(f"symmetric words: trying {size}")
-            found = self._equivariant.find(size)
-        if found is None and self._local and (over or self._local.rounds + _AHEAD <= spent):
-            progress(f"local search: trying {size}")
-            found = self._local.find(size, self._equivariant.undecided(size))
+            rounds = self._passes.get(size, _FIRST)
+            self._passes[size] = 2 * rounds
+            found = self._equivariant.find(size, rounds)
+        if found is None and self._local is not None:
+            behind = self._local.rounds + _AHEAD <= self.rounds
+            if behind or self._is_over(size):
+                progress(f"local search: trying {size}")
+                found = self._local.find(size, self._equivariant.undecided(size))
         return found
+
+    @property
+    def rounds(self) -> int:
+        """Refuted partitions, local search apart."""
+        return self._abstract.rounds + self._equivariant.rounds
+
+    def _is_over(self, size: int) -> bool:
+        """Whether neither abstractions nor symmetries leave words to look at."""
+        return self._abstract.is_over(size) and not self._equivariant.undecided(size)
 
     def figures(self) -> dict[str, float]:
         """The work done."""

@@ -39,6 +39,9 @@ from planners.tables import Ints
 
 #: Combinations of plans' next steps up to which separating words are looked for first.
 _SEPARATING_COMBINATIONS = 4_000_000
+#: A number of words has a round from below, which takes four times as long, for so many that the
+#: searches from above have had; and as many as at first.
+_ABOVE = 32
 
 
 def minimal(job: Job) -> Outcome:
@@ -173,11 +176,14 @@ class _Search:
         job, refuter = self._job, self._prepare()
         above = self._above = SearchFromAbove(job.states, refuter, self._abstractions, job.seed)
         budget = SolverBudget()
-        while self.lower < self._upper:
-            if not self._decide(self.lower, budget):
-                while self.lower < self._upper and self._descend(above):
+        while (lower := self.lower) < self._upper:
+            if not self._decide(lower, budget):
+                while lower < self._upper and self._descend(above):
                     pass
-                budget = budget.doubled()
+                rounds = max(SolverBudget().rounds, above.rounds // _ABOVE)
+                budget = replace(budget.doubled(), rounds=rounds)
+            elif self.lower > lower:
+                budget = SolverBudget()  # the next number is another problem, and may be easy
 
     def _descend(self, above: SearchFromAbove) -> bool:
         """Look for a language with fewer words; whether one was found.

@@ -132,7 +132,7 @@ def test_others_are_asked_where_no_abstraction_is_left(monkeypatch: pytest.Monke
     """And not before abstractions have had much more effort."""
     candidates = all_tasks("grid", "gw1-2x2")
     asked: list[int] = []
-    monkeypatch.setattr(EquivariantSearch, "find", lambda self, size: asked.append(size))
+    monkeypatch.setattr(EquivariantSearch, "find", lambda self, size, rounds: asked.append(size))
     refuter, states = refuter_of(candidates), states_of(candidates)
     told: list[str] = []
     above = SearchFromAbove(states, refuter, abstractions(candidates, states), 0)

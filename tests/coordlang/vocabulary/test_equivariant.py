@@ -24,7 +24,7 @@ def searching(candidates: Candidates, group: SymmetryGroup | None = None) -> Equ
     rows = len(candidates.rows)
     refuter = Refuter(candidates.spaces, group, rows, 0)
     states = sorted({s for space in candidates.spaces for s in space.state.tolist()})
-    return EquivariantSearch(states, refuter)
+    return EquivariantSearch(states, refuter, 0)
 
 
 def is_language(found: Assignment, candidates: Candidates) -> bool:
@@ -44,9 +44,9 @@ def test_languages_are_found_and_fewer_words_are_not(folder: str, stem: str, wor
     """With the numbers of words that brute force and proofs give."""
     candidates = all_tasks(folder, stem)
     search = searching(candidates)
-    assert search.find(words - 1) is None
+    assert search.find(words - 1, 1_000) is None
     for size in (words + 2, words + 1, words):
-        found = next((f for _ in range(6) if (f := search.find(size)) is not None), None)
+        found = next((f for _ in range(6) if (f := search.find(size, 1_000)) is not None), None)
         if found is not None:
             assert len(set(found.values())) <= size
             assert is_language(found, candidates)
@@ -57,7 +57,7 @@ def test_what_is_found_is_equivariant() -> None:
     """Some symmetry other than the identity takes words to words."""
     candidates = all_tasks("grid", "gw1-2x2")
     group = symmetry_group(candidates)
-    found = searching(candidates).find(4)
+    found = searching(candidates).find(4, 1_000)
     assert found is not None
 
     def keeps_words(to: list[int]) -> bool:
@@ -69,8 +69,8 @@ def test_what_is_found_is_equivariant() -> None:
 def test_without_symmetries_all_partitions_are_looked_at() -> None:
     candidates = all_tasks("grid", "gw1-2x2")
     search = searching(candidates, SymmetryGroup(()))
-    assert search.find(2) is None
-    found = search.find(3)
+    assert search.find(2, 1_000) is None
+    found = search.find(3, 1_000)
     assert found is not None
     assert is_language(found, candidates)
 
@@ -81,9 +81,9 @@ def test_what_is_not_found_raises_no_bound(monkeypatch: pytest.MonkeyPatch, find
     asked: list[int] = []
     find = EquivariantSearch.find
 
-    def told(search: EquivariantSearch, size: int) -> Assignment | None:
+    def told(search: EquivariantSearch, size: int, rounds: int) -> Assignment | None:
         asked.append(size)
-        return None if finds == "nothing" else find(search, size)
+        return None if finds == "nothing" else find(search, size, rounds)
 
     monkeypatch.setattr(
         sys.modules["coordlang.vocabulary.equivariant"].EquivariantSearch, "find", told
@@ -99,7 +99,7 @@ def test_kinds_without_a_language_are_no_bound() -> None:
     candidates = all_tasks("grid", "gw1-2x2")
     search = searching(candidates)
     search._subgroups = search._subgroups[:1]
-    sizes = [size for size in range(3, 13) if search.find(size) is None]
+    sizes = [size for size in range(3, 13) if search.find(size, 1_000) is None]
     assert sizes, "some kind has none"
     assert build_language(candidates, "minimal").language.guarantee.lower_bound == 3
     assert np.all(np.array(sizes) >= 3)

@@ -15,6 +15,7 @@ from coordlang.language.sentences import sentence
 from coordlang.language.warping import separation_clause
 from coordlang.required.choices import Choices
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
+from coordlang.vocabulary import failing_tuples
 from coordlang.vocabulary.counterexamples import many_counterexamples
 from coordlang.vocabulary.failing_tuples import FailingTuples, agreeing_rows
 from planners.search.edge_index import EdgeIndex
@@ -66,7 +67,7 @@ def test_tuples_agree_iff_their_plans_have_one_sentence(robots: int | None, seed
         assert answers[False] >= 5
 
 
-@given(st.integers(2, 4), st.integers(1, 7), st.integers(1, 5), st.integers(0, 2**32 - 1))
+@given(st.integers(2, 4), st.integers(2, 7), st.integers(1, 5), st.integers(0, 2**32 - 1))
 def test_rows_that_agree_are_those_of_all_steps(
     robots: int, length: int, words: int, seed: int
 ) -> None:
@@ -76,11 +77,18 @@ def test_rows_that_agree_are_those_of_all_steps(
     by_step[0] = by_step[0, 0]
     if seed % 2:
         by_step[-1] = by_step[-1, 0]
-    word = random.integers(words, size=6)
+    table = random.integers(words, size=(3, 6))
     expected = [
-        row for row in range(40) if has_one_sentence(by_step[:, :, row].T.tolist(), word.tolist())
+        (number, row)
+        for number, word in enumerate(table.tolist())
+        for row in range(40)
+        if has_one_sentence(by_step[:, :, row].T.tolist(), word)
     ]
-    assert agreeing_rows(word, by_step).tolist() == expected
+    for together in (1, 100, 10**6):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(failing_tuples, "_TOGETHER", together)
+            partitions, rows = agreeing_rows(table, by_step)
+        assert [*zip(partitions.tolist(), rows.tolist(), strict=True)] == expected
 
 
 def test_images_under_symmetries_are_known() -> None:

@@ -213,7 +213,7 @@ def test_languages_are_found_and_fewer_words_are_not(folder: str, stem: str, wor
     twice = []
     for _ in range(2):
         refuter, states = searching(candidates, group, 1)
-        search, kinds = LocalSearch(states, refuter, 1), EquivariantSearch(states, refuter)
+        search, kinds = LocalSearch(states, refuter, 1), EquivariantSearch(states, refuter, 0)
         assert search.find(words - 1, kinds.undecided(words - 1)) is None
         tries = (search.find(words, kinds.undecided(words)) for _ in range(8))
         found = next((f for f in tries if f is not None), None)
@@ -268,8 +268,8 @@ def test_what_is_not_found_raises_no_bound(monkeypatch: pytest.MonkeyPatch, find
     monkeypatch.setattr(module, "LOCAL_FROM", 0)
     monkeypatch.setattr(from_above, "_AHEAD", 0)
     monkeypatch.setattr(module, "SolverBudget", partial(SolverBudget, rounds=1))
-    monkeypatch.setattr(AbstractSearch, "find", lambda self, size: None)
-    monkeypatch.setattr(EquivariantSearch, "find", lambda self, size: None)
+    monkeypatch.setattr(AbstractSearch, "find", lambda self, size, *effort: None)
+    monkeypatch.setattr(EquivariantSearch, "find", lambda self, size, *effort: None)
     monkeypatch.setattr(LocalSearch, "find", told)
     built = build_language(all_tasks("grid", "gw2-2x3"), "minimal")
     guarantee = built.language.guarantee
@@ -286,9 +286,9 @@ def test_words_of_what_is_found_are_merged(monkeypatch: pytest.MonkeyPatch) -> N
     module = sys.modules["coordlang.vocabulary.minimal"]
     monkeypatch.setattr(module, "LOCAL_FROM", 0)
     monkeypatch.setattr(from_above, "_AHEAD", 0)
-    monkeypatch.setattr(AbstractSearch, "find", lambda self, size: None)
+    monkeypatch.setattr(AbstractSearch, "find", lambda self, size, *effort: None)
     monkeypatch.setattr(module, "SolverBudget", partial(SolverBudget, rounds=1))
-    monkeypatch.setattr(EquivariantSearch, "find", lambda self, size: apart)
+    monkeypatch.setattr(EquivariantSearch, "find", lambda self, size, *effort: apart)
     verified: list[Assignment] = []
     assert minimal(replace(job, check=verified.append)).lower_bound == 5
     first = verified.index(apart)
