@@ -31,7 +31,7 @@ _AT_ONCE, _ENOUGH = 300, 900
 #: All failing tuples are asked where fewer of the recent ones agree.
 _FEW = 100
 #: What may be spent on an abstraction at first: refuted partitions, conflicts for each of them.
-_FIRST = SolverBudget(rounds=60, conflicts=5_000)
+_FIRST = SolverBudget(rounds=60, conflicts=1_000)
 #: Abstractions that are looked at with this effort: as many again have half of it, and so on.
 _FOREMOST = 2
 #: A solver that is quick on many easy problems with many solutions.
