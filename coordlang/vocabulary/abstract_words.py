@@ -10,7 +10,7 @@ or None, which carries nothing else.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -84,9 +84,9 @@ class AbstractSearch:
         for problem in self._problems:
             if problem.refuted >= size:
                 continue
-            rounds = budget.rounds >> undecided // _FOREMOST
+            own = budget.lessened(undecided // _FOREMOST)
             try:
-                word = self._of(problem, size, replace(budget, rounds=rounds))
+                word = self._of(problem, size, own)
             except Undecided:
                 undecided += 1
                 continue

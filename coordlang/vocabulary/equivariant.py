@@ -12,13 +12,14 @@ docs/concepts.md).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import islice
 
 import numpy as np
 
 from coordlang.symmetry.subgroups import GroupTable, WordAction, cycle_type, group_table
 from coordlang.vocabulary.job import Assignment
+from coordlang.vocabulary.problems_by_size import SolverBudget
 from coordlang.vocabulary.recent_tuples import RecentTuples
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import Undecided, satisfiable
@@ -40,20 +41,10 @@ _FOREMOST = 3
 _SOLVER: SolverName = "minisat22"
 
 
-@dataclass(frozen=True, slots=True)
-class Effort:
-    """What may be spent on each kind of partition: refuted partitions, conflicts for each."""
-
-    rounds: int = 50
-    conflicts: int = 2_000
-
-    def doubled(self) -> Effort:
-        """Twice as much of both."""
-        return Effort(2 * self.rounds, 2 * self.conflicts)
-
-
 #: What is spent to see that one symmetry cannot act on words in some way.
-_PROBE = Effort(rounds=10, conflicts=200)
+_PROBE = SolverBudget(rounds=10, conflicts=200)
+#: What may be spent on each kind at first: refuted partitions, conflicts for each of them.
+_FIRST = SolverBudget(rounds=50, conflicts=2_000)
 
 
 @dataclass(slots=True)
@@ -81,12 +72,7 @@ class _Kinds:
 
     open: list[_Kind]
     undecided: list[_Kind] = field(default_factory=list)
-    effort: Effort = field(default_factory=Effort)
-
-    def next_effort(self) -> Effort:
-        """What may be spent on the next one: less after several that were not decided."""
-        rounds = self.effort.rounds >> len(self.undecided) // _FOREMOST
-        return replace(self.effort, rounds=rounds)
+    effort: SolverBudget = _FIRST
 
 
 class EquivariantSearch:
@@ -131,7 +117,8 @@ class EquivariantSearch:
         while kinds.open and self.rounds < until:
             kind = kinds.open.pop(0)
             try:
-                found = self._of_kind(kind, size, kinds.next_effort())
+                effort = kinds.effort.lessened(len(kinds.undecided) // _FOREMOST)
+                found = self._of_kind(kind, size, effort)
             except Undecided:
                 kinds.undecided.append(kind)
                 continue
@@ -200,7 +187,7 @@ class EquivariantSearch:
         finally:
             kind.close()
 
-    def _of_kind(self, kind: _Kind, size: int, effort: Effort) -> Assignment | None:
+    def _of_kind(self, kind: _Kind, size: int, effort: SolverBudget) -> Assignment | None:
         """A language of one kind; None if there is none.  Raises `Undecided`, and can go on."""
         if kind.problem is None:
             kind.problem = _Orbits.of(self._states, self._group, kind.action, size)

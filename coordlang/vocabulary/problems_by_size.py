@@ -91,6 +91,10 @@ class SolverBudget:
         """Twice as much of both."""
         return SolverBudget(2 * self.rounds, 2 * self.conflicts)
 
+    def lessened(self, times: int) -> SolverBudget:
+        """Half of the rounds, so many times: for problems that come after others."""
+        return SolverBudget(self.rounds >> times, self.conflicts)
+
 
 def close_bounds(
     bounds: Callable[[], tuple[int, int]], decide: Callable[[int, SolverBudget], bool]

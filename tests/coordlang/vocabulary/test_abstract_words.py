@@ -129,7 +129,7 @@ def test_what_is_not_found_raises_no_bound(monkeypatch: pytest.MonkeyPatch, find
 
 
 def test_others_are_asked_where_no_abstraction_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    """And not before abstractions have had much more effort."""
+    """And not where abstractions have given an answer."""
     candidates = all_tasks("grid", "gw1-2x2")
     asked: list[int] = []
     monkeypatch.setattr(EquivariantSearch, "find", lambda self, size, rounds: asked.append(size))
