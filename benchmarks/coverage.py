@@ -41,7 +41,7 @@ from time import process_time
 from typing import TYPE_CHECKING, Any
 
 from foreign_rows import SHARED
-from kept_rows import KeptRows
+from kept_rows import KeptRows, asked_for
 from printed_table import PrintedTable
 from processes import run_python
 from scale import Grid
@@ -324,7 +324,7 @@ def print_page(asked: Asked, limit: int, found: Sequence[tuple[str, dict[str, An
 def main() -> None:
     """Print what the arguments say."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("rows", nargs="*", metavar="ROW", help="beginnings of rows' names")
+    parser.add_argument("rows", nargs="*", metavar="ROW", help="rows, or beginnings of their names")
     parser.add_argument("--list", action="store_true", help="the names of all rows")
     parser.add_argument("--table", choices=[*TABLES, "all"], help="a table of docs/coverage.md")
     parser.add_argument("--markdown", action="store_true", help="print it as it stands there")
@@ -364,7 +364,7 @@ def chosen(given: argparse.Namespace) -> Iterator[tuple[Asked, list[str]]]:
     tables = {"all": list(TABLES.values()), None: [own]}
     for asked in tables.get(given.table) or [TABLES[given.table]]:
         names = asked.rows() if given.table else rows(given.first)
-        yield asked, [n for n in names if not given.rows or n.startswith(tuple(given.rows))]
+        yield asked, asked_for(names, given.rows)
 
 
 if __name__ == "__main__":

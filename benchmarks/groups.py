@@ -30,6 +30,7 @@ from typing import TYPE_CHECKING, Any
 import networkx as nx
 import numpy as np
 from coverage import MEMORY, SCENARIOS, load, rows
+from kept_rows import asked_for
 from printed_table import PrintedTable
 from processes import run_python
 
@@ -168,7 +169,7 @@ def _far(passable: frozenset[Cell], start: Cell) -> dict[Cell, int]:
 def main() -> None:
     """Print what the arguments say."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("rows", nargs="*", metavar="ROW", help="beginnings of rows' names")
+    parser.add_argument("rows", nargs="*", metavar="ROW", help="rows, or beginnings of their names")
     parser.add_argument("--first", type=int, default=3, metavar="N", help="problems of a domain")
     parser.add_argument("--limit", type=int, default=60, metavar="SECONDS", help="CPU seconds (60)")
     parser.add_argument("--cost", default="makespan+actions", help="of CoDMAP's tasks")
@@ -187,9 +188,8 @@ def main() -> None:
         print(f"one group: {sum(own[0] == given.windows for own in sizes)}")
         return
     table = PrintedTable(*COLUMNS)
-    for name in rows(given.first):
-        if not given.rows or name.startswith(tuple(given.rows)):
-            table.print(*cells(measured(name, given.limit, given.cost)))
+    for name in asked_for(rows(given.first), given.rows):
+        table.print(*cells(measured(name, given.limit, given.cost)))
 
 
 if __name__ == "__main__":

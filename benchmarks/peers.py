@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 import coverage
-from kept_rows import KeptRows
+from kept_rows import KeptRows, asked_for
 from printed_table import PrintedTable
 
 KSTAR = """
@@ -99,7 +99,7 @@ def measured(name: str, given: argparse.Namespace) -> dict[str, Any]:
 def main() -> None:
     """Print what the arguments say."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("rows", nargs="*", metavar="ROW", help="beginnings of rows' names")
+    parser.add_argument("rows", nargs="*", metavar="ROW", help="rows, or beginnings of their names")
     parser.add_argument("--first", type=int, default=3, metavar="N", help="problems of a domain")
     parser.add_argument("--limit", type=int, default=60, metavar="SECONDS", help="CPU seconds (60)")
     parser.add_argument("--cost", default="makespan+actions", help="of CoDMAP's tasks")
@@ -111,9 +111,7 @@ def main() -> None:
     for planner in PLANNERS:
         columns += [(planner, 7), ("MB", 5), ("plans", 9)]
     table = PrintedTable(*columns)
-    for name in coverage.rows(given.first):
-        if given.rows and not name.startswith(tuple(given.rows)):
-            continue
+    for name in asked_for(coverage.rows(given.first), given.rows):
         found = known.get(name, partial(measured, name, given))
         cells = [found["row"], found["form"], found["actions"]]
         for planner in PLANNERS:

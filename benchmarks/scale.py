@@ -31,7 +31,7 @@ from time import process_time
 from typing import TYPE_CHECKING, Any
 
 from foreign_rows import ROWS, SHARED, load
-from kept_rows import KeptRows
+from kept_rows import KeptRows, asked_for
 from printed_table import PrintedTable
 from processes import MOST, run_python
 
@@ -283,7 +283,7 @@ def main() -> None:
     if given.list:
         print(*NAMES, sep="\n")
         return
-    chosen = [name for name in NAMES if not given.rows or name.startswith(tuple(given.rows))]
+    chosen = asked_for(NAMES, given.rows)
     if not chosen:
         parser.error("no such row; --list names them")
     if not SHARED.is_dir():
