@@ -271,7 +271,7 @@ def measured(name: str, limit: int, asked: Asked) -> dict[str, Any]:
     figures |= {**done.data, "memory": done.memory}
     if "plans" not in figures:
         last = (done.errors.strip().splitlines() or [""])[-1]
-        out_of_memory = "Memory" in last or "bad_alloc" in last
+        out_of_memory = "memory" in last.lower() or "bad_alloc" in last
         figures["failed"] = "no memory" if out_of_memory else "no time" if done.code < 0 else last
     return figures
 
