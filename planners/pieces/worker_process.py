@@ -96,6 +96,31 @@ class WorkerProcess:
                 self._work = work
             self.connection.send(("piece", piece))
 
+    def begin_talk(self, talk: bytes) -> None:
+        """Begin a conversation, after which `say` and `heard` belong to it."""
+        with suppress(ConnectionError):
+            self.connection.send(("talk", talk))
+
+    def say(self, message: bytes) -> None:
+        """Send a message of the conversation."""
+        with suppress(ConnectionError):
+            self.connection.send(message)
+
+    def heard(self) -> Any:
+        """An answer of the conversation, which must be `ready`.
+
+        Raises
+        ------
+        WorkerLost
+            If the process is gone.
+        """
+        match self._received():
+            case "done", answer:
+                return answer
+            case "error", packed, text, where:
+                raise _as_raised(packed, text, where)
+        raise AssertionError
+
     def ready(self, seconds: float) -> bool:
         """Whether there is an answer, or the process is gone; waits so long for it."""
         return bool(wait([self.connection], timeout=seconds))
@@ -110,16 +135,19 @@ class WorkerProcess:
         """
         assert self.number is not None
         number, self.number = self.number, None
-        try:
-            answer, seconds, cpu = self.connection.recv()
-        except (EOFError, ConnectionError, pickle.UnpicklingError):
-            raise WorkerLost(self.kill() == ASKED_TO_END) from None
+        answer, seconds, cpu = self._received()
         match answer:
             case "done", table:
                 return Done(number, table, None, None, seconds, cpu)
             case "error", packed, text, where:
-                return Done(number, None, _received(packed, text, where), None, seconds, cpu)
+                return Done(number, None, _as_raised(packed, text, where), None, seconds, cpu)
         raise AssertionError(answer)
+
+    def _received(self) -> Any:
+        try:
+            return self.connection.recv()
+        except (EOFError, ConnectionError, pickle.UnpicklingError):
+            raise WorkerLost(self.kill() == ASKED_TO_END) from None
 
     @property
     def busy_for(self) -> float:
@@ -169,7 +197,7 @@ def lost_for_good(work: Work) -> OutOfMemory:
     )
 
 
-def _received(packed: bytes | None, text: str, where: str) -> BaseException:
+def _as_raised(packed: bytes | None, text: str, where: str) -> BaseException:
     """An error as the worker sent it, with a note of where it was raised there."""
     error: Any = WorkFailed(text, remedy=_BUG) if packed is None else pickle.loads(packed)
     assert isinstance(error, BaseException)
