@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from coordlang.language.warping import Clause
 from coordlang.symmetry.group import SymmetryGroup
 from coordlang.vocabulary.counterexamples import Counterexamples
+from coordlang.vocabulary.distinct_rows import DistinctRows
 from coordlang.vocabulary.job import Evidence
 from planners.search.plan_space import PlanSpace
 from planners.tables import Bools, Ints
@@ -50,20 +51,67 @@ class Agreeing:
     rows: Ints
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class _Table:
     """Tuples of one length: ``states`` (tuples, robots, length), and where each comes from.
 
-    ``source`` (tuples, 2): the number of a batch and the row in it.
+    Attributes
+    ----------
+    by_step
+        (length, robots, tuples) the states: what is looked at together lies together.
+    source
+        (tuples, 2) the number of a batch and the row in it.
+    begins, begin
+        Distinct first two steps of tuples: the shared state, and the next of each robot; and which
+        of these each tuple has (tuples).
+    ends, end
+        Distinct last two steps: each robot's last state, and the one before; and which of these
+        each tuple has (tuples).
     """
 
     states: Ints
+    by_step: Ints
     source: Ints
-    by_step: Ints = field(init=False)
+    begins: DistinctRows
+    begin: Ints
+    ends: DistinctRows
+    end: Ints
 
-    def __post_init__(self) -> None:
-        #: (length, robots, tuples): what is looked at together lies together.
-        self.by_step = np.ascontiguousarray(self.states.transpose(2, 1, 0))
+    @classmethod
+    def of(cls, states: Ints, source: Ints, before: _Table | None) -> _Table:
+        """A table with more tuples than the one before."""
+        robots = states.shape[1]
+        begins = DistinctRows.none(1 + robots) if before is None else before.begins
+        ends = DistinctRows.none(2 * robots) if before is None else before.ends
+        begins, begin = begins.numbered(np.column_stack((states[:, 0, 0], states[:, :, 1])))
+        ends, end = ends.numbered(np.column_stack((states[:, :, -1], states[:, :, -2])))
+        if before is not None:
+            states = np.concatenate((before.states, states))
+            source = np.concatenate((before.source, source))
+            begin = np.concatenate((before.begin, begin))
+            end = np.concatenate((before.end, end))
+        by_step = np.ascontiguousarray(states.transpose(2, 1, 0))
+        return cls(states, by_step, source, begins, begin, ends, end)
+
+    def agreeing(self, words: Ints) -> tuple[Ints, Ints]:
+        """`agreeing_rows` of these tuples."""
+        words = words.astype(np.int32)
+        begin = words.take(self.begins.rows.T, axis=1)
+        later = _part_later(begin[:, 0], begin[:, 1:].swapaxes(0, 1))
+        robots = self.states.shape[1]
+        end = words.take(self.ends.rows.T, axis=1).swapaxes(0, 1)
+        shared = (end[:robots] == end[0]).all(axis=0) & _part_later(end[0], end[robots:])
+        tuples = max(1, len(self.states))
+        together = max(1, _TOGETHER // tuples)
+        found = []
+        for first in range(0, len(words), together):
+            some = slice(first, first + together)
+            both = later[some].take(self.begin, axis=1)
+            both &= shared[some].take(self.end, axis=1)
+            partition, rows = divmod(np.flatnonzero(both), tuples)
+            found.append(_of_one_sentence(words[some], self.by_step, partition, rows, first))
+        partitions, kept = zip(*found, strict=True)
+        return np.concatenate(partitions), np.concatenate(kept)
 
 
 @dataclass(slots=True)
@@ -91,6 +139,11 @@ class FailingTuples:
     def __len__(self) -> int:
         """Count the tuples, one for all their images."""
         return sum(len(table.states) for table in self._tables.values())
+
+    def copy(self) -> FailingTuples:
+        """The same tuples, to which others are added."""
+        tables, batches = dict(self._tables), list(self._batches)
+        return FailingTuples(self.group, self.states, tables, batches, self._keys)
 
     @property
     def images(self) -> Sequence[Ints]:
@@ -136,7 +189,7 @@ class FailingTuples:
         for length, table in sorted(self._tables.items()):
             if sum(len(shorter.rows) for shorter in found) >= enough:
                 break
-            image, row = agreeing_rows(words, table.by_step)
+            image, row = table.agreeing(words)
             numbers, first = np.unique(image, return_index=True)
             for number, rows in zip(numbers.tolist(), np.split(row, first[1:]), strict=False):
                 found.append(Agreeing(length, looked_at[number], rows))
@@ -222,11 +275,7 @@ class FailingTuples:
     def _append(self, length: int, states: Ints, source: Ints) -> None:
         if not len(states):
             return
-        if length in self._tables:
-            known = self._tables[length]
-            states = np.concatenate((known.states, states))
-            source = np.concatenate((known.source, source))
-        self._tables[length] = _Table(states, source)
+        self._tables[length] = _Table.of(states, source, self._tables.get(length))
 
 
 def _different_part(states: Ints) -> tuple[Ints, Ints]:
@@ -285,9 +334,19 @@ def _agreeing_rows(words: Ints, by_step: Ints) -> tuple[Ints, Ints]:
     word, offset = words.ravel(), partition * words.shape[1]
     end, before = (word.take(by_step[step].take(rows, axis=1) + offset) for step in (-1, -2))
     kept = np.flatnonzero((end == end[0]).all(axis=0) & _part_later(end[0], before))
-    partition, rows, offset = partition[kept], rows[kept], offset[kept]
-    kept = np.flatnonzero(agree(word, by_step.take(rows, axis=2) + offset))
-    return partition[kept], rows[kept]
+    return _of_one_sentence(words, by_step, partition[kept], rows[kept])
+
+
+def _of_one_sentence(
+    words: Ints, by_step: Ints, partition: Ints, rows: Ints, first: int = 0
+) -> tuple[Ints, Ints]:
+    """Those of these pairs of a partition and a tuple for which `agree` holds.
+
+    ``first`` is added to the numbers of the partitions.
+    """
+    offset = partition * words.shape[1]
+    kept = np.flatnonzero(agree(words.ravel(), by_step.take(rows, axis=2) + offset))
+    return partition[kept] + first, rows[kept]
 
 
 def _part_later(shared: Ints, beside: Ints) -> Bools:

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The distinct rows of a growing table: what holds of many equal rows is asked once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planners.tables import Ints
+
+#: An odd multiplier: rows that are equal have equal keys, others nearly never.
+_MULTIPLIER = np.uint64(0x9E3779B97F4A7C15)
+
+
+@dataclass(frozen=True, slots=True)
+class DistinctRows:
+    """Distinct rows, numbered as they were met.
+
+    Attributes
+    ----------
+    rows
+        (rows, columns) each of them once.
+    """
+
+    rows: Ints
+    _keys: NDArray[np.uint64]
+    _numbers: Ints
+
+    @classmethod
+    def none(cls, columns: int) -> DistinctRows:
+        """No rows yet."""
+        no_numbers = np.zeros(0, np.int64)
+        return cls(np.zeros((0, columns), np.int64), no_numbers.view(np.uint64), no_numbers)
+
+    def numbered(self, table: Ints) -> tuple[DistinctRows, Ints]:
+        """These rows and those of a table, and the number of each row of the table."""
+        keys, first, of_row = np.unique(_keys(table), return_index=True, return_inverse=True)
+        at = np.searchsorted(self._keys, keys)
+        known = np.zeros(len(keys), np.bool_)
+        inside = at < len(self._keys)
+        known[inside] = self._keys[at[inside]] == keys[inside]
+        fresh = ~known
+        numbers = len(self.rows) + np.cumsum(fresh) - 1
+        numbers[known] = self._numbers[at[known]]
+        more = DistinctRows(
+            np.concatenate((self.rows, table[first[fresh]])),
+            np.insert(self._keys, at[fresh], keys[fresh]),
+            np.insert(self._numbers, at[fresh], numbers[fresh]),
+        )
+        return more, numbers[of_row]
+
+
+def _keys(table: Ints) -> NDArray[np.uint64]:
+    """A number for each row."""
+    keys = np.zeros(len(table), np.uint64)
+    for column in table.T:
+        keys = (keys ^ (column.astype(np.uint64) + np.uint64(1))) * _MULTIPLIER
+        keys ^= keys >> np.uint64(29)
+    return keys
