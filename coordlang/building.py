@@ -191,6 +191,7 @@ def build_language(
         check=lambda assignment: verified.append(
             _verified(candidates, assignment, runner, progress)
         ),
+        runner=runner,
     )
     if method != "greedy":
         require_room(candidates.source)

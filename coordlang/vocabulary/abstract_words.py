@@ -96,9 +96,9 @@ class AbstractSearch:
             problem.refuted = size
         return None
 
-    def is_over(self, size: int) -> bool:
-        """Whether no abstraction is left that may have a language with so few words."""
-        return all(problem.refuted >= size for problem in self._problems)
+    def left(self, size: int) -> list[Ints]:
+        """The abstractions that may have a language with so few words, up to symmetry."""
+        return [problem.classes for problem in self._problems if problem.refuted < size]
 
     def close(self) -> None:
         """Give back what the solvers hold."""

@@ -17,8 +17,9 @@ from itertools import islice
 
 import numpy as np
 
-from coordlang.symmetry.subgroups import GroupTable, WordAction, cycle_type, group_table
+from coordlang.symmetry.subgroups import WordAction, cycle_type, group_table
 from coordlang.vocabulary.job import Assignment
+from coordlang.vocabulary.orbit_words import OrbitWords
 from coordlang.vocabulary.problems_by_size import SolverBudget
 from coordlang.vocabulary.recent_tuples import RecentTuples
 from coordlang.vocabulary.refuter import Refuter
@@ -37,6 +38,8 @@ _AT_ONCE, _ENOUGH = 100, 300
 _FEW = 100
 #: Kinds that are looked at with this effort: as many again have half of it, and so on.
 _FOREMOST = 3
+#: Abstractions with more abstract states tie too few states to be looked at with symmetries.
+_TIED = 2
 #: A solver that is quick on many easy problems with many solutions.
 _SOLVER: SolverName = "minisat22"
 
@@ -49,9 +52,13 @@ _FIRST = SolverBudget(rounds=50, conflicts=2_000)
 
 @dataclass(slots=True)
 class _Kind:
-    """One kind of partitions, with its problem once that was looked at, and the rounds so far."""
+    """One kind of partitions, with its problem once that was looked at, and the rounds so far.
+
+    States with the same number in ``tied`` (states) have the same word besides.
+    """
 
     action: WordAction
+    tied: Ints | None = None
     problem: _Orbits | None = None
     recent: RecentTuples | None = None
     rounds: int = 0
@@ -67,10 +74,12 @@ class _Kind:
 class _Kinds:
     """The kinds of partitions into some number of words that may still hold a language.
 
-    Those that are ``open`` are looked at next, those that are ``undecided`` with more effort.
+    Those that are ``open`` are looked at next, those that are ``undecided`` with more effort;
+    each time that some of these are ``foremost``, what follows has half the effort.
     """
 
     open: list[_Kind]
+    foremost: int
     undecided: list[_Kind] = field(default_factory=list)
     effort: SolverBudget = _FIRST
 
@@ -97,10 +106,15 @@ class EquivariantSearch:
         some = self._group.up_to_conjugation(subgroups, every)
         # Large ones first: they are quick.  All partitions are what the others look at.
         self._subgroups = some[:0:-1] or some
-        self._kinds: dict[int, _Kinds] = {}
+        self._of_actions: dict[int, list[WordAction]] = {}
+        self._kinds: dict[tuple[int, bool], _Kinds] = {}
+        #: Actions under which no partition is a language, abstract or not.
+        self._ruled_out: set[int] = set()
         self.rounds = 0
 
-    def find(self, size: int, rounds: int) -> Assignment | None:
+    def find(
+        self, size: int, rounds: int, abstractions: Sequence[Ints] | None = None
+    ) -> Assignment | None:
         """A language with at most ``size`` words, None if none was found with some effort.
 
         The next call with this size goes on, and spends more on what was looked at before.
@@ -111,13 +125,23 @@ class EquivariantSearch:
             The number of words.
         rounds
             The search is given up for now after so many refuted partitions.
+        abstractions
+            Look at words that one of these decides, too, each (states) the abstract state of each
+            state: there are so few of them that most kinds are decided at once.  In later calls
+            with this size some may be left out.
         """
-        kinds = self._of_size(size)
+        kinds = self._of_size(size, abstractions)
+        left = {id(abstract) for abstract in abstractions or ()}
         until = self.rounds + rounds
         while kinds.open and self.rounds < until:
             kind = kinds.open.pop(0)
+            if kind.tied is not None and (
+                id(kind.tied) not in left or id(kind.action) in self._ruled_out
+            ):
+                kind.close()
+                continue
             try:
-                effort = kinds.effort.lessened(len(kinds.undecided) // _FOREMOST)
+                effort = kinds.effort.lessened(len(kinds.undecided) // kinds.foremost)
                 found = self._of_kind(kind, size, effort)
             except Undecided:
                 kinds.undecided.append(kind)
@@ -126,6 +150,8 @@ class EquivariantSearch:
             if found is not None:
                 self.drop(size)
                 return found
+            if kind.tied is None:
+                self._ruled_out.add(id(kind.action))
         if not kinds.open:
             kinds.open, kinds.undecided = kinds.undecided, []
             kinds.effort = kinds.effort.doubled()
@@ -133,24 +159,36 @@ class EquivariantSearch:
 
     def undecided(self, size: int) -> list[WordAction]:
         """The kinds of partitions into so many words that may still hold a language."""
-        kinds = self._of_size(size)
+        kinds = self._of_size(size, None)
         return [kind.action for kind in (*kinds.open, *kinds.undecided)]
 
     def drop(self, size: int) -> None:
         """Forget a number of words that is decided."""
-        kinds = self._kinds.pop(size, None)
-        for kind in (*kinds.open, *kinds.undecided) if kinds else ():
-            kind.close()
+        for abstract in (False, True):
+            kinds = self._kinds.pop((size, abstract), None)
+            for kind in (*kinds.open, *kinds.undecided) if kinds else ():
+                kind.close()
 
     def close(self) -> None:
         """Give back what the solvers hold."""
-        for size in list(self._kinds):
+        for size, _ in list(self._kinds):
             self.drop(size)
 
-    def _of_size(self, size: int) -> _Kinds:
-        kinds = self._kinds.get(size)
+    def _of_size(self, size: int, abstractions: Sequence[Ints] | None) -> _Kinds:
+        kinds = self._kinds.get((size, abstractions is not None))
         if kinds is None:
-            kinds = self._kinds[size] = _Kinds([_Kind(action) for action in self._actions(size)])
+            if size not in self._of_actions:
+                self._of_actions[size] = self._actions(size)
+            actions = self._of_actions[size]
+            if abstractions is not None:
+                acting = [action for action in actions if len(action.subgroup) > 1]
+                states = list(self._states)
+                few = [a for a in abstractions if _TIED * len(np.unique(a[states])) <= len(states)]
+                some = [_Kind(action, tied) for tied in few for action in acting]
+                kinds = _Kinds(some, len(some) + 1)
+            else:
+                kinds = _Kinds([_Kind(action) for action in actions], _FOREMOST)
+            self._kinds[size, abstractions is not None] = kinds
         return kinds
 
     def _actions(self, size: int) -> list[WordAction]:
@@ -190,9 +228,11 @@ class EquivariantSearch:
     def _of_kind(self, kind: _Kind, size: int, effort: SolverBudget) -> Assignment | None:
         """A language of one kind; None if there is none.  Raises `Undecided`, and can go on."""
         if kind.problem is None:
-            kind.problem = _Orbits.of(self._states, self._group, kind.action, size)
-            if kind.problem is None:
+            words = OrbitWords.of(self._states, self._group, kind.action, size, kind.tied)
+            if words is None:
                 return None
+            elements = [self._group.elements[h] for h in kind.action.subgroup]
+            kind.problem = _Orbits.of(words, elements)
             kind.recent = RecentTuples(self._refuter, _ENOUGH, _FEW)
         problem, recent = kind.problem, kind.recent
         assert recent is not None
@@ -228,25 +268,15 @@ class _Orbits:
         self._elements: list[Ints] = []
 
     @classmethod
-    def of(
-        cls, states: Sequence[int], group: GroupTable, action: WordAction, size: int
-    ) -> _Orbits | None:
-        """The problem; None if some state, which symmetries fix, could have no word."""
-        problem = cls(size)
-        problem._elements = [group.elements[h] for h in action.subgroup]
-        elements = {h: group.elements[h].tolist() for h in action.subgroup}
-        for state in states:
-            if state in problem._word:
-                continue
-            fixing = [action.words[h] for h, to in elements.items() if to[state] == state]
-            words = [w for w in range(size) if all(to[w] == w for to in fixing)]
-            if not words:
-                problem.close()
-                return None
-            own = {word: problem._new() for word in words}
-            for h, to in elements.items():
-                problem._word[to[state]] = {action.words[h][w]: v for w, v in own.items()}
-            problem._one_of(list(own.values()))
+    def of(cls, kind: OrbitWords, elements: Sequence[Ints]) -> _Orbits:
+        """The problem of a kind; ``elements`` are the symmetries of its subgroup."""
+        problem = cls(kind.size)
+        problem._elements = list(elements)
+        for members, words in zip(kind.members, kind.words, strict=True):
+            variables = [problem._new() for _ in words]
+            for state, own in zip(members.tolist(), words.T.tolist(), strict=True):
+                problem._word[state] = dict(zip(own, variables, strict=True))
+            problem._one_of(variables)
         problem._last_word = problem._last
         return problem
 

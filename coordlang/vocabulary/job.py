@@ -11,10 +11,17 @@ from coordlang.required.divergences import FirstDifferences
 from coordlang.symmetry.group import Symmetry
 from coordlang.tasks.candidates import Candidates
 from coordlang.vocabulary.counterexamples import Counterexample
+from planners.pieces.processes import Processes
+from planners.pieces.work import Runner
 from planners.search.plan_space import PlanSpace
 
 #: A partition while it is looked for: state number -> word number.
 Assignment = Mapping[int, int]
+
+
+def word_count(partition: Assignment) -> int:
+    """How many words a partition has."""
+    return len(set(partition.values()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +48,8 @@ class Job:
     check
         Verifies a partition by definition, and raises if it is no language.  An anytime method
         calls it for every better one that it finds: when it is stopped there is no time left.
+    runner
+        Who does what can be done beside the method's own work.
     """
 
     candidates: Candidates
@@ -51,6 +60,7 @@ class Job:
     alpha_only: bool = False
     progress: Callable[[str], None] = lambda _: None
     check: Callable[[Assignment], None] = lambda _: None
+    runner: Runner = field(default_factory=lambda: Processes(jobs=1))
 
     @property
     def lower_bound(self) -> int:
@@ -108,4 +118,4 @@ class Outcome:
     @property
     def size(self) -> int:
         """How many words the partition has."""
-        return len(set(self.partition.values()))
+        return word_count(self.partition)

@@ -13,19 +13,19 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import replace
-from math import isqrt
+from itertools import count
 
 import numpy as np
 
 from coordlang.language.warping import Clause
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
+from coordlang.vocabulary.above import Above
 from coordlang.vocabulary.abstractions import abstractions
 from coordlang.vocabulary.contained import ContainedInstance, parts
-from coordlang.vocabulary.from_above import LOCAL_FROM, SearchFromAbove
-from coordlang.vocabulary.job import Assignment, Evidence, Job, Outcome
-from coordlang.vocabulary.merging import merged
+from coordlang.vocabulary.from_above import Start, from_above
+from coordlang.vocabulary.job import Assignment, Evidence, Job, Outcome, word_count
 from coordlang.vocabulary.necessary_clauses import NecessaryClauses
 from coordlang.vocabulary.partitions import Partitions, Refutation
 from coordlang.vocabulary.problems_by_size import SolverBudget
@@ -39,9 +39,8 @@ from planners.tables import Ints
 
 #: Combinations of plans' next steps up to which separating words are looked for first.
 _SEPARATING_COMBINATIONS = 4_000_000
-#: A number of words has a round from below, which takes four times as long, for so many that the
-#: searches from above have had; and as many as at first.
-_ABOVE = 32
+#: Rounds in the whole space in a turn, each of which has twice as many as the one before.
+_ROUNDS = 8
 
 
 def minimal(job: Job) -> Outcome:
@@ -81,6 +80,10 @@ def refuting_clauses(job: Job, size: int) -> Mapping[Clause, Evidence]:
     return search.refuting.clauses
 
 
+class _Met(Exception):
+    """The bounds have met by a language that was found from above."""
+
+
 class _Search:
     """Closes in on the least number of words.
 
@@ -91,18 +94,18 @@ class _Search:
         self._job = job
         self.lower = job.lower_bound
         self.best: Assignment | None = job.incumbent
+        #: The best language that was not found from above.
+        self._own = job.incumbent
         self.known = NecessaryClauses(SymmetryGroup(()))
         self.refuting = Refutation(1, self.known.evidence, 1)  # any clause refutes one word
         self._partitions: Partitions | None = None
         self._refuter: Refuter | None = None
         self._abstractions: list[Ints] = []
-        self._above: SearchFromAbove | None = None
+        self._above: Above | None = None
         self._contained: list[ContainedInstance] = []
         self._rounds = 0
-
-    @property
-    def _upper(self) -> int:
-        return len(set(self.best.values())) if self.best is not None else len(self._job.states)
+        #: Rounds in the whole space, each of which takes far longer than those in a part.
+        self._most_rounds = sys.maxsize
 
     def run(self) -> None:
         """Close the bounds."""
@@ -112,7 +115,7 @@ class _Search:
             return
         self._prepare()
         self._look_for_separating_words()
-        separating = self.best
+        separating = self._own
         self._close_bounds()
         if self.best is separating:
             # It separates more than a language must: one that does not leaves more plans open.
@@ -133,12 +136,12 @@ class _Search:
         if self._refuter is not None:
             figures |= {"counterexamples": len(self._refuter.pool), "walks": self._refuter.walks}
         if self._above is not None:
-            figures |= self._above.figures()
+            figures |= self._above.figures
         return figures
 
     def close(self) -> None:
         """Give back what the solvers hold."""
-        for part in (self._partitions, self._above, *self._contained):
+        for part in (self._partitions, *self._contained):
             if part is not None:
                 part.close()
 
@@ -172,53 +175,65 @@ class _Search:
         return next(fine, None)
 
     def _close_bounds(self) -> None:
-        """Decide numbers of words until the bounds meet: from below by proof, and from above."""
-        job, refuter = self._job, self._prepare()
-        above = self._above = SearchFromAbove(job.states, refuter, self._abstractions, job.seed)
-        budget = SolverBudget()
-        while (lower := self.lower) < self._upper:
-            if not self._decide(lower, budget):
-                while lower < self._upper and self._descend(above):
-                    pass
-                rounds = max(SolverBudget().rounds, above.rounds // _ABOVE)
-                budget = replace(budget.doubled(), rounds=rounds)
-            elif self.lower > lower:
-                budget = SolverBudget()  # the next number is another problem, and may be easy
+        """Decide numbers of words until the bounds meet: from below by proof, and from above.
 
-    def _descend(self, above: SearchFromAbove) -> bool:
-        """Look for a language with fewer words; whether one was found.
-
-        What is not found is no bound: only `Refutation` is.
+        What is quick is decided from below alone.
         """
-        # The number that is not refuted yet is tried last: mostly there is no such language.
-        before = self._upper
-        least = min(self.lower + 1, before - 1)
-        size = isqrt(least * before)
-        while size < before:
-            found = above.find(size, self._report_above)
-            if found is not None:
-                self._take(found)
-                self._merge_words()
-                return self._upper < before
-            size = (size + before + 1) // 2
-        return False
+        budget = self._decide_from_below(SolverBudget())
+        if self.lower >= self._upper:
+            return
+        job, refuter = self._job, self._prepare()
+        start = Start(job.states, refuter.copy(), self._abstractions, self._upper, job.seed)
+        conversation = job.runner.beside(from_above, start)
+        with closing(Above(conversation, job.states, self._offer, self._report_above)) as above:
+            self._above = above
+            self._meet(above, budget)
+        self.best = self._standing
+
+    def _meet(self, above: Above, budget: SolverBudget) -> None:
+        """Go on in turns until the bounds meet; see `coordlang.vocabulary.above`."""
+        known = self._own
+        above.allow_turn(self.lower)
+        for turn in count(1):
+            above.allow_turn(self.lower)
+            above.begin_turn(turn, self.lower)
+            self._most_rounds = max(SolverBudget().rounds, _ROUNDS << turn)
+            with suppress(_Met):
+                self._listen()
+                budget = self._decide_from_below(budget.doubled())
+            if self._own is not known:
+                above.wait_for(turn + 1, self.lower)
+            if self.lower >= self._upper:
+                return
+
+    def _decide_from_below(self, budget: SolverBudget) -> SolverBudget:
+        """Decide numbers of words with some effort for each; the effort that was not enough."""
+        while (lower := self.lower) < self._upper and self._decide(lower, budget):
+            if self.lower > lower:
+                budget = SolverBudget()  # the next number is another problem, and may be easy
+        return budget
+
+    def _listen(self) -> None:
+        """Hear of languages from above; raises `_Met` where the bounds have met by one."""
+        if self._above is not None:
+            self._above.listen()
+            if self.lower >= self._upper:
+                raise _Met
+
+    @property
+    def _standing(self) -> Assignment | None:
+        """The best language; of two with as few words the one from above."""
+        above = self._above.best if self._above is not None else None
+        known = [language for language in (above, self._own) if language is not None]
+        return min(known, key=word_count, default=None)
+
+    @property
+    def _upper(self) -> int:
+        standing = self._standing
+        return len(self._job.states) if standing is None else word_count(standing)
 
     def _report_above(self, what: str) -> None:
         self._job.progress(f"{what}, {self.lower} to {self._upper} needed")
-
-    def _merge_words(self) -> None:
-        """Merge words of the best language as long as it stays one; small ones have none to spare.
-
-        What is known is verified before: time may be over.
-        """
-        states, best = self._job.states, self.best
-        if best is None or len(states) <= LOCAL_FROM:
-            return
-        fewer = None
-        for fewer in merged(best, states, self._prepare(), self._job.seed):
-            self._job.progress(f"merging words: {len(set(fewer.values()))}")
-        if fewer is not None:
-            self._take(fewer)
 
     def _look_for_separating_words(self) -> None:
         """Take a separating partition with fewer words, if a short search finds one.
@@ -232,7 +247,7 @@ class _Search:
         if sum(map(_combinations, spaces)) > most:
             return
         found = short_separating_search(replace(self._job, incumbent=self.best))
-        self.best = found.partition
+        self.best = self._own = found.partition
         # Its walk may be larger than ours, which needs none of it; but time that is over is over.
         if found.stopped is not None and not isinstance(found.stopped, OutOfMemory):
             raise found.stopped
@@ -251,7 +266,8 @@ class _Search:
             self.refuting = found
             self.lower = found.size + 1
         else:
-            self._take(found)
+            self._offer(found)
+            self._own = found
         return True
 
     def _refuted_within(self, size: int, budget: SolverBudget) -> Refutation | None:
@@ -263,7 +279,7 @@ class _Search:
                 f"trying {size} words for {len(instance.states):,} of the states, "
                 f"{self.lower} to {self._upper} needed: {len(instance.known.clauses):,} clauses"
             )
-            refutation = instance.refute(size, budget)
+            refutation = instance.refute(size, budget, self._listen)
             self._rounds += instance.rounds
             instance.rounds = 0
             if refutation is not None:
@@ -272,8 +288,8 @@ class _Search:
             self._contained.pop(0).close()
         return None
 
-    def _take(self, partition: Assignment) -> None:
-        """A language with fewer words, once it is verified by definition."""
+    def _offer(self, partition: Assignment) -> None:
+        """Take a language, once it is verified by definition: what is left if time is over."""
         self._job.check(partition)
         self.best = partition
 
@@ -284,8 +300,11 @@ class _Search:
             permutations = self.known.group.permutations
             self._partitions = Partitions(self._job.states, self.known.clauses, permutations)
         refuted = 0
-        while (partition := self._partitions.find(size, budget.conflicts)) is not None:
-            if refuted >= budget.rounds:
+        while (
+            partition := self._partitions.find(size, budget.conflicts, self._listen)
+        ) is not None:
+            self._listen()
+            if refuted >= min(budget.rounds, self._most_rounds):
                 raise Undecided
             word = np.zeros(rows, np.int64)
             word[list(partition)] = list(partition.values())

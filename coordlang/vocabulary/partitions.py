@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
@@ -16,7 +16,7 @@ from coordlang.vocabulary.clauses import (
 )
 from coordlang.vocabulary.job import Evidence
 from coordlang.vocabulary.problems_by_size import ProblemsBySize
-from coordlang.vocabulary.sat import PartitionProblem, Undecided
+from coordlang.vocabulary.sat import SLICE, PartitionProblem, Undecided
 from planners.sat import SolverName
 
 #: Conflicts within which most partitions are found; after so many the solver is likely on the way
@@ -75,17 +75,36 @@ class Partitions:
         self._all = ProblemsBySize(self._start, require)
         self._up_to_symmetry = ProblemsBySize(self._start_up_to_symmetry, require)
 
-    def find(self, size: int, conflicts: int) -> dict[int, int] | None:
+    def find(
+        self, size: int, conflicts: int, between: Callable[[], None] = lambda: None
+    ) -> dict[int, int] | None:
         """A partition into ``size`` words, or None if there is none.
 
-        Raises `Undecided` after so many conflicts.
+        Parameters
+        ----------
+        size
+            The number of words.
+        conflicts
+            Conflicts of the solver that are allowed.
+        between
+            Called between slices of its work; what it raises ends the search.
+
+        Raises
+        ------
+        Undecided
+            After so many conflicts.
         """
         if size not in self._hard:
             with suppress(Undecided):
                 return self._all.under(size, self._clauses).solve(_EASY)
             self._hard.add(size)
             self._all.drop(size)
-        return self._up_to_symmetry.under(size, self._clauses).solve(conflicts)
+        problem = self._up_to_symmetry.under(size, self._clauses)
+        for _ in range(0, conflicts, SLICE):
+            between()
+            with suppress(Undecided):
+                return problem.solve(SLICE)
+        raise Undecided
 
     def drop(self, size: int) -> None:
         """Forget a number of words that is decided."""

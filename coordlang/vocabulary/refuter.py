@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy, deepcopy
 from dataclasses import dataclass
 from random import Random
 
@@ -75,6 +76,14 @@ class Refuter:
         for walked in self._parts:
             progress(f"collecting plans whose mixture fails: {len(self.pool):,}")
             self._walk(walked, word)
+
+    def copy(self) -> Refuter:
+        """The same, which then goes its own way: what one meets the other does not."""
+        other = copy(self)
+        other.pool = self.pool.copy()
+        other._random = deepcopy(self._random)
+        other._parts = list(self._parts)
+        return other
 
     def agreeing(
         self, word: Ints, images: Sequence[Ints] | None = None, enough: int = sys.maxsize

@@ -10,7 +10,7 @@ from coordlang.language.warping import Clause, Pair, pair
 from planners.sat import SolverName, sat_solver, solve_slice
 
 #: Conflicts after which the solver comes back, to let signals (time limit, Ctrl-C) be heard.
-_SLICE = 2_000
+SLICE = 2_000
 
 
 class PartitionProblem:
@@ -216,8 +216,8 @@ def satisfiable(solver: Any, assumptions: Sequence[int] = (), conflicts: int | N
     """
     spent = 0
     while conflicts is None or spent < conflicts:
-        answer = solve_slice(solver, _SLICE, assumptions)
+        answer = solve_slice(solver, SLICE, assumptions)
         if answer is not None:
             return answer
-        spent += _SLICE
+        spent += SLICE
     raise Undecided

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from random import Random
@@ -21,7 +22,7 @@ from coordlang.vocabulary.abstract_words import AbstractSearch
 from coordlang.vocabulary.abstractions import abstractions
 from coordlang.vocabulary.equivariant import EquivariantSearch
 from coordlang.vocabulary.failing_tuples import agree
-from coordlang.vocabulary.from_above import SearchFromAbove
+from coordlang.vocabulary.from_above import SearchFromAbove, Start
 from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.problems_by_size import SolverBudget
 from coordlang.vocabulary.recent_tuples import RecentTuples
@@ -71,7 +72,7 @@ def test_random_abstractions_of_random_models(robots: int, seeds: range) -> None
             search = AbstractSearch([classes], states, refuter, 0)
             found = search.find(size)
             assert (found is not None) == least
-            assert search.is_over(size) != least
+            assert bool(search.left(size)) == least
             assert found is None or is_language(found, candidates)
             assert found is None or len({(classes[s], w) for s, w in found.items()}) <= number
             answers[least] += 1
@@ -132,17 +133,32 @@ def test_others_are_asked_where_no_abstraction_is_left(monkeypatch: pytest.Monke
     """And not where abstractions have given an answer."""
     candidates = all_tasks("grid", "gw1-2x2")
     asked: list[int] = []
-    monkeypatch.setattr(EquivariantSearch, "find", lambda self, size, rounds: asked.append(size))
+    monkeypatch.setattr(EquivariantSearch, "find", lambda self, size, *effort: asked.append(size))
     refuter, states = refuter_of(candidates), states_of(candidates)
-    told: list[str] = []
-    above = SearchFromAbove(states, refuter, abstractions(candidates, states), 0)
-    assert above.find(12, told.append) is not None
+    known = Start(states, refuter, abstractions(candidates, states), len(states), 0)
+    above = SearchFromAbove(known)
+    assert finding(above, 12)[0] is not None
     assert not asked
-    assert above.find(2, told.append) is None
-    assert asked == [2]
-    assert told[-2:] == ["words of abstract states: trying 2", "symmetric words: trying 2"]
-    assert SearchFromAbove(states, refuter, [], 0).find(3, told.append) is None
-    assert asked == [2, 3]
+    found, told = finding(above, 2)
+    assert found is None
+    assert asked == [2, 2]
+    assert told == [
+        "words of abstract states: trying 2",
+        "symmetric words of abstract states: trying 2",
+        "symmetric words: trying 2",
+    ]
+    assert finding(SearchFromAbove(replace(known, abstractions=[])), 3)[0] is None
+    assert asked == [2, 2, 3, 3]
+
+
+def finding(above: SearchFromAbove, size: int) -> tuple[Assignment | None, list[str]]:
+    """What a search finds, and what it says meanwhile."""
+    search, told = above.find(size), list[str]()
+    while True:
+        try:
+            told.append(next(search).what)
+        except StopIteration as over:
+            return over.value, told
 
 
 @pytest.mark.parametrize("least", [1, 20])

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -13,9 +14,11 @@ from coordlang.language.partition import Partition
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.tasks.candidates import Candidates
 from coordlang.verification.by_definition import verify
+from coordlang.vocabulary.abstractions import abstractions
 from coordlang.vocabulary.equivariant import EquivariantSearch
 from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.refuter import Refuter
+from planners.tables import Ints
 from tests.support.domains import all_tasks
 
 
@@ -66,6 +69,31 @@ def test_what_is_found_is_equivariant() -> None:
     assert any(map(keeps_words, group.permutations))
 
 
+def test_words_of_abstract_states_are_symmetric_too() -> None:
+    """What is found with abstractions is what one of them decides, and some symmetry keeps."""
+    candidates = all_tasks("grid", "gw2-2x3")
+    group = symmetry_group(candidates)
+    search = searching(candidates, group)
+    every = abstractions(candidates, search._states)
+    found = next(f for _ in range(6) if (f := search.find(6, 1_000, every)) is not None)
+    assert is_language(found, candidates)
+    words = set(found.values())
+    decided = [a for a in every if len({(a[s], w) for s, w in found.items()}) == _values(a, found)]
+    assert decided
+    images = [{(found[s], found[to[s]]) for s in found} for to in group.permutations]
+    assert any(len(image) == len(words) for image in images)
+    assert search.find(4, 1_000, every) is None
+    # Those that are left out, and those of refuted kinds, are passed over.
+    assert search.find(5, 1_000, every[:1]) is None
+    rounds = search.rounds
+    assert search.find(5, 1_000, []) is None
+    assert search.rounds == rounds
+
+
+def _values(abstract: Ints, found: Assignment) -> int:
+    return len({int(abstract[s]) for s in found})
+
+
 def test_without_symmetries_all_partitions_are_looked_at() -> None:
     candidates = all_tasks("grid", "gw1-2x2")
     search = searching(candidates, SymmetryGroup(()))
@@ -81,9 +109,11 @@ def test_what_is_not_found_raises_no_bound(monkeypatch: pytest.MonkeyPatch, find
     asked: list[int] = []
     find = EquivariantSearch.find
 
-    def told(search: EquivariantSearch, size: int, rounds: int) -> Assignment | None:
+    def told(
+        search: EquivariantSearch, size: int, rounds: int, abstractions: Sequence[Ints] = ()
+    ) -> Assignment | None:
         asked.append(size)
-        return None if finds == "nothing" else find(search, size, rounds)
+        return None if finds == "nothing" else find(search, size, rounds, abstractions or None)
 
     monkeypatch.setattr(
         sys.modules["coordlang.vocabulary.equivariant"].EquivariantSearch, "find", told

@@ -5,9 +5,8 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from dataclasses import replace
 from functools import partial
-from itertools import product
+from itertools import islice, product
 from random import Random
 
 import numpy as np
@@ -26,7 +25,6 @@ from coordlang.vocabulary.clause_table import ClauseTable
 from coordlang.vocabulary.equivariant import EquivariantSearch
 from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.local_search import LocalSearch
-from coordlang.vocabulary.minimal import minimal
 from coordlang.vocabulary.orbit_words import OrbitWords
 from coordlang.vocabulary.problems_by_size import SolverBudget
 from coordlang.vocabulary.refuter import Refuter
@@ -74,10 +72,12 @@ def is_language(word: Assignment, candidates: Candidates) -> bool:
     return verify(Partition.of_states(candidates.rows, word), candidates.spaces).holds
 
 
+@pytest.mark.parametrize("tied", [None, [0, 1, 2, 3, 4, 4], [0, 1, 1, 0, 2, 3], [0, 0, 1, 2, 1, 3]])
 @pytest.mark.parametrize("size", [1, 2, 3])
-def test_choices_are_the_equivariant_partitions(size: int) -> None:
-    """All of them, each once: ``f(h s) = rho(h) f(s)``."""
+def test_choices_are_the_equivariant_partitions(size: int, tied: list[int] | None) -> None:
+    """All of them, each once: ``f(h s) = rho(h) f(s)``, and tied states have one word."""
     group = mirrors()
+    together = None if tied is None else np.array(tied)
     kinds = Counter[bool]()
     for action in actions(group, size):
         expected = {
@@ -89,7 +89,9 @@ def test_choices_are_the_equivariant_partitions(size: int) -> None:
                 for s, to in enumerate(group.elements[h].tolist())
             )
         }
-        kind = OrbitWords.of(range(6), group, action, size)
+        if tied is not None:
+            expected = {f for f in expected if len({*zip(tied, f, strict=True)}) == len(set(tied))}
+        kind = OrbitWords.of(range(6), group, action, size, together)
         kinds[kind is None] += 1
         chosen: list[tuple[int, ...]] = []
         if kind is not None:
@@ -98,7 +100,7 @@ def test_choices_are_the_equivariant_partitions(size: int) -> None:
         assert len(chosen) == len(set(chosen))
         assert set(chosen) == expected
     assert kinds[False]
-    assert kinds[True] or size != 2
+    assert kinds[True] or size != 2 or tied is not None
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -265,7 +267,6 @@ def test_what_is_not_found_raises_no_bound(monkeypatch: pytest.MonkeyPatch, find
 
     module = sys.modules["coordlang.vocabulary.minimal"]
     monkeypatch.setattr(from_above, "LOCAL_FROM", 0)
-    monkeypatch.setattr(module, "LOCAL_FROM", 0)
     monkeypatch.setattr(from_above, "_AHEAD", 0)
     monkeypatch.setattr(module, "SolverBudget", partial(SolverBudget, rounds=1))
     monkeypatch.setattr(AbstractSearch, "find", lambda self, size, *effort: None)
@@ -280,20 +281,19 @@ def test_what_is_not_found_raises_no_bound(monkeypatch: pytest.MonkeyPatch, find
 
 
 def test_words_of_what_is_found_are_merged(monkeypatch: pytest.MonkeyPatch) -> None:
-    """After it is verified as it was found, for time may be over."""
-    job = build_language(all_tasks("grid", "gw2-2x3"), "greedy").job
-    apart = {state: number for number, state in enumerate(job.states)}
-    module = sys.modules["coordlang.vocabulary.minimal"]
-    monkeypatch.setattr(module, "LOCAL_FROM", 0)
-    monkeypatch.setattr(from_above, "_AHEAD", 0)
-    monkeypatch.setattr(AbstractSearch, "find", lambda self, size, *effort: None)
-    monkeypatch.setattr(module, "SolverBudget", partial(SolverBudget, rounds=1))
+    """After it is told as it was found, for time may be over."""
+    candidates = all_tasks("grid", "gw2-2x3")
+    refuter, states = searching(candidates, symmetry_group(candidates), 0)
+    apart = {state: number for number, state in enumerate(states)}
+    monkeypatch.setattr(from_above, "LOCAL_FROM", 0)
     monkeypatch.setattr(EquivariantSearch, "find", lambda self, size, *effort: apart)
-    verified: list[Assignment] = []
-    assert minimal(replace(job, check=verified.append)).lower_bound == 5
-    first = verified.index(apart)
-    assert len(set(verified[first + 1].values())) < 12
-    assert len({(apart[s], w) for s, w in verified[first + 1].items()}) == len(apart)
+    start = from_above.Start(states, refuter, [], len(states) + 1, 0)
+    answers = from_above.from_above(start, iter([2]))
+    told = list(islice((a.words.tolist() for a in answers if isinstance(a, from_above.Fewer)), 4))
+    assert told[0] == list(range(len(states)))
+    sizes = [len(set(words)) for words in told]
+    assert sizes == sorted(set(sizes), reverse=True)
+    assert all(is_language(dict(zip(states, words, strict=True)), candidates) for words in told)
 
 
 def test_of_many_kinds_some_race() -> None:
