@@ -102,6 +102,7 @@ class _Search:
         self._refuter: Refuter | None = None
         self._abstractions: list[Ints] = []
         self._above: Above | None = None
+        self._figures_above: dict[str, float] = {}
         self._contained: list[ContainedInstance] = []
         self._rounds = 0
         #: Rounds in the whole space, each of which takes far longer than those in a part.
@@ -135,9 +136,7 @@ class _Search:
         }
         if self._refuter is not None:
             figures |= {"counterexamples": len(self._refuter.pool), "walks": self._refuter.walks}
-        if self._above is not None:
-            figures |= self._above.figures
-        return figures
+        return figures | (self._above.figures if self._above else self._figures_above)
 
     def close(self) -> None:
         """Give back what the solvers hold."""
@@ -189,6 +188,7 @@ class _Search:
             self._above = above
             self._meet(above, budget)
         self.best = self._standing
+        self._above, self._figures_above = None, above.figures
 
     def _meet(self, above: Above, budget: SolverBudget) -> None:
         """Go on in turns until the bounds meet; see `coordlang.vocabulary.above`."""

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ import pytest
 from coordlang.building import Built, build_language
 from coordlang.vocabulary.above import Above
 from coordlang.vocabulary.from_above import Answer, Fewer, Start, Trying, TurnOver, from_above
-from coordlang.vocabulary.job import Assignment, word_count
+from coordlang.vocabulary.job import Assignment, Outcome, word_count
 from coordlang.vocabulary.minimal import minimal
 from coordlang.vocabulary.problems_by_size import SolverBudget
 from planners.pieces.conversation import Conversation, Here, Talk
@@ -141,3 +142,28 @@ def test_a_lie_from_above_is_not_believed(little_effort: None) -> None:
     lie = Fewer(np.zeros(len(job.states), np.int64))
     with pytest.raises(AssertionError, match="no coordination language"):
         minimal(replace(job, incumbent=None, runner=Playing([lie, OVER])))
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_the_search_may_end_with_what_it_began_with(
+    monkeypatch: pytest.MonkeyPatch, little_effort: None, jobs: int
+) -> None:
+    """A separating language with the fewest words, which is proved in later turns only.
+
+    Then one that separates less is looked for, when the search from above is over.
+    """
+    job = built(Processes(1), "gw1-2x2").job
+    best = minimal(job).partition
+    module = sys.modules["coordlang.vocabulary.minimal"]
+    monkeypatch.setattr(module, "short_separating_search", lambda _: Outcome(best, 1))
+    # What is quick is not decided from below alone.
+    from_below, asked = module._Search._decide_from_below, list[int]()
+
+    def later(search: Any, budget: SolverBudget) -> SolverBudget:
+        asked.append(search.lower)
+        return budget if len(asked) == 1 else from_below(search, budget)
+
+    monkeypatch.setattr(module._Search, "_decide_from_below", later)
+    found = minimal(replace(job, runner=Processes(jobs)))
+    assert len(asked) > 1
+    assert (found.size, found.lower_bound) == (3, 3)
