@@ -179,8 +179,12 @@ def _renamings(
     stay = {name: name for name in (*names, *graph.nodes)}
     for symmetry in group.symmetries:
         yield {**stay, **symmetry.renaming}
-    for renaming in islice(GraphMatcher(graph, graph).isomorphisms_iter(), _RENAMINGS):
-        yield {**stay, **renaming}
+    objects = sorted(graph.nodes)  # by number: the order of sets of names is another in each run
+    number_of = {name: number for number, name in enumerate(objects)}
+    numbered: nx.Graph[int] = nx.empty_graph(len(objects))
+    numbered.add_edges_from(sorted(sorted((number_of[a], number_of[b])) for a, b in graph.edges))
+    for found in islice(GraphMatcher(numbered, numbered).isomorphisms_iter(), _RENAMINGS):
+        yield {**stay, **{objects[one]: objects[other] for one, other in sorted(found.items())}}
 
 
 def _neighbours(candidates: Candidates) -> nx.Graph[str]:
