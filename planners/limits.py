@@ -299,6 +299,9 @@ def lacks_memory(error: BaseException) -> bool:
         return True
     if isinstance(error, OSError) and error.errno == errno.ENOMEM:
         return True
+    # C code that was refused memory and does not say so; without a limit it is a bug.
+    if isinstance(error, SystemError) and "without exception set" in str(error):
+        return has_memory_limit()
     return any(text in str(error).lower() for text in _NO_MEMORY)
 
 
