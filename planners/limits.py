@@ -44,6 +44,8 @@ _NO_MEMORY = (
     "can't start new thread",
     "std::bad_alloc",
 )
+#: How Python says that C code has failed without a word.
+_NO_REASON = ("without exception set", "without setting an exception")
 #: Seconds of processor time in which numpy is loaded, on a slow machine, too.
 _LOADING = 20
 _LONGER = "Use a larger --time-limit."
@@ -300,7 +302,7 @@ def lacks_memory(error: BaseException) -> bool:
     if isinstance(error, OSError) and error.errno == errno.ENOMEM:
         return True
     # C code that was refused memory and does not say so; without a limit it is a bug.
-    if isinstance(error, SystemError) and "without exception set" in str(error):
+    if isinstance(error, SystemError) and any(text in str(error) for text in _NO_REASON):
         return has_memory_limit()
     return any(text in str(error).lower() for text in _NO_MEMORY)
 
