@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.tables import Ints
+from planners.tables import Ints, find_rows
 
 #: An odd multiplier: rows that are equal have equal keys, others nearly never.
-_MULTIPLIER = np.uint64(0x9E3779B97F4A7C15)
+MULTIPLIER = np.uint64(0x9E3779B97F4A7C15)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,26 +36,24 @@ class DistinctRows:
 
     def numbered(self, table: Ints) -> tuple[DistinctRows, Ints]:
         """These rows and those of a table, and the number of each row of the table."""
-        keys, first, of_row = np.unique(_keys(table), return_index=True, return_inverse=True)
-        at = np.searchsorted(self._keys, keys)
-        known = np.zeros(len(keys), np.bool_)
-        inside = at < len(self._keys)
-        known[inside] = self._keys[at[inside]] == keys[inside]
-        fresh = ~known
+        keys, first, of_row = np.unique(row_keys(table.T), return_index=True, return_inverse=True)
+        found = find_rows(self._keys[:, None], keys[:, None])
+        fresh = found < 0
         numbers = len(self.rows) + np.cumsum(fresh) - 1
-        numbers[known] = self._numbers[at[known]]
+        numbers[~fresh] = self._numbers[found[~fresh]]
+        at = np.searchsorted(self._keys, keys[fresh])
         more = DistinctRows(
             np.concatenate((self.rows, table[first[fresh]])),
-            np.insert(self._keys, at[fresh], keys[fresh]),
-            np.insert(self._numbers, at[fresh], numbers[fresh]),
+            np.insert(self._keys, at, keys[fresh]),
+            np.insert(self._numbers, at, numbers[fresh]),
         )
         return more, numbers[of_row]
 
 
-def _keys(table: Ints) -> NDArray[np.uint64]:
-    """A number for each row."""
-    keys = np.zeros(len(table), np.uint64)
-    for column in table.T:
-        keys = (keys ^ (column.astype(np.uint64) + np.uint64(1))) * _MULTIPLIER
+def row_keys(columns: Ints) -> NDArray[np.uint64]:
+    """(..) a number for each row of a table (columns, ..); different rows nearly always differ."""
+    keys = np.zeros(columns.shape[1:], np.uint64)
+    for column in columns:
+        keys = (keys ^ (column.astype(np.uint64) + np.uint64(1))) * MULTIPLIER
         keys ^= keys >> np.uint64(29)
     return keys

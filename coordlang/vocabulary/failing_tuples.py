@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from coordlang.language.warping import Clause
 from coordlang.symmetry.group import SymmetryGroup
 from coordlang.vocabulary.counterexamples import Counterexamples
-from coordlang.vocabulary.distinct_rows import DistinctRows
+from coordlang.vocabulary.distinct_rows import MULTIPLIER, DistinctRows, row_keys
 from coordlang.vocabulary.job import Evidence
 from planners.search.plan_space import PlanSpace
 from planners.tables import Bools, Ints
@@ -33,8 +33,6 @@ _LEAST = 20
 _WARPED = 10
 #: Tuples, for each partition, that are compared together: some megabytes.
 _TOGETHER = 300_000
-#: An odd multiplier: sentences that are equal have equal codes, others nearly never.
-_MULTIPLIER = 0x9E3779B97F4A7C15
 #: Cost of a cell that no warping path of equal words passes.
 _NO_PATH = 10**4
 
@@ -94,7 +92,7 @@ class _Table:
         return cls(states, by_step, source, begins, begin, ends, end)
 
     def agreeing(self, words: Ints) -> tuple[Ints, Ints]:
-        """`agreeing_rows` of these tuples."""
+        """`agreeing_rows` under some partitions (partitions, states): partitions, and tuples."""
         words = words.astype(np.int32)
         begin = words.take(self.begins.rows.T, axis=1)
         later = _part_later(begin[:, 0], begin[:, 1:].swapaxes(0, 1))
@@ -108,10 +106,12 @@ class _Table:
             some = slice(first, first + together)
             both = later[some].take(self.begin, axis=1)
             both &= shared[some].take(self.end, axis=1)
-            partition, rows = divmod(np.flatnonzero(both), tuples)
-            found.append(_of_one_sentence(words[some], self.by_step, partition, rows, first))
-        partitions, kept = zip(*found, strict=True)
-        return np.concatenate(partitions), np.concatenate(kept)
+            partition, rows = divmod(np.flatnonzero(both) + first * tuples, tuples)
+            states = self.by_step.take(rows, axis=2) + partition * words.shape[1]
+            of_one = agree(words.ravel(), states)
+            found.append((partition[of_one], rows[of_one]))
+        partitions, tuples_of = zip(*found, strict=True)
+        return np.concatenate(partitions), np.concatenate(tuples_of)
 
 
 @dataclass(slots=True)
@@ -291,62 +291,29 @@ def _different_part(states: Ints) -> tuple[Ints, Ints]:
 
 def _keys(states: Ints) -> Ints:
     """A number for each tuple that does not depend on the order of its sequences."""
-    code = np.zeros(states.shape[:2], np.uint64)
-    multiplier = np.uint64(_MULTIPLIER)
-    for step in range(states.shape[2]):
-        code = (code ^ (states[:, :, step].astype(np.uint64) + np.uint64(1))) * multiplier
-        code ^= code >> np.uint64(29)
-    key: Ints = (code.sum(axis=1, dtype=np.uint64) * multiplier).view(np.int64)
+    code = row_keys(states.transpose(2, 0, 1))
+    key: Ints = (code.sum(axis=1, dtype=np.uint64) * MULTIPLIER).view(np.int64)
     return key
 
 
-def agreeing_rows(words: Ints, by_step: Ints) -> tuple[Ints, Ints]:
+def agreeing_rows(word: Ints, by_step: Ints) -> Ints:
     """The tuples all of whose sequences have one sentence; rarely others.
 
     Most have two sequences that part at once, on their first step or their last one.
 
     Parameters
     ----------
-    words
-        (partitions, states) the word of each state number, in some partitions.
+    word
+        (states) the word of each state number.
     by_step
         (length, robots, tuples) the states; the sequences of a tuple begin in one state.
-
-    Returns
-    -------
-    Ints, Ints
-        The partitions, in their order, and the tuples.
     """
-    tuples = max(1, by_step.shape[2])
-    together = max(1, _TOGETHER // tuples)
-    parts = [
-        _agreeing_rows(words[first : first + together].astype(np.int32), by_step)
-        for first in range(0, len(words), together)
-    ]
-    partitions = [some + n * together for n, (some, _) in enumerate(parts)]
-    return np.concatenate(partitions), np.concatenate([rows for _, rows in parts])
-
-
-def _agreeing_rows(words: Ints, by_step: Ints) -> tuple[Ints, Ints]:
-    """See `agreeing_rows`, for a few partitions."""
-    begin, beside = (words.take(states, axis=1) for states in (by_step[0, 0], by_step[1]))
-    partition, rows = np.nonzero(_part_later(begin, beside.swapaxes(0, 1)))
-    word, offset = words.ravel(), partition * words.shape[1]
-    end, before = (word.take(by_step[step].take(rows, axis=1) + offset) for step in (-1, -2))
-    kept = np.flatnonzero((end == end[0]).all(axis=0) & _part_later(end[0], before))
-    return _of_one_sentence(words, by_step, partition[kept], rows[kept])
-
-
-def _of_one_sentence(
-    words: Ints, by_step: Ints, partition: Ints, rows: Ints, first: int = 0
-) -> tuple[Ints, Ints]:
-    """Those of these pairs of a partition and a tuple for which `agree` holds.
-
-    ``first`` is added to the numbers of the partitions.
-    """
-    offset = partition * words.shape[1]
-    kept = np.flatnonzero(agree(words.ravel(), by_step.take(rows, axis=2) + offset))
-    return partition[kept] + first, rows[kept]
+    word = word.astype(np.int32)
+    rows = np.flatnonzero(_part_later(word.take(by_step[0, 0]), word.take(by_step[1])))
+    end, before = (word.take(by_step[step].take(rows, axis=1)) for step in (-1, -2))
+    rows = rows[(end == end[0]).all(axis=0) & _part_later(end[0], before)]
+    found: Ints = rows[agree(word, by_step.take(rows, axis=2))]
+    return found
 
 
 def _part_later(shared: Ints, beside: Ints) -> Bools:
@@ -374,7 +341,7 @@ def agree(word: Ints, by_step: Ints) -> Bools:
     code = before.copy()
     for states in by_step[1:]:
         here = named[states]
-        np.copyto(code, code * np.uint64(_MULTIPLIER) + here, where=here != before)
+        np.copyto(code, code * MULTIPLIER + here, where=here != before)
         before = here
     agree: Bools = (code == code[:1]).all(axis=0)
     return agree

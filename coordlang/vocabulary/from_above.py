@@ -19,7 +19,7 @@ import numpy as np
 
 from coordlang.vocabulary.abstract_words import AbstractSearch
 from coordlang.vocabulary.equivariant import EquivariantSearch
-from coordlang.vocabulary.job import Assignment
+from coordlang.vocabulary.job import Assignment, word_count
 from coordlang.vocabulary.local_search import LocalSearch
 from coordlang.vocabulary.merging import merged
 from coordlang.vocabulary.refuter import Refuter
@@ -83,7 +83,7 @@ class TurnOver:
 Answer = Trying | Fewer | TurnOver
 
 
-def from_above(start: Start, lowers: Iterator[int]) -> Iterator[Answer]:
+def from_above(start: Start, lowers: Iterator[int]) -> Generator[Answer]:
     """Languages with fewer and fewer words, turn by turn, each with more effort; a conversation.
 
     Parameters
@@ -126,7 +126,7 @@ def _with_merged_words(found: Assignment, start: Start) -> Generator[Answer, Non
             found = fewer
             yield Trying("merging words")
             yield Fewer(_words(found, start))
-    return len(set(found.values()))
+    return word_count(found)
 
 
 def _words(found: Assignment, start: Start) -> Ints:

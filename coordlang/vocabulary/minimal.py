@@ -303,7 +303,6 @@ class _Search:
         while (
             partition := self._partitions.find(size, budget.conflicts, self._listen)
         ) is not None:
-            self._listen()
             if refuted >= min(budget.rounds, self._most_rounds):
                 raise Undecided
             word = np.zeros(rows, np.int64)

@@ -16,7 +16,7 @@ from coordlang.vocabulary.clauses import (
 )
 from coordlang.vocabulary.job import Evidence
 from coordlang.vocabulary.problems_by_size import ProblemsBySize
-from coordlang.vocabulary.sat import SLICE, PartitionProblem, Undecided
+from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from planners.sat import SolverName
 
 #: Conflicts within which most partitions are found; after so many the solver is likely on the way
@@ -87,7 +87,7 @@ class Partitions:
         conflicts
             Conflicts of the solver that are allowed.
         between
-            Called between slices of its work; what it raises ends the search.
+            Called before each slice of its work; what it raises ends the search.
 
         Raises
         ------
@@ -96,15 +96,10 @@ class Partitions:
         """
         if size not in self._hard:
             with suppress(Undecided):
-                return self._all.under(size, self._clauses).solve(_EASY)
+                return self._all.under(size, self._clauses).solve(_EASY, between)
             self._hard.add(size)
             self._all.drop(size)
-        problem = self._up_to_symmetry.under(size, self._clauses)
-        for _ in range(0, conflicts, SLICE):
-            between()
-            with suppress(Undecided):
-                return problem.solve(SLICE)
-        raise Undecided
+        return self._up_to_symmetry.under(size, self._clauses).solve(conflicts, between)
 
     def drop(self, size: int) -> None:
         """Forget a number of words that is decided."""

@@ -61,7 +61,7 @@ class RecentTuples:
     def _still_agreeing(self, word: Ints) -> Iterator[Agreeing]:
         """Those to which a partition gives one sentence, short ones first."""
         for length, table in sorted(self._tables.items()):
-            image, row = table.source[:, agreeing_rows(word[None], table.by_step)[1]]
+            image, row = table.source[:, agreeing_rows(word, table.by_step)]
             for number in np.unique(image).tolist():
                 yield Agreeing(length, self._images[number], row[image == number])
 

@@ -3,14 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from coordlang.language.warping import Clause, Pair, pair
 from planners.sat import SolverName, sat_solver, solve_slice
 
 #: Conflicts after which the solver comes back, to let signals (time limit, Ctrl-C) be heard.
-SLICE = 2_000
+_SLICE = 2_000
 
 
 class PartitionProblem:
@@ -97,15 +97,19 @@ class PartitionProblem:
         self._solver.add_clause([*before, -here, -there, equal])
         return equal
 
-    def solve(self, conflicts: int | None = None) -> dict[int, int] | None:
+    def solve(
+        self, conflicts: int | None = None, between: Callable[[], None] = lambda: None
+    ) -> dict[int, int] | None:
         """A partition (state -> word), or None if it is proved that there is none.
+
+        ``between`` is called between slices of the work; what it raises ends it.
 
         Raises
         ------
         Undecided
             After about so many ``conflicts`` of the solver.
         """
-        if not satisfiable(self._solver, conflicts=conflicts):
+        if not satisfiable(self._solver, conflicts=conflicts, between=between):
             return None
         true = {v for v in self._solver.get_model() if v > 0}
         return {s: next(w for w, v in enumerate(own) if v in true) for s, own in self._word.items()}
@@ -197,7 +201,12 @@ class Undecided(Exception):
     """The conflicts allowed are used up, and the formula is not decided."""
 
 
-def satisfiable(solver: Any, assumptions: Sequence[int] = (), conflicts: int | None = None) -> bool:
+def satisfiable(
+    solver: Any,
+    assumptions: Sequence[int] = (),
+    conflicts: int | None = None,
+    between: Callable[[], None] = lambda: None,
+) -> bool:
     """Whether the clauses of a solver of python-sat can be satisfied.
 
     Parameters
@@ -208,6 +217,8 @@ def satisfiable(solver: Any, assumptions: Sequence[int] = (), conflicts: int | N
         Literals that are assumed besides.
     conflicts
         Conflicts of the solver that are allowed, None without limit.
+    between
+        Called before each slice of its work; what it raises ends it.
 
     Raises
     ------
@@ -216,8 +227,9 @@ def satisfiable(solver: Any, assumptions: Sequence[int] = (), conflicts: int | N
     """
     spent = 0
     while conflicts is None or spent < conflicts:
-        answer = solve_slice(solver, SLICE, assumptions)
+        between()
+        answer = solve_slice(solver, _SLICE, assumptions)
         if answer is not None:
             return answer
-        spent += SLICE
+        spent += _SLICE
     raise Undecided

@@ -10,11 +10,11 @@ it: this process, whenever an answer is waited for (`Here`), or one of its own
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from typing import Any, Protocol
 
 #: What answers: it gets what it works on, and the messages; it takes one when it needs it.
-Talk = Callable[[Any, Iterator[Any]], Iterator[Any]]
+Talk = Callable[[Any, Iterator[Any]], Generator[Any]]
 
 
 class Conversation(Protocol):
@@ -71,9 +71,7 @@ class Here:
 
     def close(self) -> None:
         """See `Conversation`."""
-        close = getattr(self._answers, "close", None)
-        if close is not None:
-            close()
+        self._answers.close()
 
     def _received(self) -> Iterator[Any]:
         while self._messages:

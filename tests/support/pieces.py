@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 import signal
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -41,7 +41,7 @@ def takes_memory(_: object, piece: int) -> Table:
     return {"values": np.ones(piece << 17)[:1]}
 
 
-def sums(begin: int, messages: Iterator[int]) -> Iterator[tuple[int, int]]:
+def sums(begin: int, messages: Iterator[int]) -> Generator[tuple[int, int]]:
     """Of each message its sum with those before it, twice, and who answers; 0 is a bug."""
     for message in messages:
         begin += message

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -99,7 +99,7 @@ class Playing:
         assert talk is from_above
         return Here(self._plays, shared)
 
-    def _plays(self, _start: Start, lowers: Iterator[int]) -> Iterator[Answer]:
+    def _plays(self, _start: Start, lowers: Iterator[int]) -> Generator[Answer]:
         for _ in lowers:
             yield from self._answers
             self._answers = [OVER]
