@@ -33,7 +33,7 @@ _FEW = 100
 #: What may be spent on an abstraction at first: refuted partitions, conflicts for each of them.
 _FIRST = SolverBudget(rounds=60, conflicts=1_000)
 #: Abstractions that are looked at with this effort: as many again have half of it, and so on.
-_FOREMOST = 2
+_FOREMOST = 1
 #: A solver that is quick on many easy problems with many solutions.
 _SOLVER: SolverName = "minisat22"
 

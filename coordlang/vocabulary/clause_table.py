@@ -10,11 +10,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from coordlang.vocabulary.distinct_rows import MULTIPLIER
 from coordlang.vocabulary.orbit_words import OrbitWords
 from planners.tables import Bools, Ints
 
-#: An odd multiplier: different clauses have different keys, nearly always; others are lost.
-_MULTIPLIER = np.uint64(0x9E3779B97F4A7C15)
 #: Clause and orbit as one number.
 _RADIX = 1 << 32
 
@@ -121,10 +120,13 @@ def _rows_of_sets(codes: Ints) -> Ints:
 
 
 def _keys(codes: Ints) -> np.ndarray[tuple[int, ...], np.dtype[np.uint64]]:
-    """A number for each row, whatever number of -1 is at its end."""
+    """A number for each row, whatever number of -1 is at its end.
+
+    Different clauses have different keys, nearly always; others are lost.
+    """
     keys = np.zeros(len(codes), np.uint64)
     for column in codes.T:
-        mixed = (keys ^ (column + 1).astype(np.uint64)) * _MULTIPLIER
+        mixed = (keys ^ (column + 1).astype(np.uint64)) * MULTIPLIER
         mixed ^= mixed >> np.uint64(29)
         keys = np.where(column >= 0, mixed, keys)
     return keys

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from planners.tables import Ints, find_rows
 
-#: An odd multiplier: rows that are equal have equal keys, others nearly never.
+#: An odd multiplier: what is equal has equal keys, other things nearly never.
 MULTIPLIER = np.uint64(0x9E3779B97F4A7C15)
 
 

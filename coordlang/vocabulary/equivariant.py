@@ -264,7 +264,8 @@ class _Orbits:
         self._solver = sat_solver(_SOLVER)
         self._last = self._last_word = 0
         self._word: dict[int, dict[int, int]] = {}
-        self._orbit_of_pair: dict[tuple[int, int], int] = {}
+        #: Of the code of an orbit's first pair; -1 is no pair, and 0 no variable.
+        self._variable_of: dict[int, int] = {-1: 0}
         self._elements: list[Ints] = []
 
     @classmethod
@@ -303,10 +304,10 @@ class _Orbits:
             (states) symmetries: with the subgroup of this kind they give the whole group.
         """
         every = np.unique(np.concatenate([self._orbits_of(clauses, to) for to in images]), axis=0)
-        states = len(images[0])
-        for row in every.tolist():
-            pairs = (divmod(code, states) for code in dict.fromkeys(row) if code >= 0)
-            self._solver.add_clause([self._separated(a, b) for a, b in pairs])
+        codes, number = np.unique(every, return_inverse=True)
+        variables = np.array([self._separated(code) for code in codes.tolist()])
+        for row in variables[number.reshape(every.shape)].tolist():
+            self._solver.add_clause([variable for variable in row if variable])
 
     def _orbits_of(self, clauses: Ints, to: Ints) -> Ints:
         """Images of clauses, each with the first pair of the orbit in place of each pair."""
@@ -314,15 +315,16 @@ class _Orbits:
         found: Ints = np.sort(np.minimum.reduce(images), axis=1)
         return found
 
-    def _separated(self, a: int, b: int) -> int:
-        """A variable that is true only where two states, and their images, have different words."""
-        known = self._orbit_of_pair.get((a, b))
+    def _separated(self, code: int) -> int:
+        """A variable that is true only where two states, and their images, have different words.
+
+        ``code`` is that of the first pair of an orbit.
+        """
+        known = self._variable_of.get(code)
         if known is not None:
             return known
-        variable = self._new()
-        for to in self._elements:
-            x, y = int(to[a]), int(to[b])
-            self._orbit_of_pair[x, y] = self._orbit_of_pair[y, x] = variable
+        variable = self._variable_of[code] = self._new()
+        a, b = divmod(code, len(self._elements[0]))
         first, second = self._word[a], self._word[b]
         for word in first.keys() & second.keys():
             self._solver.add_clause([-variable, *{-first[word], -second[word]}])
