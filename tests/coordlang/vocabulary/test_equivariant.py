@@ -4,7 +4,10 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Sequence
+from itertools import product
+from random import Random
 
 import numpy as np
 import pytest
@@ -12,11 +15,13 @@ import pytest
 from coordlang.building import build_language
 from coordlang.language.partition import Partition
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
+from coordlang.symmetry.subgroups import group_table
 from coordlang.tasks.candidates import Candidates
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary.abstractions import abstractions
-from coordlang.vocabulary.equivariant import EquivariantSearch
+from coordlang.vocabulary.equivariant import EquivariantSearch, _Orbits
 from coordlang.vocabulary.job import Assignment
+from coordlang.vocabulary.orbit_words import OrbitWords
 from coordlang.vocabulary.refuter import Refuter
 from planners.tables import Ints
 from tests.support.domains import all_tasks
@@ -92,6 +97,46 @@ def test_words_of_abstract_states_are_symmetric_too() -> None:
 
 def _values(abstract: Ints, found: Assignment) -> int:
     return len({int(abstract[s]) for s in found})
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_partitions_of_a_kind_are_found_iff_there_are_some(seed: int) -> None:
+    """Under growing clauses and their images: against all partitions of six states."""
+    random = Random(seed)
+    one, other = np.array([1, 0, 3, 2, 4, 5]), np.array([0, 1, 2, 3, 5, 4])
+    group = group_table([np.arange(6), one, other, one[other]])
+    subgroups = group.subgroups(frozenset(range(4)), 10)
+    actions = [action for h in subgroups for action in group.word_actions(h, 3, 10)]
+    answers = Counter[bool]()
+    for action in actions:
+        kind = OrbitWords.of(range(6), group, action, 3)
+        if kind is None:
+            continue
+        left = {
+            tuple(kind.partition(np.array(choice)).tolist())
+            for choice in product(*(range(len(words)) for words in kind.words))
+        }
+        problem = _Orbits.of(kind, [group.elements[h] for h in action.subgroup])
+        for _ in range(4):
+            pairs = [[random.sample(range(6), 2) for _ in range(2)] for _ in range(2)]
+            codes = [[min(pair) * 6 + max(pair) for pair in clause] for clause in pairs]
+            images = group.right_cosets(frozenset(action.words))
+            problem.separate_one_of_each(np.array([[*row, -1] for row in codes]), images)
+            left = {
+                word
+                for word in left
+                if all(
+                    any(word[to[a]] != word[to[b]] for a, b in clause)
+                    for to in group.elements
+                    for clause in pairs
+                )
+            }
+            found = problem.solve(10_000)
+            assert (found is not None) == bool(left)
+            assert found is None or tuple(found[state] for state in range(6)) in left
+            answers[bool(left)] += 1
+        problem.close()
+    assert min(answers[True], answers[False]) >= 3, answers
 
 
 def test_without_symmetries_all_partitions_are_looked_at() -> None:
