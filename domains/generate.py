@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes the problems, task files and pictures of the grid domains.
 
-python domains/generate.py all                                    every generated file in domains/,
-again python domains/generate.py open 3x4                               one problem, on stdout
-python domains/generate.py ring 3x5 --picture ring.svg -o ring.pddl python domains/generate.py map
-FILE --robots 3 --starts c0-0 c0-1 c0-2 --goals c2-0 c2-1 c2-2
+    python domains/generate.py all                 every generated file in domains/, again
+    python domains/generate.py open 3x4            one problem, on stdout
+    python domains/generate.py ring 3x5 --picture ring.svg -o ring.pddl
+    python domains/generate.py map FILE --robots 3 --starts c0-0 c0-1 c0-2 --goals c2-0 c2-1 c2-2
+
+Without ``-o`` a problem goes to stdout.
 """
 
 from __future__ import annotations
