@@ -8,7 +8,7 @@
 # proof.  Others than these two are named by SOLVER and DRAT_TRIM: SOLVER is called with FORMULA and
 # PROOF and ends with 20 if the formula is unsatisfiable, as cadical and kissat do.
 #
-# On Debian cadical is a package, and its source has drat-trim:
+# On Debian cadical is a package, and its source has drat-trim (apt needs a deb-src line for it):
 #
 #     apt-get install cadical && apt-get source cadical
 #     gcc -O2 -o drat-trim cadical-*/test/cnf/drat-trim.c
