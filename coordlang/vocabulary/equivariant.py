@@ -11,7 +11,7 @@ docs/concepts.md).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 
@@ -36,8 +36,6 @@ _TRIED = 600
 _AT_ONCE, _ENOUGH = 100, 300
 #: All failing tuples are asked where fewer of the recent ones agree.
 _FEW = 100
-#: Kinds that are looked at with this effort: as many again have half of it, and so on.
-_FOREMOST = 3
 #: Abstractions with more abstract states tie too few states to be looked at with symmetries.
 _TIED = 2
 #: A solver that is quick on many easy problems with many solutions.
@@ -48,6 +46,11 @@ _SOLVER: SolverName = "minisat22"
 _PROBE = SolverBudget(rounds=10, conflicts=200)
 #: What may be spent on each kind at first: refuted partitions, conflicts for each of them.
 _FIRST = SolverBudget(rounds=50, conflicts=2_000)
+#: What then may be spent on the first kind that is left; who comes after one that took all of its
+#: rounds has half of them.
+#: Most kinds that are left after a few refuted partitions hold a language, and many are refuted
+#: before it is met: a few kinds to their end are better than all of them half the way.
+_DEEP = SolverBudget(rounds=800, conflicts=10_000)
 
 
 @dataclass(slots=True)
@@ -74,14 +77,33 @@ class _Kind:
 class _Kinds:
     """The kinds of partitions into some number of words that may still hold a language.
 
-    Those that are ``open`` are looked at next, those that are ``undecided`` with more effort;
-    each time that some of these are ``foremost``, what follows has half the effort.
+    Those that are ``open`` are looked at next, those that are ``undecided`` with more effort.
+    Where it ``deepens``, from the second time on, kinds have half the rounds of those before; a
+    kind that stopped for its conflicts does not count.
     """
 
     open: list[_Kind]
-    foremost: int
+    deepens: bool
     undecided: list[_Kind] = field(default_factory=list)
     effort: SolverBudget = _FIRST
+    spent: int = 0
+
+    def next_effort(self) -> SolverBudget:
+        """What may be spent on the next kind."""
+        if not self.deepens or self.effort == _FIRST:
+            return self.effort
+        return self.effort.lessened(self.spent)
+
+    def leave_undecided(self, kind: _Kind) -> None:
+        """Look at a kind later."""
+        self.spent += kind.rounds >= self.next_effort().rounds
+        self.undecided.append(kind)
+
+    def begin_again(self) -> None:
+        """Look at those that are undecided with more effort."""
+        self.open, self.undecided, self.spent = self.undecided, [], 0
+        first = self.deepens and self.effort == _FIRST
+        self.effort = _DEEP if first else self.effort.doubled()
 
 
 class EquivariantSearch:
@@ -113,7 +135,11 @@ class EquivariantSearch:
         self.rounds = 0
 
     def find(
-        self, size: int, rounds: int, abstractions: Sequence[Ints] | None = None
+        self,
+        size: int,
+        rounds: int,
+        abstractions: Sequence[Ints] | None = None,
+        between: Callable[[], None] = lambda: None,
     ) -> Assignment | None:
         """A language with at most ``size`` words, None if none was found with some effort.
 
@@ -129,6 +155,8 @@ class EquivariantSearch:
             Look at words that one of these decides, too, each (states) the abstract state of each
             state: there are so few of them that most kinds are decided at once.  In later calls
             with this size some may be left out.
+        between
+            Called before each partition.
         """
         kinds = self._of_size(size, abstractions)
         left = {id(abstract) for abstract in abstractions or ()}
@@ -141,10 +169,9 @@ class EquivariantSearch:
                 kind.close()
                 continue
             try:
-                effort = kinds.effort.lessened(len(kinds.undecided) // kinds.foremost)
-                found = self._of_kind(kind, size, effort)
+                found = self._of_kind(kind, size, kinds.next_effort(), between)
             except Undecided:
-                kinds.undecided.append(kind)
+                kinds.leave_undecided(kind)
                 continue
             kind.close()
             if found is not None:
@@ -153,8 +180,7 @@ class EquivariantSearch:
             if kind.tied is None:
                 self._ruled_out.add(id(kind.action))
         if not kinds.open:
-            kinds.open, kinds.undecided = kinds.undecided, []
-            kinds.effort = kinds.effort.doubled()
+            kinds.begin_again()
         return None
 
     def undecided(self, size: int) -> list[WordAction]:
@@ -185,9 +211,9 @@ class EquivariantSearch:
                 states = list(self._states)
                 few = [a for a in abstractions if _TIED * len(np.unique(a[states])) <= len(states)]
                 some = [_Kind(action, tied) for tied in few for action in acting]
-                kinds = _Kinds(some, len(some) + 1)
+                kinds = _Kinds(some, deepens=False)
             else:
-                kinds = _Kinds([_Kind(action) for action in actions], _FOREMOST)
+                kinds = _Kinds([_Kind(action) for action in actions], deepens=True)
             self._kinds[size, abstractions is not None] = kinds
         return kinds
 
@@ -219,13 +245,15 @@ class EquivariantSearch:
         """Whether it is soon seen that no language has words on which an element acts so."""
         kind = _Kind(self._group.cyclic_action(element, words))
         try:
-            return self._of_kind(kind, len(words), _PROBE) is None
+            return self._of_kind(kind, len(words), _PROBE, lambda: None) is None
         except Undecided:
             return False
         finally:
             kind.close()
 
-    def _of_kind(self, kind: _Kind, size: int, effort: SolverBudget) -> Assignment | None:
+    def _of_kind(
+        self, kind: _Kind, size: int, effort: SolverBudget, between: Callable[[], None]
+    ) -> Assignment | None:
         """A language of one kind; None if there is none.  Raises `Undecided`, and can go on."""
         if kind.problem is None:
             words = OrbitWords.of(self._states, self._group, kind.action, size, kind.tied)
@@ -239,6 +267,7 @@ class EquivariantSearch:
         word = np.zeros(len(self._group.elements[0]), np.int64)
         images = self._group.right_cosets(frozenset(kind.action.words))
         while kind.rounds < effort.rounds:
+            between()
             partition = problem.solve(effort.conflicts)
             if partition is None:
                 return None

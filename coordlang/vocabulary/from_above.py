@@ -98,6 +98,8 @@ def from_above(start: Start, lowers: Iterator[int]) -> Generator[Answer]:
         for lower in lowers:
             while lower < upper and (fewer := (yield from _descend(search, start, lower, upper))):
                 upper = fewer
+                if upper == lower + 1:
+                    break  # the number that is left is mostly refuted before the next turn
             yield TurnOver(search.figures())
 
 
@@ -108,7 +110,7 @@ def _descend(
     # The number that is not refuted yet is tried last: mostly there is no such language.
     size = isqrt(min(lower + 1, upper - 1) * upper)
     while size < upper:
-        found = yield from search.find(size)
+        found = yield from search.find(size, symmetric=size > lower)
         if found is not None:
             return (yield from _with_merged_words(found, start))
         size = (size + upper + 1) // 2
@@ -143,8 +145,10 @@ class SearchFromAbove:
         self._local = LocalSearch(states, refuter, seed) if len(states) > LOCAL_FROM else None
         self._passes: dict[int, int] = {}
 
-    def find(self, size: int) -> Generator[Trying, None, Assignment | None]:
+    def find(self, size: int, symmetric: bool) -> Generator[Trying, None, Assignment | None]:
         """A language with at most ``size`` words, None if none was found with some effort.
+
+        ``symmetric`` says whether symmetric words are looked for, abstractions apart.
 
         Abstractions are asked first, then those whose words are symmetric, then symmetric words.
         Local search goes on when it has done much less than these.
@@ -156,7 +160,7 @@ class SearchFromAbove:
         if found is None:
             yield Trying(f"symmetric words of abstract states: trying {size}")
             found = self._equivariant.find(size, rounds, self._abstract.left(size))
-        if found is None:
+        if found is None and symmetric:
             yield Trying(f"symmetric words: trying {size}")
             found = self._equivariant.find(size, rounds)
         if found is None and self._local is not None:

@@ -24,6 +24,7 @@ from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.vocabulary.above import Above
 from coordlang.vocabulary.abstractions import abstractions
 from coordlang.vocabulary.contained import ContainedInstance, parts
+from coordlang.vocabulary.equivariant import EquivariantSearch
 from coordlang.vocabulary.from_above import Start, from_above
 from coordlang.vocabulary.job import Assignment, Evidence, Job, Outcome, word_count
 from coordlang.vocabulary.necessary_clauses import NecessaryClauses
@@ -41,6 +42,8 @@ from planners.tables import Ints
 _SEPARATING_COMBINATIONS = 4_000_000
 #: Rounds in the whole space in a turn, each of which has twice as many as the one before.
 _ROUNDS = 8
+#: Refuted partitions that symmetric words may take in the first turn.
+_SYMMETRIC_ROUNDS = 500
 
 
 def minimal(job: Job) -> Outcome:
@@ -101,6 +104,7 @@ class _Search:
         self._partitions: Partitions | None = None
         self._refuter: Refuter | None = None
         self._abstractions: list[Ints] = []
+        self._equivariant: EquivariantSearch | None = None
         self._above: Above | None = None
         self._figures_above: dict[str, float] = {}
         self._contained: list[ContainedInstance] = []
@@ -136,11 +140,15 @@ class _Search:
         }
         if self._refuter is not None:
             figures |= {"counterexamples": len(self._refuter.pool), "walks": self._refuter.walks}
-        return figures | (self._above.figures if self._above else self._figures_above)
+        figures |= self._above.figures if self._above else self._figures_above
+        if self._equivariant is not None:
+            rounds = figures.get("equivariant_rounds", 0) + self._equivariant.rounds
+            figures["equivariant_rounds"] = rounds
+        return figures
 
     def close(self) -> None:
         """Give back what the solvers hold."""
-        for part in (self._partitions, *self._contained):
+        for part in (self._partitions, self._equivariant, *self._contained):
             if part is not None:
                 part.close()
 
@@ -201,6 +209,7 @@ class _Search:
             with suppress(_Met):
                 self._listen()
                 budget = self._decide_from_below(budget.doubled())
+                self._look_for_symmetric_words(_SYMMETRIC_ROUNDS << (turn - 1))
             if self._own is not known:
                 above.wait_for(turn + 1, self.lower)
             if self.lower >= self._upper:
@@ -212,6 +221,22 @@ class _Search:
             if self.lower > lower:
                 budget = SolverBudget()  # the next number is another problem, and may be easy
         return budget
+
+    def _look_for_symmetric_words(self, rounds: int) -> None:
+        """Look for as many words as are needed at least, words that go to words under symmetries.
+
+        The search from above leaves these to this one, which mostly proves its bounds long before
+        the other one has come down to them.
+        """
+        if self.lower >= self._upper:
+            return
+        if self._equivariant is None:
+            self._equivariant = EquivariantSearch(self._job.states, self._prepare(), self._job.seed)
+        self._report_above(f"symmetric words: trying {self.lower}")
+        found = self._equivariant.find(self.lower, rounds, between=self._listen)
+        if found is not None:
+            self._offer(found)
+            self._own = found
 
     def _listen(self) -> None:
         """Hear of languages from above; raises `_Met` where the bounds have met by one."""
