@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -13,11 +13,14 @@ import numpy as np
 import pytest
 
 from coordlang.building import Built, build_language
+from coordlang.symmetry.group import symmetry_group
 from coordlang.vocabulary.above import Above
+from coordlang.vocabulary.equivariant import EquivariantSearch
 from coordlang.vocabulary.from_above import Answer, Fewer, Start, Trying, TurnOver, from_above
 from coordlang.vocabulary.job import Assignment, Outcome, word_count
 from coordlang.vocabulary.minimal import minimal
 from coordlang.vocabulary.problems_by_size import SolverBudget
+from coordlang.vocabulary.refuter import Refuter
 from planners.pieces.conversation import Conversation, Here, Talk
 from planners.pieces.processes import Processes
 from planners.pieces.work import Runner
@@ -134,6 +137,41 @@ def test_of_two_languages_that_from_above_is_taken(little_effort: None) -> None:
     for answers in plays:
         found = minimal(replace(job, incumbent=None, runner=Playing(answers)))
         assert (found.size, found.lower_bound) == (3, 3)
+
+
+@pytest.mark.parametrize("finds", [True, False])
+def test_symmetric_words_of_the_last_number_are_looked_for_from_below(
+    little_effort: None, monkeypatch: pytest.MonkeyPatch, finds: bool
+) -> None:
+    """What they find ends the search; that they find nothing is no bound."""
+    asked: list[tuple[int, int]] = []
+    find = EquivariantSearch.find
+
+    def told(
+        search: EquivariantSearch, size: int, rounds: int, *, between: Callable[[], None]
+    ) -> Assignment | None:
+        asked.append((size, rounds))
+        return find(search, size, rounds, between=between) if finds else None
+
+    job = built(Processes(1), "gw2-2x3").job
+    monkeypatch.setattr(EquivariantSearch, "find", told)
+    found = minimal(replace(job, incumbent=None, runner=Playing([OVER])))
+    assert (found.size, found.lower_bound) == (5, 5)
+    assert asked
+    assert {size for size, _ in asked} <= {3, 4, 5}
+    assert [rounds for _, rounds in asked] == [500 << turn for turn in range(len(asked))]
+
+
+def test_who_looks_for_symmetric_words_listens_meanwhile() -> None:
+    candidates = all_tasks("grid", "gw2-2x3")
+    refuter = Refuter(candidates.spaces, symmetry_group(candidates), len(candidates.rows), 0)
+    states = sorted({s for space in candidates.spaces for s in space.state.tolist()})
+
+    def heard() -> None:
+        raise InterruptedError
+
+    with pytest.raises(InterruptedError):
+        EquivariantSearch(states, refuter, 0).find(5, 500, between=heard)
 
 
 def test_a_lie_from_above_is_not_believed(little_effort: None) -> None:

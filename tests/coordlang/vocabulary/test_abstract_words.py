@@ -149,11 +149,16 @@ def test_others_are_asked_where_no_abstraction_is_left(monkeypatch: pytest.Monke
     ]
     assert finding(SearchFromAbove(replace(known, abstractions=[])), 3)[0] is None
     assert asked == [2, 2, 3, 3]
+    # The last number is left to the search from below, but for words of abstract states.
+    assert finding(above, 2, symmetric=False)[1] == told[:2]
+    assert asked == [2, 2, 3, 3, 2]
 
 
-def finding(above: SearchFromAbove, size: int) -> tuple[Assignment | None, list[str]]:
+def finding(
+    above: SearchFromAbove, size: int, symmetric: bool = True
+) -> tuple[Assignment | None, list[str]]:
     """What a search finds, and what it says meanwhile."""
-    search, told = above.find(size), list[str]()
+    search, told = above.find(size, symmetric), list[str]()
     while True:
         try:
             told.append(next(search).what)

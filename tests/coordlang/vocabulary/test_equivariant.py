@@ -19,7 +19,7 @@ from coordlang.symmetry.subgroups import group_table
 from coordlang.tasks.candidates import Candidates
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary.abstractions import abstractions
-from coordlang.vocabulary.equivariant import EquivariantSearch, _Orbits
+from coordlang.vocabulary.equivariant import EquivariantSearch, _Kind, _Kinds, _Orbits
 from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.orbit_words import OrbitWords
 from coordlang.vocabulary.refuter import Refuter
@@ -137,6 +137,23 @@ def test_partitions_of_a_kind_are_found_iff_there_are_some(seed: int) -> None:
             answers[bool(left)] += 1
         problem.close()
     assert min(answers[True], answers[False]) >= 3, answers
+
+
+def test_a_few_kinds_are_looked_at_to_their_end() -> None:
+    """At first all alike; then each has half of what one had that used all of it up."""
+    kinds = [_Kind(group_table([np.arange(3)]).cyclic_action(0, (0, 1))) for _ in range(4)]
+    looked_at = _Kinds([*kinds], deepens=True)
+    rounds: list[list[int]] = []
+    for _ in range(3):
+        rounds.append([])
+        while looked_at.open:
+            kind = looked_at.open.pop(0)
+            rounds[-1].append(looked_at.next_effort().rounds)
+            if kind is not kinds[1]:  # it stops for its conflicts
+                kind.rounds = rounds[-1][-1]
+            looked_at.leave_undecided(kind)
+        looked_at.begin_again()
+    assert rounds == [[50] * 4, [800, 400, 400, 200], [1600, 800, 800, 400]]
 
 
 def test_without_symmetries_all_partitions_are_looked_at() -> None:

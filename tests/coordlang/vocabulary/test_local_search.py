@@ -270,7 +270,7 @@ def test_what_is_not_found_raises_no_bound(monkeypatch: pytest.MonkeyPatch, find
     monkeypatch.setattr(from_above, "_AHEAD", 0)
     monkeypatch.setattr(module, "SolverBudget", partial(SolverBudget, rounds=1))
     monkeypatch.setattr(AbstractSearch, "find", lambda self, size, *effort: None)
-    monkeypatch.setattr(EquivariantSearch, "find", lambda self, size, *effort: None)
+    monkeypatch.setattr(EquivariantSearch, "find", lambda self, size, *effort, **more: None)
     monkeypatch.setattr(LocalSearch, "find", told)
     built = build_language(all_tasks("grid", "gw2-2x3"), "minimal")
     guarantee = built.language.guarantee
@@ -286,7 +286,7 @@ def test_words_of_what_is_found_are_merged(monkeypatch: pytest.MonkeyPatch) -> N
     refuter, states = searching(candidates, symmetry_group(candidates), 0)
     apart = {state: number for number, state in enumerate(states)}
     monkeypatch.setattr(from_above, "LOCAL_FROM", 0)
-    monkeypatch.setattr(EquivariantSearch, "find", lambda self, size, *effort: apart)
+    monkeypatch.setattr(EquivariantSearch, "find", lambda self, size, *effort, **more: apart)
     start = from_above.Start(states, refuter, [], len(states) + 1, 0)
     answers = from_above.from_above(start, iter([2]))
     told = list(islice((a.words.tolist() for a in answers if isinstance(a, from_above.Fewer)), 4))
