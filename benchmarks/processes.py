@@ -39,12 +39,12 @@ def coordlang(*arguments: str) -> Done:
     return run_python(("-c", "from coordlang.__main__ import main; main()", *arguments))
 
 
-def run_python(arguments: Sequence[str], most: float = MOST) -> Done:
+def run_python(arguments: Sequence[str], most: float = MOST, python: str = sys.executable) -> Done:
     """Run Python with these arguments, ``most`` seconds; what it prints is read as JSON."""
     start = perf_counter()
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         process = subprocess.Popen(
-            [sys.executable, *arguments],
+            [python, *arguments],
             stdout=out,
             stderr=err,
             stdin=subprocess.DEVNULL,
