@@ -11,7 +11,7 @@ that have as many joint steps and, under makespan+actions, as many actions as th
 Shared with the search are the PDDL reader, the grounder and the rule of who may idle.
 
 Columns: the cost and the number of plans by the search; what CaDiCaL says of fewer joint steps, and
-of as many with fewer actions (``none``: refuted); Ganak's number of models; CPU seconds and memory.
+of as many with fewer actions (``none``: refuted); Ganak's number of models; seconds and memory.
 A question that is not answered within ``--limit`` CPU seconds (60) and 8 GB is left open (``?``);
 a number that differs ends the run with an error.  ``--searched`` is a file that coverage.py kept:
 its rows are not searched again.  ``--python`` is a Python that has the counter
@@ -50,7 +50,7 @@ COLUMNS = (
     ("cheaper", 7),
     ("plans", 24),
     ("models", 24),
-    ("CPU s", 7),
+    ("s", 7),
     ("MB", 5),
 )
 QUESTIONS = ("shorter", "cheaper", "models")
