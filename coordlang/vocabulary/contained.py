@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lower bounds from contained instances: those with fewer objects, as a part of a map.
+"""Lower bounds from contained instances: those with fewer objects, as a part of a map, or tasks.
 
 A contained instance is the optimal plans of the candidate tasks that never leave some states.  Its
 clauses are clauses of the whole one (Proposition 19 of docs/concepts.md), so where it needs K words
@@ -138,6 +138,37 @@ def parts(candidates: Candidates, group: SymmetryGroup) -> list[Part]:
         Part(part, symmetries_of_part(part, end, _renamings(graph.subgraph(objects), names, group)))
         for objects, part in chosen
     ]
+
+
+def tasks_of_one_orbit(candidates: Candidates, group: SymmetryGroup) -> list[Part]:
+    """Tasks whose plans pass through images of one state alone, orbit by orbit, small ones first.
+
+    A plan has two steps at least, or there is nothing to agree on.  No optimal plan is left out, so
+    their clauses are those of the whole one.  On a ring of cells robots that keep their distance go
+    half the way round, all of them to one side or to the other.
+    """
+    if not group.symmetries:
+        return []
+    states = np.arange(len(candidates.rows))
+    orbit = np.minimum.reduce([states, *(symmetry.states for symmetry in group.symmetries)])
+    found = []
+    for space in candidates.spaces:
+        of_plans = _orbit_of_plans(space, orbit)[space.starts]
+        of_plans[space.layer[space.starts] < 2] = -1
+        for number in np.unique(of_plans[of_plans >= 0]):
+            tasks = of_plans == number
+            part = space.with_tasks(space.starts[tasks], space.second[tasks])
+            if (part.out_degrees > 1).any():
+                found.append(Part(part, group))
+    return sorted(found, key=lambda part: len(part.space))[:_INSTANCES]
+
+
+def _orbit_of_plans(space: PlanSpace, orbit: Ints) -> Ints:
+    """The orbit of all states that paths from each node pass through; -1 where they have several."""
+    own = orbit[space.state]
+    for edges in space.edges_by_layer():
+        own[edges.source[own[edges.target] != own[edges.source]]] = -1
+    return own
 
 
 def part_of(space: PlanSpace, inside: Bools, end: Ints) -> PlanSpace | None:

@@ -23,7 +23,7 @@ from coordlang.language.warping import Clause
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.vocabulary.above import Above
 from coordlang.vocabulary.abstractions import abstractions
-from coordlang.vocabulary.contained import ContainedInstance, parts
+from coordlang.vocabulary.contained import ContainedInstance, parts, tasks_of_one_orbit
 from coordlang.vocabulary.equivariant import EquivariantSearch
 from coordlang.vocabulary.from_above import Start, from_above
 from coordlang.vocabulary.job import Assignment, Evidence, Job, Outcome, word_count
@@ -165,9 +165,12 @@ class _Search:
                 job.progress,
                 self._first_words(),
             )
-            self._contained = [
-                ContainedInstance(part, job.seed) for part in parts(candidates, self.known.group)
+            contained = [
+                *tasks_of_one_orbit(candidates, self.known.group),
+                *parts(candidates, self.known.group),
             ]
+            instances = [ContainedInstance(part, job.seed) for part in contained]
+            self._contained = sorted(instances, key=lambda instance: len(instance.states))
         return self._refuter
 
     def _first_words(self) -> Ints | None:

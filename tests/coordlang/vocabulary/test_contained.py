@@ -22,7 +22,13 @@ from coordlang.language.warping import pair
 from coordlang.symmetry.group import Symmetry, symmetry_group
 from coordlang.symmetry.of_part import symmetries_of_part
 from coordlang.tasks.candidates import Candidates, all_pairs
-from coordlang.vocabulary.contained import ContainedInstance, _ends, part_of, parts
+from coordlang.vocabulary.contained import (
+    ContainedInstance,
+    _ends,
+    part_of,
+    parts,
+    tasks_of_one_orbit,
+)
 from coordlang.vocabulary.problems_by_size import SolverBudget
 from planners.errors import Refuted
 from planners.pddl import parse_domain, parse_problem
@@ -49,11 +55,11 @@ def without(candidates: Candidates, *names: str) -> Bools:
     return np.array([not set(names) & set(re.findall(r"[^ ()]+", key)) for key in keys])
 
 
-def plans_by_task(space: PlanSpace) -> Iterator[tuple[int, int, int, list[Plan]]]:
+def plans_by_task(space: PlanSpace, most: int = MOST) -> Iterator[tuple[int, int, int, list[Plan]]]:
     """Each task: its number, the states at its two ends, and its plans."""
     end = _ends(space)
     for task, node in enumerate(space.starts.tolist()):
-        plans = naive.listed(space, task, MOST)
+        plans = naive.listed(space, task, most)
         yield task, int(space.state[node]), int(end[space.goal[node]]), plans
 
 
@@ -298,6 +304,63 @@ def test_certificates_rest_on_parts(folder: str, stem: str, words: int) -> None:
     built = build_language(candidates, "minimal")
     assert built.language.guarantee.lower_bound == words
     assert check(certificate_of(built), candidates).lower_bound == words
+
+
+def ring(cells: int) -> list[tuple[int, int]]:
+    return [(n, (n + 1) % cells) for n in range(cells)]
+
+
+def test_tasks_of_one_orbit_are_those_whose_plans_pass_through_images_of_one_state() -> None:
+    """Random maps and rings, each plan listed; orbits by the texts of states."""
+    random, found_any, left_out = Random(0), 0, 0
+    for number in range(24):
+        cells = random.choice([4, 5, 6])
+        edges = [e for e in combinations(range(cells), 2) if random.random() < 0.6]
+        candidates = on_graph(cells, ring(cells) if number % 3 == 0 else edges)
+        group = symmetry_group(candidates)
+        orbit = list(range(len(candidates.rows)))
+        for symmetry in group.symmetries:
+            for state, image in enumerate(states_under(candidates.spaces[0], symmetry.renaming)):
+                orbit[state] = min(orbit[state], image)
+        expected: dict[int, set[tuple[int, int]]] = {}
+        several = set()
+        for space in candidates.spaces:
+            for task, start, end, plans in plans_by_task(space, most=5_000):
+                passed = {orbit[s] for p in plans for s in naive.states(space, task, p)}
+                if len(passed) == 1 and space.cost_of(task)[0] > 1:
+                    expected.setdefault(orbit[start], set()).add((start, end))
+                    several |= passed if len(plans) > 1 else set()
+                left_out += len(passed) > 1
+        expected = {orbit: tasks for orbit, tasks in expected.items() if orbit in several}
+        found = {}
+        for part in tasks_of_one_orbit(candidates, group):
+            tasks = {(start, end) for _, start, end, _ in plans_by_task(part.space, most=5_000)}
+            found[orbit[min(tasks)[0]]] = tasks
+        assert found == (expected if group.symmetries else {})
+        found_any += len(found)
+    assert found_any > 10
+    assert left_out > 100
+
+
+@pytest.mark.parametrize("cells", [6, 8, 10])
+def test_two_words_are_too_few_on_a_ring_and_states_of_one_distance_show_it(cells: int) -> None:
+    """By hand: Proposition 29 of docs/concepts.md.  Each clause is checked in the whole."""
+    candidates = on_graph(cells, ring(cells))
+    found = tasks_of_one_orbit(candidates, symmetry_group(candidates))
+    instance = ContainedInstance(found[0], 0)
+    refuted = instance.refute(2, SolverBudget())
+    instance.close()
+    assert refuted is not None
+    assert {s for clause in refuted.clauses for states in clause for s in states} <= set(
+        instance.states
+    )
+    assert len(instance.states) <= 2 * cells
+    domain, robots = candidates.loaded.domain.name, list(candidates.model.robots)
+    certificate = Certificate(domain, robots, 2, reasons_of(candidates, instance))
+    assert check(certificate, candidates).lower_bound == 3
+    built = build_language(candidates, "minimal")
+    assert built.language.guarantee.lower_bound == 3
+    assert check(certificate_of(built), candidates).lower_bound == 3
 
 
 def test_symmetries_of_parts_are_in_one_order_in_every_run() -> None:
