@@ -164,7 +164,7 @@ def tasks_of_one_orbit(candidates: Candidates, group: SymmetryGroup) -> list[Par
 
 
 def _orbit_of_plans(space: PlanSpace, orbit: Ints) -> Ints:
-    """The orbit of all states that paths from each node pass through; -1 where they have several."""
+    """The orbit of all states on paths from each node; -1 where there are several."""
     own = orbit[space.state]
     for edges in space.edges_by_layer():
         own[edges.source[own[edges.target] != own[edges.source]]] = -1

@@ -320,7 +320,8 @@ def test_tasks_of_one_orbit_are_those_whose_plans_pass_through_images_of_one_sta
         group = symmetry_group(candidates)
         orbit = list(range(len(candidates.rows)))
         for symmetry in group.symmetries:
-            for state, image in enumerate(states_under(candidates.spaces[0], symmetry.renaming)):
+            to = states_under(candidates.spaces[0], dict(symmetry.renaming))
+            for state, image in enumerate(to):
                 orbit[state] = min(orbit[state], image)
         expected: dict[int, set[tuple[int, int]]] = {}
         several = set()
