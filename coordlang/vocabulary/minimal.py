@@ -164,6 +164,7 @@ class _Search:
                 job.seed,
                 job.progress,
                 self._first_words(),
+                job.runner,
             )
             contained = [
                 *tasks_of_one_orbit(candidates, self.known.group),

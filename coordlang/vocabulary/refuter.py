@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from copy import copy, deepcopy
 from dataclasses import dataclass
 from random import Random
@@ -16,10 +17,13 @@ import numpy as np
 
 from coordlang.language.warping import Clause
 from coordlang.symmetry.group import SymmetryGroup
+from coordlang.vocabulary.counterexamples import Counterexamples
 from coordlang.vocabulary.failing_tuples import Agreeing, FailingTuples
 from coordlang.vocabulary.job import Evidence
 from coordlang.vocabulary.necessary_clauses import TaskPart
 from planners.joint.model import FullState
+from planners.pieces.processes import Processes
+from planners.pieces.work import Runner, Table, Work, digest, tables
 from planners.search.plan_space import PlanSpace
 from planners.tables import Ints
 
@@ -29,6 +33,7 @@ _LEAST_PARTS = 8
 _TASKS_OF_A_PART = 1_500
 #: Longer tuples are left out of what is looked at once there are so many.
 _ENOUGH = 2_000
+_COLUMNS = ("start", "edges", "states")
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +47,23 @@ class _Walked:
     part: TaskPart
     images: tuple[int, ...]
 
+    def failing(self, word: Ints) -> list[Counterexamples]:
+        """See `TaskPart.failing`."""
+        return self.part.failing(word, ways=len(self.images))
+
+    @property
+    def effort(self) -> float:
+        """Of a walk under one word: the moves of as many plans as robots from one node."""
+        space = self.part.space
+        return float((space.out_degrees.astype(np.float64) ** space.robots).sum())
+
+    @property
+    def identity(self) -> str:
+        """A hash of all that `failing` depends on, the partition apart."""
+        space = self.part.space
+        nodes = (space.state, space.goal, space.layer, space.first, space.starts)
+        return digest(*nodes, space.target, space.labels, self.images)
+
 
 class Refuter:
     """Decides whether partitions are languages, and keeps what refutes them.
@@ -49,7 +71,7 @@ class Refuter:
     Of goals that are images of each other under a symmetry one is walked: a partition is refuted
     by plans of the tasks to an image iff its image under the symmetry is refuted by plans of the
     tasks to the goal itself.  At the beginning plans are collected that refute the partition
-    ``first``, by default a single word, where walks are longest.
+    ``first``, by default a single word, where walks are longest: by ``runner``, in pieces.
 
     Attributes
     ----------
@@ -67,15 +89,26 @@ class Refuter:
         seed: int,
         progress: Callable[[str], None] = lambda _: None,
         first: Ints | None = None,
+        runner: Runner | None = None,
     ) -> None:
         self.pool = FailingTuples(group, states)
         self.walks = 0
         self._random = np.random.default_rng(seed)
         self._parts = _parts(spaces, self.pool.images, Random(seed))
         word = np.zeros(states, np.int64) if first is None else first
-        for walked in self._parts:
-            progress(f"collecting plans whose mixture fails: {len(self.pool):,}")
-            self._walk(walked, word)
+        work = Work(
+            "plans whose mixture fails",
+            _walk_alone,
+            (self._parts, word),
+            range(len(self._parts)),
+            digest(word, *(walked.identity for walked in self._parts)),
+            [walked.effort for walked in self._parts],
+        )
+        with closing(tables((runner or Processes(jobs=1)).run(work))) as pieces:
+            progress("collecting plans whose mixture fails")
+            for walked, table in zip(self._parts, pieces, strict=True):
+                self._add(walked, _read(table))
+                progress(f"collecting plans whose mixture fails: {len(self.pool):,}")
 
     def copy(self) -> Refuter:
         """The same, which then goes its own way: what one meets the other does not."""
@@ -121,11 +154,27 @@ class Refuter:
 
     def _walk(self, walked: _Walked, word: Ints) -> bool:
         """Add failing plans with one sentence to the pool; whether there are any."""
+        return self._add(walked, walked.failing(word))
+
+    def _add(self, walked: _Walked, found: Sequence[Counterexamples]) -> bool:
+        """Add what a walk has found; whether that is anything."""
         self.walks += 1
-        found = walked.part.failing(word, ways=len(walked.images))
         for table in found:
             self.pool.add(table, walked.part.space)
         return bool(found)
+
+
+def _walk_alone(shared: tuple[Sequence[_Walked], Ints], number: int) -> Table:
+    """One piece: the failing plans of one part under a partition."""
+    parts, word = shared
+    found = enumerate(parts[number].failing(word))
+    return {f"{name} {n}": getattr(table, name) for n, table in found for name in _COLUMNS}
+
+
+def _read(piece: Table) -> list[Counterexamples]:
+    """What `_walk_alone` has found."""
+    count = len(piece) // len(_COLUMNS)
+    return [Counterexamples(*(piece[f"{name} {n}"] for name in _COLUMNS)) for n in range(count)]
 
 
 def _parts(spaces: Sequence[PlanSpace], images: Sequence[Ints], random: Random) -> list[_Walked]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from pathlib import Path
 from random import Random
 
 import numpy as np
@@ -14,6 +15,10 @@ from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary.failing_tuples import FailingTuples
 from coordlang.vocabulary.refuter import Refuter
+from planners.pieces.kept import Kept
+from planners.pieces.processes import Processes
+from planners.pieces.work import Runner
+from planners.tables import Ints
 from tests.support.domains import all_tasks, own_task
 
 
@@ -86,3 +91,33 @@ def test_what_is_collected_first_may_refute_other_words() -> None:
         answers.add(bool(silent.violated(word)))
         assert bool(silent.violated(word)) == bool(others.violated(word))
     assert answers == {True, False}
+
+
+@pytest.mark.parametrize("stem", ["gw2-2x3", "gw4-3x3"])
+def test_first_walks_find_the_same_in_other_processes_and_from_kept_pieces(
+    stem: str, tmp_path: Path
+) -> None:
+    """The same plans in the same order, so the same clauses for the same reasons."""
+    candidates = all_tasks("grid", stem)
+    group, states = symmetry_group(candidates), len(candidates.rows)
+    halves = np.arange(states) % 2
+
+    def refuter(runner: Runner | None, first: Ints | None = None) -> Refuter:
+        return Refuter(candidates.spaces, group, states, 0, first=first, runner=runner)
+
+    kept = Kept(Processes(1), tmp_path, pytest.fail)
+    here = refuter(None)
+    others = [refuter(runner) for runner in (Processes(2, worth=0), kept, kept)]
+    pieces = len(list(tmp_path.iterdir()))
+    assert pieces == len(here._parts)
+    for other in others:
+        assert other.walks == here.walks == pieces
+        assert len(other.pool) == len(here.pool) > 20
+    violated = [
+        [(clause, evidence.example) for clause, evidence in found.violated(halves).items()]
+        for found in (here, *others)
+    ]
+    assert violated[0]
+    assert all(found == violated[0] for found in violated[1:])
+    refuter(kept, first=halves)
+    assert len(list(tmp_path.iterdir())) == 2 * pieces, "other words, other pieces"
