@@ -11,12 +11,13 @@ that have as many joint steps and, under makespan+actions, as many actions as th
 Shared with the search are the PDDL reader, the grounder and the rule of who may idle.
 
 Columns: the cost and the number of plans by the search; what CaDiCaL says of fewer joint steps, and
-of as many with fewer actions (``none``: refuted); Ganak's number of models; seconds and memory.
-A question that is not answered within ``--limit`` CPU seconds (60) and 8 GB is left open (``?``);
-a number that differs ends the run with an error.  ``--searched`` is a file that coverage.py kept:
-its rows are not searched again.  ``--python`` is a Python that has the counter
-(``pip install '.[oracles]'``).  Actions with conditional effects, disjunctions, quantifiers or
-conditions about the joint step are not written down here, nor those of several robots.
+of as many with fewer actions (``none``: refuted); Ganak's number of models; where it has none, how
+many models CaDiCaL finds one by one until no other is left; seconds and memory.  A question that is
+not answered within ``--limit`` CPU seconds (60) and 8 GB is left open (``?``); a number that
+differs ends the run with an error.  ``--searched`` is a file that coverage.py kept: its rows are
+not searched again.  ``--python`` is a Python that has the counter (``pip install '.[oracles]'``).
+Actions with conditional effects, disjunctions, quantifiers or conditions about the joint step are
+not written down here, nor those of several robots.
 """
 
 from __future__ import annotations
@@ -50,10 +51,13 @@ COLUMNS = (
     ("cheaper", 7),
     ("plans", 24),
     ("models", 24),
+    ("listed", 7),
     ("s", 7),
     ("MB", 5),
 )
 QUESTIONS = ("shorter", "cheaper", "models")
+#: Plans beyond which models are not found one by one.
+_LISTED = 400_000
 #: Reads a formula and the variables whose values are counted; prints the number as JSON.
 COUNT = """
 import json, resource, sys
@@ -270,6 +274,22 @@ def answer(formula: PlanFormula) -> bool:
         return bool(solver.solve())
 
 
+def listed(formula: PlanFormula, most: int) -> int:
+    """How many plans a formula has, found one by one by CaDiCaL until no other is left.
+
+    It stops at one more than ``most``.
+    """
+    from pysat.solvers import Cadical153
+
+    found = 0
+    with Cadical153(bootstrap_with=formula.clauses) as solver:
+        while found <= most and solver.solve():
+            found += 1
+            true = set(solver.get_model() or ())
+            solver.add_clause([-variable for variable in formula.sampled if variable in true])
+    return found
+
+
 def one(name: str, given: argparse.Namespace) -> dict[str, Any]:
     """The answer to a question about a row; for the number of models the formula is written."""
     loaded = coverage.load(name, given.cost)
@@ -282,6 +302,8 @@ def one(name: str, given: argparse.Namespace) -> dict[str, Any]:
         formula = PlanFormula(loaded, given.makespan, most=most - 1)
         return {"found": [most - 1] if answer(formula) else []}
     formula = PlanFormula(loaded, given.makespan, most or 0, most)
+    if given.question == "listed":
+        return {"listed": str(listed(formula, _LISTED))}
     with Path(given.out).open("w") as file:
         print("p cnf", formula.size, len(formula.clauses), file=file)
         print("c p show", *formula.sampled, 0, file=file)
@@ -319,8 +341,16 @@ def measured(name: str, known: KeptRows, given: argparse.Namespace) -> dict[str,
     return {"row": name, "version": coverage.project(), **found}
 
 
-def cells(figures: dict[str, Any]) -> Iterator[object]:
-    """The line of a row; exits with an error where a number differs."""
+def one_by_one(key: str, figures: dict[str, Any], given: argparse.Namespace) -> dict[str, Any]:
+    """The answer to the last question, about a row whose models were not counted."""
+    return {"row": key, **asked(figures["row"], "listed", figures, given)}
+
+
+def cells(figures: dict[str, Any], last: dict[str, Any] | None) -> Iterator[object]:
+    """The line of a row; exits with an error where a number differs.
+
+    ``last`` is the answer to the last question, None where it was not asked.
+    """
     yield from (figures[key] for key in ("row", "makespan", "second"))
     answers = [figures[question] for question in QUESTIONS]
     for own in answers[:2]:
@@ -328,10 +358,13 @@ def cells(figures: dict[str, Any]) -> Iterator[object]:
             raise SystemExit(f"{figures['row']}: a better plan was found: {figures}")
         yield own.get("refused", "none" if "found" in own else "?")
     models = answers[2].get("models")
-    if models not in (None, figures["plans"]):
-        raise SystemExit(f"{figures['row']}: the number of models differs: {figures}")
+    one_by_one = None if last is None else last.get("listed")
+    if {models, one_by_one} - {None, figures["plans"]}:
+        raise SystemExit(f"{figures['row']}: the number of models differs: {figures}, {last}")
     yield figures["plans"]
     yield models or answers[2].get("refused", "?")
+    yield "" if last is None else one_by_one or "?"
+    answers += [] if last is None else [last]
     yield round(sum(own["seconds"] for own in answers), 1)
     yield max(own["memory"] for own in answers)
 
@@ -363,8 +396,13 @@ def main() -> None:
     table = PrintedTable(*COLUMNS)
     for name in asked_for(coverage.rows(given.first), given.rows):
         found = known.get(name, partial(measured, name, searched, given))
-        if "plans" in found:
-            table.print(*cells(found))
+        if "plans" not in found:
+            continue
+        last = None
+        if not {"models", "refused"} & found["models"].keys() and int(found["plans"]) <= _LISTED:
+            key = f"{name} (one by one)"
+            last = known.get(key, partial(one_by_one, key, found, given))
+        table.print(*cells(found, last))
 
 
 if __name__ == "__main__":

@@ -6,8 +6,7 @@ from __future__ import annotations
 from random import Random
 
 import pytest
-from counted import NotWritten, PlanFormula, answer  # benchmarks/counted.py
-from pysat.solvers import Minisat22
+from counted import NotWritten, PlanFormula, answer, listed  # benchmarks/counted.py
 
 from planners.errors import ProvedImpossible
 from planners.joint.model import Cost
@@ -19,17 +18,6 @@ from planners.search.plans import counts
 from tests.support.domains import DOMAINS
 
 _MOST = 400
-
-
-def models(formula: PlanFormula) -> int:
-    """How many choices of actions the models of a formula have, one by one."""
-    with Minisat22(bootstrap_with=formula.clauses) as solver:
-        found = 0
-        while found <= _MOST and solver.solve():
-            true = set(solver.get_model() or ())
-            solver.add_clause([-v for v in formula.sampled if v in true])
-            found += 1
-    return found
 
 
 def random_strips(seed: int, cost: Cost) -> PlanningInstance:
@@ -75,7 +63,9 @@ def check(loaded: PlanningInstance) -> tuple[int, int, int]:
     assert not any(answer(PlanFormula(loaded, steps)) for steps in range(makespan))
     if most:
         assert not answer(PlanFormula(loaded, makespan, most=most - 1))
-    assert models(PlanFormula(loaded, makespan, most or 0, most)) == expected
+    formula = PlanFormula(loaded, makespan, most or 0, most)
+    assert listed(formula, _MOST) == expected
+    assert listed(formula, 0) == 1, "there is one more than none"
     return makespan, second, expected
 
 
