@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The child process in which Fast Downward solves one classical task.
 
-``python -P fast_downward_worker.py TASK RESULT`` reads the task (JSON, see
-`planners.classical.fast_downward.as_json`) and writes one JSON object: ``{"status": .., "total":
-cost of the plan or null, "log": the end of what Fast Downward said}``.
+``python -P fast_downward_worker.py TASK RESULT SEARCH`` reads the task (JSON, see
+`planners.classical.fast_downward_searches.as_json`), solves it by a search that finds optimal plans
+(what Fast Downward gets as ``--search``) and writes one JSON object: ``{"status": .., "plan":
+numbers of actions or null, "log": the end of what Fast Downward said}``.
 """
 
 from __future__ import annotations
@@ -42,11 +43,11 @@ class _FastDownward(subprocess.Popen[bytes]):
         self.started.append(self)
 
 
-def main(task_file: str, result_file: str) -> None:
+def main(task_file: str, result_file: str, search: str) -> None:
     """Solve the task of one file and write the outcome to another (never half of it)."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
     task = json.loads(Path(task_file).read_text())
-    result = solve(task)
+    result = solve(task, search)
     beside = Path(result_file + ".part")
     beside.write_text(json.dumps(result))
     os.replace(beside, result_file)
@@ -58,8 +59,11 @@ def _end_with_parent() -> None:
     os.killpg(0, signal.SIGKILL)
 
 
-def solve(task: dict[str, Any]) -> dict[str, Any]:
-    """Build the task with unified-planning and ask ``fast-downward-opt`` for an optimal plan."""
+def solve(task: dict[str, Any], search: str) -> dict[str, Any]:
+    """Build the task with unified-planning and ask ``fast-downward-opt`` for an optimal plan.
+
+    The engine calls its answer optimal whatever it is told to search by: ``search`` has to be so.
+    """
     sys.modules.setdefault("ConfigSpace", _config_space())
     from unified_planning.engines import PlanGenerationResultStatus as Status
     from unified_planning.shortcuts import OneshotPlanner, get_environment
@@ -71,8 +75,9 @@ def solve(task: dict[str, Any]) -> dict[str, Any]:
     with OneshotPlanner(name="fast-downward-opt") as planner:
         # A search for invariants among facts without arguments takes seconds and gains nothing:
         # 0.05 s without it where it took 7 s.  The engine that promises optimality has no parameter
-        # for it.
+        # for it, nor for the search.
         planner._fd_translate_options = ["--invariant-generation-max-time", "0"]
+        planner._fd_search_config = search
         answer = planner.solve(problem)
     log = "".join(message.message for message in answer.log_messages or ())
     code = _FastDownward.started[-1].returncode
@@ -142,4 +147,4 @@ def build(task: dict[str, Any]) -> Any:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], sys.argv[2])
+    main(*sys.argv[1:])

@@ -14,9 +14,11 @@ import pytest
 
 from coordlang.api.inputs import read_instance
 from coordlang.api.options import GivenOptions
-from planners.classical import LONGEST, ClassicalTask, compile_classical, fast_downward
+from planners.classical import LONGEST, ClassicalTask, compile_classical
+from planners.classical import fast_downward_searches as searches
 from planners.classical import fast_downward_worker as worker
-from planners.classical.fast_downward import FastDownwardFailed, as_json, total_cost
+from planners.classical.fast_downward import FastDownwardFailed, total_cost
+from planners.classical.fast_downward_searches import SEARCHES, answered, as_json
 from tests.support.domains import DOMAINS
 from tests.support.forks import fork, fork_command
 
@@ -34,9 +36,9 @@ def task() -> ClassicalTask:
 def answer(task: ClassicalTask) -> dict[str, Any]:
     """What the worker writes of the task."""
     found: dict[str, Any] = {}
-    read = fast_downward._read_answer
+    read = searches._read_answer
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fast_downward, "_read_answer", lambda path: found.update(read(path)) or found)
+        patch.setattr(searches, "_read_answer", lambda path: found.update(read(path)) or found)
         assert total_cost(task) == 2
     assert found["status"] == "solved"
     return found
@@ -44,36 +46,26 @@ def answer(task: ClassicalTask) -> dict[str, Any]:
 
 @pytest.mark.parametrize("every", [97, pytest.param(1, marks=pytest.mark.slow)])
 def test_the_answer_is_cut_off(
-    every: int, answer: dict[str, Any], task: ClassicalTask, monkeypatch: pytest.MonkeyPatch
+    every: int, answer: dict[str, Any], task: ClassicalTask, tmp_path: Path
 ) -> None:
     whole = json.dumps(answer).encode()
     for size in (*range(0, len(whole), every), len(whole) - 1, len(whole)):
-
-        def written(directory: Path, *_: object, size: int = size) -> int:
-            (directory / "result.json").write_bytes(whole[:size])
-            return 0
-
-        monkeypatch.setattr(fast_downward, "_run", written)
+        (tmp_path / "result.json").write_bytes(whole[:size])
         if size == len(whole):
-            assert total_cost(task) == 2
+            assert answered(task, tmp_path, 0) == answer["plan"]
         else:
             with pytest.raises(FastDownwardFailed, match="is not complete"):
-                total_cost(task)
+                answered(task, tmp_path, 0)
 
 
 def test_a_plan_that_is_none_is_no_answer(
-    answer: dict[str, Any], task: ClassicalTask, monkeypatch: pytest.MonkeyPatch
+    answer: dict[str, Any], task: ClassicalTask, tmp_path: Path
 ) -> None:
     plan = answer["plan"]
     for wrong in ([], plan[:1], plan[1:], plan[::-1], [*plan, 10**6], [-1]):
-
-        def written(directory: Path, *_: object, wrong: list[int] = wrong) -> int:
-            (directory / "result.json").write_text(json.dumps({**answer, "plan": wrong}))
-            return 0
-
-        monkeypatch.setattr(fast_downward, "_run", written)
+        (tmp_path / "result.json").write_text(json.dumps({**answer, "plan": wrong}))
         with pytest.raises(FastDownwardFailed, match="actions that are no plan of its task"):
-            total_cost(task)
+            answered(task, tmp_path, 0)
 
 
 @pytest.mark.parametrize("every", [11, pytest.param(1, marks=pytest.mark.slow)])
@@ -93,8 +85,8 @@ def test_its_plan_is_cut_off(
             return [*copy, *map(str, command(self, domain, problem, plan))]
 
         monkeypatch.setattr(FastDownwardMixin, "_get_cmd", kept)
-        given = json.loads(as_json(task, None))
-        print(json.dumps(worker.solve(given)["plan"]))
+        given, (search, _) = json.loads(as_json(task, None)), SEARCHES[0]
+        print(json.dumps(worker.solve(given, search)["plan"]))
         length = (tmp_path / "whole").stat().st_size
         for size in (*range(0, length, every), length):
 
@@ -103,7 +95,7 @@ def test_its_plan_is_cut_off(
 
             monkeypatch.setattr(FastDownwardMixin, "_get_cmd", cut)
             try:
-                print(json.dumps(worker.solve(given)["plan"]))
+                print(json.dumps(worker.solve(given, search)["plan"]))
             except Exception as error:  # whatever unified-planning raises: the worker ends with 1
                 print(json.dumps(repr(error)))
 
@@ -117,8 +109,9 @@ def test_its_plan_is_cut_off(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("how", [search for search, _ in SEARCHES])
 def test_its_translated_task_is_cut_off_at_every_length(
-    task: ClassicalTask, tmp_path: Path
+    how: str, task: ClassicalTask, tmp_path: Path
 ) -> None:
     """The file ``output.sas`` between its translator and its search."""
     import up_fast_downward
@@ -136,7 +129,7 @@ def test_its_translated_task_is_cut_off_at_every_length(
     )
     sas = (tmp_path / "output.sas").read_bytes()
     plan = tmp_path / "plan"
-    search = [str(home / "builds/release/bin/downward"), "--search", "astar(lmcut())"]
+    search = [str(home / "builds/release/bin/downward"), "--search", how]
     answers = set()
     for size in range(len(sas) + 1):
         plan.unlink(missing_ok=True)

@@ -8,15 +8,19 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from functools import cache
 from itertools import pairwise
+from multiprocessing.connection import wait
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
 from planners import classical as plain_module
-from planners.classical import fast_downward
+from planners.classical import fast_downward_searches
 from planners.classical.fast_downward import FastDownwardFailed, optimal_cost
+from planners.classical.fast_downward_searches import SEARCHES
 from planners.errors import OutOfMemory, OutOfTime, ProvedImpossible
 from planners.joint.model import Cost
 from planners.loading import ModelOptions, PlanningInstance, build, load
@@ -27,6 +31,8 @@ from planners.search.optimal_plans import search
 from tests.support.domains import ROOT, SHARED
 
 FOREIGN = SHARED / "foreign"
+#: The searches without a head start for the first.
+AT_ONCE = [(how, 0.0) for how, _ in SEARCHES]
 
 #: A formula that demands a partner without effects, a conditional effect, a disjunction,
 #: interference over a tool.
@@ -155,6 +161,52 @@ def test_fast_downward_agrees(texts: tuple[str, str], cost: Cost, limit: int) ->
     assert answer.seconds > 0
 
 
+@pytest.mark.parametrize("how", SEARCHES)
+@pytest.mark.parametrize(
+    "texts", [(WORKSHOP, WORKSHOP_TASK.format(goal=GOAL)), (RELAY, RELAY_TASK)]
+)
+def test_each_search_alone_agrees(
+    texts: tuple[str, str], how: tuple[str, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fast_downward_searches, "SEARCHES", [how])
+    loaded = read(*texts, "makespan+actions")
+    answer = optimal_cost(loaded.model, loaded.tasks[0], limit=0)
+    assert answer.cost == search(loaded.model, loaded.tasks[0]).cost_of(0)
+
+
+def test_a_search_that_breaks_down_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The next one begins at once."""
+    searches = [("astar(nonsense())", 0.0), ("astar(lmcut())", 1000.0)]
+    monkeypatch.setattr(fast_downward_searches, "SEARCHES", searches)
+    loaded = workshop(GOAL)
+    expected = search(loaded.model, loaded.tasks[0]).cost_of(0)
+    assert optimal_cost(loaded.model, loaded.tasks[0]).cost == expected
+    monkeypatch.setattr(fast_downward_searches, "SEARCHES", searches[:1] * 2)
+    with pytest.raises(FastDownwardFailed, match="exit code 33"):
+        optimal_cost(loaded.model, loaded.tasks[0])
+
+
+def test_the_searches_run_beside_each_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(fast_downward_searches, "SEARCHES", AT_ONCE)
+    loaded = big()
+
+    def until_both_search(pipes: list[int], seconds: float | None) -> Sequence[object]:
+        lines = processes(tmp_path)
+        if all(any(f"--search {how}" in line for line in lines) for how, _ in AT_ONCE):
+            monkeypatch.undo()
+            raise KeyboardInterrupt
+        return wait(pipes, 0.05 if seconds is None else min(seconds, 0.05))
+
+    monkeypatch.setattr(fast_downward_searches, "wait", until_both_search)
+    with pytest.raises(KeyboardInterrupt):
+        optimal_cost(loaded.model, loaded.tasks[0], time_limit=60)
+    assert processes(tmp_path) == set()
+    assert [*tmp_path.iterdir()] == []
+
+
 def test_a_wrong_model_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     text = WORKSHOP_TASK.format(goal="(and (done r1) (done r2))")
     loaded = read(WORKSHOP, text.replace("(:init (free))", "(:init (free) (in r1) (in r2))"))
@@ -188,9 +240,15 @@ def test_a_step_cost_that_was_too_small_is_raised() -> None:
     ).cost_of(0)
 
 
+@pytest.mark.parametrize("searches", [SEARCHES, AT_ONCE], ids=["usual", "at-once"])
 def test_nothing_is_written_or_printed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    searches: Sequence[tuple[str, float]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
+    """Whichever search ends first: the other one is ended."""
+    monkeypatch.setattr(fast_downward_searches, "SEARCHES", searches)
     work, temporary = tmp_path / "work", tmp_path / "tmp"
     work.mkdir()
     temporary.mkdir()
@@ -222,12 +280,12 @@ def test_the_time_limit_ends_everything(
 def test_an_interrupt_ends_everything(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
-    def interrupted(*_: object) -> int:
+    def interrupted(*_: object) -> NoReturn:
         monkeypatch.undo()
         time.sleep(0.2)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(subprocess.Popen, "wait", interrupted)
+    monkeypatch.setattr(fast_downward_searches, "wait", interrupted)
     loaded = workshop(GOAL)
     with pytest.raises(KeyboardInterrupt):
         optimal_cost(loaded.model, loaded.tasks[0])
@@ -274,7 +332,7 @@ def test_the_memory_limit_is_an_error_of_its_own(limit: int) -> None:
 
 def test_a_crash_of_the_worker_shows_what_it_said(monkeypatch: pytest.MonkeyPatch) -> None:
     loaded = workshop(GOAL)
-    monkeypatch.setattr(fast_downward, "as_json", lambda *_: "no json")
+    monkeypatch.setattr(fast_downward_searches, "as_json", lambda *_: "no json")
     with pytest.raises(FastDownwardFailed, match="exit code 1") as caught:
         optimal_cost(loaded.model, loaded.tasks[0])
     assert "JSONDecodeError" in str(caught.value)
