@@ -1,12 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The select-then-apply form, of linear size: select one after another, check, then apply."""
+"""The select-then-apply form, of linear size: robots select one after another, then it is applied.
+
+What no other robot can see is applied as it is selected (`planners.classical.immediate`).  A step
+in which all selections are of this kind is over with the last of them; else there is *work left*,
+in stages: all check; all undo (rarely); all apply.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence, Set
+from dataclasses import dataclass, field
+from itertools import pairwise
 
+from planners.classical.immediate import Immediate
 from planners.classical.selectors import Selectors
-from planners.classical.staged import StagedAction, selected
+from planners.classical.staged import STAGES, StagedAction, selected
+from planners.classical.task import Known
 from planners.classical.writer import (
     Writer,
     fact_atoms,
@@ -20,19 +29,22 @@ from planners.pddl.formula_tree import GroundLeaf
 from planners.pddl.lifted import FALSE, TRUE, Atom, Formula, StepAtom
 
 _IDLE = "idle"
+#: Where all selected is applied, and what is left of the step is to be deleted.
+_TIDY = own_fact("time to end the step")
 #: What a stage leads from and to: facts that say which stage it is.
 _Phases = tuple[Atom, Atom]
+#: The deletes of all last selections of a step beyond which one more action makes them for all.
+_MANY = 20_000
 
 
 def select_then_apply(team: Selectors, model: JointModel, goal: Goal, step_cost: int) -> Writer:
     """Stages of a step: all select; all check; all undo (rarely); all apply.
 
-    Robots without work skip a stage.
+    Robots without work skip a stage, and a step without work left ends when all have selected.
     """
     value = _of_selections(team, model)
     actions = [StagedAction(team, number, value) for number in range(len(team.actions))]
-    stages = _Stages(team, actions)
-    form = _SelectThenApply(Writer(fact_atoms(model)), team, actions, stages, step_cost)
+    form = _SelectThenApply(Writer(fact_atoms(model)), team, actions, step_cost)
     for robot in range(len(team.names)):
         form.write_robot(robot)
     form.write_goal(goal_formula(model, goal))
@@ -53,28 +65,59 @@ def _of_selections(team: Selectors, model: JointModel) -> Callable[[GroundLeaf],
 
 
 class _Stages:
-    """The stages of a step in their order, and the facts that say which one it is."""
+    """The stages of a step in their order, and the facts that say which one it is.
 
-    def __init__(self, team: Selectors, actions: Sequence[StagedAction]) -> None:
-        robots = range(len(team.names))
-        order = [("choose", robot) for robot in robots]
-        for stage in ("check", "undo"):
-            busy = {action.robot for action in actions if action.has(stage)}
-            order += [(stage, robot) for robot in robots if robot in busy]
-        order += [("apply", robot) for robot in robots]
-        facts = [own_fact(f"time to {stage}", team.names[robot]) for stage, robot in order]
-        self.first = facts[0]
-        self._phases = dict(
-            zip(order, zip(facts, (*facts[1:], facts[0]), strict=True), strict=True)
-        )
+    Attributes
+    ----------
+    first
+        The fact that a step begins, and the one before is over.
+    """
+
+    def __init__(self, names: Sequence[str], late: Iterable[StagedAction]) -> None:
+        self._names = names
+        work = list(late)
+        order = []
+        for stage in STAGES:
+            busy = {action.robot for action in work if action.has(stage)}
+            order += [(stage, robot) for robot in sorted(busy)]
+        facts = [own_fact(f"time to {stage}", names[robot]) for stage, robot in order]
+        self.first = own_fact("time to choose", names[0])
+        self._first_work = facts[0] if facts else self.first
+        self._phases = dict(zip(order, pairwise((*facts, self.first)), strict=True))
+
+    def choosing(self, robot: int, *, work_left: bool) -> Atom:
+        """The fact that it is a robot's turn to choose; of robot ``n`` of ``n``, what follows."""
+        if robot < len(self._names):
+            kind = "time to choose, work left" if work_left else "time to choose"
+            return own_fact(kind, self._names[robot])
+        return self._first_work if work_left else self.first
 
     def of(self, stage: str, robot: int) -> _Phases:
         """The fact that this stage comes now, and that the next one does."""
         return self._phases[stage, robot]
 
-    def between(self, robot: int) -> list[str]:
-        """The stages between selecting and applying that the robot takes part in."""
-        return [stage for stage in ("check", "undo") if (stage, robot) in self._phases]
+    def after_choosing(self, robot: int) -> list[str]:
+        """The stages after selecting that the robot takes part in."""
+        return [stage for stage in STAGES if (stage, robot) in self._phases]
+
+
+@dataclass(frozen=True, slots=True)
+class _Choice:
+    """What one robot selects, whoever has selected before.
+
+    ``first`` is the first owner of what is selected: robots that wait for another selection of this
+    one forbid it.  ``known``, ``adds`` and ``deletes`` are its own, without those of the turn;
+    ``leaves_work`` says whether something of it is left for later stages.
+    """
+
+    robot: int
+    label: str
+    first: int
+    known: Known = field(default_factory=dict)
+    adds: Set[Atom] = frozenset()
+    deletes: Set[Atom] = frozenset()
+    cost: int = 0
+    leaves_work: bool = False
 
 
 class _SelectThenApply:
@@ -85,34 +128,48 @@ class _SelectThenApply:
         out: Writer,
         team: Selectors,
         actions: Sequence[StagedAction],
-        stages: _Stages,
         step_cost: int,
     ) -> None:
         self.out = out
         self._team = team
         self._actions = actions
-        self._stages = stages
         self._step_cost = step_cost
+        self._immediate = Immediate(team, actions)
+        late = [a for a in actions if a.literals is not None and a.number not in self._immediate]
+        self._stages = _Stages(team.names, late)
+        #: The first robot that may select with work left: one before it has work to leave.
+        self._first_late = min((a.robot for a in late), default=len(team.names)) + 1
+        self._cleared = set(self._immediate.marks)
+        self._cleared |= {
+            self._left(stage, robot)
+            for robot in range(len(team.names))
+            for stage in self._stages.after_choosing(robot)
+        }
+        last = sum(action.robot == len(team.names) - 1 for action in actions)
+        self._tidies = last * len(self._immediate.marks) > _MANY
+        if self._tidies:
+            self._tidy()
 
     def write_robot(self, robot: int) -> None:
         """Everything that one robot does in a step."""
-        name = self._team.names[robot]
-        if self._team.may_idle[robot]:
-            self._select_idling(robot)
-        for stage in self._stages.between(robot):
-            nothing = self._nothing_to(stage, robot)
-            self._pass(f"nothing to {stage}", self._stages.of(stage, robot), nothing)
+        for work_left in (False, True) if robot >= self._first_late else (False,):
+            if self._team.may_idle[robot]:
+                self._choose(_Choice(robot, _IDLE, robot), work_left=work_left)
+            for action in self._actions:
+                if action.literals is None:
+                    continue
+                if robot == action.robot:
+                    self._select(action, work_left=work_left)
+                elif work_left and robot in self._team.owners[action.number]:
+                    self._join(robot, action)
+        for stage in self._stages.after_choosing(robot):
+            here, after = self._stages.of(stage, robot)
+            name = f"nothing to {stage} {self._team.names[robot]}"
+            self._lead(name, {self._left(stage, robot): False}, here, after)
         for action in self._actions:
-            if robot == action.robot:
-                self._select(action)
+            late = action.literals is not None and action.number not in self._immediate
+            if robot == action.robot and late:
                 self._carry_out(action)
-            elif robot in self._team.owners[action.number]:
-                self._join(robot, action)
-                mark = selected(self._team, robot, action.label)
-                self._pass(f"apply {name} {action.label}", self._stages.of("apply", robot), mark)
-        if self._team.may_idle[robot]:
-            mark = selected(self._team, robot, _IDLE)
-            self._pass(f"apply {name} {_IDLE}", self._stages.of("apply", robot), mark)
 
     def write_goal(self, formula: Formula) -> None:
         """The goal counts between two steps."""
@@ -128,57 +185,56 @@ class _SelectThenApply:
 
     # -- select
 
-    def _select(self, action: StagedAction) -> None:
+    def _select(self, action: StagedAction, *, work_left: bool) -> None:
         """The first owner selects an action; what earlier robots have selected may forbid it."""
-        if action.literals is None:
-            return
+        assert action.literals is not None, "an action that can never be selected"
         team, robot = self._team, action.robot
-        known = dict(action.literals)
-        for other in team.clashes[action.number]:
-            earlier = team.owners[other][0]
-            if earlier < robot:
-                known[selected(team, earlier, team.actions[other].label)] = False
-        adds = {self._waits(robot, k) for k in team.owners[action.number] if k != robot}
-        idle = [stage for stage in self._stages.between(robot) if not action.has(stage)]
+        known = {**action.literals, **self._not_ruled_out(action, work_left=work_left)}
+        late = action.number not in self._immediate
+        if late:
+            adds = {self._waits(robot, k) for k in team.owners[action.number] if k != robot}
+            adds |= {self._left(stage, robot) for stage in STAGES if action.has(stage)}
+            adds.add(action.selected)
+        else:
+            mark = self._immediate.mark(action.number)
+            adds = action.adds | ({mark} if mark else set())
+        deletes = set[Atom]() if late else action.deletes
         cost = team.seconds[action.number]
-        self._write_selection(robot, action.label, robot, known, adds, set(), idle, cost)
+        choice = _Choice(robot, action.label, robot, known, adds, deletes, cost, late)
+        self._choose(choice, work_left=work_left)
+
+    def _not_ruled_out(self, action: StagedAction, *, work_left: bool) -> dict[Atom, bool]:
+        """That no earlier robot has selected what cannot share a step with the action."""
+        found = {}
+        for other in self._team.clashes[action.number]:
+            earlier = self._team.owners[other][0]
+            if earlier < action.robot:
+                mark = self._immediate.mark(other)
+                if mark is not None:
+                    found[mark] = False
+                elif work_left:
+                    found[selected(self._team, earlier, self._team.actions[other].label)] = False
+        return found
 
     def _join(self, robot: int, action: StagedAction) -> None:
-        """Another owner selects an action that its first owner has selected."""
-        known, deletes = {action.selected: True}, {self._waits(action.robot, robot)}
-        idle = self._stages.between(robot)
-        self._write_selection(robot, action.label, action.robot, known, set(), deletes, idle, 0)
+        """Another owner selects an action that its first owner has selected, and carries out."""
+        deletes = {self._waits(action.robot, robot)}
+        known = {action.selected: True}
+        choice = _Choice(robot, action.label, action.robot, known, deletes=deletes)
+        self._choose(choice, work_left=True)
 
-    def _select_idling(self, robot: int) -> None:
-        idle = self._stages.between(robot)
-        self._write_selection(robot, _IDLE, robot, {}, set(), set(), idle, 0)
-
-    def _write_selection(
-        self,
-        robot: int,
-        label: str,
-        first: int,
-        known: dict[Atom, bool],
-        adds: set[Atom],
-        deletes: set[Atom],
-        idle: Sequence[str],
-        cost: int,
-    ) -> None:
-        """One robot's selection; only the one of robot 0 pays for the step.
-
-        ``first`` is the first owner of what is selected: robots that wait for another selection of
-        this one forbid it.  ``idle`` are the stages in which the robot then has nothing to do.
-        """
-        here, after = self._stages.of("choose", robot)
-        for caller in self._callers(robot):
-            known[self._waits(caller, robot)] = caller == first
-        known[here] = True
-        adds = adds | {after, selected(self._team, robot, label)}
-        adds |= {self._nothing_to(stage, robot) for stage in idle}
-        if robot == 0:
-            cost += self._step_cost
-        name = f"choose {self._team.names[robot]} {label}"
-        self.out.action(name, known, adds, deletes | {here}, cost)
+    def _choose(self, choice: _Choice, *, work_left: bool) -> None:
+        """One robot's turn to select; only the one of robot 0 pays for the step."""
+        robot = choice.robot
+        known = dict(choice.known)
+        if work_left:  # else no robot waits for a partner, for a shared action leaves work
+            for caller in self._callers(robot):
+                known[self._waits(caller, robot)] = caller == choice.first
+        here = self._stages.choosing(robot, work_left=work_left)
+        after = self._stages.choosing(robot + 1, work_left=work_left or choice.leaves_work)
+        cost = choice.cost + (self._step_cost if robot == 0 else 0)
+        name = f"choose {self._team.names[robot]} {choice.label}"
+        self._lead(name, known, here, after, choice.adds, choice.deletes, cost)
 
     def _waits(self, caller: int, robot: int) -> Atom:
         """The caller has selected an action that this robot has to select too."""
@@ -188,13 +244,34 @@ class _SelectThenApply:
         owners = [own for own in self._team.owners if robot in own]
         return sorted({own[0] for own in owners if own[0] != robot})
 
-    def _nothing_to(self, stage: str, robot: int) -> Atom:
-        return own_fact(f"nothing to {stage}", self._team.names[robot])
+    def _left(self, stage: str, robot: int) -> Atom:
+        return own_fact(f"left to {stage}", self._team.names[robot])
 
-    def _pass(self, name: str, phases: _Phases, mark: Atom) -> None:
-        """Leave a stage in which a robot has nothing to do."""
-        here, after = phases
-        self.out.action(name, {here: True, mark: True}, {after}, {here, mark})
+    # -- from one stage to the next
+
+    def _lead(
+        self,
+        name: str,
+        known: Known,
+        here: Atom,
+        after: Atom,
+        adds: Set[Atom] = frozenset(),
+        deletes: Set[Atom] = frozenset(),
+        cost: int = 0,
+    ) -> None:
+        """An action from one stage to the next; at the end of a step nothing is left of it."""
+        if after == self._stages.first:
+            if self._tidies:
+                after = _TIDY
+            else:
+                false = {atom for atom, value in known.items() if not value}
+                deletes = deletes | (self._cleared - false)
+        self.out.action(name, {**known, here: True}, adds | {after}, deletes | {here}, cost)
+
+    def _tidy(self) -> None:
+        """One action for the deletes of all that end a step."""
+        first = self._stages.first
+        self.out.action("end the step", {_TIDY: True}, {first}, self._cleared | {_TIDY})
 
     # -- check, undo, apply
 
@@ -232,13 +309,12 @@ class _SelectThenApply:
         adds, deletes = part(action.adds, action.deletes)
         end = self.out.phase() if action.groups else after
         done = set() if early else {action.selected}
-        known = {here: True, action.selected: True}
-        self.out.action(name, known, adds | {end}, deletes | done | {here})
+        self._lead(name, {action.selected: True}, here, end, adds, deletes | done)
         for k, (_, effects) in enumerate(action.groups):
             here, end = end, after if k + 1 == len(action.groups) else self.out.phase()
             adds, deletes = part(*effects)
             fires = action.fires(k)
             done = set() if early else {fires}
-            known = {here: True, fires: True}
-            self.out.action(f"{name} fired {k}", known, adds | {end}, deletes | done | {here})
-            self.out.action(f"{name} not fired {k}", {here: True, fires: False}, {end}, {here})
+            fired = f"{name} fired {k}"
+            self._lead(fired, {fires: True}, here, end, adds, deletes | done)
+            self._lead(f"{name} not fired {k}", {fires: False}, here, end)

@@ -10,6 +10,9 @@ from planners.classical.writer import known_literals, own_fact
 from planners.pddl.formula_tree import GroundLeaf, conjuncts, joined, negated, signed, substituted
 from planners.pddl.lifted import FALSE, TRUE, And, Atom, Formula, Or, StepAtom
 
+#: The stages after selecting, in their order.
+STAGES = ("check", "undo", "apply")
+
 
 class StagedAction:
     """A ground action of the robot that owns it first, as the select-then-apply form needs it.
@@ -74,9 +77,14 @@ class StagedAction:
         """Whether something is checked after the selection."""
         return self.checks != TRUE or bool(self.groups)
 
+    @property
+    def written(self) -> set[Atom]:
+        """The atoms of its unconditional effects."""
+        return self.adds | self.deletes
+
     def has(self, stage: str) -> bool:
-        """Whether there is something to do in the stage ``check`` or ``undo``."""
-        return self.has_checks if stage == "check" else bool(self.early)
+        """Whether there is something to do in a stage, one of `STAGES`."""
+        return {"check": self.has_checks, "undo": bool(self.early), "apply": True}[stage]
 
     def fires(self, group: int) -> Atom:
         """The fact that the condition of a group of effects holds."""

@@ -4,8 +4,14 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 
+import pytest
+
+from planners.classical import selection
+from planners.classical.immediate import Immediate
 from planners.joint.model import Cost
 from planners.loading import ModelOptions, PlanningInstance, build
 from planners.pddl.domain import parse_domain
@@ -16,6 +22,9 @@ from planners.tables import Rows
 
 COSTS: tuple[Cost, ...] = ("makespan", "makespan+actions")
 FORMS = {"explicit": 100_000, "select-then-apply": 0}
+#: Ways to write select-then-apply: what no other robot sees is applied at once, or nothing is; the
+#: actions that end a step delete what is left of it, or one more action does.
+WAYS = ("usual", "nothing at once", "tidied")
 
 CORRIDOR = """
 (define (domain corridor)
@@ -153,6 +162,19 @@ SOLO_TASK = """
 (define (problem solo-1) (:domain solo) (:objects r1 r2 - robot) (:init) (:goal (and (done r1) (done r2))))
 """
 
+#: A shared action of which nobody reads what it does: a robot is needed for it all the same.
+LIFT = """
+(define (domain lift)
+  (:types robot box)
+  (:predicates (up ?b - box) (near ?r ?s - robot))
+  (:action lift :parameters (?r ?s - robot ?b - box)
+    :precondition (near ?r ?s) :effect (up ?b)))
+"""
+LIFT_TASK = """
+(define (problem lift-1) (:domain lift) (:objects r1 r2 r3 - robot b1 b2 - box)
+  (:init (near r1 r2) (near r2 r3) (near r3 r1)) (:goal (and (up b1) (up b2))))
+"""
+
 MODELS = {
     "tool": (TOOL, TOOL_TASK),
     "solo": (SOLO, SOLO_TASK),
@@ -160,8 +182,20 @@ MODELS = {
     "partners": (PARTNERS, PARTNERS_TASK),
     "relay": (RELAY, RELAY_TASK),
     "blink": (BLINK, BLINK_TASK),
+    "lift": (LIFT, LIFT_TASK),
     "joint-action": (JOINT, JOINT_TASK),
 }
+
+
+@contextmanager
+def written(way: str) -> Iterator[None]:
+    """Let select-then-apply be written in one of `WAYS`."""
+    with pytest.MonkeyPatch.context() as patch:
+        if way == "nothing at once":
+            patch.setattr(Immediate, "_is_seen", lambda *_: True)
+        if way == "tidied":
+            patch.setattr(selection, "_MANY", -1)
+        yield
 
 
 @cache

@@ -119,6 +119,8 @@ class _NamingFacts:
             adds |= {self.naming} if labels else set()
         elif self.between in adds:
             adds = adds - {self.between} | {self.naming}
+            if (self.between, True) in conditions:  # one robot: the step ends as it begins
+                deletes.add(self.between)
         for robot, label in labels:
             last = Atom("last", (self.model.robots[robot], self.model.labels[robot][label]))
             for atom in self.remembered:

@@ -32,8 +32,10 @@ from tests.support.classical_models import (
     PARTNERS_TASK,
     TOOL,
     TOOL_TASK,
+    WAYS,
     random_state,
     read,
+    written,
 )
 from tests.support.naive_classical import holds, successors
 from tests.support.random_pddl import KINDS, Kind, random_model
@@ -101,6 +103,7 @@ def test_the_models_are_not_trivial() -> None:
         "partners": (6, 11),
         "relay": (2, 3),
         "blink": (1, 2),
+        "lift": (2, 2),
         "joint-action": (3, 3),
     }
 
@@ -268,7 +271,8 @@ def test_every_state_of_random_models_costs_the_same(seed: int, kind: Kind, cost
     except BadInput:  # one label tuple, two results
         reject()
     event(f"{kind}: farthest state {max(expected.values())[0]}")
-    for form, limit in FORMS.items():
-        plain = compile_classical(loaded.model, task, limit)
+    for form, way in (("explicit", "usual"), *(("select-then-apply", way) for way in WAYS)):
+        with written(way):
+            plain = compile_classical(loaded.model, task, FORMS[form])
         assert plain.form == form
-        assert plain_distances(plain) == expected
+        assert plain_distances(plain) == expected, way

@@ -16,7 +16,15 @@ from planners.loading import PlanningInstance
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from planners.search.reachable import explore
-from tests.support.classical_models import COSTS, FORMS, MODELS, random_state, read
+from tests.support.classical_models import (
+    COSTS,
+    FORMS,
+    MODELS,
+    WAYS,
+    random_state,
+    read,
+    written,
+)
 from tests.support.naive_classical import optimal_plans
 from tests.support.random_pddl import KINDS, Kind, random_model
 
@@ -70,6 +78,28 @@ def test_every_plan_once(name: str, cost: Cost, form: str) -> None:
     assert optimal_plans(plain).count() == ours(loaded)
 
 
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("cost", COSTS)
+@pytest.mark.parametrize("name", MODELS)
+def test_every_plan_once_however_it_is_written(name: str, cost: Cost, way: str) -> None:
+    loaded = read(*MODELS[name], cost)
+    with written(way):
+        plain = compile_classical(loaded.model, loaded.tasks[0], 0)
+    assert optimal_plans(plain).count() == ours(loaded)
+
+
+def test_what_is_applied_at_once_takes_fewer_states() -> None:
+    """In the corridor all is, in the relay what is handed over is not."""
+    for name in ("corridor", "relay"):
+        loaded = read(*MODELS[name])
+        states = []
+        for way in ("usual", "tidied", "nothing at once"):
+            with written(way):
+                plain = compile_classical(loaded.model, loaded.tasks[0], 0)
+            states.append(len(optimal_plans(plain).edges))
+        assert states == sorted(set(states)), name
+
+
 def test_one_joint_action_in_two_guises() -> None:
     loaded = read(TWICE, TWICE_TASK, "makespan+cost")
     space = search(loaded.model, loaded.tasks[0])
@@ -90,5 +120,8 @@ def test_every_plan_of_random_models_once(seed: int, kind: Kind, cost: Cost) -> 
     task = replace(loaded.tasks[0], init=random_state(loaded, seed), goal=last)
     expected = Plans.of(search(loaded.model, task)).count
     event(f"plans: {expected if expected < 3 else 'many'}")
-    for limit in FORMS.values():
-        assert optimal_plans(compile_classical(loaded.model, task, limit)).count() == expected
+    assert optimal_plans(compile_classical(loaded.model, task, 100_000)).count() == expected
+    for way in WAYS:
+        with written(way):
+            plain = compile_classical(loaded.model, task, 0)
+        assert optimal_plans(plain).count() == expected, way
