@@ -14,7 +14,7 @@ from itertools import pairwise
 
 from planners.classical.immediate import Immediate
 from planners.classical.selectors import Selectors
-from planners.classical.staged import STAGES, StagedAction, selected
+from planners.classical.staged import STAGES, StagedAction, selected, staged_actions
 from planners.classical.task import Known
 from planners.classical.writer import (
     Writer,
@@ -43,7 +43,7 @@ def select_then_apply(team: Selectors, model: JointModel, goal: Goal, step_cost:
     Robots without work skip a stage, and a step without work left ends when all have selected.
     """
     value = _of_selections(team, model)
-    actions = [StagedAction(team, number, value) for number in range(len(team.actions))]
+    actions = staged_actions(team, value)
     form = _SelectThenApply(Writer(fact_atoms(model)), team, actions, step_cost)
     for robot in range(len(team.names)):
         form.write_robot(robot)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable
 
 from planners.classical.selectors import Selectors
@@ -32,9 +33,11 @@ class StagedAction:
     groups
         Its conditional effects, by condition: (condition, (adds, deletes)).
     early
-        The atoms that it may both delete and conditionally add: their deletes come before all adds
-        of the step.
+        The atoms that it may delete in a step in which it, or another action, may add them: their
+        deletes come before all adds of the step.  `staged_actions` decides this.
     """
+
+    early: frozenset[Atom] = frozenset()
 
     def __init__(
         self, team: Selectors, number: int, value: Callable[[GroundLeaf], Formula]
@@ -52,8 +55,6 @@ class StagedAction:
         by_condition.pop(FALSE, None)
         self.adds, self.deletes = by_condition.pop(TRUE)
         self.groups = list(by_condition.items())
-        maybe = {atom for _, (adds, _) in self.groups for atom in adds} - self.adds
-        self.early = maybe & self.deletes.union(*(deletes for _, (_, deletes) in self.groups))
 
     def _split_precondition(self, team: Selectors, value: Callable[[GroundLeaf], Formula]) -> None:
         now: list[Formula] = []
@@ -82,6 +83,16 @@ class StagedAction:
         """The atoms of its unconditional effects."""
         return self.adds | self.deletes
 
+    @property
+    def may_add(self) -> set[Atom]:
+        """The atoms that it adds in some step."""
+        return self.adds.union(*(adds for _, (adds, _) in self.groups))
+
+    @property
+    def may_delete(self) -> set[Atom]:
+        """The atoms that it deletes in some step; not those that it always adds."""
+        return self.deletes.union(*(deletes for _, (_, deletes) in self.groups)) - self.adds
+
     def has(self, stage: str) -> bool:
         """Whether there is something to do in a stage, one of `STAGES`."""
         return {"check": self.has_checks, "undo": bool(self.early), "apply": True}[stage]
@@ -89,6 +100,31 @@ class StagedAction:
     def fires(self, group: int) -> Atom:
         """The fact that the condition of a group of effects holds."""
         return own_fact("condition holds", *self.selected.args, str(group))
+
+
+def staged_actions(
+    team: Selectors, value: Callable[[GroundLeaf], Formula]
+) -> tuple[StagedAction, ...]:
+    """All ground actions of a team in stages.
+
+    Two actions of which one deletes what the other adds clash, but for conditions that a third one
+    in the step makes true; and what an action may add itself counts as added.
+    """
+    actions = tuple(StagedAction(team, number, value) for number in range(len(team.actions)))
+    adders: dict[Atom, set[int]] = defaultdict(set)
+    for action in actions:
+        for atom in action.may_add:
+            adders[atom].add(action.number)
+    for action in actions:
+        action.early = frozenset(
+            atom
+            for atom in action.may_delete
+            if any(
+                other == action.number or actions[other].robot != action.robot
+                for other in adders[atom] - team.clashes[action.number]
+            )
+        )
+    return actions
 
 
 def selected(team: Selectors, robot: int, label: str) -> Atom:

@@ -175,6 +175,23 @@ LIFT_TASK = """
   (:init (near r1 r2) (near r2 r3) (near r3 r1)) (:goal (and (up b1) (up b2))))
 """
 
+#: What the last robot deletes if both others do their part, one of these adds: no two of them
+#: interfere, for the condition needs all three, and what is added is there after the step.
+BASIN = """
+(define (domain basin)
+  (:types robot)
+  (:constants r1 r2 r3 - robot)
+  (:predicates (full) (done ?r - robot))
+  (:action fill :agent ?r - robot :parameters () :precondition (= ?r r1) :effect (and (full) (done ?r)))
+  (:action stir :agent ?r - robot :parameters () :precondition (= ?r r2) :effect (done ?r))
+  (:action drain :agent ?r - robot :parameters () :precondition (= ?r r3)
+    :effect (and (done ?r) (when (and (fill r1) (stir r2)) (not (full))))))
+"""
+BASIN_TASK = """
+(define (problem basin-1) (:domain basin) (:objects) (:init)
+  (:goal (and (full) (done r1) (done r2) (done r3))))
+"""
+
 MODELS = {
     "tool": (TOOL, TOOL_TASK),
     "solo": (SOLO, SOLO_TASK),
@@ -184,6 +201,7 @@ MODELS = {
     "blink": (BLINK, BLINK_TASK),
     "lift": (LIFT, LIFT_TASK),
     "joint-action": (JOINT, JOINT_TASK),
+    "basin": (BASIN, BASIN_TASK),
 }
 
 

@@ -3,15 +3,16 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import pytest
-from hypothesis import event, given, reject, settings
+from hypothesis import event, example, given, reject, settings
 from hypothesis import strategies as st
 
 from planners.classical import compile_classical
-from planners.errors import BadInput
-from planners.joint.model import Cost
+from planners.errors import BadInput, ProvedImpossible
+from planners.joint.model import Cost, JointModel, PlanningTask
 from planners.loading import PlanningInstance
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
@@ -27,6 +28,7 @@ from tests.support.classical_models import (
 )
 from tests.support.naive_classical import optimal_plans
 from tests.support.random_pddl import KINDS, Kind, random_model
+from tests.support.random_threes import random_threes
 
 #: Two ground actions of joint-action PDDL with the same parts: where both are possible they are one
 #: joint action.
@@ -118,10 +120,31 @@ def test_every_plan_of_random_models_once(seed: int, kind: Kind, cost: Cost) -> 
         reject()
     last = space.model.full_state(space.rows[seed % len(space)])
     task = replace(loaded.tasks[0], init=random_state(loaded, seed), goal=last)
-    expected = Plans.of(search(loaded.model, task)).count
-    event(f"plans: {expected if expected < 3 else 'many'}")
-    assert optimal_plans(compile_classical(loaded.model, task, 100_000)).count() == expected
-    for way in WAYS:
-        with written(way):
-            plain = compile_classical(loaded.model, task, 0)
-        assert optimal_plans(plain).count() == expected, way
+    assert every_plan_once(loaded.model, task)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 100_000), cost=st.sampled_from(COSTS))
+@example(seed=82, cost="makespan").via("a third action makes one delete what another adds")
+@example(seed=331, cost="makespan+actions").via("the same, and no plan was left")
+def test_every_plan_once_where_a_third_robot_decides(seed: int, cost: Cost) -> None:
+    text = random_threes(seed)
+    loaded = read(text.domain, text.problem, cost)
+    every_plan_once(loaded.model, loaded.tasks[0])
+
+
+def every_plan_once(model: JointModel, task: PlanningTask) -> int:
+    """That all forms have the plans of a task, and as cheap ones; how many there are."""
+    expected: tuple[tuple[int, int] | None, int] = (None, 0)
+    with suppress(ProvedImpossible):
+        space = search(model, task)
+        expected = (space.cost_of(0), Plans.of(space).count)
+    event(f"plans: {expected[1] if expected[1] < 3 else 'many'}")
+    for limit, ways in ((100_000, WAYS[:1]), (0, WAYS)):
+        for way in ways:
+            with written(way):
+                plain = compile_classical(model, task, limit)
+            found = optimal_plans(plain)
+            cost = None if found.cost is None else plain.cost(found.cost)
+            assert (cost, found.count()) == expected, (way, limit)
+    return expected[1]

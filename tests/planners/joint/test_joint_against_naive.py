@@ -20,6 +20,7 @@ from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from tests.support.joint_twin import built, check_idling_adds_nothing, check_model, twin_of
 from tests.support.random_pddl import KINDS, Kind, RandomModel, random_model
+from tests.support.random_threes import random_threes
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -52,6 +53,12 @@ def test_same_joint_steps_and_optimal_plans(kind: Kind, number: int) -> None:
         check_model(random_model(seed, kind), event)
 
     compare()
+
+
+@pytest.mark.parametrize("number", [40, pytest.param(600, marks=pytest.mark.slow)])
+def test_same_joint_steps_where_a_third_robot_decides(number: int) -> None:
+    for seed in range(number):
+        check_model(random_threes(seed), lambda _: None)
 
 
 # -- by hand: rules that random models meet rarely
