@@ -3,8 +3,9 @@
 
 Two forms.  *Explicit*: one classical action per joint action.  *Select-then-apply*, of linear
 size: the robots select their subactions one after another, the selection is checked, and only then
-the effects happen, one robot after another.  Selections and checks see the state before the step,
-and only the first selection of a step pays for it.
+the effects happen, one robot after another; but what no other robot can see in that step happens as
+it is selected.  Selections and checks see the state before the step, and only the first selection
+of a step pays for it.
 
 In both forms the optimal plans stand one to one for the optimal joint plans (sequences of the
 robots' labels): cases and formulas are decided in one order, so that nothing can be done in two

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import fields, replace
 from itertools import product
 from random import Random
@@ -27,9 +27,11 @@ from planners.search.projections import Projections
 from planners.search.reachable import PIECES
 from planners.search.state_variables import state_variables
 from tests.support import blind_search
+from tests.support.classical_models import read
 from tests.support.domains import DOMAINS
 from tests.support.random_models import random_model
 from tests.support.random_pddl import random_model as random_pddl
+from tests.support.random_threes import random_threes
 
 #: Searches that ask the solver at once, with effort for all or some of its answers, and one that
 #: composes steps again on the way back.
@@ -79,9 +81,9 @@ def expected(model: JointModel, task: PlanningTask) -> PlanSpace | None:
         return None
 
 
-def compared(seeds: range, robots: int | None) -> Counter[str]:
+def compared(models: Iterable[PlanningInstance]) -> Counter[str]:
     met: Counter[str] = Counter()
-    for number, loaded in enumerate(instances(seeds, robots)):
+    for number, loaded in enumerate(models):
         task = loaded.tasks[0]
         try:
             twin = expected(loaded.model, task)
@@ -100,9 +102,17 @@ def compared(seeds: range, robots: int | None) -> Counter[str]:
 
 @pytest.mark.parametrize(("robots", "number"), [(2, 60), (3, 40), (None, 110)])
 def test_bounds_lose_no_optimal_plan(robots: int | None, number: int) -> None:
-    met = compared(range(number), robots)
+    met = compared(instances(range(number), robots))
     assert met["solved"] >= 10
     assert met["unsolvable"] >= 1
+
+
+def test_bounds_lose_no_optimal_plan_where_a_third_robot_decides() -> None:
+    texts = [random_threes(seed) for seed in range(60)]
+    met = compared(
+        read(text.domain, text.problem, COSTS[seed % 2]) for seed, text in enumerate(texts)
+    )
+    assert min(met["solved"], met["unsolvable"]) >= 10
 
 
 def test_states_that_are_not_asked_for_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -126,7 +136,7 @@ def test_states_that_are_not_asked_for_change_nothing(monkeypatch: pytest.Monkey
 @pytest.mark.slow
 @pytest.mark.parametrize("robots", [2, 3, 4, None])
 def test_bounds_lose_no_optimal_plan_of_many_models(robots: int | None) -> None:
-    met = compared(range(10_000, 10_800), robots)
+    met = compared(instances(range(10_000, 10_800), robots))
     print(robots or "any", "robots:", dict(met))
     assert min(met["solved"], met["unsolvable"]) >= 20
 
