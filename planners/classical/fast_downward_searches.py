@@ -24,7 +24,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import wait
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from planners.classical.task import ClassicalTask
 from planners.errors import CoordlangError, OutOfMemory, OutOfTime
@@ -79,7 +79,7 @@ def first_answer(
         Seconds of wall time for all of it; what to call the limit in an error.
     memory_limit
         Bytes of address space for each translator and each search.  None: those of this process,
-        or most of what the machine has free.
+        or its share of most of what the machine has free.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def first_answer(
         All searches broke down; the end of what one of them said is in the message.
     """
     if memory_limit is None and not has_memory_limit():
-        memory_limit = default_memory_limit()
+        memory_limit = default_memory_limit() // len(SEARCHES)
     with postponed_signals() as signals, _directory() as directory:
         try:
             (directory / "task.json").write_text(as_json(classical, memory_limit))
@@ -98,7 +98,7 @@ def first_answer(
         race = _Race(classical, directory, signals)
         try:
             return race.winner(math.inf if left is None else left)
-        except TimeoutError:
+        except _TimeIsOver:
             raise OutOfTime(
                 f"Fast Downward found no answer in {time_limit:g} s",
                 remedy="Use a larger --time-limit.",
@@ -131,6 +131,10 @@ def _directory() -> Iterator[Path]:
         yield Path(name)
 
 
+class _TimeIsOver(Exception):
+    """The searches ran for as long as they may."""
+
+
 class _Race:
     """The searches that run; `end` ends them all."""
 
@@ -141,7 +145,7 @@ class _Race:
         self._running: list[_Worker] = []
 
     def winner(self, seconds: float) -> list[int] | None:
-        """The first answer; the error of a search if none has one; TimeoutError after the limit."""
+        """The first answer, or the error of a search if none has one.  Raises `_TimeIsOver`."""
         begin = time.monotonic()
         coming = list(SEARCHES)
         failures: list[CoordlangError] = []
@@ -155,7 +159,7 @@ class _Race:
                     continue
             now = time.monotonic() - begin
             if now >= seconds:
-                raise TimeoutError
+                raise _TimeIsOver
             for worker in self._ended(min([seconds, *(after for _, after in coming)]) - now):
                 self._running.remove(worker)
                 try:
@@ -178,7 +182,7 @@ class _Race:
 
 
 class _Worker:
-    """A process group in which Fast Downward searches; its output ends when it does.
+    """A process group in which Fast Downward searches; ``pipe`` ends when it does.
 
     Parameters
     ----------
@@ -190,36 +194,24 @@ class _Worker:
 
     def __init__(self, folder: Path, search: str) -> None:
         self.folder = folder
-        home = str(Path(__file__).resolve().parents[2])
-        path = os.pathsep.join(p for p in (home, os.environ.get("PYTHONPATH")) if p)
         try:
             folder.mkdir()
             errors = (folder / "stderr").open("wb")
         except OSError as error:
             raise _unwritten(error) from None
-        with errors:
-            self._process = subprocess.Popen(
-                [
-                    sys.executable,
-                    "-P",  # by its path: the package around it loads numpy, which it does not need
-                    str(Path(__file__).with_name("fast_downward_worker.py")),
-                    "../task.json",
-                    "result.json",
-                    search,
-                ],
-                cwd=folder,
-                # What the worker's libraries put into a temporary directory goes away with this
-                # one.
-                env={**os.environ, **_ENVIRONMENT, "PYTHONPATH": path, "TMPDIR": str(folder)},
-                stdin=subprocess.PIPE,  # ends when we do; then the worker ends its group
-                stdout=subprocess.PIPE,  # nothing is written: it ends when the worker does
-                stderr=errors,
-                start_new_session=True,
-            )
-        assert self._process.stdin is not None, "a pipe that was asked for"
-        assert self._process.stdout is not None, "a pipe that was asked for"
-        self._pipes = self._process.stdin, self._process.stdout
-        self.pipe = self._process.stdout.fileno()
+        #: Ends when the worker does: nobody writes to it, whatever libraries print.
+        self.pipe, lifeline = os.pipe()
+        try:
+            with errors:
+                self._process = _started(folder, search, errors, lifeline)
+        except OSError as error:
+            os.close(self.pipe)
+            raise FastDownwardFailed(
+                f"a process for Fast Downward cannot be started: {error.strerror}",
+                remedy="End other programs, or allow more processes (`ulimit -u`).",
+            ) from None
+        finally:
+            os.close(lifeline)
 
     def end(self) -> int:
         """End its process group at once, wait for the worker, return its exit code."""
@@ -227,9 +219,36 @@ class _Worker:
             self._process.wait()
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(self._process.pid, signal.SIGKILL)
-        for pipe in self._pipes:
-            pipe.close()
+        assert self._process.stdin is not None, "a pipe that was asked for"
+        self._process.stdin.close()
+        os.close(self.pipe)
         return self._process.wait()
+
+
+def _started(
+    folder: Path, search: str, errors: IO[bytes], lifeline: int
+) -> subprocess.Popen[bytes]:
+    """The process of a worker, which alone has the writing end of a pipe."""
+    home = str(Path(__file__).resolve().parents[2])
+    path = os.pathsep.join(p for p in (home, os.environ.get("PYTHONPATH")) if p)
+    return subprocess.Popen(
+        [
+            sys.executable,
+            "-P",  # by its path: the package around it loads numpy, which it does not need
+            str(Path(__file__).with_name("fast_downward_worker.py")),
+            "../task.json",
+            "result.json",
+            search,
+        ],
+        cwd=folder,
+        # What the worker's libraries put into a temporary directory goes away with this one.
+        env={**os.environ, **_ENVIRONMENT, "PYTHONPATH": path, "TMPDIR": str(folder)},
+        stdin=subprocess.PIPE,  # ends when we do; then the worker ends its group
+        stdout=errors,
+        stderr=errors,
+        pass_fds=(lifeline,),
+        start_new_session=True,
+    )
 
 
 def answered(classical: ClassicalTask, folder: Path, code: int) -> list[int] | None:

@@ -25,6 +25,8 @@ from planners.limits import limit_memory
 #: unified-planning takes other codes for a proof too, 1 among them, with which the driver ends when
 #: Python cannot even start.
 _UNSOLVABLE = (10, 11)
+#: The code of the driver when its search was killed: by the system, which is out of memory.
+_KILLED = 256 - signal.SIGKILL
 
 
 class _FastDownward(subprocess.Popen[bytes]):
@@ -86,7 +88,8 @@ def solve(task: dict[str, Any], search: str) -> dict[str, Any]:
     elif answer.status == Status.UNSOLVABLE_PROVEN and code in _UNSOLVABLE:
         outcome = "unsolvable"
     else:
-        outcome = "memory" if answer.status == Status.MEMOUT else f"ended with exit code {code}"
+        out_of_memory = answer.status == Status.MEMOUT or code == _KILLED
+        outcome = "memory" if out_of_memory else f"ended with exit code {code}"
     plan = (
         [int(step.action.name[1:]) for step in answer.plan.actions] if outcome == "solved" else None
     )

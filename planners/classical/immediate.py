@@ -21,26 +21,26 @@ from planners.pddl.lifted import Atom
 class Immediate:
     """The actions that are applied as they are selected; ``number in immediate``.
 
-    An action is none of them if several robots own it, if something of it is checked or undone, or
-    if a formula that is checked names it.
+    An action is none of them if several robots own it, if something of it is checked or undone, if
+    a formula that is checked names it, or if an action beside it reads what it has written.
 
     Attributes
     ----------
     marks
-        The facts that rule actions out until the step is over, see `mark`.
+        The facts without which actions are ruled out until the step is over, see `mark`.
     """
 
     def __init__(self, team: Selectors, actions: Sequence[StagedAction]) -> None:
         self._team = team
-        checked, needed = _readers(actions)
+        late, needed = _readers(actions)
         self._numbers = {
             action.number
             for action in actions
             if len(team.owners[action.number]) == 1
             and not action.has("check")
             and not action.has("undo")
-            and action.selected not in checked
-            and not any(self._is_seen(action, atom, checked, needed) for atom in action.written)
+            and action.selected not in late
+            and not any(self._is_seen(action, atom, late, needed) for atom in action.written)
         }
         self._mark: dict[int, Atom] = {}
         classes: dict[tuple[int, frozenset[int]], Atom] = {}
@@ -50,7 +50,9 @@ class Immediate:
             )
             if action.number in self._numbers and later:
                 name = team.names[action.robot], str(len(classes))
-                mark = classes.setdefault((action.robot, later), own_fact("rules out", *name))
+                mark = classes.setdefault(
+                    (action.robot, later), own_fact("rules nothing out", *name)
+                )
                 self._mark[action.number] = mark
         self.marks = tuple(classes.values())
 
@@ -58,9 +60,9 @@ class Immediate:
         return number in self._numbers
 
     def mark(self, number: int) -> Atom | None:
-        """The fact that an immediate action was selected; None if it rules out no later one.
+        """The fact that ends when an immediate action is selected; None if it rules out none later.
 
-        Actions of a robot that rule out the same ones share it.
+        Actions of a robot that rule out the same ones share it.  It is true between two steps.
         """
         return self._mark.get(number)
 
@@ -68,14 +70,14 @@ class Immediate:
         self,
         action: StagedAction,
         atom: Atom,
-        checked: Mapping[Atom, Set[StagedAction]],
+        late: Mapping[Atom, Set[StagedAction]],
         needed: Mapping[Atom, Set[StagedAction]],
     ) -> bool:
         """Whether an action beside this one reads the atom after this one has written it."""
         beside = self._team.clashes[action.number]
         return any(
             other.robot != action.robot and other.number not in beside
-            for other in checked.get(atom, ())
+            for other in late.get(atom, ())
         ) or any(
             other.robot > action.robot and other.number not in beside
             for other in needed.get(atom, ())
@@ -86,15 +88,15 @@ def _readers(
     actions: Sequence[StagedAction],
 ) -> tuple[Mapping[Atom, Set[StagedAction]], Mapping[Atom, Set[StagedAction]]]:
     """For each atom the actions that read it after all have selected, or when they are selected."""
-    checked: dict[Atom, set[StagedAction]] = defaultdict(set)
+    late: dict[Atom, set[StagedAction]] = defaultdict(set)
     needed: dict[Atom, set[StagedAction]] = defaultdict(set)
     for action in actions:
         if action.literals is not None:
             for atom in _read_late(action):
-                checked[atom].add(action)
+                late[atom].add(action)
             for atom in action.literals:
                 needed[atom].add(action)
-    return checked, needed
+    return late, needed
 
 
 def _read_late(action: StagedAction) -> Iterator[Atom]:

@@ -29,11 +29,11 @@ from planners.pddl.formula_tree import GroundLeaf
 from planners.pddl.lifted import FALSE, TRUE, Atom, Formula, StepAtom
 
 _IDLE = "idle"
-#: Where all selected is applied, and what is left of the step is to be deleted.
+#: Where all selected is applied, and the facts about the step are to be restored.
 _TIDY = own_fact("time to end the step")
 #: What a stage leads from and to: facts that say which stage it is.
 _Phases = tuple[Atom, Atom]
-#: The deletes of all last selections of a step beyond which one more action makes them for all.
+#: The adds of all last selections of a step beyond which one more action makes them for all.
 _MANY = 20_000
 
 
@@ -86,7 +86,7 @@ class _Stages:
         self._phases = dict(zip(order, pairwise((*facts, self.first)), strict=True))
 
     def choosing(self, robot: int, *, work_left: bool) -> Atom:
-        """The fact that it is a robot's turn to choose; of robot ``n`` of ``n``, what follows."""
+        """The fact that it is a robot's turn to choose; beyond the last one, what follows."""
         if robot < len(self._names):
             kind = "time to choose, work left" if work_left else "time to choose"
             return own_fact(kind, self._names[robot])
@@ -139,9 +139,10 @@ class _SelectThenApply:
         self._stages = _Stages(team.names, late)
         #: The first robot that may select with work left: one before it has work to leave.
         self._first_late = min((a.robot for a in late), default=len(team.names)) + 1
-        self._cleared = set(self._immediate.marks)
-        self._cleared |= {
-            self._left(stage, robot)
+        #: What is true between two steps, false once something is selected, and restored.
+        self._restored = set(self._immediate.marks)
+        self._restored |= {
+            self._none_left(stage, robot)
             for robot in range(len(team.names))
             for stage in self._stages.after_choosing(robot)
         }
@@ -165,7 +166,7 @@ class _SelectThenApply:
         for stage in self._stages.after_choosing(robot):
             here, after = self._stages.of(stage, robot)
             name = f"nothing to {stage} {self._team.names[robot]}"
-            self._lead(name, {self._left(stage, robot): False}, here, after)
+            self._lead(name, {self._none_left(stage, robot): True}, here, after)
         for action in self._actions:
             late = action.literals is not None and action.number not in self._immediate
             if robot == action.robot and late:
@@ -174,7 +175,7 @@ class _SelectThenApply:
     def write_goal(self, formula: Formula) -> None:
         """The goal counts between two steps."""
         here = self._stages.first
-        self.out.init = {self.out.fact(here)}
+        self.out.init = {self.out.fact(atom) for atom in (here, *self._restored)}
         found = known_literals(formula)
         if found and not found[1]:
             self.out.goal = self.out.conditions({here: True, **found[0]})
@@ -193,14 +194,17 @@ class _SelectThenApply:
         late = action.number not in self._immediate
         if late:
             adds = {self._waits(robot, k) for k in team.owners[action.number] if k != robot}
-            adds |= {self._left(stage, robot) for stage in STAGES if action.has(stage)}
             adds.add(action.selected)
+            deletes = set[Atom]()
+            over = {self._none_left(stage, robot) for stage in STAGES if action.has(stage)}
         else:
+            adds, deletes = action.adds, action.deletes
             mark = self._immediate.mark(action.number)
-            adds = action.adds | ({mark} if mark else set())
-        deletes = set[Atom]() if late else action.deletes
+            over = {mark} if mark else set()
+        # What is over was true: to say so spares readers a conditional effect.
+        known |= dict.fromkeys(over, True)
         cost = team.seconds[action.number]
-        choice = _Choice(robot, action.label, robot, known, adds, deletes, cost, late)
+        choice = _Choice(robot, action.label, robot, known, adds, deletes | over, cost, late)
         self._choose(choice, work_left=work_left)
 
     def _not_ruled_out(self, action: StagedAction, *, work_left: bool) -> dict[Atom, bool]:
@@ -211,7 +215,7 @@ class _SelectThenApply:
             if earlier < action.robot:
                 mark = self._immediate.mark(other)
                 if mark is not None:
-                    found[mark] = False
+                    found[mark] = True
                 elif work_left:
                     found[selected(self._team, earlier, self._team.actions[other].label)] = False
         return found
@@ -244,8 +248,8 @@ class _SelectThenApply:
         owners = [own for own in self._team.owners if robot in own]
         return sorted({own[0] for own in owners if own[0] != robot})
 
-    def _left(self, stage: str, robot: int) -> Atom:
-        return own_fact(f"left to {stage}", self._team.names[robot])
+    def _none_left(self, stage: str, robot: int) -> Atom:
+        return own_fact(f"nothing left to {stage}", self._team.names[robot])
 
     # -- from one stage to the next
 
@@ -259,19 +263,19 @@ class _SelectThenApply:
         deletes: Set[Atom] = frozenset(),
         cost: int = 0,
     ) -> None:
-        """An action from one stage to the next; at the end of a step nothing is left of it."""
+        """An action from one stage to the next; at the end of a step all of it is forgotten."""
         if after == self._stages.first:
             if self._tidies:
                 after = _TIDY
             else:
-                false = {atom for atom, value in known.items() if not value}
-                deletes = deletes | (self._cleared - false)
+                deletes = deletes - self._restored
+                adds = adds | (self._restored - known.keys())
         self.out.action(name, {**known, here: True}, adds | {after}, deletes | {here}, cost)
 
     def _tidy(self) -> None:
-        """One action for the deletes of all that end a step."""
+        """One action for what all that end a step restore."""
         first = self._stages.first
-        self.out.action("end the step", {_TIDY: True}, {first}, self._cleared | {_TIDY})
+        self.out.action("end the step", {_TIDY: True}, {first} | self._restored, {_TIDY})
 
     # -- check, undo, apply
 

@@ -105,6 +105,7 @@ def test_the_models_are_not_trivial() -> None:
         "blink": (1, 2),
         "lift": (2, 2),
         "joint-action": (3, 3),
+        "basin": (1, 3),
     }
 
 

@@ -102,6 +102,19 @@ def test_what_is_applied_at_once_takes_fewer_states() -> None:
         assert states == sorted(set(states)), name
 
 
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("name", MODELS)
+def test_what_the_form_says_of_a_step_ends_only_where_it_is_known_true(name: str, way: str) -> None:
+    """Else planners without conditional effects could not read it: "if true, false"."""
+    loaded = read(*MODELS[name])
+    with written(way):
+        plain = compile_classical(loaded.model, loaded.tasks[0], 0)
+    own = set(range(len(loaded.model.codec.facts), len(plain.facts)))
+    for action in plain.actions:
+        true = {fact for fact, positive in action.preconditions if positive}
+        assert own & {*action.deletes} <= true, action.name
+
+
 def test_one_joint_action_in_two_guises() -> None:
     loaded = read(TWICE, TWICE_TASK, "makespan+cost")
     space = search(loaded.model, loaded.tasks[0])

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -13,7 +15,7 @@ from functools import cache
 from itertools import pairwise
 from multiprocessing.connection import wait
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import pytest
 
@@ -205,6 +207,64 @@ def test_the_searches_run_beside_each_other(
         optimal_cost(loaded.model, loaded.tasks[0], time_limit=60)
     assert processes(tmp_path) == set()
     assert [*tmp_path.iterdir()] == []
+
+
+def test_a_search_that_cannot_begin_does_not_end_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fast_downward_searches, "SEARCHES", AT_ONCE)
+    begin = fast_downward_searches._started
+    began: list[object] = []
+
+    def once(*arguments: Any) -> subprocess.Popen[bytes]:
+        if began:
+            raise BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")
+        began.append(arguments)
+        return begin(*arguments)
+
+    monkeypatch.setattr(fast_downward_searches, "_started", once)
+    loaded = workshop(GOAL)
+    expected = search(loaded.model, loaded.tasks[0]).cost_of(0)
+    assert optimal_cost(loaded.model, loaded.tasks[0]).cost == expected
+    with pytest.raises(FastDownwardFailed, match="cannot be started: Resource"):
+        optimal_cost(loaded.model, loaded.tasks[0])
+
+
+def test_what_a_library_prints_is_not_the_end_of_a_search(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else nobody would watch the time limit and signals until it ends."""
+    (tmp_path / "sitecustomize.py").write_text("print('hello', flush=True)\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    ended: list[int] = []
+
+    def end(worker: Any) -> int:
+        ended.append(worker.pipe)
+        return whole(worker)
+
+    whole = fast_downward_searches._Worker.end
+    monkeypatch.setattr(fast_downward_searches._Worker, "end", end)
+    loaded = big()
+    with pytest.raises(OutOfTime):
+        optimal_cost(loaded.model, loaded.tasks[0], time_limit=4)
+    assert len(ended) == 2  # both when the time was over
+
+
+def test_a_search_that_the_system_kills_had_too_little_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(fast_downward_searches, "SEARCHES", SEARCHES[:1])
+    loaded = big()
+
+    def killing(pipes: list[int], seconds: float | None) -> Sequence[object]:
+        for line in processes(tmp_path):
+            number, program, *_ = line.split()
+            if program.endswith("/downward"):
+                os.kill(int(number), signal.SIGKILL)
+        return wait(pipes, 0.05 if seconds is None else min(seconds, 0.05))
+
+    monkeypatch.setattr(fast_downward_searches, "wait", killing)
+    with pytest.raises(OutOfMemory):
+        optimal_cost(loaded.model, loaded.tasks[0], time_limit=60)
 
 
 def test_a_wrong_model_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
