@@ -72,6 +72,7 @@ def compile_classical(
         goal=out.goal,
         step_cost=step_cost,
         highest_cost=team.highest_cost,
+        between=out.between,
     )
 
 

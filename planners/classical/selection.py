@@ -175,7 +175,8 @@ class _SelectThenApply:
     def write_goal(self, formula: Formula) -> None:
         """The goal counts between two steps."""
         here = self._stages.first
-        self.out.init = {self.out.fact(atom) for atom in (here, *self._restored)}
+        self.out.between = self.out.fact(here)
+        self.out.init = {self.out.between, *map(self.out.fact, sorted(self._restored, key=str))}
         found = known_literals(formula)
         if found and not found[1]:
             self.out.goal = self.out.conditions({here: True, **found[0]})

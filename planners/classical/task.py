@@ -38,7 +38,8 @@ class ClassicalTask:
 
     ``facts`` are texts; facts of the model are its PDDL atoms.  A plan of total cost ``step_cost *
     m + s`` stands for a joint plan of makespan ``m`` and second cost ``s``; ``highest_cost`` is the
-    most that one joint step adds to ``s``.
+    most that one joint step adds to ``s``.  ``between`` is the fact that is true between two joint
+    steps and false within one; None where every action is a whole joint step.
     """
 
     name: str
@@ -49,6 +50,7 @@ class ClassicalTask:
     goal: tuple[Condition, ...]
     step_cost: int
     highest_cost: int
+    between: int | None = None
 
     def cost(self, total: int) -> tuple[int, int] | None:
         """An optimal total cost as (makespan, second cost).

@@ -18,6 +18,7 @@ class Writer:
         self.facts: dict[Atom, int] = {atom: n for n, atom in enumerate(facts)}
         self.actions: list[ClassicalAction] = []
         self.init: set[int] = set()
+        self.between: int | None = None
         self.goal: tuple[Condition, ...] = ()
         self._seen: set[ClassicalAction] = set()
         self._phases = 0

@@ -90,10 +90,9 @@ class _NamingFacts:
             if true:
                 self.init.add(self.number[atom])
         self.first_new = len(self.model.codec.facts)  # from here on, facts of the compilation
-        between = [number for number in plain.init if number >= self.first_new]
-        self.explicit = not between
+        self.explicit = plain.between is None
         #: Between two joint steps: select-then-apply has a fact for this already.
-        self.between = between[0] if between else self.add("(time to act)")
+        self.between = self.add("(time to act)") if plain.between is None else plain.between
         self.naming = self.add("(time to name)")
         self.named = {word: self.add(f"(named {self.names[word]})") for word in sorted(set(words))}
         self.said = [self.add(f"(said {n})") for n in range(1, len(words) + 1)]
