@@ -1,15 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/cli.md against click's own lists, links against files, the list of files against the
-packages.
-"""
+"""docs/cli.md against click's own lists, and links against files."""
 
 from __future__ import annotations
 
 import importlib
 import re
 import signal
-import subprocess
-import sys
 from functools import cache
 from pathlib import Path
 
@@ -151,13 +147,6 @@ def test_links_are_found() -> None:
 
 def test_index_links_every_page() -> None:
     assert {p.name for p in DOCS.glob("*.md")} - {"index.md"} <= set(links(DOCS / "index.md"))
-
-
-def test_file_list() -> None:
-    """The list of files in docs/extending.md is what the files say of themselves."""
-    program = [sys.executable, str(DOCS / "generate_extending.py"), "--check"]
-    done = subprocess.run(program, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
 
 
 def test_files_that_extending_names_exist() -> None:
