@@ -131,7 +131,7 @@ class PlanFormula:
         for fact, variable in now.items():
             self.clauses.append([variable if fact in true else -variable])
         for _ in range(steps):
-            now = self._step(now, model.keeps_idle)
+            now = self._step(now)
         for fact, value in goal:
             self.clauses.append([now[fact] if value else -now[fact]])
         if most is not None:
@@ -155,15 +155,13 @@ class PlanFormula:
         self.clauses += [[found, -variable] for variable in variables]
         return found
 
-    def _step(self, now: dict[Atom, int], keeps_idle: Sequence[bool]) -> dict[Atom, int]:
+    def _step(self, now: dict[Atom, int]) -> dict[Atom, int]:
         """The clauses of a joint step; the variables of the facts after it."""
         own = [[self._fresh() for _ in (None, *actions)] for actions in self._actions]
         self.chosen.append(own)
         touched: list[dict[str, dict[Atom, int]]] = []
         for robot, variables in enumerate(own):
             self._exactly_one(variables)
-            if not keeps_idle[robot]:
-                self.clauses.append([-variables[0]])
             footprint: dict[str, dict[Atom, list[int]]] = {
                 kind: {} for kind in ("adds", "deletes", "needs", "forbids")
             }
@@ -209,12 +207,9 @@ class PlanFormula:
             so_far = self._any([so_far, variable])
 
     def _count(self, least: int, most: int) -> None:
-        """The actions that are no idling and do something are so many: a sequential counter."""
+        """The actions that are no idling are so many: a sequential counter."""
         counted = [
-            self._any(busy)
-            for step in self.chosen
-            for own, variables in zip(self._actions, step, strict=True)
-            if (busy := [v for a, v in zip(own, variables[1:], strict=True) if not a.does_nothing])
+            self._any(variables[1:]) for step in self.chosen for variables in step if variables[1:]
         ]
         # at_least[k]: of those so far more than k are true.
         at_least: list[int] = []

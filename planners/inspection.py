@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planners.grounding import GroundAction
+from planners.grounding import GroundAction, idling_schemas
 from planners.joint.interference import footprint
 from planners.joint.model import JointModel, show
 from planners.loading import PlanningInstance
@@ -34,13 +34,13 @@ class Inspection:
     """Everything that a user needs to see whether the domain was read as it was meant.
 
     ``objects`` counts them by type, each in all its types; ``subactions[robot][schema]`` counts
-    ground subactions, and ``impossible`` are the schemas that have none; ``idle[robot]`` says how
-    the robot may do nothing; ``formulas`` shows for each schema of ``step_formulas`` what one of
-    its subactions asks of the others.  ``interfering`` counts pairs of subactions of different
-    robots that cannot share a step; the ``example`` is one that meets in a reachable state, None if
-    no state near the start has one.  ``start`` counts the fluents that are true at first, ``never``
-    are the predicates that no state can make true.  ``growth`` says how large a search would be
-    without bounds, ``outlook`` what it is bounded by.
+    ground subactions, and ``impossible`` are the schemas that have none; ``idle[robot]`` says when
+    the robot may idle, ``left_out`` are the schemas that are idling; ``formulas`` shows for each
+    schema of ``step_formulas`` what one of its subactions asks of the others.  ``interfering``
+    counts pairs of subactions of different robots that cannot share a step; the ``example`` is one
+    that meets in a reachable state, None if no state near the start has one.  ``start`` counts the
+    fluents that are true at first, ``never`` are the predicates that no state can make true.
+    ``growth`` says how large a search would be without bounds, ``outlook`` what it is bounded by.
     """
 
     domain: str
@@ -52,6 +52,7 @@ class Inspection:
     subactions: dict[str, dict[str, int]]
     impossible: tuple[str, ...]
     idle: dict[str, str]
+    left_out: tuple[str, ...]
     shared: dict[str, int]
     unowned: str
     step_formulas: dict[str, int]
@@ -79,6 +80,7 @@ def inspect(loaded: PlanningInstance) -> Inspection:
     model, domain = loaded.model, loaded.domain
     growth, layers = first_layers(model, loaded.tasks[0])
     start = model.codec.true_facts(loaded.tasks[0].init)
+    idling = idling_schemas(domain)
     acting = {action.schema for action in model.actions}
     return Inspection(
         domain=domain.name,
@@ -88,8 +90,9 @@ def inspect(loaded: PlanningInstance) -> Inspection:
         robots_by=loaded.team.by,
         objects=_objects(loaded),
         subactions=_subactions(model),
-        impossible=tuple(s.name for s in domain.schemas if s.name not in acting),
+        impossible=tuple(s.name for s in domain.schemas if s.name not in acting | idling),
         idle=_idle(model),
+        left_out=tuple(sorted(idling)),
         shared=_counted(a.schema for a in model.actions if len(a.owners) > 1 and not a.parts),
         unowned=loaded.options.robots.unowned,
         step_formulas=_counted(a.schema for a in model.actions if _speaks_of_others(a)),
@@ -138,13 +141,7 @@ def _subactions(model: JointModel) -> dict[str, dict[str, int]]:
 def _idle(model: JointModel) -> dict[str, str]:
     if model.is_joint_action:
         return dict.fromkeys(model.robots, "where a joint action says so")
-    nothing = sorted({a.schema for a in model.actions if a.does_nothing})
-    return {
-        robot: "may idle in every step"
-        if keeps
-        else f"does nothing by its own action ({', '.join(nothing)})"
-        for robot, keeps in zip(model.robots, model.keeps_idle, strict=True)
-    }
+    return dict.fromkeys(model.robots, "may idle in every step")
 
 
 def _speaks_of_others(action: GroundAction) -> bool:

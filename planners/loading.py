@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import get_args
 
 from planners.errors import BadInput, Position, UsageError
-from planners.grounding import FEWER, ground_actions, ground_goal
+from planners.grounding import FEWER, ground_actions, ground_goal, idling_costs
 from planners.grounding.networks import apply_network
 from planners.joint.assembly import SLACK_LEFT, assemble
 from planners.joint.model import Cost, JointModel, PlanningTask, show
@@ -42,8 +42,6 @@ class ModelOptions:
         What optimal means.
     remember_actions
         Whether a state also holds each robot's last subaction.
-    idle
-        The robots that may idle without an action of their own; None: found from the model.
     slack
         Joint steps that plans may take more than the least makespan.
     sees_slack
@@ -58,7 +56,6 @@ class ModelOptions:
     robots: RobotSelection = field(default_factory=RobotSelection)
     cost: Cost = "makespan"
     remember_actions: bool = False
-    idle: tuple[str, ...] | None = None
     slack: int = 0
     sees_slack: bool = False
 
@@ -113,8 +110,8 @@ def build(
 ) -> PlanningInstance:
     """The joint model of problems over the same objects and statics.
 
-    ``inits`` are the fluents of further initial states (of a task file): what can be true, and
-    whether idling is dropped, depends on where tasks start.
+    ``inits`` are the fluents of further initial states (of a task file): what can be true
+    depends on where tasks start.
     """
     options = options or ModelOptions()
     if options.remember_actions and "last" in domain.predicates:
@@ -135,7 +132,8 @@ def build(
     team = find_team(domain, first, options.robots)
     starts = [*(problem.init for problem in problems), *inits]
     extra = {atom for start in starts for atom in start}
-    actions = ground_actions(domain, first, team, also=extra, costs=options.cost == "makespan+cost")
+    with_costs = options.cost == "makespan+cost"
+    actions = ground_actions(domain, first, team, also=extra, costs=with_costs)
     with reaching(
         lambda: f"comparing {len(actions):,} ground actions of {len(team.robots)} robots", FEWER
     ):
@@ -149,7 +147,7 @@ def build(
             starts,
             cost=options.cost,
             remember_actions=options.remember_actions,
-            idle=options.idle,
+            idling_costs=idling_costs(domain, first, team, costs=with_costs),
             slack=options.slack,
             sees_slack=options.sees_slack,
         )

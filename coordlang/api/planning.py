@@ -129,6 +129,7 @@ class Inspected(Presented):
             *(("", f"e.g. {example}") for example in found.formulas),
             ("never possible", ", ".join(found.impossible) or "none"),
             ("no effects", ", ".join(found.without_effects) or "none"),
+            *([("left out", f"{', '.join(found.left_out)}: idling")] if found.left_out else []),
             ("action costs", found.costs),
             ("interference", counted(found.interfering, "pair") + self._example()),
             ("fluents", self._fluents()),

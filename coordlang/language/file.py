@@ -13,7 +13,13 @@ from msgspec import UNSET
 
 from coordlang.language.duplicate_keys import duplicate_key
 from coordlang.language.provenance import Guarantee, Provenance
-from coordlang.language.record import LANGUAGE, LanguageRecord, TasksRecord, ToleranceRecord
+from coordlang.language.record import (
+    LANGUAGE,
+    LanguageRecord,
+    ModelRecord,
+    TasksRecord,
+    ToleranceRecord,
+)
 from coordlang.language.tolerance import Tolerance
 from coordlang.language.words import Language
 from planners.errors import BadInput, Position
@@ -93,6 +99,7 @@ def language_from_bytes(data: bytes, position: Position) -> Language:
         raise BadInput(
             "the robots must be different, and at least one", position=position, remedy=_BUILD_AGAIN
         )
+    require_idling(record.model, robots, position, _BUILD_AGAIN)
     return Language(
         words=tuple(record.words),
         states=record.states,
@@ -101,9 +108,9 @@ def language_from_bytes(data: bytes, position: Position) -> Language:
         provenance=Provenance(
             robots=tuple(robots),
             guarantee=_guarantee(record, position),
-            domain={} if record.domain is UNSET else _present(record.domain),
-            model=_present(record.model),
-            tasks=_present(TasksRecord("problems", 0) if record.tasks is UNSET else record.tasks),
+            domain={} if record.domain is UNSET else present(record.domain),
+            model=present(record.model),
+            tasks=present(TasksRecord("problems", 0) if record.tasks is UNSET else record.tasks),
             producer=record.producer,
             lifted={} if record.lifted is UNSET else msgspec.to_builtins(record.lifted),
             tolerance=_tolerance(record, position),
@@ -111,9 +118,23 @@ def language_from_bytes(data: bytes, position: Position) -> Language:
     )
 
 
-def _present(record: msgspec.Struct) -> dict[str, Any]:
+def present(record: msgspec.Struct) -> dict[str, Any]:
     """The entries of a record that its file has."""
-    return {key: value for key, value in msgspec.to_builtins(record).items() if value is not None}
+    entries = msgspec.to_builtins(record)
+    return {key: value for key, value in entries.items() if value is not None and key != "idle"}
+
+
+def require_idling(
+    model: ModelRecord, robots: Sequence[str], position: Position, remedy: str
+) -> None:
+    """Raise `BadInput` for a file of an older version, with another rule of idling."""
+    if model.idle is not None and set(model.idle) != set(robots):
+        raise BadInput(
+            "this file is of an older version, in which some robot might not idle; its words are "
+            "of other plans",
+            position=position,
+            remedy=remedy,
+        )
 
 
 def _check_words(record: LanguageRecord, position: Position) -> None:

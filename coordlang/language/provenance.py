@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from hashlib import sha256
 from typing import Any
 
+from coordlang.language.keys import keys_of
 from coordlang.language.tolerance import Tolerance
 from coordlang.tasks.candidates import Candidates
 from coordlang.tasks.task_file import task_data
@@ -78,9 +79,10 @@ def provenance_of(
     """The provenance of a language built for candidate tasks."""
     loaded = candidates.loaded
     tasks: dict[str, Any] = {"kind": candidates.kind, "count": candidates.count}
-    if candidates.kind != "all":
+    if candidates.kind == "all":
+        tasks["states_sha256"] = states_sha256(candidates)
+    else:
         tasks["tasks"] = task_data(candidates.listed)
-    keeps_idle = zip(loaded.model.robots, loaded.model.keeps_idle, strict=True)
     return Provenance(
         robots=loaded.model.robots,
         guarantee=guarantee,
@@ -96,7 +98,6 @@ def provenance_of(
             "unowned": loaded.options.robots.unowned,
             "remember_actions": loaded.options.remember_actions,
             **({"words_see_slack": True} if loaded.options.sees_slack else {}),
-            "idle": [robot for robot, keeps in keeps_idle if keeps],
             "problem_sha256": loaded.problems[0].source.sha256,
             "world_sha256": world_sha256(loaded.domain, loaded.problems[0]),
         },
@@ -120,6 +121,12 @@ def domain_sha256(domain: Domain) -> str:
     if isinstance(domain.source, JoinedSource):
         return Source(domain.source.name, domain_text(domain)).sha256
     return domain.source.sha256
+
+
+def states_sha256(candidates: Candidates) -> str:
+    """A hash of the reachable states, by their keys: what all pairs are made of."""
+    keys = sorted(keys_of(candidates.model.codec, candidates.rows))
+    return sha256("\n".join(keys).encode()).hexdigest()
 
 
 def world_sha256(domain: Domain, problem: Problem) -> str:

@@ -60,8 +60,8 @@ class ModelRecord(msgspec.Struct):
     idle: Annotated[
         list[str] | None,
         Meta(
-            description="The robots that may idle without an action of their own; without it: "
-            "found from the model."
+            description="Of older versions: the robots that may idle. Every robot may; a file that "
+            "says otherwise is refused."
         ),
     ] = None
     problem_sha256: Annotated[
@@ -83,6 +83,13 @@ class TasksRecord(msgspec.Struct):
         Kind, Meta(description="All pairs of states, those of problems, or those of a task file.")
     ]
     count: Annotated[int, Meta(description="How many they are.", ge=0)]
+    states_sha256: Annotated[
+        str | None,
+        Meta(
+            description="For 'all', the SHA-256 of the keys of all reachable states, sorted, each "
+            "on a line; without it only their number is compared."
+        ),
+    ] = None
     tasks: Annotated[list[ListedTask] | None, Meta(description="The tasks; not for 'all'.")] = None
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from coordlang.language.keys import read_keys
-from coordlang.language.provenance import domain_sha256, world_sha256
+from coordlang.language.provenance import domain_sha256, states_sha256, world_sha256
 from coordlang.language.words import Language
 from coordlang.tasks.candidates import (
     Candidates,
@@ -66,12 +66,10 @@ def options_of(
             f"--robots contradicts the language file: its robots are {', '.join(own)}",
             remedy="Leave out --robots.",
         )
-    idle = model.get("idle")
     return ModelOptions(
         RobotSelection(own, None, recorded["--unowned"], recorded=bool(language.provenance.robots)),
         recorded["--cost"],
         recorded["--remember-actions"],
-        tuple(idle) if idle is not None else None,
         recorded["--slack"],
         recorded["--words-see-slack"],
     )
@@ -161,6 +159,7 @@ def recorded_candidates(
                     remedy="Give the problems that the language was built for, or say --tasks all "
                     "to check these.",
                 )
+            _require_same_states(language, candidates)
             return candidates
         listed = recorded_list(language)
         if not listed or len(listed) != language.provenance.tasks["count"]:
@@ -175,6 +174,18 @@ def recorded_candidates(
         if error.position is not None:
             raise
         raise BadInput(error.what, position=position, remedy=error.remedy) from None
+
+
+def _require_same_states(language: Language, candidates: Candidates) -> None:
+    """Raise `BadInput` where other states are reachable than those of a language for all pairs."""
+    recorded = language.provenance.tasks.get("states_sha256")
+    if recorded not in (None, states_sha256(candidates)):
+        raise BadInput(
+            "the language serves all pairs of other states: as many are reachable here, but not "
+            "the same ones",
+            remedy="Give the problems that the language was built for, or say --tasks all to check "
+            "these.",
+        )
 
 
 def with_recorded(

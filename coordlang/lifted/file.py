@@ -13,6 +13,7 @@ import msgspec
 from msgspec import Meta
 
 from coordlang.language.duplicate_keys import duplicate_key
+from coordlang.language.file import present, require_idling
 from coordlang.language.record import DomainRecord, ModelRecord
 from coordlang.lifted.language import LiftedLanguage, Vector, Verified
 from coordlang.lifted.notation import LARGEST, feature_of
@@ -132,6 +133,7 @@ def lifted_from_bytes(data: bytes, position: Position) -> LiftedLanguage:
         )
     _check_names(record, position)
     _check_words(record, position)
+    require_idling(record.model, record.robots, position, _LIFT_AGAIN)
     features = tuple(feature_of(own.definition, position) for own in record.features)
     values = read_values(record.values, len(features), position)
     return LiftedLanguage(
@@ -139,8 +141,8 @@ def lifted_from_bytes(data: bytes, position: Position) -> LiftedLanguage:
         tuple(record.words),
         values,
         tuple(record.robots),
-        _present(record.domain),
-        _present(record.model),
+        present(record.domain),
+        present(record.model),
         record.names_robots,
         tuple(Verified(**msgspec.to_builtins(known)) for known in record.verified),
         record.producer,
@@ -211,7 +213,3 @@ def _vector(key: str, size: int, position: Position) -> Vector:
             remedy=_LIFT_AGAIN,
         )
     return vector
-
-
-def _present(record: msgspec.Struct) -> dict[str, Any]:
-    return {key: value for key, value in msgspec.to_builtins(record).items() if value is not None}

@@ -49,11 +49,11 @@ class SymmetryCheck:
         return states
 
     def _keeps_robots(self, renaming: Renaming) -> bool:
-        """Whether robots go to robots that idle alike; joint actions name theirs, which stay."""
+        """Whether robots go to robots whose idling costs as much; joint actions name them."""
         robots = self._model.robots
         if self._model.is_joint_action:
             return all(renaming.get(robot, robot) == robot for robot in robots)
-        idle = dict(zip(robots, self._model.keeps_idle, strict=True))
+        idle = dict(zip(robots, self._model.idling_costs, strict=True))
         return {renaming.get(robot, robot): idle[robot] for robot in robots} == idle
 
     def _states_under(self, images: Sequence[int]) -> Ints | None:

@@ -114,7 +114,8 @@ class _ModelGraph:
         robot: Hashable = None
         if name in model.robots:
             # Joint actions name their robots in the text of the domain.
-            robot = name if model.is_joint_action else model.keeps_idle[model.robots.index(name)]
+            number = model.robots.index(name)
+            robot = name if model.is_joint_action else model.idling_costs[number]
         constant = name if name in domain.constants else ""
         return ("object", constant, tuple(sorted(types)), robot)
 

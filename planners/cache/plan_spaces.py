@@ -42,7 +42,7 @@ def model_digest(model: JointModel) -> str:
         found.hexdigest(),
         model.robots,
         model.labels,
-        tuple(map(int, model.keeps_idle)),
+        model.idling_costs,
         model.codec.facts.texts,
         model.codec.memory,
         model.cost,
@@ -193,7 +193,7 @@ class _Texts:
         """All that a search reads of an action."""
         effects = [(e.adds, self._part(e.atom), self._of(e.condition)) for e in action.effects]
         links = sorted(label(link.action, link.args) for link in action.links)
-        rest = (action.owners, action.parts, action.cost, action.does_nothing, links, effects)
+        rest = (action.owners, action.parts, action.cost, links, effects)
         return f"{action.label} {self._of(action.precondition)} {rest}"
 
     def _of(self, formula: Formula) -> str:

@@ -23,7 +23,20 @@ from planners.check.meaning import (
     text_of,
 )
 from planners.errors import BadInput
-from planners.pddl.lifted import Atom, Constraint, Domain, Problem, Schema, StepAtom
+from planners.pddl.lifted import (
+    And,
+    Atom,
+    Constraint,
+    Domain,
+    Exists,
+    Forall,
+    Formula,
+    Not,
+    Or,
+    Problem,
+    Schema,
+    StepAtom,
+)
 from planners.pddl.robots import Team
 
 #: One entry per robot: the text of its subaction, or None for idling.
@@ -64,7 +77,6 @@ class Rules:
     domain: Domain
     problem: Problem
     team: Team
-    allow_idle: tuple[bool, ...]
     meaning: Meaning
     schemas: dict[str, Schema]
     is_joint_action: bool
@@ -72,17 +84,13 @@ class Rules:
     _touched: dict[tuple[StepAtom, StepAtom | None], Touched] = field(default_factory=dict)
 
     @classmethod
-    def of(
-        cls, domain: Domain, problem: Problem, team: Team, allow_idle: Sequence[bool] | None = None
-    ) -> Rules:
-        """The rules of a problem's joint steps; ``allow_idle`` says which robots may idle."""
-        idle = tuple(allow_idle) if allow_idle is not None else (True,) * len(team.robots)
+    def of(cls, domain: Domain, problem: Problem, team: Team) -> Rules:
+        """The rules of a problem's joint steps."""
         schemas = {schema.name: schema for schema in domain.schemas}
         return cls(
             domain,
             problem,
             team,
-            idle,
             Meaning(domain, problem, team),
             schemas,
             domain.is_joint_action,
@@ -144,12 +152,23 @@ class Rules:
         schema = self.schemas.get(name)
         if schema is None:
             return f"{label} is no action of the domain"
+        if not (schema.effects or schema.parts or self._is_named(name)):
+            return f"{label} has no effects, and nothing names {name}: it is idling, and left out"
         if len(args) != len(schema.parameters):
             return f"{label} has {len(args)} arguments, {name} takes {len(schema.parameters)}"
         for parameter, arg in zip(schema.parameters, args, strict=True):
             if arg not in self.meaning.objects(parameter.types):
                 return f"in {label}, {arg} is no object of type {' or '.join(parameter.types)}"
         return self.bind(schema, tuple(args))
+
+    def _is_named(self, name: str) -> bool:
+        """Whether an action formula or a concurrency network speaks of an action."""
+        domain = self.domain
+        formulas = [
+            f for s in domain.schemas for f in (s.precondition, *(e.condition for e in s.effects))
+        ]
+        listed = [action for constraint in domain.constraints for action, _ in constraint.actions]
+        return name in listed or any(name in _actions_in(formula) for formula in formulas)
 
     def bind(self, schema: Schema, args: tuple[str, ...]) -> Instance:
         """A schema with (type-correct) arguments."""
@@ -160,14 +179,11 @@ class Rules:
     def _wrong_choice(self, chosen: Sequence[Instance | None]) -> str | None:
         """Labels that no step may have.
 
-        Idling where it is not allowed, another robot's action, a shared action that not all its
-        owners chose.
+        Another robot's action, a shared action that not all its owners chose.
         """
         robots = self.team.robots
         for robot, action in enumerate(chosen):
             if action is None:
-                if not self.allow_idle[robot]:
-                    return f"{robots[robot]} has to choose an action of its own"
                 continue
             if robot not in action.owners:
                 whose = " and ".join(robots[i] for i in action.owners) or "no robot"
@@ -364,6 +380,18 @@ class Rules:
                 if wanted != name:
                     return None
         return binding
+
+
+def _actions_in(formula: Formula) -> set[str]:
+    """The actions that a formula speaks of."""
+    match formula:
+        case StepAtom(action):
+            return {action}
+        case Not(part) | Forall(_, part) | Exists(_, part):
+            return _actions_in(part)
+        case And(parts) | Or(parts):
+            return set().union(*map(_actions_in, parts))
+    return set()
 
 
 def _first(atoms: Iterable[Atom | StepAtom]) -> str:

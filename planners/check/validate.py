@@ -40,7 +40,6 @@ def validate(
     *,
     init: Iterable[Atom] | None = None,
     goal: Formula | None = None,
-    allow_idle: Sequence[bool] | None = None,
 ) -> Verdict:
     """Check that every step is legal where it is taken and that the goal holds at the end.
 
@@ -53,14 +52,11 @@ def validate(
     init, goal
         Another task than the problem's own: its true fluents (statics come from the problem) and
         its goal.
-    allow_idle
-        For each robot whether it may idle without an action of its own (`JointModel.keeps_idle`);
-        None: all may.
 
     Raises `BadInput` where two applicable joint actions with the same subactions have different
     results.
     """
-    rules = Rules.of(domain, problem, team, allow_idle)
+    rules = Rules.of(domain, problem, team)
     state = rules.meaning.fluents_of(problem.init if init is None else init)
     for number, labels in enumerate(plan):
         reason = rules.broken_rule(state, labels)

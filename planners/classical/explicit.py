@@ -32,7 +32,7 @@ def explicit(team: Selectors, model: JointModel, goal: Goal, step_cost: int, lim
     out = Writer(fact_atoms(model))
     for step in _joint_steps(team, limit):
         for known, adds, deletes in _cases_of(team, model, step):
-            cost = step_cost + sum(team.seconds[n] for n in step)
+            cost = step_cost + team.second_cost(step)
             out.action(_name(team, step), known, adds, deletes, cost)
             if len(out.actions) > limit:
                 raise TooManyError
@@ -55,12 +55,12 @@ def _joint_steps(team: Selectors, limit: int) -> list[tuple[int, ...]]:
     `TooManyError` beyond a limit.
     """
     partial: list[tuple[int, ...]] = [()]
-    for robot, idle in enumerate(team.may_idle):
+    for robot, idling in enumerate(team.idling):
         first = [n for n, owners in enumerate(team.owners) if owners[0] == robot]
         grown: list[tuple[int, ...]] = []
         for step in partial:
             bound = any(robot in team.owners[n] for n in step)
-            if bound or idle:
+            if bound or idling is not None:
                 grown.append(step)
             if not bound:
                 grown += [(*step, n) for n in first if _may_join(team, n, step)]

@@ -154,8 +154,8 @@ class _SelectThenApply:
     def write_robot(self, robot: int) -> None:
         """Everything that one robot does in a step."""
         for work_left in (False, True) if robot >= self._first_late else (False,):
-            if self._team.may_idle[robot]:
-                self._choose(_Choice(robot, _IDLE, robot), work_left=work_left)
+            if (idling := self._team.idling[robot]) is not None:
+                self._choose(_Choice(robot, _IDLE, robot, cost=idling), work_left=work_left)
             for action in self._actions:
                 if action.literals is None:
                     continue

@@ -22,8 +22,8 @@ class Selectors:
     ----------
     names
         The names of the robots, or of the team.
-    may_idle
-        Which of them may idle.
+    idling
+        The second cost of idling for each of them; None for a team that always acts.
     actions
         The ground actions.
     owners
@@ -38,17 +38,23 @@ class Selectors:
     """
 
     names: tuple[str, ...]
-    may_idle: tuple[bool, ...]
+    idling: tuple[int | None, ...]
     actions: tuple[GroundAction, ...]
     owners: tuple[tuple[int, ...], ...]
     seconds: tuple[int, ...]
     clashes: tuple[frozenset[int], ...]
     covered_by: tuple[tuple[int, ...], ...]
 
+    def second_cost(self, step: Sequence[int]) -> int:
+        """The second cost of a joint step: of its actions, and of those who idle in it."""
+        busy = {owner for number in step for owner in self.owners[number]}
+        idle = sum(cost or 0 for own, cost in enumerate(self.idling) if own not in busy)
+        return idle + sum(self.seconds[number] for number in step)
+
     @property
     def highest_cost(self) -> int:
         """The most that one joint step can add to the second cost."""
-        most = [0] * len(self.names)
+        most = [cost or 0 for cost in self.idling]
         for owners, second in zip(self.owners, self.seconds, strict=True):
             most[owners[0]] = max(most[owners[0]], second)
         return sum(most)
@@ -62,7 +68,7 @@ def selectors_of(model: JointModel) -> Selectors:
         nothing = (frozenset[int](),) * len(actions)
         return Selectors(
             ("team",),
-            (False,),
+            (None,),
             actions,
             ((0,),) * len(actions),
             seconds,
@@ -72,7 +78,7 @@ def selectors_of(model: JointModel) -> Selectors:
     owners = tuple(action.owners for action in actions)
     return Selectors(
         model.robots,
-        model.keeps_idle,
+        model.idling_costs,
         actions,
         owners,
         seconds,
@@ -99,11 +105,7 @@ def second_cost(model: JointModel, action: GroundAction) -> int:
         return action.cost
     if model.cost == "makespan":
         return 0
-    return (
-        sum(part is not None for part in action.parts)
-        if model.is_joint_action
-        else int(not action.does_nothing)
-    )
+    return sum(part is not None for part in action.parts) if model.is_joint_action else 1
 
 
 #: A fact and the value that is written or read.

@@ -9,6 +9,16 @@ from planners.grounding.instantiate import (
     FEWER,
     ground_actions,
     ground_goal,
+    idling_costs,
+    idling_schemas,
 )
 
-__all__ = ["FEWER", "GroundAction", "GroundEffect", "ground_actions", "ground_goal"]
+__all__ = [
+    "FEWER",
+    "GroundAction",
+    "GroundEffect",
+    "ground_actions",
+    "ground_goal",
+    "idling_costs",
+    "idling_schemas",
+]

@@ -24,8 +24,7 @@ class GroundAction:
 
     ``owners`` are the indices of the robots that choose it together; for joint-action PDDL they are
     all robots and ``parts`` holds each robot's own label (None: idle).  ``cost`` is the PDDL action
-    cost.  ``does_nothing`` says that the action is as good as idling: its schema has no
-    effect as written, no cost that is counted, and no formula or network names it.  ``links`` are
+    cost.  ``links`` are
     the actions that a concurrency network joins it with: they are meant to be done together.
     """
 
@@ -36,7 +35,6 @@ class GroundAction:
     effects: tuple[GroundEffect, ...]
     parts: tuple[str | None, ...] = ()
     cost: int = 1
-    does_nothing: bool = False
     links: frozenset[StepAtom] = frozenset()
 
     @property

@@ -7,6 +7,8 @@ Static atoms, equalities and types are evaluated.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import product
 
 from planners.errors import BadInput, Unsupported
 from planners.grounding.actions import GroundAction, GroundEffect
@@ -44,7 +46,7 @@ FEWER = "fewer objects, or actions with fewer parameters"
 def ground_actions(
     domain: Domain, problem: Problem, team: Team, *, also: Iterable[Atom] = (), costs: bool = False
 ) -> tuple[GroundAction, ...]:
-    """All ground actions that may ever be applied.
+    """All ground actions that may ever be applied; those that are idling are left out.
 
     Sorted by schema (in domain order) and arguments.
 
@@ -60,6 +62,8 @@ def ground_actions(
     BadInput
         An action that no robot owns (``--unowned error``), or a missing cost value.
     """
+    idling = idling_schemas(domain)
+    domain = replace(domain, schemas=tuple(s for s in domain.schemas if s.name not in idling))
     world = f"{len(domain.schemas):,} action schemas over {len(problem.objects):,} objects"
     with reaching(lambda: f"looking for the applicable instances of {world}", FEWER):
         reachable = reachable_arguments(
@@ -82,6 +86,36 @@ def ground_actions(
     return tuple(actions)
 
 
+def idling_schemas(domain: Domain) -> frozenset[str]:
+    """The action schemas that are idling: without effects as written, and named nowhere.
+
+    A robot may always idle; with such an action besides every plan would be there twice.  One that
+    a formula or a network names is none: another action may depend on it.  A joint action says
+    itself who idles.
+    """
+    if domain.is_joint_action:
+        return frozenset()
+    named = {atom.action for schema in domain.schemas for atom in _step_atoms(schema)}
+    named |= {name for constraint in domain.constraints for name, _ in constraint.actions}
+    return frozenset(s.name for s in domain.schemas if not s.effects) - named
+
+
+def idling_costs(domain: Domain, problem: Problem, team: Team, *, costs: bool) -> tuple[int, ...]:
+    """What idling costs each robot: what its cheapest action that is idling costs, else 0.
+
+    Of all arguments of the right types, whatever the precondition: idling is always possible.
+    Without ``costs`` nothing.
+    """
+    idling = idling_schemas(domain) if costs else frozenset()
+    grounder = _Grounder(domain, problem, team, {})
+    found: list[list[int]] = [[] for _ in team.robots]
+    for schema in domain.schemas:
+        if schema.name in idling:
+            for owner, cost in grounder.costs_alone(schema):
+                found[owner].append(cost)
+    return tuple(min(own, default=0) for own in found)
+
+
 def ground_goal(domain: Domain, problem: Problem, goal: Formula) -> Formula:
     """A goal formula over fluent atoms, in negation normal form."""
     return _Grounder(domain, problem, Team((), ""), {}).formula(goal, {}, True)
@@ -101,8 +135,6 @@ class _Grounder:
         self._fluents = fluent_predicates(domain)
         self._statics = static_atoms(domain, problem)
         self._schemas = {schema.name: schema for schema in domain.schemas}
-        self._named = {atom.action for schema in domain.schemas for atom in _step_atoms(schema)}
-        self._named |= {name for constraint in domain.constraints for name, _ in constraint.actions}
         self._bindings = Bindings(domain, problem, self._fluents, self._statics, reachable)
         self._interned = Interned()
         #: The owners of a subaction that a formula names; None for arguments of other types.
@@ -127,7 +159,6 @@ class _Grounder:
                 "or --unowned shared (all robots choose them together).",
             )
         effects = tuple(e for effect in schema.effects for e in self._effect(effect, binding))
-        cost = self._cost(schema, binding) if costs else 1
         return GroundAction(
             schema=schema.name,
             args=args,
@@ -135,10 +166,7 @@ class _Grounder:
             precondition=precondition,
             effects=effects,
             parts=self._parts(schema, binding),
-            cost=cost,
-            does_nothing=not schema.effects
-            and schema.name not in self._named
-            and not (costs and cost),
+            cost=self._cost(schema, binding) if costs else 1,
         )
 
     def formula(
@@ -235,6 +263,20 @@ class _Grounder:
             label(t[0], (binding.get(a, a) for a in t[1:])) if (t := templates.get(robot)) else None
             for robot in self._team.robots
         )
+
+    def costs_alone(self, schema: Schema) -> Iterator[tuple[int, int]]:
+        """The robot and the cost of each instance with one owner, as far as its cost is given."""
+        objects = [self._bindings.objects(p.types) for p in schema.parameters]
+        for args in product(*objects):
+            binding = {p.name: a for p, a in zip(schema.parameters, args, strict=True)}
+            owners = self._team.owners(schema, args)
+            if len(owners) != 1:
+                continue
+            if isinstance(schema.cost, Atom):
+                atom = self._atom(schema.cost.predicate, schema.cost.args, binding)
+                if atom not in self._problem.values:
+                    continue
+            yield owners[0], self._cost(schema, binding)
 
     def _cost(self, schema: Schema, binding: Binding) -> int:
         if schema.cost is None or isinstance(schema.cost, int):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ground actions of a team -> the joint model: its facts, labels, rules of idling, and stepper."""
+"""Ground actions of a team -> the joint model: its facts, labels and stepper."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from planners.grounding import GroundAction
 from planners.joint.composition import ComposingStepper
 from planners.joint.conditions import Evaluator
 from planners.joint.facts import FactTable
-from planners.joint.idling import always_has_nothing_to_do
 from planners.joint.joint_actions import JointActionStepper
 from planners.joint.model import IDLE, Cost, JointModel, Stepper
 from planners.joint.states import StateCodec
@@ -32,7 +31,7 @@ def assemble(
     *,
     cost: Cost,
     remember_actions: bool,
-    idle: tuple[str, ...] | None,
+    idling_costs: Sequence[int],
     slack: int = 0,
     sees_slack: bool = False,
 ) -> JointModel:
@@ -44,8 +43,8 @@ def assemble(
         Where the static atoms are from.
     starts
         The true atoms of all initial states: what can ever be true depends on them.
-    idle
-        The robots that may idle without an action of their own; None: found from the model.
+    idling_costs
+        For each robot what idling adds to the second cost.
     slack
         Joint steps that plans may take more than the least makespan.
     sees_slack
@@ -57,24 +56,23 @@ def assemble(
     left = [Atom(SLACK_LEFT, (str(k),)) for k in range(slack + 1)] if sees_slack else []
     facts = FactTable.of({*_facts(domain, actions, starts), *left})
     codec = StateCodec(facts, robots, labels if remember_actions else None)
-    keeps_idle = _keeps_idle(domain, robots, subactions, actions, starts, idle)
     evaluator = Evaluator(codec.facts, {} if domain.is_joint_action else _step_atoms(subactions))
     stepper: Stepper
     if domain.is_joint_action:
         positions = {s.name: domain.source.position(s.offset) for s in domain.schemas}
         stepper = JointActionStepper(codec, evaluator, robots, labels, actions, cost, positions)
     else:
-        stepper = ComposingStepper(codec, evaluator, robots, subactions, keeps_idle, cost)
+        stepper = ComposingStepper(codec, evaluator, robots, subactions, cost, idling_costs)
     return JointModel(
         name=domain.name,
         robots=robots,
         labels=labels,
         actions=actions,
-        keeps_idle=keeps_idle,
         codec=codec,
         stepper=stepper,
         evaluator=evaluator,
         cost=cost,
+        idling_costs=tuple(idling_costs),
         statics=static_atoms(domain, problem),
         is_joint_action=domain.is_joint_action,
         slack=slack,
@@ -112,21 +110,3 @@ def _step_atoms(subactions: Sequence[Sequence[GroundAction]]) -> dict[StepAtom, 
         for robot, own in reversed([*enumerate(subactions)])
         for number, action in enumerate(own)
     }
-
-
-def _keeps_idle(
-    domain: Domain,
-    robots: Sequence[str],
-    subactions: Sequence[Sequence[GroundAction]],
-    actions: Sequence[GroundAction],
-    starts: Sequence[frozenset[Atom]],
-    idle: tuple[str, ...] | None,
-) -> tuple[bool, ...]:
-    if idle is not None:
-        return tuple(robot in idle for robot in robots)
-    if domain.is_joint_action:
-        return (True,) * len(robots)
-    return tuple(
-        not always_has_nothing_to_do(robot, own, actions, starts)
-        for robot, own in enumerate(subactions)
-    )

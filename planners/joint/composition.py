@@ -34,8 +34,8 @@ class ComposingStepper:
     ----------
     subactions
         For each robot its ground actions, shared ones in the lists of all their owners.
-    keeps_idle
-        For each robot whether it may do nothing at all.
+    idling_costs
+        For each robot what idling adds to the second cost.
 
     Attributes
     ----------
@@ -56,11 +56,10 @@ class ComposingStepper:
         evaluator: Evaluator,
         robots: Sequence[str],
         subactions: Sequence[Sequence[GroundAction]],
-        keeps_idle: Sequence[bool],
         cost: Cost,
+        idling_costs: Sequence[int],
     ) -> None:
         self._codec, self._evaluator, self._robots = codec, evaluator, tuple(robots)
-        self._keeps_idle = tuple(keeps_idle)
         self.labelled: list[list[GroundAction | None]] = [[None, *own] for own in subactions]
         known = [Choices(own) for own in self.labelled]
         self.tables = {
@@ -71,7 +70,7 @@ class ComposingStepper:
         #: Pairs of robots some of whose labels may not meet.
         self._apart = {pair for pair, table in self.tables.items() if not table.all()}
         self._robot = [
-            _Subactions(own, codec, evaluator, number, cost)
+            _Subactions(own, codec, evaluator, number, cost, idling_costs[number])
             for number, own in enumerate(subactions)
         ]
 
@@ -128,7 +127,7 @@ class ComposingStepper:
 
         (first index, labels), CSR.
         """
-        return [self._options(robot, number, rows) for number, robot in enumerate(self._robot)]
+        return [self._options(robot, rows) for robot in self._robot]
 
     def most_steps(self, rows: Rows) -> int:
         """An upper bound on the joint steps out of these states: products of the own choices."""
@@ -142,7 +141,7 @@ class ComposingStepper:
         chosen = [self.labelled[i][label] for i, label in enumerate(labels)]
         return (
             self._unmet_in_state(row, chosen)
-            or self._unshared(labels, chosen)
+            or self._unshared(chosen)
             or self._interfering(labels, chosen)
             or self._unmet_in_step(row, labels, chosen)
             or "this is a joint step"
@@ -157,13 +156,10 @@ class ComposingStepper:
                     return f"{robot} cannot {action.label} here: it needs {_text(part)}"
         return None
 
-    def _unshared(self, labels: Sequence[int], chosen: Sequence[GroundAction | None]) -> str | None:
-        for robot, (label, action) in enumerate(zip(labels, chosen, strict=True)):
-            if label == 0 and not self._keeps_idle[robot]:
-                return f"{self._robots[robot]} has to choose an action of its own"
-            for owner in action.owners if action else ():
+    def _unshared(self, chosen: Sequence[GroundAction | None]) -> str | None:
+        for action in filter(None, chosen):
+            for owner in action.owners:
                 if chosen[owner] != action:
-                    assert action is not None
                     return f"{action.label} needs {self._robots[owner]} to choose it too"
         return None
 
@@ -222,15 +218,13 @@ class ComposingStepper:
             for a, b in np.argwhere(~self.tables[i, j][np.ix_(mine, theirs)]).tolist():
                 yield i, j, int(mine[a]), int(theirs[b])
 
-    def _options(self, robot: _Subactions, number: int, rows: Rows) -> tuple[Ints, Ints]:
-        """CSR of each state's labels for one robot: (first index, labels)."""
+    def _options(self, robot: _Subactions, rows: Rows) -> tuple[Ints, Ints]:
+        """CSR of each state's labels for one robot, idling first: (first index, labels)."""
         row, operator = robot.applicable(rows)
-        label = operator + 1
-        if self._keeps_idle[number]:
-            row = np.concatenate((np.arange(len(rows)), row))
-            label = np.concatenate((np.zeros(len(rows), np.int64), label))
-            order = np.lexsort((label, row))
-            row, label = row[order], label[order]
+        row = np.concatenate((np.arange(len(rows)), row))
+        label = np.concatenate((np.zeros(len(rows), np.int64), operator + 1))
+        order = np.lexsort((label, row))
+        row, label = row[order], label[order]
         return np.searchsorted(row, np.arange(len(rows) + 1)), label
 
     def _possible(self, robot: int, rows: Rows, first: Ints, label: Ints) -> _Options:
@@ -339,6 +333,7 @@ class _Subactions:
         evaluator: Evaluator,
         robot: int,
         cost: Cost,
+        idling_cost: int,
     ) -> None:
         self._evaluator = evaluator
         self._operators = Operators(actions, codec, evaluator)
@@ -348,7 +343,7 @@ class _Subactions:
         self.conditional = {n + 1: e for n, e in self._operators.conditional.items()}
         # A shared subaction is paid once, by the first of its owners.
         own = [cost_of(a, cost) if a.owners[0] == robot else 0 for a in actions]
-        self.cost = np.array([0, *own], np.int64)
+        self.cost = np.array([idling_cost, *own], np.int64)
         of_label: dict[int, list[Clause]] = {}
         #: Formulas about the step that have too many clauses, by label.
         self._formulas: dict[int, list[Formula]] = {}
@@ -380,10 +375,8 @@ class _Subactions:
 
 
 def cost_of(action: GroundAction, cost: Cost) -> int:
-    """The second component of a subaction's cost; doing nothing is free."""
-    if cost == "makespan+cost":
-        return action.cost
-    return int(cost == "makespan+actions" and not action.does_nothing)
+    """The second component of a subaction's cost."""
+    return action.cost if cost == "makespan+cost" else int(cost == "makespan+actions")
 
 
 def _text(formula: Formula) -> str:

@@ -119,21 +119,22 @@ class JointModel:
     """A joint model ``M = (P, A)`` (the paper, section 2) over the robots of one problem.
 
     ``labels[i]`` are robot i's labels, ``labels[i][0]`` being idle.  ``actions`` are the ground
-    actions it is made of; ``keeps_idle[i]`` says whether robot i may idle without an action of its
-    own.  ``slack`` is how many joint steps more than the least makespan plans may take
-    (`planners.search.slack`); ``slack_facts``, where states on plans say how many of them are left,
-    are the numbers of the facts that do: none left, one left, and so on.
+    actions it is made of.  Every robot may always idle (joint-action PDDL says itself who idles);
+    ``idling_costs[i]`` is what that adds to the second cost.  ``slack`` is how many steps more
+    than the least makespan plans may take (`planners.search.slack`); ``slack_facts``, where states
+    on plans say how many of them are left, are the numbers of the facts that do: none left, one
+    left, and so on.
     """
 
     name: str
     robots: tuple[str, ...]
     labels: tuple[tuple[str, ...], ...]
     actions: tuple[GroundAction, ...]
-    keeps_idle: tuple[bool, ...]
     codec: StateCodec
     stepper: Stepper
     evaluator: Evaluator
     cost: Cost = "makespan"
+    idling_costs: tuple[int, ...] = ()
     statics: frozenset[Atom] = frozenset()
     is_joint_action: bool = False
     slack: int = 0
@@ -156,15 +157,6 @@ class JointModel:
     def hides_slack(self) -> bool:
         """Whether plans have slack and states do not say how much is left: states may repeat."""
         return bool(self.slack) and not self.slack_facts
-
-    @property
-    def resting(self) -> tuple[frozenset[int], ...]:
-        """For each robot the labels with which it rests: idling, and do-nothing actions alone."""
-        found = []
-        for robot, own in enumerate(self.labels):
-            nothing = {a.label for a in self.actions if a.does_nothing and a.owners == (robot,)}
-            found.append(frozenset({0, *(k for k, text in enumerate(own) if text in nothing)}))
-        return tuple(found)
 
     @property
     def remembers(self) -> bool:

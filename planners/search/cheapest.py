@@ -57,7 +57,7 @@ def cheapest(
 
 
 def label_costs(model: JointModel) -> list[Ints]:
-    """Per robot the second cost component of each of its labels; idling is free."""
+    """Per robot the second cost component of each of its labels."""
     assert isinstance(model.stepper, ComposingStepper)
     return model.stepper.costs
 

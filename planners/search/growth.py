@@ -108,10 +108,7 @@ def first_layers(
     makespan = reached[0] if reached else None
     bound = int(relaxed(model, task.goal)(task.init[None, :])[0]) if makespan is None else makespan
     growth = Growth(
-        labels={
-            robot: len(own) - (not keeps and not model.is_joint_action)
-            for robot, own, keeps in zip(model.robots, model.labels, model.keeps_idle, strict=True)
-        },
+        labels={robot: len(own) for robot, own in zip(model.robots, model.labels, strict=True)},
         choices=dict(zip(model.robots, choices, strict=True)),
         layers=tuple(map(len, layers)),
         next_steps=_most_steps(model, layer) if len(layer) else None,

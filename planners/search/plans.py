@@ -152,9 +152,9 @@ class Plans:
         return plan[:length]
 
     def _rest(self, node: int) -> int | None:
-        """The first edge from a node in which every robot rests, None if there is none."""
+        """The first edge from a node in which every robot idles, None if there is none."""
         edges = self.space.out_edges(node)
-        found = np.flatnonzero(rests(self.space.model, self.space.labels[edges.start : edges.stop]))
+        found = np.flatnonzero(rests(self.space.labels[edges.start : edges.stop]))
         return edges.start + int(found[0]) if len(found) else None
 
     def sample(self, number: int, seed: int) -> Iterator[Plan]:

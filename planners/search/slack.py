@@ -72,12 +72,10 @@ def explore_within(
         return joined_steps(model, seen, sources, found)
 
 
-def rests(model: JointModel, labels: Labels) -> Bools:
-    """In which of these joint steps (steps, robots) every robot rests (`JointModel.resting`)."""
-    resting = np.ones(len(labels), np.bool_)
-    for robot, own in enumerate(model.resting):
-        resting &= np.isin(labels[:, robot], sorted(own))
-    return resting
+def rests(labels: Labels) -> Bools:
+    """In which of these joint steps (steps, robots) every robot idles."""
+    found: Bools = (labels == 0).all(axis=1)
+    return found
 
 
 def require_rest(graph: PlanSpace) -> None:
@@ -91,7 +89,7 @@ def require_rest(graph: PlanSpace) -> None:
     for number, goal in enumerate(graph.goals):
         mine = np.flatnonzero(graph.goal == number)
         ends[mine] = graph.model.holds(goal, graph.rows[graph.state[mine]])
-    good = rests(graph.model, graph.labels) & ends[graph.target]
+    good = rests(graph.labels) & ends[graph.target]
     can = graph.layer == 0
     can[source[good]] = True
     stuck = np.flatnonzero(ends & ~can)

@@ -123,10 +123,7 @@ class _Builder:
         return self.first_label[robot] + label
 
     def _one_label(self, robot: int, count: int) -> None:
-        labels = [self._label(robot, label) for label in range(count)]
-        if not self._model.keeps_idle[robot]:
-            self.clauses.append((-labels[0],))
-        self._exactly_one(labels)
+        self._exactly_one([self._label(robot, label) for label in range(count)])
 
     def _exactly_one(self, variables: Literals) -> None:
         """Of some variables; at most one, by a chain: "one of those up to here"."""

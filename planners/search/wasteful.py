@@ -38,10 +38,7 @@ def wasteful_pairs(model: JointModel, variables: Sequence[StateVariable]) -> lis
     if model.cost == "makespan" or any(facts is None for facts in spoken):
         return none
     several = np.sum([facts for facts in spoken if facts is not None], axis=0) > 1
-    return [
-        _Robot(model, robot, variables, ~several).pairs() if keeps else none[robot]
-        for robot, keeps in enumerate(model.keeps_idle)
-    ]
+    return [_Robot(model, robot, variables, ~several).pairs() for robot in range(len(model.robots))]
 
 
 def _spoken_of(model: JointModel, actions: Sequence[GroundAction | None]) -> Bools | None:
@@ -144,7 +141,7 @@ class _Robot:
         adds, deletes = adds & ~true, deletes & ~false
         for place, second in enumerate(seconds.tolist()):
             yield self._fits[0, second] and any(
-                self._costs[label] < self._costs[first] + self._costs[second]
+                self._costs[label] + self._costs[0] < self._costs[first] + self._costs[second]
                 and self._fits[label, first]
                 and not (self._needs[label] & ~true[place]).any()
                 and not (self._lacks[label] & ~false[place]).any()

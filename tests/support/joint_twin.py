@@ -36,7 +36,7 @@ def built(text: RandomModel, cost: str = "makespan") -> PlanningInstance:
 
 def twin_of(loaded: PlanningInstance, text: RandomModel) -> Twin:
     domain, (problem,) = loaded.domain, loaded.problems
-    return Twin(domain, problem, loaded.team, loaded.model.keeps_idle, _MOST_TRIES)
+    return Twin(domain, problem, loaded.team, _MOST_TRIES)
 
 
 def _key(state: State) -> list[str]:
@@ -75,25 +75,12 @@ def check_model(text: RandomModel, note: Callable[[str], None]) -> None:
         slow = {(labels, tuple(_key(after))) for labels, after in twin.successors(state)}
         assert _fast_steps(loaded, state) == slow, _key(state)
     note("one state" if len(states) == 1 else "several states")
-    if not all(loaded.model.keeps_idle):
-        note("nobody has to idle")
-        check_idling_adds_nothing(twin)
     if len(states) == 1:
         _check_plans(loaded, twin, loaded.problems[0], note)
         return
     for one in (loaded, built(text, "makespan+actions")):
         _check_plans(one, twin, one.problems[0], note)
         _check_plans(one, twin, _far(twin, states[-1]), note)
-
-
-def check_idling_adds_nothing(twin: Twin) -> None:
-    """Where a robot may not idle, its do-nothing action leads everywhere that idling would lead."""
-    rules = twin.rules
-    free = Twin(rules.domain, rules.problem, rules.team, budget=_MOST_TRIES)
-    for state in free.reachable(_MOST_STATES):
-        assert {t for _, t in free.successors(state)} == {t for _, t in twin.successors(state)}, (
-            _key(state)
-        )
 
 
 def _far(twin: Twin, state: State) -> Problem:
@@ -127,20 +114,19 @@ def _check_plans(
     listed = [tuple(model.texts(step) for step in plan) for plan in islice(plans, _MOST_PLANS)]
     if plans.count <= _MOST_PLANS:
         assert sorted(map(str, listed)) == sorted(map(str, wanted.plans()))
-    _check_verdicts(twin, problem, model.keeps_idle, listed[:20])
+    _check_verdicts(twin, problem, listed[:20])
 
 
 def _check_verdicts(
     twin: Twin,
     problem: Problem,
-    keeps_idle: tuple[bool, ...],
     plans: list[tuple[tuple[str | None, ...], ...]],
 ) -> None:
     domain, team = twin.rules.domain, twin.rules.team
     for plan in plans:
-        verdict = validate(domain, problem, team, plan, allow_idle=keeps_idle)
+        verdict = validate(domain, problem, team, plan)
         assert verdict.valid, verdict
         assert verdict.makespan == len(plan)
         if plan:  # one step fewer would be a plan shorter than the optimal ones
-            shorter = validate(domain, problem, team, plan[:-1], allow_idle=keeps_idle)
+            shorter = validate(domain, problem, team, plan[:-1])
             assert (shorter.valid, shorter.step) == (False, len(plan) - 1)

@@ -8,13 +8,24 @@ search.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 from math import prod
 
 from planners.check.validate import Moment, Rules, State
-from planners.pddl.lifted import And, Domain, Exists, Forall, Formula, Not, Or, Problem, StepAtom
+from planners.pddl.lifted import (
+    And,
+    Domain,
+    Exists,
+    Forall,
+    Formula,
+    Not,
+    Or,
+    Problem,
+    Schema,
+    StepAtom,
+)
 from planners.pddl.robots import Team
 
 Labels = tuple[str | None, ...]
@@ -37,11 +48,10 @@ class Twin:
         domain: Domain,
         problem: Problem,
         team: Team,
-        idle_allowed: Sequence[bool] | None = None,
         budget: int = 1_000_000,
     ) -> None:
         self._budget = budget
-        self.rules = Rules.of(domain, problem, team, idle_allowed)
+        self.rules = Rules.of(domain, problem, team)
         self.init = self.rules.meaning.fluents_of(problem.init)
         self.labels = [self._labels(robot) for robot in range(len(team.robots))]
         self._steps: dict[State, frozenset[Step]] = {}
@@ -50,6 +60,8 @@ class Twin:
         """Everything that a robot might write down as its part of a step, sensible or not."""
         texts: set[str] = set()
         for schema in self.rules.domain.schemas:
+            if self.is_idling(schema):
+                continue
             templates = [(schema.name, *(v.name for v in schema.parameters))]
             if schema.parts:
                 name = self.rules.team.robots[robot]
@@ -99,25 +111,19 @@ class Twin:
         return list(found)
 
     def actions(self, labels: Labels) -> int:
-        """The second component of ``makespan+actions``: chosen subactions, shared ones once,
-        do-nothing ones free.
-        """
+        """The second component of ``makespan+actions``: chosen subactions, shared ones once."""
         if self.rules.is_joint_action:
             return sum(label is not None for label in labels)
-        return sum(not self.does_nothing(label) for label in {*labels} if label is not None)
+        return len({label for label in labels if label is not None})
 
-    def does_nothing(self, label: str) -> bool:
-        """No effect as written, and no formula of the domain names the action."""
-        found = self.rules.instance(label)
-        assert not isinstance(found, str), found
-        if found.schema.effects:
+    def is_idling(self, schema: Schema) -> bool:
+        """No effect as written, and no formula and no network of the domain names the action."""
+        if schema.effects or schema.parts:
             return False
         schemas = self.rules.domain.schemas
         bound = {name for c in self.rules.domain.constraints for name, _ in c.actions}
         formulas = [f for s in schemas for f in (s.precondition, *(e.condition for e in s.effects))]
-        return (
-            found.schema.name not in {name for f in formulas for name in _actions_named(f)} | bound
-        )
+        return schema.name not in {name for f in formulas for name in _actions_named(f)} | bound
 
     def optimal(self, goal: Formula | None = None, *, actions: bool = False) -> Optimal | None:
         """The optimal plans under ``makespan`` or ``makespan+actions``; None if the goal cannot be

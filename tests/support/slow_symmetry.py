@@ -92,8 +92,8 @@ def renamings(candidates: Candidates, most: int) -> Iterator[dict[str, str]]:
 
 
 def keeps_actions(model: JointModel, renaming: Mapping[str, str]) -> bool:
-    """Whether actions go to actions of the same cost, and robots to robots that idle alike."""
-    idle = dict(zip(model.robots, model.keeps_idle, strict=True))
+    """Whether actions go to actions of the same cost, and robots to robots whose idling costs as much."""
+    idle = dict(zip(model.robots, model.idling_costs, strict=True))
     if model.is_joint_action and any(renaming.get(r, r) != r for r in model.robots):
         return False
     if {renaming.get(robot, robot): idle[robot] for robot in model.robots} != idle:

@@ -136,12 +136,11 @@ def freedom(tasks: Sequence[TaskLanguage]) -> dict[str, int]:
 
 def _options(model: JointModel, robot: int, labels: set[int]) -> set[str]:
     """The cells that labels lead to, or the texts of those that lead to none."""
-    idle = {action.label for action in model.actions if action.does_nothing}
     entered = entered_cells(model, robot)
     found = set()
     for label in labels:
         text = model.label_text(robot, label)
-        if text is not None and text not in idle:
+        if text is not None:
             found.add(entered[label] or text)
     return found
 

@@ -40,13 +40,12 @@ class Execution:
 
     def __init__(self, model: JointModel) -> None:
         self._model = model.without_slack
-        self._resting = [sorted(own) for own in model.resting]
         self._steps: dict[bytes, _Steps] = {}
 
     def part_of(self, plan: Plan, robot: int) -> Part:
         """A robot's part of a plan, without the rest at its end."""
         labels = [step[robot] for step in plan]
-        while labels and labels[-1] in self._resting[robot]:
+        while labels and labels[-1] == 0:
             labels.pop()
         return tuple(labels)
 
@@ -89,7 +88,7 @@ class Execution:
                 for labels, row in zip(found.labels.tolist(), found.result, strict=True)
             }
         steps = self._steps[state]
-        choices = ([acting[r]] if r in acting else own for r, own in enumerate(self._resting))
+        choices = ([acting.get(r, 0)] for r in range(len(self._model.robots)))
         return next((steps[labels] for labels in product(*choices) if labels in steps), None)
 
 

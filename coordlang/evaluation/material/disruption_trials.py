@@ -122,12 +122,11 @@ def subaction_trials(candidates: Candidates, language: Language) -> Trials:
 
 def _single_subactions(model: JointModel, space: PlanSpace) -> list[Disruption]:
     """A disruption for each subaction in the plan space that does something."""
-    idle = {action.label for action in model.actions if action.does_nothing}
     found = []
     for robot, name in enumerate(model.robots):
         for label in np.unique(space.robot_labels(robot)).tolist():
             text = model.label_text(robot, label)
-            if text is None or text in idle:
+            if text is None:
                 continue
             forbidden = [frozenset[int]()] * len(model.robots)
             forbidden[robot] = frozenset([label])

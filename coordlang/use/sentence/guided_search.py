@@ -148,7 +148,7 @@ def _earliest(task_language: TaskLanguage, words: Sequence[int] | None) -> Guide
     else:
         space = task_language.plans_with(words)
         start = int(space.starts[0])
-    resting = rests(space.model, space.labels)
+    resting = rests(space.labels)
     # Per node the steps until a rest that lasts to the end; per edge those with it.
     left = np.zeros(len(space), np.int64)
     through = np.zeros(len(resting), np.int64)

@@ -69,10 +69,9 @@ def read_preference(task_language: TaskLanguage, text: str) -> Preference:
 def goes_first(model: JointModel, robot: str) -> PlanPreference:
     """The preference that a robot goes first.
 
-    A robot *acts* in a step if it neither idles nor does a subaction that has the same effect as
-    idling.  Robot r goes before robot q in a plan if, in the first step in which one of the two
-    acts and the other one does not, it is r that acts.  Grades: 0 if r goes before every other
-    robot, 2 if some other robot goes before r, else 1.
+    A robot *acts* in a step if it does not idle.  Robot r goes before robot q in a plan if, in the
+    first step in which one of the two acts and the other one does not, it is r that acts.  Grades:
+    0 if r goes before every other robot, 2 if some other robot goes before r, else 1.
 
     Raises `UsageError` for a robot that the model does not have.
     """
@@ -88,17 +87,8 @@ def goes_first(model: JointModel, robot: str) -> PlanPreference:
         f"no robot goes before {robot}",
         f"another robot goes before {robot}",
     )
-    order = _Order(own, _acting(model))
+    order = _Order(own)
     return PlanPreference(f"first:{robot}", lambda _: others, order.step, order.grade, grades)
-
-
-def _acting(model: JointModel) -> list[list[bool]]:
-    """For each robot and each of its labels whether the robot acts."""
-    nothing = {action.label for action in model.actions if action.does_nothing and not action.parts}
-    return [
-        [label > 0 and text not in nothing for label, text in enumerate(own)]
-        for own in model.labels
-    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,13 +99,12 @@ class _Order:
     """
 
     robot: int
-    acting: list[list[bool]]
 
     def step(self, memory: Memory, labels: tuple[int, ...], _state: int) -> Memory:
         if memory == _LATE:
             return memory
-        acts = self.acting[self.robot][labels[self.robot]]
-        others = {other: self.acting[other][labels[other]] for other in memory}
+        acts = labels[self.robot] != 0
+        others = {other: labels[other] != 0 for other in memory}
         if not acts and any(others.values()):
             return _LATE
         return tuple(other for other in memory if others[other] == acts)

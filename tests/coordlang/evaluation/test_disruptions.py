@@ -188,7 +188,6 @@ def test_subactions_that_fail_are_needed_by_some_plan() -> None:
     for trial in trials.trials:
         by_task.setdefault(trial.tasks[0], set()).add(trials.disruptions[trial.disruption].name)
     model, space = candidates.model, trials.choices.space
-    nothing = {action.label for action in model.actions if action.does_nothing}
     for task in Random(0).sample(range(len(space.starts)), 30):
         used = {
             (robot, label)
@@ -197,11 +196,7 @@ def test_subactions_that_fail_are_needed_by_some_plan() -> None:
             for robot, label in enumerate(step)
             if label
         }
-        names = {
-            f"{model.robots[r]} {model.labels[r][n]}"
-            for r, n in used
-            if model.labels[r][n] not in nothing
-        }
+        names = {f"{model.robots[r]} {model.labels[r][n]}" for r, n in used}
         assert by_task.get(task, set()) == names
 
 

@@ -42,8 +42,7 @@ def breaks(candidates: Candidates, space: PlanSpace, found: Miscoordination) -> 
         (problem,) = loaded.problems
 
         def verdict(plan: Sequence[Step]) -> Verdict:
-            idle = model.keeps_idle
-            return validate(loaded.domain, problem, loaded.team, plan, allow_idle=idle)
+            return validate(loaded.domain, problem, loaded.team, plan)
 
         for plan in found.plans:
             assert verdict(plan).valid

@@ -50,10 +50,8 @@ def check(candidates: Candidates, task_language: TaskLanguage, names: tuple[str,
                 assert found.cost == without.cost
                 assert found.states <= found.expanded < found.generated + 1
                 searches += 1
-            said, idle = texts(task_language.model, found.plan), task_language.model.keeps_idle
-            verdict = validate(
-                loaded.domain, problem, loaded.team, said, init=init, goal=goal, allow_idle=idle
-            )
+            said = texts(task_language.model, found.plan)
+            verdict = validate(loaded.domain, problem, loaded.team, said, init=init, goal=goal)
             assert verdict.valid, verdict.reason
     return searches
 

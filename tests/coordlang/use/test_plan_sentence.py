@@ -139,9 +139,7 @@ def judged(
     said: tuple[Texts, ...] = texts(model, plan)
     problem = loaded.problems[0]
     init, goal = ground_task(loaded.domain, problem, candidates.listed[0])
-    verdict = validate(
-        loaded.domain, problem, loaded.team, said, init=init, goal=goal, allow_idle=model.keeps_idle
-    )
+    verdict = validate(loaded.domain, problem, loaded.team, said, init=init, goal=goal)
     if not verdict.valid:
         with pytest.raises(NotAPlan) as wrong:
             sentence_of_plan(task_language, said)

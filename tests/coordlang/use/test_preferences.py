@@ -51,11 +51,7 @@ def goes_first(task_language: TaskLanguage, plan: Plan, robot: str) -> int:
     """2 if somebody goes before the robot, 0 if the robot goes before everybody, else 1."""
     model = task_language.model
     me = model.robots.index(robot)
-    nothing = {a.label for a in model.actions if a.does_nothing and not a.parts}
-    active = [
-        [step[r] != 0 and model.labels[r][step[r]] not in nothing for step in plan]
-        for r in range(len(model.robots))
-    ]
+    active = [[step[r] != 0 for step in plan] for r in range(len(model.robots))]
     orders = []
     for other in range(len(model.robots)):
         if other != me:

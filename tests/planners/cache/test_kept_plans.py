@@ -128,7 +128,6 @@ def test_what_changes_plans_changes_the_key() -> None:
         loaded(),
         loaded(options=ModelOptions(cost="makespan+actions")),
         loaded(options=ModelOptions(remember_actions=True)),
-        loaded(options=ModelOptions(idle=("r1",))),
         loaded(problem=PROBLEM.replace("(adjacent c0-0 c0-1)", "")),
         loaded(problem=PROBLEM.replace("(:goal (and (at r1 c2-2)", "(:goal (and (at r1 c2-1)")),
         loaded(problem=PROBLEM.replace("(at r1 c0-0)", "(at r1 c0-1)", 1)),

@@ -86,16 +86,6 @@ def test_idling_is_a_choice_and_costs_a_step() -> None:
     assert verdict == Verdict(True, 3, None, verdict.reason)
 
 
-def test_idling_can_be_forbidden() -> None:
-    plan: list[Labels] = [
-        ["(move r1 a b)", "(move r2 b c)"],
-        ["(move r1 b a)", None],
-        ["(move r1 a b)", None],
-    ]
-    assert validate(*rooms(), plan, allow_idle=(False, True)).valid
-    assert rejected(validate(*rooms(), plan, allow_idle=(True, False)), 1, "r2 has to choose")
-
-
 def test_the_goal_must_hold_at_the_end() -> None:
     plan: list[Labels] = [["(move r1 a b)", None]]
     assert rejected(validate(*rooms(), plan), 1, "goal", "(at r2 b) is true")

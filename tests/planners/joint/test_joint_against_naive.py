@@ -11,14 +11,11 @@ import pytest
 from hypothesis import Phase, event, given, settings
 from hypothesis import strategies as st
 
-from planners.grounding import instantiate
+from planners.grounding import idling_schemas, instantiate
 from planners.grounding.reachability import reachable_arguments
 from planners.joint.model import own_text
-from planners.loading import PlanningInstance
 from planners.pddl.lifted import Atom, Domain
-from planners.search.optimal_plans import search
-from planners.search.plans import Plans
-from tests.support.joint_twin import built, check_idling_adds_nothing, check_model, twin_of
+from tests.support.joint_twin import built, check_model, twin_of
 from tests.support.random_pddl import KINDS, Kind, RandomModel, random_model
 from tests.support.random_threes import random_threes
 
@@ -91,7 +88,7 @@ def test_formulas_about_the_joint_step(effect: str) -> None:
     check_model(RandomModel(domain, problem), note=lambda _: None)
 
 
-# -- by hand: when a robot may not idle
+# -- by hand: which actions are idling
 # ---------------------------------------------------------------------------
 
 _ROOMS = """(define (domain rooms) (:types robot place) (:predicates (at ?r - robot ?p - place) (ok ?r - robot))
@@ -102,94 +99,68 @@ _TASK = """(define (problem p) (:domain rooms) (:objects r1 r2 - robot a b - pla
   (:init (at r1 a) (at r2 b) (ok r1)) (:goal (and (at r1 b) (at r2 b))))"""
 
 
-def _rooms(*more: str) -> PlanningInstance:
-    return built(RandomModel(_ROOMS.format(more=" ".join(more)), _TASK))
-
-
 _WAIT = "(:action wait :agent ?r - robot :parameters () {precondition} :effect ())"
 
 
 @pytest.mark.parametrize(
-    ("more", "keeps_idle"),
+    ("more", "is_left_out"),
     [
-        ("", (True, True)),
-        (_WAIT.format(precondition=""), (False, False)),
-        # One of a group of facts always holds: every action that ends one makes another one true.
+        (_WAIT.format(precondition=""), True),
         (
-            "(:action stay :agent ?r - robot :parameters (?p - place) :precondition (at ?r ?p))",
-            (False, False),
+            "(:action wait :agent ?r - robot :parameters (?p - place) :precondition (at ?r ?p))",
+            True,
         ),
-        # Only r1 is ok at the start, and nobody ever stops being ok.
+        # Whether its precondition ever holds does not count: idling is always possible.
+        (_WAIT.format(precondition=":precondition (ok ?r)"), True),
+        (_WAIT.format(precondition=":precondition (not (ok ?r))"), True),
+        # Nor does who owns it.
+        ("(:action wait :parameters (?r ?q - robot))", True),
+        # What it asks of others makes it no other action; what others ask of it does.
         (
-            _WAIT.format(precondition=":precondition (ok ?r)")
-            + "(:action heal :agent ?r - robot :parameters () :effect (ok ?r))",
-            (False, True),
+            "(:action wait :agent ?r - robot :parameters () "
+            ":precondition (forall (?o - robot) (not (move ?o nowhere nowhere))))",
+            True,
         ),
-        (
-            _WAIT.format(precondition=":precondition (ok ?r)")
-            + "(:action fall :agent ?r - robot :parameters () :effect (not (ok ?r)))",
-            (True, True),
-        ),
-        (
-            _WAIT.format(precondition=":precondition (not (ok ?r))")
-            + "(:action heal :agent ?r - robot :parameters () :effect (ok ?r))",
-            (True, True),
-        ),
-        # A formula needs it.
         (
             _WAIT.format(precondition="")
             + "(:action watch :agent ?r - robot :parameters (?o - robot) :precondition (wait ?o) :effect (ok ?r))",
-            (True, True),
+            False,
         ),
-        # It does something.
-        (_WAIT.format(precondition="").replace(":effect ()", ":effect (ok ?r)"), (True, True)),
+        (
+            _WAIT.format(precondition="")
+            + "(:action watch :agent ?r - robot :parameters (?o - robot) "
+            ":effect (when (not (wait ?o)) (ok ?r)))",
+            False,
+        ),
+        (
+            "(:action wait :agent ?r - robot :parameters (?p - place)) "
+            "(:concurrency-constraint v :parameters (?p - place) :bounds (1 2) :actions ((wait 1)))",
+            False,
+        ),
+        # Effects as written count, those that never come about among them.
+        (_WAIT.format(precondition="").replace(":effect ()", ":effect (ok ?r)"), False),
+        (
+            _WAIT.format(precondition="").replace(
+                ":effect ()", ":effect (when (at ?r nowhere) (ok ?r))"
+            ),
+            False,
+        ),
     ],
 )
-def test_when_idling_is_dropped(more: str, keeps_idle: tuple[bool, bool]) -> None:
-    loaded = _rooms(more)
-    assert loaded.model.keeps_idle == keeps_idle
-    # r1 walks over, r2 stays where it is: one plan, and not one more for every way to do nothing.
-    if not any(keeps_idle):
-        plans = [
-            [loaded.model.texts(step) for step in plan]
-            for plan in Plans.of(search(loaded.model, loaded.tasks[0]))
-        ]
-        assert all(label is not None for plan in plans for step in plan for label in step)
-
-
-def test_a_shared_do_nothing_action_is_nobodys_own() -> None:
+def test_an_action_that_is_idling_is_left_out(more: str, is_left_out: bool) -> None:
     text = RandomModel(
-        """(define (domain d) (:types robot) (:predicates (p ?r - robot))
-        (:action meet :parameters (?r ?q - robot))
-        (:action go :parameters (?r - robot) :effect (p ?r)))""",
-        "(define (problem p) (:domain d) (:objects r1 r2 - robot) (:init) (:goal (p r1)))",
-    )
-    # (meet r1 r1) belongs to r1 alone; without it there is only meeting the other one.
-    assert built(text).model.keeps_idle == (False, False)
-    apart = text.domain.replace(
-        "(?r ?q - robot))", "(?r ?q - robot) :precondition (not (= ?r ?q)))"
-    )
-    assert built(RandomModel(apart, text.problem)).model.keeps_idle == (True, True)
-
-
-def test_a_wait_that_others_disturb_does_not_replace_idling() -> None:
-    """r1 pushes r2 away, which deletes what r2's ``stay`` requires: r2 must be able to idle."""
-    text = RandomModel(
-        """(define (domain push) (:types robot place) (:predicates (at ?r - robot ?p - place) (next ?p ?q - place))
-        (:action stay :agent ?r - robot :parameters (?p - place) :precondition (at ?r ?p))
-        (:action push :agent ?r - robot :parameters (?o - robot ?from ?to - place)
-          :precondition (and (at ?o ?from) (next ?from ?to) (not (= ?r ?o)))
-          :effect (and (not (at ?o ?from)) (at ?o ?to))))""",
-        """(define (problem p) (:domain push) (:objects r1 r2 - robot a b - place)
-        (:init (at r1 a) (at r2 a) (next a b)) (:goal (and (at r1 a) (at r2 b))))""",
+        _ROOMS.format(more=more).replace(
+            "(:predicates", "(:constants nowhere - place) (:predicates"
+        ),
+        _TASK,
     )
     loaded = built(text)
-    twin = twin_of(loaded, text)
-    check_idling_adds_nothing(twin)
-    plans = Plans.of(search(loaded.model, loaded.tasks[0]))
-    assert [[loaded.model.texts(step) for step in plan] for plan in plans] == [
-        [("(push r1 r2 a b)", None)]
-    ]
+    assert any("wait" in label for own in loaded.model.labels for label in own) != is_left_out
+    assert idling_schemas(loaded.domain) == ({"wait"} if is_left_out else set())
+    reason = twin_of(loaded, text).rules.instance("(wait r1 r2)" if "?q" in more else "(wait r1)")
+    if is_left_out and ":parameters (?p" not in more:
+        assert "it is idling, and left out" in str(reason)
+    check_model(text, note=lambda _: None)
 
 
 def test_an_effect_on_every_object() -> None:
