@@ -7,8 +7,7 @@ The rows are GWB5 and GWB7 by default. One line for each language: words, the av
 tasks of the plans left open (for a plan drawn uniformly, and for the first plan in our order), the
 upper bound for every language, tasks in which the first plan's sentence leaves more than one plan
 open and their average, communication saving (all plans in expectation; first plans; first plans
-with a sentence shorter than the plan), seconds. "+ overlap" enlarges the words of the language
-above it.
+with a sentence shorter than the plan), seconds.
 
 The paper gives for its own language of GWB7: 4 words, 12.1 plans a task (14.7 over 774 tasks),
 saving 27.3 % (33.3 % over 784 plans).
@@ -31,14 +30,12 @@ from coordlang.tasks.candidates import Candidates
 from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from planners.limits import time_limit
 
-#: Label, method, the language to prefer, whether words may overlap.
-LANGUAGES: tuple[tuple[str, str, Literal["flexible"] | None, bool], ...] = (
-    ("greedy", "greedy", None, False),
-    ("separating", "separating", None, False),
-    ("minimal", "minimal", None, False),
-    ("minimal + overlap", "minimal", None, True),
-    ("minimal, flexible", "minimal", "flexible", False),
-    ("flexible + overlap", "minimal", "flexible", True),
+#: Label, method, the language to prefer.
+LANGUAGES: tuple[tuple[str, str, Literal["flexible"] | None], ...] = (
+    ("greedy", "greedy", None),
+    ("separating", "separating", None),
+    ("minimal", "minimal", None),
+    ("minimal, flexible", "minimal", "flexible"),
 )
 COLUMNS = (
     ("row", 5),
@@ -83,15 +80,12 @@ def print_row(row: World, seconds: float, table: PrintedTable) -> None:
     bound = f"{np.mean(flexibility_bounds(candidates.spaces, requires)):.2f}"
     if row.name == PAPER[0]:
         table.print(*PAPER)
-    for label, method, prefer, overlap in LANGUAGES:
+    for label, method, prefer in LANGUAGES:
         start = perf_counter()
         with time_limit(seconds):
-            built = build_language(candidates, method, prefer=prefer, overlap=overlap)
+            built = build_language(candidates, method, prefer=prefer)
         taken = perf_counter() - start
         left, first, *others = measures(candidates, built)
-        if overlap:  # the other columns are about partitions
-            left = f"{built.figures['overlapping_flexibility']:.2f}"
-            first, others = "", [""] * len(others)
         size = built.language.guarantee.size
         table.print(row.name, label, size, left, first, bound, *others, f"{taken:.1f}")
 

@@ -74,10 +74,8 @@ COMMANDS = {
         build D problem.pddl --tasks all --method exhaustive -o @exhaustive.json --json
         build D problem.pddl --tasks all --method minimal --certificate @proof.json -o @minimal.json
         build D problem.pddl --tasks all --method minimal --prefer flexible -o @flexible.json --json
-        build D problem.pddl --tasks all --method minimal --overlap -o @overlap.json --json
         build D problem.pddl --tasks all --method minimal -o -
         verify @minimal.json D problem.pddl --lower-bound @proof.json --dimacs @proof.cnf
-        verify @overlap.json D problem.pddl --json
         verify @one.json D problem.pddl
         verify @one.json D problem.pddl --tasks all
         verify @one.json D problem.pddl --tasks all --json
@@ -85,7 +83,6 @@ COMMANDS = {
         explain @one.json D problem.pddl --task
         explain @one.json D problem.pddl --task --json
         explain @minimal.json D problem.pddl --each
-        explain @overlap.json D problem.pddl --json
         understand @one.json D problem.pddl "w1 w2 w0" --json -o @plans.json
         understand @one.json D problem.pddl "w1 w2 w0"
         understand @one.json D problem.pddl "w1 w2 w0" --count
@@ -119,10 +116,8 @@ COMMANDS = {
         build D problem.pddl --tasks all --method separating -o @separating.json --json
         build D problem.pddl --tasks all --method minimal --certificate @proof.json -o @minimal.json
         build D problem.pddl --tasks all --method minimal --prefer flexible -o @flexible.json --json
-        build D problem.pddl --tasks all --overlap -o @overlap.json --json
         verify @minimal.json D problem.pddl --lower-bound @proof.json --json
         verify @minimal.json D problem.pddl --dimacs @proof.cnf --lower-bound @proof.json
-        verify @overlap.json D problem.pddl
         explain @minimal.json D problem.pddl
         explain @minimal.json D problem.pddl --json
         explain @minimal.json D problem.pddl --task
@@ -175,7 +170,6 @@ COMMANDS = {
         plans D parade.pddl --sample 3 --seed 1
         build D parade.pddl --method minimal -o @minimal.json --certificate @proof.json
         build D parade.pddl --method separating -o @separating.json --json
-        build D parade.pddl --method greedy --overlap -o @overlap.json
         verify @minimal.json D parade.pddl --lower-bound @proof.json
         explain @minimal.json D parade.pddl --task
         plan @minimal.json D parade.pddl --wish most-plans --json

@@ -6,10 +6,9 @@
 One line for each of the smallest languages that `--method minimal` finds: without a preference, and
 with each value of `--prefer`.  Words; terms of their formulas and variables that these limit
 (`limits`), without the word that is "every other state"; plans left open by a sentence, averaged
-over the tasks (for a plan drawn uniformly); words heard until the sentence is known; communication
-saving; seconds.  A star behind the language: no other one of the row is as good in all three of
-formulas, plans left open and words heard, and better in one.  "proved": what was asked for is
-proved to be the best of any language with so many words.
+over the tasks (for a plan drawn uniformly); communication saving; seconds.  A star behind the
+language: no other one of the row is as good in formulas and in plans left open, and better in one.
+"proved": what was asked for is proved to be the best of any language with so many words.
 """
 
 from __future__ import annotations
@@ -26,7 +25,6 @@ from coordlang.evaluation.material.suite import ROWS, World, find_domains
 from coordlang.explanation.simple import formula_lengths
 from coordlang.explanation.words import mapped_states
 from coordlang.language.flexibility import flexibility
-from coordlang.language.lateness import words_heard
 from coordlang.tasks.candidates import Candidates
 from planners.limits import time_limit
 
@@ -37,7 +35,6 @@ COLUMNS = (
     ("terms", 5),
     ("limits", 6),
     ("open", 6),
-    ("heard", 6),
     ("saving", 7),
     ("proved", 6),
     ("s", 6),
@@ -46,7 +43,6 @@ COLUMNS = (
 PROOFS = {
     "flexible": (("flexibility", "flexibility_bound"),),
     "simple": (("terms", "terms_lower_bound"), ("limits", "limits_lower_bound")),
-    "early": (("words_heard", "words_heard_lower_bound"),),
 }
 
 
@@ -59,16 +55,13 @@ class Measured:
     terms: int
     limits: int
     left_open: float
-    heard: float
     saving: float
     proved: bool
     seconds: float
 
     def is_beaten_by(self, other: Measured) -> bool:
         """Whether another language is at least as good in all, and better in one."""
-        mine, its = (
-            ((m.terms, m.limits), -round(m.left_open, 6), round(m.heard, 6)) for m in (self, other)
-        )
+        mine, its = (((m.terms, m.limits), -round(m.left_open, 6)) for m in (self, other))
         return its != mine and all(a <= b for a, b in zip(its, mine, strict=True))
 
 
@@ -86,7 +79,6 @@ def measure(candidates: Candidates, prefer: BuildPreference | None, seconds: flo
         len(partition.words),
         *_lengths(candidates, built),
         found.value,
-        float(words_heard(candidates.spaces, words).mean()),
         float(found.saving.mean()),
         _is_proved(built, prefer),
         taken,
@@ -118,7 +110,6 @@ def print_row(row: World, languages: Sequence[Measured], table: PrintedTable) ->
             one.terms,
             one.limits,
             f"{one.left_open:.2f}",
-            f"{one.heard:.2f}",
             f"{100 * one.saving:.1f} %",
             "yes" if one.proved else "no",
             f"{one.seconds:.1f}",

@@ -14,16 +14,13 @@ from coordlang.language.partition import Partition
 from coordlang.language.provenance import Guarantee, provenance_of
 from coordlang.language.warping import Clause
 from coordlang.language.words import Language
-from coordlang.required.divergences import FirstDifferences, required_nodes
+from coordlang.required.divergences import FirstDifferences
 from coordlang.required.pieces import differences
 from coordlang.tasks.candidates import Candidates, require_solvable
 from coordlang.tolerance.failures import NONE, Failures
 from coordlang.verification.by_definition import Verdict
-from coordlang.verification.overlapping import verify_overlapping
 from coordlang.verification.pieces import verify_candidates
 from coordlang.vocabulary import EXACT, METHODS, Job, Outcome, greedy
-from coordlang.vocabulary.early import early
-from coordlang.vocabulary.enlarging import enlarge
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.hidden_slack import hidden_differences
 from coordlang.vocabulary.job import Assignment, Evidence
@@ -36,11 +33,10 @@ from planners.pieces.work import Runner
 from planners.search.portions import require_room
 
 #: What the language should be like, of those with the fewest words, by the value of ``--prefer``.
-BuildPreference = Literal["flexible", "simple", "early"]
+BuildPreference = Literal["flexible", "simple"]
 PREFERENCES: Mapping[BuildPreference, Callable[[Job, Outcome], Outcome]] = {
     "flexible": flexible,
     "simple": simple,
-    "early": early,
 }
 
 
@@ -80,11 +76,8 @@ class BuildOptions:
         For the method "separating": separate plans where they part, never where they meet.
     prefer
         Of the languages with as many words as the method finds, "flexible": one whose sentences
-        leave many plans open; "simple": one whose words have short formulas; "early": one whose
-        sentences differ early.  For the exact methods, "minimal" and "exhaustive".
-    overlap
-        Then give states further words as long as that leaves more plans open
-        (`coordlang.language.overlapping`).
+        leave many plans open; "simple": one whose words have short formulas.  For the exact
+        methods, "minimal" and "exhaustive".
 
     Raises
     ------
@@ -96,7 +89,6 @@ class BuildOptions:
     seed: int = 0
     alpha_only: bool = False
     prefer: BuildPreference | None = None
-    overlap: bool = False
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
@@ -133,7 +125,6 @@ def build_language(
     seed: int = 0,
     alpha_only: bool = False,
     prefer: BuildPreference | None = None,
-    overlap: bool = False,
     reserve: float = 0.0,
     progress: Callable[[str], None] = lambda _: None,
     runner: Runner | None = None,
@@ -144,7 +135,7 @@ def build_language(
     ----------
     candidates
         The tasks that it must serve.
-    method, seed, alpha_only, prefer, overlap
+    method, seed, alpha_only, prefer
         See `BuildOptions`.
     reserve
         Share of a time limit's rest that a search, once there is a language, leaves for
@@ -165,7 +156,7 @@ def build_language(
     UsageError
         The options contradict each other.
     """
-    options = BuildOptions(method, seed, alpha_only, prefer, overlap)
+    options = BuildOptions(method, seed, alpha_only, prefer)
     require_solvable(candidates)
     runner = runner or Processes(jobs=1)
     clock = Clock()
@@ -203,16 +194,11 @@ def build_language(
     outcome = _outcome(job, options, verified, clock)
     best = next(known for known in verified if known.assignment is outcome.partition)
     clock.note("verify")
-    partition = best.partition
-    if overlap and outcome.stopped is None:
-        progress("enlarging words")
-        partition, outcome = _overlapping(candidates, partition, outcome)
-        clock.note("overlap")
-    size = len(partition.words)
+    size = len(best.partition.words)
     guarantee = Guarantee(method, size, outcome.lower_bound, size == outcome.lower_bound)
     provenance = provenance_of(candidates, guarantee, {"program": "coordlang"})
     return Built(
-        language=Language.of(partition, candidates.model, provenance),
+        language=Language.of(best.partition, candidates.model, provenance),
         first_differences=found.first,
         states=len(states),
         verdict=best.verdict,
@@ -261,39 +247,6 @@ def _outcome(
     if not verified:
         raise stopped
     return Outcome(verified[-1].assignment, job.lower_bound, stopped=stopped)
-
-
-def _overlapping(
-    candidates: Candidates, partition: Partition, outcome: Outcome
-) -> tuple[Partition, Outcome]:
-    """Add further words of states; if that is stopped early, the words stay as they are."""
-    found: list[tuple[Partition, Outcome]] = []
-    stopped = run_until_stopped(lambda: found.append(_enlarged(candidates, partition, outcome)))
-    return found[0] if stopped is None else (partition, replace(outcome, stopped=stopped))
-
-
-def _enlarged(
-    candidates: Candidates, partition: Partition, outcome: Outcome
-) -> tuple[Partition, Outcome]:
-    """The partition with further words of its states, verified by definition."""
-    spaces = candidates.spaces
-    word = partition.word_of(candidates.rows)
-    enlarged = enlarge(
-        spaces,
-        [required_nodes(space) for space in spaces],
-        {state: int(word[state]) for state in outcome.partition},
-    )
-    partition = partition.enlarged(candidates.rows, enlarged.words)
-    verdict = verify_overlapping(partition, spaces)
-    if not verdict.holds:
-        raise AssertionError(f"the enlarged words are no coordination language: {verdict.witness}")
-    figures = {
-        **outcome.figures,
-        "overlapping_words": enlarged.further,
-        "overlapping_flexibility": float(enlarged.expected.mean()),
-        "partition_flexibility": float(enlarged.before.mean()),
-    }
-    return partition, replace(outcome, figures=figures, stopped=enlarged.stopped)
 
 
 def certificate_of(built: Built) -> Certificate:

@@ -87,8 +87,7 @@ def repair_language(
     """Change the words of as few states as makes a language serve candidate tasks.
 
     The result is verified by definition.  States that are on no plan of the candidate tasks keep
-    their words.  Further words of states, where words overlap, are kept only where the language
-    still holds as it is.
+    their words.
 
     Parameters
     ----------
@@ -242,9 +241,7 @@ class _Old:
 def _without(language: Language, places: set[int]) -> Language:
     """A language without the states at some places of its list."""
     kept = [item for n, item in enumerate(language.states.items()) if n not in places]
-    states = dict(kept)
-    also = {state: words for state, words in language.also.items() if state in states}
-    return replace(language, states=states, also=also)
+    return replace(language, states=dict(kept))
 
 
 def _names(old: Sequence[str], used: Sequence[int]) -> tuple[str, ...]:

@@ -169,7 +169,6 @@ def build(
     method: Method = "greedy",
     alpha_only: bool = False,
     prefer: BuildPreference | None = None,
-    overlap: bool = False,
     words: int | None = None,
     worst: bool = False,
     start: LanguageSource | None = None,
@@ -199,9 +198,7 @@ def build(
     prefer
         What the language should be like, of those with the fewest words, with ``"minimal"`` or
         ``"exhaustive"``.  ``"flexible"``: its sentences leave many plans open; ``"simple"``: its
-        words have short formulas; ``"early"``: its sentences differ early.
-    overlap
-        Whether states get further words while that leaves more plans open.
+        words have short formulas.
     words
         The most words, in place of a method: those under which robots that choose by themselves
         fail least often (docs/concepts.md, what communication is worth).  1 is silence.  Where
@@ -236,7 +233,7 @@ def build(
         If a limit was hit before there was any verified language; later the language so far is
         returned, with ``stopped`` set.
     """
-    options = BuildOptions(method, seed, alpha_only, prefer, overlap)
+    options = BuildOptions(method, seed, alpha_only, prefer)
     limit = _word_limit(words, worst, options, start)
     require_one_of("--unsolvable", unsolvable, UNSOLVABLE)
     require_seed(seed)
@@ -283,9 +280,8 @@ class Verification(Presented):
     Or iff it is none and robots fail no more often than it claims (``tolerance``; ``failures`` says
     how often they do).
 
-    ``witness`` has plans of one sentence that miscoordinate, or is None.  ``overlapping``: whether
-    states have further words.  ``certificate`` is the checked one, where one was given, and
-    ``claimed`` the lower bound that the language file claims.
+    ``witness`` has plans of one sentence that miscoordinate, or is None.  ``certificate`` is the
+    checked one, where one was given, and ``claimed`` the lower bound that the language file claims.
     """
 
     holds: bool
@@ -293,7 +289,6 @@ class Verification(Presented):
     tasks: int
     nodes: int
     witness: Miscoordination | None
-    overlapping: bool
     certificate: Checked | None
     claimed: int
     failures: Failures = NONE
@@ -428,7 +423,6 @@ def verify(
         verdict.tasks,
         verdict.nodes,
         verdict.witness,
-        bool(read.also),
         checked,
         read.guarantee.lower_bound,
         found,
@@ -482,7 +476,7 @@ def _word_limit(
     if options != BuildOptions(seed=options.seed) or start is not None:
         raise UsageError(
             "--words finds the words in its own way",
-            remedy="Leave out --method, --alpha-only, --prefer, --overlap and --start.",
+            remedy="Leave out --method, --alpha-only, --prefer and --start.",
         )
     return WordLimit(words, worst)
 
@@ -492,7 +486,7 @@ def _require_no_method(options: BuildOptions) -> None:
     if options != BuildOptions(seed=options.seed):
         raise UsageError(
             "--start changes the words of a language, and no method makes new ones",
-            remedy="Leave out --method, --alpha-only, --prefer and --overlap, or --start.",
+            remedy="Leave out --method, --alpha-only and --prefer, or --start.",
         )
 
 

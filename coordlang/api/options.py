@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 Cost = Literal["makespan", "makespan+actions", "makespan+cost"]
 Unowned = Literal["error", "environment", "shared"]
 Method = Literal["greedy", "separating", "minimal", "exhaustive"]
-BuildPreference = Literal["flexible", "simple", "early"]
+BuildPreference = Literal["flexible", "simple"]
 Unsolvable = Literal["fail", "skip"]
 HeuristicName = Literal["relaxed", "manhattan", "blind"]
 Target = Literal["pddl", "ltlf", "bt"]

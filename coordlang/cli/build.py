@@ -72,13 +72,7 @@ _FOR_CERTIFICATE = 0.25
     "--prefer",
     type=click.Choice(BUILD_PREFERENCES),
     help="Of the languages with the fewest words (--method minimal or exhaustive) one whose .. "
-    "flexible: sentences leave many plans open.  simple: words have short formulas.  early: "
-    "sentences differ early.",
-)
-@click.option(
-    "--overlap",
-    is_flag=True,
-    help="Then give states further words while that leaves more plans open.",
+    "flexible: sentences leave many plans open.  simple: words have short formulas.",
 )
 @click.option(
     "--words",
@@ -139,7 +133,6 @@ def command(
     method: Method,
     alpha_only: bool,
     prefer: BuildPreference | None,
-    overlap: bool,
     words: int | None,
     worst: bool,
     start: str | None,
@@ -175,7 +168,6 @@ def command(
         method=method,
         alpha_only=alpha_only,
         prefer=prefer,
-        overlap=overlap,
         words=words,
         worst=worst,
         start=start,
@@ -373,40 +365,26 @@ def _repair(built: BuiltLanguage, *, err: bool) -> str:
 
 
 def _readability(figures: dict[str, Any]) -> str:
-    """How short formulas are, or how early sentences differ, where that was optimised."""
-    if "terms" in figures:
-        terms, limits = figures["terms"], figures["limits"]
-        proved = (terms, limits) == (figures["terms_lower_bound"], figures["limits_lower_bound"])
-        proof = "proved the shortest" if proved else f"at least {figures['terms_lower_bound']}"
-        before = f"{counted(figures['terms_before'], 'term')}, {figures['limits_before']} limits"
-        return (
-            f"formulas of {counted(terms, 'term')} with {counted(limits, 'limit')} on variables "
-            f"({before} before; {proof})\n"
-        )
-    if "words_heard" in figures:
-        return (
-            f"{figures['words_heard']:,.2f} words are heard on average until the sentence is known "
-            f"({figures['words_heard_before']:,.2f} before, "
-            f"{figures['words_heard_lower_bound']:,.2f} at least)\n"
-        )
-    return ""
+    """How short formulas are, where that was optimised; whole lines."""
+    if "terms" not in figures:
+        return ""
+    terms, limits = figures["terms"], figures["limits"]
+    proved = (terms, limits) == (figures["terms_lower_bound"], figures["limits_lower_bound"])
+    proof = "proved the shortest" if proved else f"at least {figures['terms_lower_bound']}"
+    before = f"{counted(figures['terms_before'], 'term')}, {figures['limits_before']} limits"
+    return (
+        f"formulas of {counted(terms, 'term')} with {counted(limits, 'limit')} on variables "
+        f"({before} before; {proof})\n"
+    )
 
 
 def _flexibility(figures: dict[str, Any]) -> str:
     """How many plans the sentences leave open, where that was optimised; whole lines."""
-    text = ""
-    if "flexibility" in figures:
-        text += (
-            f"a sentence leaves {figures['flexibility']:,.2f} plans open on average ("
-            f"{figures['flexibility_before']:,.2f} before, "
-            f"{figures['flexibility_bound']:,.2f} at most), "
-            f"communication saving {100 * figures['communication_saving']:.1f} %\n"
-        )
-    if "overlapping_words" in figures:
-        text += (
-            f"{counted(figures['overlapping_words'], 'further word')} of states: "
-            "a sentence well chosen leaves "
-            f"{figures['overlapping_flexibility']:,.2f} plans open on average (without them "
-            f"{figures['partition_flexibility']:,.2f})\n"
-        )
-    return text
+    if "flexibility" not in figures:
+        return ""
+    return (
+        f"a sentence leaves {figures['flexibility']:,.2f} plans open on average ("
+        f"{figures['flexibility_before']:,.2f} before, "
+        f"{figures['flexibility_bound']:,.2f} at most), "
+        f"communication saving {100 * figures['communication_saving']:.1f} %\n"
+    )

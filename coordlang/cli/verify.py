@@ -120,11 +120,8 @@ def _text(found: Verification) -> str:
             fail += f".\nThe file claims less: {found.tolerance.warning}"
         return f"{head}\n{witness_text(found.witness, line_width())}\n\nOn the whole {fail}."
     slack = found.tolerance.slack if found.tolerance else None
-    plans = f"plan{'s' * (not found.overlapping)}"
-    plans = f"{plans} within slack {slack}" if slack else f"optimal {plans}"
+    plans = f"plans within slack {slack}" if slack else "optimal plans"
     mixing = f"all {plans} of one sentence mix freely"
-    if found.overlapping:
-        mixing = f"words overlap, every {plans} has a sentence whose plans mix freely"
     return f"verified: {words}, {tasks}: {mixing} ({found.nodes:,} walk nodes)"
 
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -47,8 +46,6 @@ def to_bytes(language: Language) -> bytes:
         "guarantee": _guarantee_data(language.guarantee),
         "producer": dict(provenance.producer),
     }
-    if language.also:
-        data["also"] = {state: list(words) for state, words in language.also.items()}
     if provenance.lifted:
         data["lifted"] = dict(provenance.lifted)
     if provenance.tolerance is not None:
@@ -79,9 +76,15 @@ def read_language(path: str | Path) -> Language:
 def language_from_bytes(data: bytes, position: Position) -> Language:
     """The language in the text of a language file; see `read_language`."""
     record = LANGUAGE.decode(data, position)
-    large = msgspec.json.decode(data, type=_States).states
+    large = msgspec.json.decode(data, type=_Large)
+    if large.also:
+        raise BadInput(
+            "states have several words here ('also'), which is no longer read",
+            position=position,
+            remedy="Build the language again, without --overlap.",
+        )
     try:
-        twice = duplicate_key(data, memoryview(large), len(record.states))
+        twice = duplicate_key(data, memoryview(large.states), len(record.states))
     except RecursionError as error:
         raise BadInput(
             f"this is no JSON that can be read: {error}", position=position, remedy=_BUILD_AGAIN
@@ -104,7 +107,6 @@ def language_from_bytes(data: bytes, position: Position) -> Language:
         words=tuple(record.words),
         states=record.states,
         default=record.default,
-        also={key: tuple(further) for key, further in record.also.items()},
         provenance=Provenance(
             robots=tuple(robots),
             guarantee=_guarantee(record, position),
@@ -158,14 +160,6 @@ def _check_words(record: LanguageRecord, position: Position) -> None:
             position=position,
             remedy="Add it to 'words', or give the state one of them.",
         )
-    for key, further in record.also.items():
-        others = words - {record.states.get(key)}
-        if key not in record.states or not further or not _all_different(further, others):
-            raise BadInput(
-                f"'also' of {echoed(key)} must hold further words of a state that 'states' has",
-                position=position,
-                remedy="Name words that differ from the state's own.",
-            )
 
 
 def _check_seen(record: LanguageRecord, position: Position) -> None:
@@ -179,10 +173,6 @@ def _check_seen(record: LanguageRecord, position: Position) -> None:
         require_seen(record.domain.name, position, "domain name")
     if record.guarantee is not UNSET:
         require_seen(record.guarantee.method, position, "method")
-
-
-def _all_different(words: Sequence[str], among: set[str]) -> bool:
-    return len(set(words)) == len(words) and among.issuperset(words)
 
 
 def _guarantee(record: LanguageRecord, position: Position) -> Guarantee | None:
@@ -243,5 +233,6 @@ def _claims_coordination(record: LanguageRecord) -> bool:
     return record.guarantee is not UNSET and record.guarantee.coordination_language
 
 
-class _States(msgspec.Struct):
+class _Large(msgspec.Struct):
     states: msgspec.Raw
+    also: Any = None

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,16 +25,12 @@ class Partition:
         The word number of each listed state.
     default
         The word number of every other state.
-    further
-        Number of a listed state -> numbers of its further words, where words overlap
-        (`coordlang.language.overlapping`).  Without them this is a partition.
     """
 
     words: tuple[str, ...]
     rows: Rows
     word: Ints
     default: int
-    further: Mapping[int, frozenset[int]] = field(default_factory=dict)
 
     @classmethod
     def of_states(cls, rows: Rows, words: Mapping[int, int]) -> Partition:
@@ -61,23 +57,8 @@ class Partition:
         return cls(tuple(words), table, sorted_word, default)
 
     def word_of(self, rows: Rows) -> Ints:
-        """Return the word number of each state of a table, without further words."""
+        """Return the word number of each state of a table."""
         if not len(self.rows):
             return np.full(len(rows), self.default, np.int64)
         found = find_rows(self.rows, rows)
         return np.where(found >= 0, self.word[np.maximum(found, 0)], self.default)
-
-    def words_of(self, rows: Rows) -> list[frozenset[int]]:
-        """Return all words of each state of a table, further ones included."""
-        words = [frozenset((word,)) for word in self.word_of(rows).tolist()]
-        if self.further:
-            for state, number in enumerate(find_rows(self.rows, rows).tolist()):
-                words[state] |= self.further.get(number, frozenset())
-        return words
-
-    def enlarged(self, rows: Rows, words: Mapping[int, frozenset[int]]) -> Partition:
-        """Add further words: ``words[state]`` are all those of ``rows[state]``, a listed state."""
-        states = sorted(words)
-        number = find_rows(self.rows, rows[states]).tolist()
-        further = {n: words[s] - {int(self.word[n])} for s, n in zip(states, number, strict=True)}
-        return replace(self, further={n: more for n, more in sorted(further.items()) if more})

@@ -188,13 +188,6 @@ class LanguageRecord(msgspec.Struct):
             "two runs."
         ),
     ] = {}
-    also: Annotated[
-        dict[str, list[str]],
-        Meta(
-            description="Further words of states, where words overlap; without it this is a "
-            "language all the same."
-        ),
-    ] = {}
     tolerance: Annotated[
         ToleranceRecord | UnsetType,
         Meta(
@@ -214,7 +207,7 @@ LANGUAGE = FileFormat("language", "language file", LanguageRecord, "coordlang/la
 def json_schema() -> dict[str, Any]:
     """The JSON Schema of language files.
 
-    What it cannot say, readers check besides: words of ``states``, ``default`` and ``also`` are
-    among ``words``, the guarantee fits their number, and no key occurs twice.
+    What it cannot say, readers check besides: words of ``states`` and ``default`` are among
+    ``words``, the guarantee fits their number, and no key occurs twice.
     """
     return LANGUAGE.json_schema()

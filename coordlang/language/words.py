@@ -20,7 +20,7 @@ from planners.errors import BadInput
 from planners.joint.model import JointModel
 from planners.messages import echoed
 from planners.notebook import counted, html_table
-from planners.tables import Rows, find_rows
+from planners.tables import Rows
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -35,9 +35,6 @@ class Language:
         State key (`planners.joint.states.StateCodec.key`) -> word.
     default
         The word of every other state.
-    also
-        State key -> further words, where words overlap (`coordlang.language.overlapping`); without
-        them this is still a language.
     provenance
         Model, tasks and method that it was made with.
     """
@@ -45,7 +42,6 @@ class Language:
     words: tuple[str, ...]
     states: Mapping[str, str]
     default: str
-    also: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     provenance: Provenance = field(default_factory=Provenance)
 
     @classmethod
@@ -56,15 +52,10 @@ class Language:
         words = partition.words
         keys = keys_of(model.codec, partition.rows)
         states = zip(keys, (words[word] for word in partition.word.tolist()), strict=True)
-        also = {
-            keys[state]: tuple(words[word] for word in sorted(further))
-            for state, further in partition.further.items()
-        }
         return cls(
             words,
             dict(sorted(states)),
             words[partition.default],
-            dict(sorted(also.items())),
             provenance or Provenance(model.robots),
         )
 
@@ -134,17 +125,8 @@ class Language:
         word = np.fromiter(
             map(number.__getitem__, self.states.values()), np.int64, len(self.states)
         )
-        partition = Partition.of_table(
-            self.words, _rows(model, self.states), word, number[self.default]
-        )
-        if not self.also:
-            return partition
-        listed = find_rows(partition.rows, _rows(model, self.also)).tolist()
-        further = {
-            state: frozenset(number[word] for word in words)
-            for state, words in zip(listed, self.also.values(), strict=True)
-        }
-        return replace(partition, further=further)
+        rows = _rows(model, self.states)
+        return Partition.of_table(self.words, rows, word, number[self.default])
 
 
 def _rows(model: JointModel, keys: Iterable[str]) -> Rows:

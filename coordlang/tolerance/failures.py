@@ -121,16 +121,12 @@ def failures_under(
 ) -> Failures:
     """Count how often robots fail under words in all candidate tasks.
 
-    Where words overlap a plan has several sentences, and nothing says which of them is said.
-
     Parameters
     ----------
     is_claimed
         Whether a language file claims it, so that it is counted whatever the work is, up to
         ``most`` additions; else only where that takes seconds.
     """
-    if partition.further:
-        return Failures(None, None, None, "words overlap, so that a plan has many sentences")
     if not is_claimed:
         most = min(most, _QUICKLY)
         if estimate(candidates.source).is_large:

@@ -15,7 +15,6 @@ import numpy as np
 from coordlang.language.partition import Partition
 from coordlang.tasks.candidates import Candidates
 from coordlang.verification.by_definition import Verdict, verify
-from coordlang.verification.overlapping import verify_overlapping
 from planners.limits import reaching
 from planners.pieces.work import Runner, Table, Work, digest, tables
 from planners.search.plan_space import PlanSpace
@@ -30,13 +29,10 @@ class _Check:
     partition: Partition
 
     def verdict(self, space: PlanSpace) -> Verdict:
-        """By definition; words that overlap are checked as a partition first."""
+        """By definition."""
         if not len(space):  # nothing leads to these goals
             return Verdict(True, 0, 0, None)
-        verdict = verify(self.partition, [space])
-        if verdict.holds and self.partition.further:
-            return verify_overlapping(self.partition, [space])
-        return verdict
+        return verify(self.partition, [space])
 
 
 def verify_candidates(
@@ -53,10 +49,11 @@ def verify_candidates(
     source = candidates.source
     portions = cut(source.efforts, portion)
     if len(portions) == 1:
-        return _all_at_once(partition, candidates)
+        return verify(partition, candidates.spaces)
     efforts = [float(source.efforts[goals.start : goals.stop].sum()) for goals in portions]
     check = _Check(source, partition)
-    identity = digest(source.identity, *_of_words(partition))
+    words = (partition.words, partition.rows, partition.word, partition.default)
+    identity = digest(source.identity, *words)
     work = Work("verification", _verdict, check, portions, identity, efforts)
     done = nodes = 0
 
@@ -81,15 +78,3 @@ def _verdict(check: _Check, goals: range) -> Table:
     """One piece: the tasks of some goals."""
     verdict = check.verdict(check.source.portion(goals))
     return {"holds": np.array(verdict.holds), "nodes": np.array(verdict.nodes)}
-
-
-def _all_at_once(partition: Partition, candidates: Candidates) -> Verdict:
-    verdict = verify(partition, candidates.spaces)
-    if verdict.holds and partition.further:
-        return verify_overlapping(partition, candidates.spaces)
-    return verdict
-
-
-def _of_words(partition: Partition) -> tuple[object, ...]:
-    further = tuple((state, *sorted(more)) for state, more in sorted(partition.further.items()))
-    return partition.words, partition.rows, partition.word, partition.default, further

@@ -138,8 +138,6 @@ class Annealing:
         (tasks) what no language exceeds.
     verified
         Called with the words (states) of a better language, in the end and now and then.
-    objective
-        What is maximised; None: flexibility.
     """
 
     def __init__(
@@ -150,13 +148,12 @@ class Annealing:
         bound: Floats,
         verified: Callable[[Ints], None],
         settings: AnnealingSettings,
-        objective: Objective | None = None,
     ) -> None:
         self._states, self._violations, self._words = job.states, violations, words
         self._bound, self._verified, self._settings = bound, verified, settings
         self._random = Random(job.seed)
         self._permutations = violations.group.permutations
-        self._objective = objective or Objective(job.candidates.spaces, words)
+        self._objective = Objective(job.candidates.spaces, words)
         self._word = np.zeros(len(job.candidates.rows), np.int64)
         #: The same as a list, which is quicker to ask for single words.
         self._word_list: list[int] = []

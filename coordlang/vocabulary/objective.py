@@ -57,7 +57,7 @@ class Layer:
 class Part:
     """Some tasks of a plan space.
 
-    The layers of their plan graph, the node of each task, its number of plans and of joint steps.
+    The layers of their plan graph, the node of each task and its number of plans.
     """
 
     tasks: Ints
@@ -66,7 +66,6 @@ class Part:
     edges: int
     start: Ints
     plans: Floats
-    steps: Ints
 
     def expected(self, word: Ints, code: Hashes) -> Floats:
         """E of each task; ``word`` of every state, ``code`` a random number for every word."""
@@ -79,8 +78,7 @@ class Part:
                 sentence, share = code[word[layer.state]], np.ones(len(layer.state))
                 node = np.arange(len(sentence))
             else:
-                above = sentences_above(layer, first, sentence, share, word, code)
-                node, sentence, share = above.node, above.sentence, above.share
+                node, sentence, share = _above(layer, first, sentence, share, word, code)
             first = np.searchsorted(node, np.arange(layer.high - layer.low + 1))
             open_share[layer.low : layer.high] = np.bincount(
                 node, share * share, layer.high - layer.low
@@ -88,31 +86,13 @@ class Part:
         return self.plans * open_share[self.start]
 
 
-@dataclass(frozen=True, slots=True)
-class Said:
-    """The sentences of the nodes of a layer, sorted by node.
+def _above(
+    layer: Layer, first: Ints, sentence: Hashes, share: Floats, word: Ints, code: Hashes
+) -> tuple[Ints, Hashes, Floats]:
+    """The sentences of a layer from those of the layer below, sorted by node.
 
-    Of each entry the ``node``, the ``sentence``, the ``share`` of the node's plans that have it,
-    the word of the node as ``head``, and as ``rest`` what is said from the next node on: the same
-    sentence where that goes on in its word.
+    Of each the node, the sentence, and the share of the node's plans that have it.
     """
-
-    node: Ints
-    sentence: Hashes
-    share: Floats
-    head: Ints
-    rest: Hashes
-
-
-def sentences_above(
-    layer: Layer,
-    first: Ints,
-    sentence: Hashes,
-    share: Floats,
-    word: Ints,
-    code: Hashes,
-) -> Said:
-    """The sentences of a layer from those of the layer below."""
     leaving, entering = word[layer.leaving], word[layer.entering]
     source, weight = layer.source, layer.share
     if len(first) - 1 == len(sentence):  # one sentence for every node below
@@ -131,14 +111,7 @@ def sentences_above(
     fresh = np.ones(len(order), np.bool_)
     fresh[1:] = (source[1:] != source[:-1]) | (new[1:] != new[:-1])
     at = np.flatnonzero(fresh)
-    chosen = order[at]
-    return Said(
-        source[at],
-        new[at],
-        np.add.reduceat((share[entry] * weight)[order], at),
-        leaving[chosen],
-        rest[chosen],
-    )
+    return source[at], new[at], np.add.reduceat((share[entry] * weight)[order], at)
 
 
 class Objective:
@@ -153,7 +126,7 @@ class Objective:
             for k, space in enumerate(spaces)
         ]
         #: (words) the number by which each word enters hashes.
-        self.code: Hashes = np.random.default_rng(0).integers(1, 2**63, words, np.uint64)
+        self._code: Hashes = np.random.default_rng(0).integers(1, 2**63, words, np.uint64)
         self._all = [
             space.part(np.ones(len(space.space.starts), np.bool_)) for space in self._spaces
         ]
@@ -195,11 +168,7 @@ class Objective:
 
     def _one(self, part: Part, word: Ints) -> Floats:
         self.edges += part.edges
-        return self.measured(part, word)
-
-    def measured(self, part: Part, word: Ints) -> Floats:
-        """E of each task of a part; ``word`` of every state number."""
-        return part.expected(word, self.code)
+        return part.expected(word, self._code)
 
     def _through(self, state: int) -> list[Part]:
         """The tasks with plans through a state."""
@@ -274,5 +243,4 @@ class _Measured:
             sum(len(layer.source) for layer in layers),
             number[space.starts[tasks]],
             self._plans[tasks],
-            space.layer[space.starts[tasks]],
         )

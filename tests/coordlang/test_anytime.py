@@ -15,11 +15,10 @@ from pathlib import Path
 
 import pytest
 
-import coordlang.building
 from coordlang.building import build_language
 from coordlang.language.file import read_language
 from coordlang.vocabulary.sat import PartitionProblem
-from planners.errors import OutOfMemory, OutOfTime
+from planners.errors import OutOfTime
 from planners.limits import time_limit
 from tests.support.command import Command, own_process
 from tests.support.domains import DOMAINS, all_tasks
@@ -85,23 +84,6 @@ def test_an_interrupt_writes_the_best_language(tmp_path: Path) -> None:
     assert code == 130, said
     assert "interrupted; the best language so far is written to" in said
     check_file(path)
-
-
-@pytest.mark.parametrize(
-    "error", [OutOfTime("late"), OutOfMemory("full"), MemoryError(), KeyboardInterrupt()]
-)
-def test_words_are_kept_when_enlarging_them_is_stopped(
-    error: BaseException, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def stop(*_: object) -> None:
-        raise error
-
-    monkeypatch.setattr(coordlang.building, "verify_overlapping", stop)
-    built = build_language(all_tasks("grid", "gw1-2x2"), "minimal", overlap=True)
-    assert built.stopped is error
-    assert built.language.also == {}
-    assert len(built.language.words) == 3
-    assert built.language.guarantee.proved_minimal
 
 
 def test_a_better_partition_found_on_the_way_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:

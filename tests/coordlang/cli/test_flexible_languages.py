@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``build --prefer flexible`` and ``--overlap``: what is printed, written, and verified again."""
+"""``build --prefer flexible`` and ``simple``: what is printed, written, and verified again."""
 
 from __future__ import annotations
 
 import json
 import re
 from pathlib import Path
-
-import pytest
 
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
@@ -59,12 +57,11 @@ def test_prefer_flexible(tmp_path: Path, coordlang: Command) -> None:
 
 
 def test_the_summary_says_what_is_left_open(tmp_path: Path, coordlang: Command) -> None:
-    arguments = ("--tasks", "all", "--method", "exhaustive", "--prefer", "flexible", "--overlap")
+    arguments = ("--tasks", "all", "--method", "exhaustive", "--prefer", "flexible")
     files = DOMAINS / "three-cells" / "domain.pddl", DOMAINS / "three-cells" / "problem.pddl"
     outcome = coordlang("build", *files, *arguments, "-o", tmp_path / "l.json")
     assert outcome.code == 0
     assert "a sentence leaves 1.20 plans open on average (1.20 before, 1.20 at most)" in outcome.out
-    assert "0 further words of states" in outcome.out
 
 
 def test_prefer_simple(tmp_path: Path, coordlang: Command) -> None:
@@ -84,46 +81,8 @@ def test_prefer_simple(tmp_path: Path, coordlang: Command) -> None:
     assert coordlang("verify", path, *ring).code == 0
 
 
-def test_prefer_early(tmp_path: Path, coordlang: Command) -> None:
-    path = tmp_path / "l.json"
-    chosen = ("--tasks", "all", "--method", "minimal", "--prefer", "early")
-    outcome = coordlang("build", *SQUARE, *chosen, "-o", path)
-    assert outcome.code == 0
-    assert "0.30 words are heard on average until the sentence is known (0.47 before, " in (
-        outcome.out
-    )
-    assert coordlang("verify", path, *SQUARE).code == 0
-
-
 def test_prefer_belongs_to_the_exact_methods(tmp_path: Path, coordlang: Command) -> None:
     outcome = coordlang("build", *SQUARE, "--prefer", "flexible", "-o", tmp_path / "l.json")
     assert outcome.code == 2
     assert "--prefer flexible belongs to --method minimal or exhaustive" in outcome.err
     assert not (tmp_path / "l.json").exists()
-
-
-@pytest.mark.thorough
-def test_overlapping_words_are_written_and_verified(tmp_path: Path, coordlang: Command) -> None:
-    path = tmp_path / "l.json"
-    outcome = coordlang("build", *SQUARE, "--tasks", "all", "--overlap", "-o", path, "--json")
-    figures = json.loads(outcome.out)
-    assert outcome.code == 0
-    assert figures["overlapping_words"] > 0
-    assert figures["overlapping_flexibility"] > figures["partition_flexibility"]
-    data = json.loads(path.read_text())
-    assert sum(map(len, data["also"].values())) == figures["overlapping_words"]
-    outcome = coordlang("verify", path, *SQUARE)
-    assert outcome.code == 0
-    assert "words overlap, every optimal plan has a sentence whose plans mix freely" in outcome.out
-    # All words for all states: no sentence is usable any more.
-    data["also"] = {
-        state: [w for w in data["words"][:3] if w != word] for state, word in data["states"].items()
-    }
-    path.write_text(json.dumps(data))
-    outcome = coordlang("verify", path, *SQUARE)
-    assert outcome.code == 1
-    assert outcome.out.startswith("refuted: plans with the sentence")
-    assert "breaks here" in outcome.out
-    data["also"] = {"(at r1 c0-0) (at r2 c0-1)": ["w99"]}
-    path.write_text(json.dumps(data))
-    assert coordlang("verify", path, *SQUARE).code == 31

@@ -127,7 +127,6 @@ WRONG: list[Change] = [
     lambda d: d["guarantee"].update(lower_bound=0),
     lambda d: d["guarantee"].update(proved_minimal=1),
     lambda d: d.update(producer=[]),
-    lambda d: d.update(also={"(at r1 a) (at r2 b)": "w1"}),
     lambda d: d["guarantee"].update(coordination_language=0),
     lambda d: d.update(tolerance={"failure_mean": -0.1, "failure_worst": 0.5}),
     lambda d: d.update(tolerance={"failure_mean": 0.1, "failure_worst": 1.5}),
@@ -183,6 +182,18 @@ def test_only_the_reader_refuses(number: int, written: dict[str, Any]) -> None:
     CONTRADICTORY[number](data)
     assert valid(data)
     assert not readable(data)
+
+
+def test_several_words_of_a_state_are_refused(coordlang: Command, tmp_path: Path) -> None:
+    """`also` of older files; one that is empty changes nothing."""
+    path = tmp_path / "old.json"
+    path.write_text(json.dumps(BY_HAND | {"also": {"(at r1 a) (at r2 b)": ["a"]}}))
+    refused = coordlang("verify", path, *RUNNING, "--tasks", "all")
+    assert refused.code == 31
+    assert "old.json" in refused.err
+    assert "without --overlap" in refused.err
+    path.write_text(json.dumps(BY_HAND | {"also": {}}))
+    assert coordlang("verify", path, *RUNNING, "--tasks", "all").code == 0
 
 
 def test_further_keys_are_ignored(written: dict[str, Any]) -> None:

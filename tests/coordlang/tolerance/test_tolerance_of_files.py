@@ -95,19 +95,6 @@ def test_a_refuted_language_is_refuted_when_time_is_over(
     assert "fail in an unknown share of all runs (the time limit of 1 s is over)" in found.out
 
 
-def test_overlapping_words_are_said_not_to_be_counted(tmp_path: Path) -> None:
-    path = silent(tmp_path / "l.json", None)
-    data = json.loads(path.read_text())
-    data["words"].append("w1")
-    data["guarantee"]["size"] = 2
-    data["also"] = {next(iter(data["states"])): ["w1"]}
-    path.write_text(json.dumps(data))
-    found = library.verify(path, *SQUARE)
-    assert not found
-    assert found.failures.mean is None
-    assert "a plan has many sentences" in found.failures.text()
-
-
 def test_a_verified_language_never_fails(coordlang: Command, tmp_path: Path) -> None:
     path = tmp_path / "l.json"
     built = json.loads(coordlang("build", *SQUARE, "--tasks", "all", "-o", path, "--json").out)

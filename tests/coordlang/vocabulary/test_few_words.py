@@ -221,7 +221,7 @@ def test_files_say_what_they_are(
         ("--words", 0),
         ("--words", 2, "--method", "minimal"),
         ("--words", 2, "--method", "greedy"),
-        ("--words", 2, "--overlap"),
+        ("--words", 2, "--method", "minimal", "--prefer", "simple"),
         ("--words", 2, "--certificate", "c.json"),
     ],
 )
