@@ -75,34 +75,33 @@ COMMANDS = {
         build D problem.pddl --tasks all --method minimal --certificate @proof.json -o @minimal.json
         build D problem.pddl --tasks all --method minimal --prefer flexible -o @flexible.json --json
         build D problem.pddl --tasks all --method minimal -o -
-        verify @minimal.json D problem.pddl --lower-bound @proof.json --dimacs @proof.cnf
+        verify @minimal.json D problem.pddl --certificate @proof.json --dimacs @proof.cnf
         verify @one.json D problem.pddl
         verify @one.json D problem.pddl --tasks all
         verify @one.json D problem.pddl --tasks all --json
         explain @one.json D problem.pddl
         explain @one.json D problem.pddl --task
         explain @one.json D problem.pddl --task --json
-        explain @minimal.json D problem.pddl --each
+        explain @minimal.json D problem.pddl --formula-per-word
         understand @one.json D problem.pddl "w1 w2 w0" --json -o @plans.json
         understand @one.json D problem.pddl "w1 w2 w0"
         understand @one.json D problem.pddl "w1 w2 w0" --count
         understand @one.json D problem.pddl "w1 w2 w0" --sample 3 --seed 1
         understand @one.json D problem.pddl "w1 w2 w0" --format dot
-        understand @one.json D problem.pddl "w1 w2 w0" --format svg -o @one.svg
         understand @one.json D problem.pddl "w1 w2"
         say @one.json D problem.pddl @plans.json
         say @one.json D problem.pddl @plans.json --json
         plan @one.json D problem.pddl "w1 w0"
-        plan @one.json D problem.pddl --wish first:r2 --wish most-plans --json
-        plan @one.json D problem.pddl --wish shortest --wish "avoid:(at r1 c)"
+        plan @one.json D problem.pddl --prefer first:r2 --prefer most-plans --json
+        plan @one.json D problem.pddl --prefer shortest --prefer "avoid:(at r1 c)"
         choices @one.json D problem.pddl "w1 w0" --check
         choices @one.json D problem.pddl "w1 w0" --format json -o @choices.json
         choices @one.json D problem.pddl "w1 w0" --format dot
         choices @one.json D problem.pddl "w1 w0" --robot r2 --visit "(at r2 c)"
-        choices @one.json D problem.pddl "w1 w0" --robot r2 --did idle --visit "(at r2 a)" --json
+        choices @one.json D problem.pddl "w1 w0" --robot r2 --history idle --visit "(at r2 a)" --json
         export @one.json D problem.pddl "w1 w0"
         export @one.json D problem.pddl "w1 w0" --json
-        export @one.json D problem.pddl "w1 w0" --limit 0
+        export @one.json D problem.pddl "w1 w0" --max-actions 0
         export @one.json D problem.pddl "w1 w0" --to ltlf
         export @one.json D problem.pddl "w1 w0" --to ltlf --json
         report @one.json D problem.pddl -o @one.html
@@ -116,14 +115,14 @@ COMMANDS = {
         build D problem.pddl --tasks all --method separating -o @separating.json --json
         build D problem.pddl --tasks all --method minimal --certificate @proof.json -o @minimal.json
         build D problem.pddl --tasks all --method minimal --prefer flexible -o @flexible.json --json
-        verify @minimal.json D problem.pddl --lower-bound @proof.json --json
-        verify @minimal.json D problem.pddl --dimacs @proof.cnf --lower-bound @proof.json
+        verify @minimal.json D problem.pddl --certificate @proof.json --json
+        verify @minimal.json D problem.pddl --dimacs @proof.cnf --certificate @proof.json
         explain @minimal.json D problem.pddl
         explain @minimal.json D problem.pddl --json
         explain @minimal.json D problem.pddl --task
         explain @greedy.json D problem.pddl --task --json
-        plan @minimal.json D problem.pddl --wish first:r1 --json
-        plan @greedy.json D problem.pddl --wish shortest --heuristic blind
+        plan @minimal.json D problem.pddl --prefer first:r1 --json
+        plan @greedy.json D problem.pddl --prefer shortest --heuristic blind
         understand @minimal.json D problem.pddl "w0 w2 w1 w0"
         understand @minimal.json D problem.pddl "w0" --json
         choices @minimal.json D problem.pddl "w0 w2 w1 w0"
@@ -140,8 +139,8 @@ COMMANDS = {
         verify @queue.json D queue.pddl --json
         explain @queue.json D queue.pddl --task
         explain @three.json D three-robots.pddl --task --json
-        plan @three.json D three-robots.pddl --wish most-plans --json
-        plan @queue.json D queue.pddl --wish shortest
+        plan @three.json D three-robots.pddl --prefer most-plans --json
+        plan @queue.json D queue.pddl --prefer shortest
         report @three.json D three-robots.pddl -o @three.html
         """,
     "corridor": """
@@ -151,8 +150,8 @@ COMMANDS = {
         tasks D problem.pddl --start "(at r1 ?)" --goal "(at r1 c0-8)" --goal "(at r2 ?)" -o @t.json
         explain @minimal.json D problem.pddl --task
         explain @greedy.json D problem.pddl --json
-        plan @minimal.json D problem.pddl --wish most-plans --json
-        plan @minimal.json D problem.pddl --wish most-plans --heuristic manhattan
+        plan @minimal.json D problem.pddl --prefer most-plans --json
+        plan @minimal.json D problem.pddl --prefer most-plans --heuristic manhattan
         report @minimal.json D problem.pddl -o @minimal.html
         """,
     "elevator": """
@@ -162,7 +161,7 @@ COMMANDS = {
         build D two-calls.pddl --tasks all -o @greedy.json --json
         verify @minimal.json D two-calls.pddl
         explain @minimal.json D two-calls.pddl --task
-        plan @minimal.json D two-calls.pddl --wish shortest --json
+        plan @minimal.json D two-calls.pddl --prefer shortest --json
         report @greedy.json D two-calls.pddl -o @greedy.html
         """,
     "flags": """
@@ -170,9 +169,9 @@ COMMANDS = {
         plans D parade.pddl --sample 3 --seed 1
         build D parade.pddl --method minimal -o @minimal.json --certificate @proof.json
         build D parade.pddl --method separating -o @separating.json --json
-        verify @minimal.json D parade.pddl --lower-bound @proof.json
+        verify @minimal.json D parade.pddl --certificate @proof.json
         explain @minimal.json D parade.pddl --task
-        plan @minimal.json D parade.pddl --wish most-plans --json
+        plan @minimal.json D parade.pddl --prefer most-plans --json
         report @minimal.json D parade.pddl -o @minimal.html
         """,
     "grid": """
@@ -193,15 +192,15 @@ COMMANDS = {
         build D corners-3x3.pddl gw4-3x3.pddl --method separating -o @two-problems.json --json
         build D three-robots-3x3.pddl --method minimal -o @three.json --json
         build D three-robots-3x3.pddl -o @three-greedy.json
-        verify @gw1.json D gw1-2x2.pddl --lower-bound @gw1.proof.json --json
+        verify @gw1.json D gw1-2x2.pddl --certificate @gw1.proof.json --json
         verify @three.json D three-robots-3x3.pddl
         verify @two-problems.json D corners-3x3.pddl gw4-3x3.pddl --json
         explain @gw2.json D gw2-2x3.pddl
         explain @gwb5.json D gwb5-3x3.pddl --task --json
         explain @corners.json D corners-4x4.pddl --task
-        plan @corners.json D corners-4x4.pddl --wish most-plans --json
-        plan @few-actions.json D corners-4x4.pddl --wish shortest
-        plan @three.json D three-robots-3x3.pddl --wish first:r3 --json
+        plan @corners.json D corners-4x4.pddl --prefer most-plans --json
+        plan @few-actions.json D corners-4x4.pddl --prefer shortest
+        plan @three.json D three-robots-3x3.pddl --prefer first:r3 --json
         report @corners.json D corners-4x4.pddl -o @corners.html
         report @gwb5.json D gwb5-3x3.pddl --tasks-shown 5 --seed 3 -o @gwb5.html
         """,
@@ -211,7 +210,7 @@ COMMANDS = {
         build D gw1-2x2.pddl --tasks all --method minimal -o @gw1.json --json
         build D corners-3x3.pddl --method minimal -o @corners.json
         explain @corners.json D corners-3x3.pddl --task
-        plan @corners.json D corners-3x3.pddl --wish most-plans
+        plan @corners.json D corners-3x3.pddl --prefer most-plans
         """,
     "handover": """
         coordination D two-doors.pddl
@@ -219,8 +218,8 @@ COMMANDS = {
         build D two-doors.pddl --method minimal -o @minimal.json --json
         build D three-rooms.pddl --method minimal -o @three.json
         explain @minimal.json D two-doors.pddl --task
-        plan @minimal.json D two-doors.pddl --wish most-plans --json
-        plan @three.json D three-rooms.pddl --wish shortest
+        plan @minimal.json D two-doors.pddl --prefer most-plans --json
+        plan @three.json D three-rooms.pddl --prefer shortest
         report @minimal.json D two-doors.pddl -o @minimal.html
         """,
     "lock": """
@@ -230,11 +229,11 @@ COMMANDS = {
         build D three-robots.pddl --remember-actions --cost makespan+actions -o @remember-cost.json
         build D both-in.pddl --tasks all --method minimal -o @minimal.json --certificate @proof.json
         verify @remember.json D three-robots.pddl
-        verify @minimal.json D both-in.pddl --lower-bound @proof.json --json
+        verify @minimal.json D both-in.pddl --certificate @proof.json --json
         explain @remember.json D three-robots.pddl --task
         explain @minimal.json D both-in.pddl --task --json
-        plan @remember.json D three-robots.pddl --wish most-plans --json
-        plan @minimal.json D both-in.pddl --wish first:r2
+        plan @remember.json D three-robots.pddl --prefer most-plans --json
+        plan @minimal.json D both-in.pddl --prefer first:r2
         report @remember.json D three-robots.pddl -o @remember.html
         """,
     "push-box": """
@@ -243,7 +242,7 @@ COMMANDS = {
         build D three-robots.pddl --method separating -o @three.json
         build D around.pddl --method minimal -o @minimal.json
         explain @greedy.json D around.pddl --task
-        plan @three.json D three-robots.pddl --wish shortest --json
+        plan @three.json D three-robots.pddl --prefer shortest --json
         report @minimal.json D around.pddl -o @minimal.html
         """,
     "tray": """
@@ -253,7 +252,7 @@ COMMANDS = {
         verify @minimal.json D serve.pddl
         explain @minimal.json D serve.pddl
         explain @three.json D three-robots.pddl --task
-        plan @three.json D three-robots.pddl --wish most-plans --json
+        plan @three.json D three-robots.pddl --prefer most-plans --json
         report @minimal.json D serve.pddl -o @minimal.html
         """,
     "two-arms": """
@@ -261,7 +260,7 @@ COMMANDS = {
         build D exchange.pddl --tasks exchange.tasks.json -o @greedy.json --json
         build D exchange.pddl --method minimal -o @minimal.json
         explain @minimal.json D exchange.pddl --task --json
-        plan @minimal.json D exchange.pddl --wish shortest --json
+        plan @minimal.json D exchange.pddl --prefer shortest --json
         report @minimal.json D exchange.pddl -o @minimal.html
         """,
     "vans": """
@@ -271,7 +270,7 @@ COMMANDS = {
         build D two-vans.pddl --cost makespan+cost --method minimal -o @cost.json
         verify @minimal.json D one-van.pddl
         explain @minimal.json D one-van.pddl --task
-        plan @minimal.json D one-van.pddl --wish most-plans --json
+        plan @minimal.json D one-van.pddl --prefer most-plans --json
         report @minimal.json D one-van.pddl -o @minimal.html
         """,
 }
@@ -296,7 +295,7 @@ verify @minimal.json D problem.pddl --cost makespan+actions
 verify @minimal.json ../lock/domain.pddl ../lock/both-in.pddl
 say @minimal.json D problem.pddl D
 understand @minimal.json D problem.pddl "w0 w9"
-plan @minimal.json D problem.pddl --wish anything
+plan @minimal.json D problem.pddl --prefer anything
 choices @minimal.json D problem.pddl "w0" --robot r9
 """
 

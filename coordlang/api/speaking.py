@@ -24,7 +24,6 @@ from coordlang.use.sentence.best_sentence import BestSentence, best_sentence
 from coordlang.use.sentence.drawing import cut_note, to_dot
 from coordlang.use.sentence.guided_search import ExpandedStates, GuidedPlan, plan_under_sentence
 from coordlang.use.sentence.open_plans import OpenPlans, open_plans_data
-from coordlang.use.sentence.picture import to_svg
 from coordlang.use.sentence.plan_dag import PlanDag, plan_dag
 from coordlang.use.sentence.plan_sentence import read_plan_file, sentence_of_plan
 from coordlang.use.sentence.preferences import Preference, read_preference
@@ -155,10 +154,6 @@ class SentencePlans(OptimalPlans):
         """Return the DAG in the language of Graphviz."""
         return to_dot(self.dag(nodes))
 
-    def svg(self, nodes: int = NODES_DRAWN) -> str:
-        """Return the DAG as an SVG picture."""
-        return to_svg(self.dag(nodes))
-
     def cut_note(self, nodes: int = NODES_DRAWN) -> str | None:
         """Return what a picture with so many nodes leaves out, or None."""
         return cut_note(self.dag(nodes)) or None
@@ -170,9 +165,6 @@ class SentencePlans(OptimalPlans):
     def facts(self) -> Mapping[str, object]:
         """Return the main facts, as a notebook shows them."""
         return {"sentence": self.sentence, **super().facts(), "covered": self.covered}
-
-    def _repr_html_(self) -> str:
-        return self.svg()
 
 
 def understand(

@@ -22,7 +22,6 @@ from coordlang.cli.files import (
     planning_files,
     write,
 )
-from coordlang.cli.group import RenamedOptions
 from coordlang.cli.listing import form_of
 from coordlang.cli.shared_options import ModelKeywords, kept_plans, limits, model_options
 from coordlang.cli.terminal import covered_code, line_width, working
@@ -40,7 +39,7 @@ _MAY_DO = "may do"
 _LEAST_ROOM = 30
 
 
-@click.command(name="choices", cls=RenamedOptions, renamed={"--did": "--history"})
+@click.command(name="choices")
 @language_argument
 @planning_files("DOMAIN PROBLEM SENTENCE", most=1, then="sentence")
 @click.option(

@@ -14,7 +14,6 @@ import click
 from coordlang.cli.echo import echo
 from coordlang.cli.exit_codes import UNPROVED
 from coordlang.cli.files import FOLDER, check_outputs
-from coordlang.cli.group import RenamedOptions
 from coordlang.cli.shared_options import limits, note, was_given
 from coordlang.cli.terminal import bar
 from planners.messages import echoed
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from coordlang.evaluation.lab.results import Results
 
 
-@click.command(name="evaluate", cls=RenamedOptions, renamed={"--unit-limit": "--unit-time-limit"})
+@click.command(name="evaluate")
 @click.argument("names", nargs=-1, required=True, metavar="NAME...")
 @click.option(
     "--results",

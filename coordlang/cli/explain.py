@@ -11,7 +11,6 @@ import click
 import coordlang
 from coordlang.cli.echo import echo
 from coordlang.cli.files import PlanningFiles, language_argument, planning_files
-from coordlang.cli.group import RenamedOptions
 from coordlang.cli.shared_options import ModelKeywords, kept_plans, limits, model_options
 from coordlang.cli.terminal import covered_code, line_width, warn_of_failures, working
 from planners.errors import OutOfMemory
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     from coordlang.api.explaining import Explanation
 
 
-@click.command(name="explain", cls=RenamedOptions, renamed={"--each": "--formula-per-word"})
+@click.command(name="explain")
 @language_argument
 @planning_files("DOMAIN PROBLEM", most=1)
 @click.option(

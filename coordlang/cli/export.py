@@ -20,7 +20,6 @@ from coordlang.cli.files import (
     planning_files,
     write,
 )
-from coordlang.cli.group import RenamedOptions
 from coordlang.cli.shared_options import ModelKeywords, kept_plans, limits, model_options, was_given
 from coordlang.cli.terminal import covered_code, working
 from planners.messages import visible
@@ -29,10 +28,8 @@ from planners.notebook import counted
 if TYPE_CHECKING:
     from coordlang.api.exporting import ExportedFormula, ExportedTask
 
-_RENAMED = {"--limit": "--max-actions", "--back": "--translate-plan"}
 
-
-@click.command(name="export", cls=RenamedOptions, renamed=_RENAMED)
+@click.command(name="export")
 @language_argument
 @planning_files("DOMAIN PROBLEM SENTENCE", most=1, then="sentence")
 @click.option(

@@ -1,16 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command group, and commands that still read former names of their options."""
+"""The command group, which imports a command only when it is called."""
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping
-from typing import Any
 
 import click
 
 import coordlang
-from coordlang.cli.echo import echo
 
 #: Command -> one line about it, so that ``--help`` need not import them all.  A command is the
 #: module of this name in `coordlang.cli`, imported when it is called.
@@ -54,35 +51,6 @@ class _LazyGroup(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
-
-
-class RenamedOptions(click.Command):
-    """A command that reads former names of its options for one release, with a note on stderr.
-
-    Parameters
-    ----------
-    renamed
-        Former spelling -> present spelling.
-    """
-
-    def __init__(self, *args: Any, renamed: Mapping[str, str], **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
-        self.renamed = renamed
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse the arguments, with former names of options replaced by the present ones."""
-        end = args.index("--") if "--" in args else len(args)
-        former = {arg.partition("=")[0] for arg in args[:end]} & self.renamed.keys()
-        for name in sorted(former):
-            echo(
-                f"coordlang: note: {name} is deprecated: it is called {self.renamed[name]} now",
-                err=True,
-            )
-        return super().parse_args(ctx, [*map(self._present, args[:end]), *args[end:]])
-
-    def _present(self, arg: str) -> str:
-        name, equals, value = arg.partition("=")
-        return f"{self.renamed.get(name, name)}{equals}{value}"
 
 
 @click.group(

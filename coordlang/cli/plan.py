@@ -12,7 +12,6 @@ import coordlang
 from coordlang.api.options import HEURISTICS, HeuristicName
 from coordlang.cli.echo import echo
 from coordlang.cli.files import PlanningFiles, language_argument, planning_files
-from coordlang.cli.group import RenamedOptions
 from coordlang.cli.listing import form_of
 from coordlang.cli.shared_options import ModelKeywords, kept_plans, limits, model_options
 from coordlang.cli.terminal import covered_code, working
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
     from coordlang.api.speaking import Fulfilled
 
 
-@click.command(name="plan", cls=RenamedOptions, renamed={"--wish": "--prefer"})
+@click.command(name="plan")
 @language_argument
 @planning_files("DOMAIN PROBLEM [SENTENCE]", most=1, then="sentence", optional=True)
 @click.option(

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from coordlang.api.speaking import SentencePlans
 
 _DEFAULT_NODES = 200
-_DRAWN = ("dot", "svg")
 
 
 @click.command(name="understand")
@@ -36,7 +35,7 @@ _DRAWN = ("dot", "svg")
 @click.option(
     "--format",
     "form",
-    type=click.Choice(["ipc", "json", *_DRAWN]),
+    type=click.Choice(["ipc", "json", "dot"]),
     default="ipc",
     show_default=True,
 )
@@ -45,8 +44,7 @@ _DRAWN = ("dot", "svg")
     "--nodes",
     type=click.IntRange(min=1),
     metavar="N",
-    help=f"Cut the DAG to about N nodes (default: {_DEFAULT_NODES} for dot and svg; json: "
-    "not cut).",
+    help=f"Cut the DAG to about N nodes (default: {_DEFAULT_NODES} for dot; json: not cut).",
 )
 @click.option(
     "-o", "--output", type=FILE, metavar="FILE", help="Write to this file instead of stdout."
@@ -72,8 +70,8 @@ def command(
 
     The optimal plans that it leaves open are counted, listed, sampled or drawn.
 
-    --format dot and svg draw them as one DAG, whose paths they are; json has both the listed plans
-    and the DAG.
+    --format dot draws them as one DAG, whose paths they are; json has both the listed plans and
+    the DAG.
     """
     form = form_of(form, as_json)
     listing = Listing.of(only_count, most, sample, seed)
@@ -85,7 +83,7 @@ def command(
         )
         text = _text(plans, form, listing, nodes)
     write(text, output)
-    if form in _DRAWN and (note := plans.cut_note(nodes or _DEFAULT_NODES)):
+    if form == "dot" and (note := plans.cut_note(nodes or _DEFAULT_NODES)):
         echo(f"coordlang: note: {note}; --nodes N draws more", err=True)
     if form == "ipc" and not only_count:
         listing.note_more(plans, listing.chosen(plans), "plans")
@@ -93,21 +91,19 @@ def command(
 
 
 def _check_form(form: str, listing: Listing, nodes: int | None) -> None:
-    if form in _DRAWN and not listing.is_default:
+    if form == "dot" and not listing.is_default:
         raise click.UsageError(
-            f"--format {form} draws the DAG of all plans: leave out --count, --max and --sample"
+            "--format dot draws the DAG of all plans: leave out --count, --max and --sample"
         )
     if nodes is not None and (form == "ipc" or listing.only_count):
         raise click.UsageError(
-            "--nodes cuts the DAG: it belongs to --format dot, svg or json, without --count"
+            "--nodes cuts the DAG: it belongs to --format dot or json, without --count"
         )
 
 
 def _text(plans: SentencePlans, form: str, listing: Listing, nodes: int | None) -> str:
     if form == "dot":
         return plans.dot(nodes or _DEFAULT_NODES)
-    if form == "svg":
-        return plans.svg(nodes or _DEFAULT_NODES)
     if form == "ipc" and listing.only_count:
         return f"{plans.count}\n"
     listed = listing.chosen(plans)

@@ -19,7 +19,6 @@ from coordlang.cli.files import (
     never_stdout,
     planning_files,
 )
-from coordlang.cli.group import RenamedOptions
 from coordlang.cli.shared_options import (
     ModelKeywords,
     PiecesKeywords,
@@ -36,7 +35,7 @@ if TYPE_CHECKING:
     from coordlang.certificate import Checked
 
 
-@click.command(name="verify", cls=RenamedOptions, renamed={"--lower-bound": "--certificate"})
+@click.command(name="verify")
 @language_argument
 @planning_files("DOMAIN PROBLEMS...")
 @click.option(

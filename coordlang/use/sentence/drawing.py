@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The plans that a sentence leaves open, drawn: what is written and coloured, and Graphviz text."""
+"""The plans that a sentence leaves open in Graphviz' language: texts and colours."""
 
 from __future__ import annotations
 
@@ -82,14 +82,7 @@ def cut_note(dag: PlanDag) -> str | None:
     )
 
 
-def headline(dag: PlanDag) -> str:
-    """What the drawing shows, in a line."""
-    if not dag.sentence:
-        return f"{plans_text(dag.count)}, all optimal plans of the task"
-    return f'"{" ".join(dag.sentence)}" leaves {plans_text(dag.count)} open'
-
-
-def plans_text(number: int) -> str:
+def _plans_text(number: int) -> str:
     """``12 plans``."""
     return f"{number:,} plan{'s' * (number != 1)}" if number < 10**12 else f"{number:.2e} plans"
 
@@ -98,7 +91,8 @@ def to_dot(dag: PlanDag) -> str:
     """Graphviz text, layers from left to right.  The same DAG gives the same text."""
     ink, lines = inks(dag), node_lines(dag)
     note = cut_note(dag)
-    title = "\n".join([headline(dag), dag.task, *([note] if note else [])])
+    headline = f'"{" ".join(dag.sentence)}" leaves {_plans_text(dag.count)} open'
+    title = "\n".join([headline, dag.task, *([note] if note else [])])
     out = [
         "digraph plans {",
         "  rankdir=LR;",
@@ -118,7 +112,7 @@ def to_dot(dag: PlanDag) -> str:
 
 
 def _dot_node(node: DagNode, lines: list[str], ink: dict[str, Ink]) -> str:
-    text = "\n".join([*([] if node.merged else [node.word]), *lines, plans_text(node.plans)])
+    text = "\n".join([*([] if node.merged else [node.word]), *lines, _plans_text(node.plans)])
     if node.merged:
         return f'label={quoted(text)}, style="dashed,rounded"'
     own = ink[node.word]

@@ -9,8 +9,7 @@ from typing import Any
 
 from coordlang.language.tolerance import tolerance_data
 from coordlang.tasks.candidates import describe
-from coordlang.use.sentence.picture import to_svg
-from coordlang.use.sentence.plan_dag import NODES_SHOWN, DagNode, PlanDag, plan_dag
+from coordlang.use.sentence.plan_dag import DagNode, PlanDag
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.search.plan_file import json_count, to_json
 from planners.search.plan_space import PlanSpace
@@ -69,9 +68,6 @@ class OpenPlans:
         """The sentence and the number of plans, not the plan space."""
         sentence = self.task_language.text(self.words)
         return f"OpenPlans(sentence={sentence!r}, count={self.count})"
-
-    def _repr_svg_(self) -> str:
-        return to_svg(plan_dag(self, NODES_SHOWN))
 
 
 def open_plans_data(

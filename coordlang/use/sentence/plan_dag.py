@@ -8,20 +8,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from coordlang.explanation.demands import words_passed
 from coordlang.tasks.candidates import describe
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
-from planners.tables import Ints
-
-#: Nodes of a DAG in a notebook.
-NODES_SHOWN = 60
 
 if TYPE_CHECKING:
     from coordlang.use.sentence.open_plans import OpenPlans
-    from coordlang.use.sentence.task_language import TaskLanguage
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,12 +60,12 @@ class DagEdge:
 
 @dataclass(frozen=True, slots=True)
 class PlanDag:
-    """The plans that a sentence leaves open, or all of a task, as the paths of a layered graph.
+    """The plans that a sentence leaves open as the paths of a layered graph.
 
     Parameters
     ----------
     sentence
-        Its words; empty for all plans of a task, which have different sentences.
+        Its words.
     task
         The task in words.
     robots
@@ -98,13 +91,7 @@ class PlanDag:
     @property
     def words(self) -> tuple[str, ...]:
         """The different words of its nodes, in the order in which plans come to them."""
-        named = self.sentence or tuple(node.word for node in self.nodes if not node.merged)
-        return tuple(dict.fromkeys(named))
-
-    def _repr_svg_(self) -> str:
-        from coordlang.use.sentence.picture import to_svg  # pictures are drawn from this module
-
-        return to_svg(self)
+        return tuple(dict.fromkeys(self.sentence))
 
     @property
     def layers(self) -> list[range]:
@@ -124,27 +111,9 @@ def plan_dag(open_plans: OpenPlans, most: int | None = None) -> PlanDag:
     least one, and the others of a step are merged into one.
     """
     task_language, space = open_plans.task_language, open_plans.fits
-    word = task_language.partition.word_of(space.rows)[space.state]
-    return _dag(task_language, space, open_plans.words, words_passed(space, word), most)
-
-
-def task_dag(task_language: TaskLanguage, most: int | None = None) -> PlanDag:
-    """All optimal plans of a task as a DAG, cut as `plan_dag` is."""
-    space, task = task_language.space, [task_language.task]
-    alone = space.with_tasks(space.starts[task], space.second[task])
-    return _dag(task_language, alone, (), np.zeros(len(alone), np.int64), most)
-
-
-def _dag(
-    task_language: TaskLanguage,
-    space: PlanSpace,
-    sentence: Sequence[int],
-    passed: Ints,
-    most: int | None,
-) -> PlanDag:
-    """The plans of a plan space of one task; ``passed`` has the words passed at each node."""
     names, codec = task_language.partition.words, task_language.model.codec
     word = task_language.partition.word_of(space.rows)[space.state]
+    passed = words_passed(space, word)
     through = _plans_through(space)
     width = _width(space, most)
     nodes: list[DagNode] = []
@@ -161,7 +130,7 @@ def _dag(
             number.update(dict.fromkeys(others, len(nodes)))
             nodes.append(DagNode(step, "", "", 0, sum(through[n] for n in others), len(others)))
     return PlanDag(
-        sentence=tuple(names[w] for w in sentence),
+        sentence=tuple(names[w] for w in open_plans.words),
         task=describe(task_language.space, task_language.task),
         robots=task_language.model.robots,
         count=through[int(space.starts[0])],

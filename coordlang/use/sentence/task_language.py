@@ -131,12 +131,6 @@ class TaskLanguage:
         task = describe(self.space, self.task)
         return f"TaskLanguage({self.language!r}, task={task!r}, covered={self.covered})"
 
-    def _repr_svg_(self) -> str:
-        from coordlang.use.sentence.picture import to_svg
-        from coordlang.use.sentence.plan_dag import NODES_SHOWN, task_dag
-
-        return to_svg(task_dag(self, NODES_SHOWN))
-
 
 def language_in_task(
     language: Language,

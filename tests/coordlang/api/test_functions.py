@@ -198,7 +198,6 @@ def test_say_and_understand(language: Path, tmp_path: Path) -> None:
         assert (left.count, left.sentence, left.covered) == (1, "w0 w2 w1 w0", True)
         assert plans.rank(left[0]) is not None
         assert len(left.dag().nodes) == 5
-        assert left.svg().startswith("<svg")
         assert left.dot().startswith("digraph")
     with pytest.raises(coordlang.NoPlanFits):
         coordlang.understand(language, *T_MAP, "w0 w1")
@@ -347,7 +346,7 @@ def test_results_show_themselves(language: Path) -> None:
         assert len(repr(result)) < 400
         assert repr(result).startswith(f"{type(result).__name__}(")
         html = result._repr_html_()
-        assert html.startswith(("<table>", "<svg"))
+        assert html.startswith("<table>")
     loaded = coordlang.load_language(language)
     assert len(repr(loaded)) < 200
     for word, states in loaded.sizes().items():

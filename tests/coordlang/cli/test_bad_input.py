@@ -585,7 +585,7 @@ PLANS, UNDERSTAND = ("plans", "d", "p"), ("understand", "l", "d", "p", "w0")
         ((*PLANS, "--seed", "0"), "--seed belongs to --sample"),
         ((*UNDERSTAND, "--seed", "1"), "--seed belongs to --sample"),
         ((*PLANS, "--format", "ipc", "--json"), "leave out --format ipc"),
-        ((*UNDERSTAND, "--format", "svg", "--json"), "leave out --format svg"),
+        ((*UNDERSTAND, "--format", "dot", "--json"), "leave out --format dot"),
         (("choices", "l", "d", "p", "w0", "--format", "dot", "--json"), "leave out --format dot"),
         ((*UNDERSTAND, "--nodes", "3"), "--nodes cuts the DAG"),
         ((*UNDERSTAND, "--nodes", "3", "--json", "--count"), "--nodes cuts the DAG"),

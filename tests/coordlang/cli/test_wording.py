@@ -93,17 +93,14 @@ def test_pairs_of_several_problems(coordlang: Command, tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("form", "node"), [("dot", "(no fact holds)\\n"), ("svg", ">(no fact holds)</text>")]
-)
 def test_a_drawn_state_without_facts(
-    form: str, node: str, coordlang: Command, files: tuple[Path, Path], tmp_path: Path
+    coordlang: Command, files: tuple[Path, Path], tmp_path: Path
 ) -> None:
     files[0].write_text(DOMAIN.replace(":precondition (ok ?r)", ""))
     language = tmp_path / "l.json"
     assert coordlang("build", *files, "-o", language).code == 0
-    out = coordlang("understand", language, *files, "w0", "--format", form).out
-    assert out.count(node) == 1, out
+    out = coordlang("understand", language, *files, "w0", "--format", "dot").out
+    assert out.count("(no fact holds)\\n") == 1, out
 
 
 def test_a_miscoordination_through_states_without_facts() -> None:

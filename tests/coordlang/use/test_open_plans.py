@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
-from itertools import pairwise
 from pathlib import Path
 from random import Random
 from xml.etree import ElementTree
@@ -15,17 +14,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordlang.building import build_language
-from coordlang.use.sentence.drawing import COLOURS, cut_note, edge_lines, inks, node_lines, to_dot
+from coordlang.use.sentence.drawing import COLOURS, cut_note, inks, to_dot
 from coordlang.use.sentence.fitting_plans import NoPlanFits
 from coordlang.use.sentence.open_plans import OpenPlans, open_plans_data
-from coordlang.use.sentence.picture import _items, _place, to_svg
-from coordlang.use.sentence.plan_dag import PlanDag, plan_dag, task_dag
-from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
+from coordlang.use.sentence.plan_dag import PlanDag, plan_dag
+from coordlang.use.sentence.task_language import TaskLanguage
 from planners.search.plan_file import texts
-from planners.search.plans import Plan, Plans
+from planners.search.plans import Plan
 from tests.support.command import Command
-from tests.support.domains import DOMAINS, all_tasks
+from tests.support.domains import DOMAINS
 from tests.support.naive_sentences import by_sentence
 from tests.support.task_languages import SHIPPED, random_task_language, shipped
 
@@ -151,7 +148,6 @@ def test_a_cut_dag_says_what_is_missing(name: str, most: int) -> None:
         )
     assert (cut_note(small) is None) == (small.cut == 0)
     if small.cut:
-        assert f"cut: {small.cut} nodes" in to_svg(small)
         assert f"cut: {small.cut} nodes" in to_dot(small)
         assert "dashed" in to_dot(small)
     else:
@@ -166,38 +162,6 @@ DRAWN = [
     "elevator/two-calls",
     "grid-joint/corners-4x4",
 ]
-
-
-@pytest.mark.parametrize("name", DRAWN)
-def test_the_picture_holds_everything(name: str) -> None:
-    graph = largest(name)
-    text = to_svg(graph)
-    root = ElementTree.fromstring(text)
-    written = Counter(element.text for element in root.iter("{http://www.w3.org/2000/svg}text"))
-    titles = {element.text for element in root.iter("{http://www.w3.org/2000/svg}title")}
-    assert {node.key for node in graph.nodes} <= titles
-    for word, number in Counter(node.word for node in graph.nodes).items():
-        assert written[word] == number + graph.sentence.count(word)
-    for robot in graph.robots:
-        wanted = sum(min(3, len(edge.actions)) for edge in graph.edges)
-        assert (
-            sum(n for line, n in written.items() if line and line.startswith(f"{robot} ")) >= wanted
-        )
-    assert to_svg(graph) == text
-    for x, y in re.findall(r'<text x="([-\d.]+)" y="([-\d.]+)"', text):
-        assert 0 <= float(x) <= float(root.get("width", 0))
-        assert 0 <= float(y) <= float(root.get("height", 0))
-
-
-@pytest.mark.parametrize("name", DRAWN)
-def test_no_box_lies_on_another(name: str) -> None:
-    graph = largest(name)
-    items, columns = _items(graph, node_lines(graph), [edge_lines(graph, e) for e in graph.edges])
-    _place(items, columns)
-    assert sum(map(len, columns)) == len(graph.nodes) + len(graph.edges)
-    for column in columns:
-        inside = sorted((items[n].y, items[n].y + items[n].height) for n in column)
-        assert all(low >= end + 10 for (_, end), (low, _) in pairwise(inside))
 
 
 @pytest.mark.parametrize("name", DRAWN)
@@ -233,7 +197,7 @@ def test_a_task_without_steps_is_drawn(
     done, language = tmp_path / "done.pddl", tmp_path / "language.json"
     done.write_text(re.sub(r"\(:goal.*", "(:goal (and)))", problem.read_text(), flags=re.S))
     assert coordlang("build", domain, done, "-o", language).code == 0
-    for form in ("svg", "dot", "json", "ipc"):
+    for form in ("dot", "json", "ipc"):
         outcome = coordlang("understand", language, domain, done, "w0", "--format", form)
         assert outcome.code == 0, outcome.err
         assert outcome.out
@@ -294,15 +258,15 @@ def test_samples_are_seeded(coordlang: Command, tmp_path: Path) -> None:
         *files,
         sentence,
         "--format",
-        "svg",
+        "dot",
         "--nodes",
         10,
         "-o",
-        tmp_path / "x.svg",
+        tmp_path / "x.dot",
     )
     assert (cut.code, cut.out) == (0, "")
     assert "are drawn as" in cut.err
-    assert ElementTree.parse(tmp_path / "x.svg").getroot().tag.endswith("svg")
+    assert (tmp_path / "x.dot").read_text().startswith("digraph plans {")
 
 
 @pytest.mark.parametrize(
@@ -329,7 +293,7 @@ def test_sentences_that_cannot_be_understood(
 def test_options_that_do_not_go_together(coordlang: Command, files: tuple[Path, ...]) -> None:
     for options in (
         ["--count", "--max", 3],
-        ["--format", "svg", "--sample", 2],
+        ["--format", "dot", "--sample", 2],
         ["--format", "dot", "--count"],
     ):
         assert coordlang("understand", *files, "w0", *options).code == 2
@@ -347,46 +311,6 @@ def test_json_of_a_plan_file_and_more() -> None:
 
 
 # -- in a notebook
-
-
-def shown_texts(svg: str) -> list[str]:
-    return ["".join(e.itertext()) for e in ElementTree.fromstring(svg).iter() if e.text]
-
-
-def test_a_sentence_and_its_dag_show_themselves_as_a_picture() -> None:
-    task_language = shipped("t-map/problem")[1]
-    words = max(by_sentence(task_language), key=len)
-    found = OpenPlans.of(task_language, task_language.words_of(words))
-    assert found._repr_svg_() == plan_dag(found)._repr_svg_() == to_svg(plan_dag(found))
-    texts = shown_texts(found._repr_svg_())
-    assert set(words) <= set(texts)
-    assert any(text.startswith(f'"{" ".join(words)}" leaves') for text in texts)
-    assert repr(found) == f"OpenPlans(sentence={' '.join(words)!r}, count={found.count})"
-
-
-def test_a_language_in_a_task_shows_all_optimal_plans() -> None:
-    task_language = shipped("t-map/problem")[1]
-    groups = by_sentence(task_language)
-    graph = task_dag(task_language)
-    plans = set().union(*groups.values())
-    assert graph.count == len(plans)
-    check_paths(task_language, graph, plans)
-    assert set(graph.words) == {word for words in groups for word in words}
-    texts = shown_texts(task_language._repr_svg_())
-    assert set(graph.words) <= set(texts)
-    assert f"{len(plans)} plans, all optimal plans of the task" in texts
-    assert graph.task in texts
-    assert "task=" in repr(task_language)
-
-
-def test_only_one_of_several_tasks_is_shown() -> None:
-    candidates = all_tasks("grid", "gw1-2x2")
-    language = build_language(candidates, "greedy").language
-    *_, last = languages_in_tasks(language, candidates)
-    assert len(last.space.starts) > 1
-    plans = set(Plans.of(last.space, last.task))
-    assert task_dag(last).count == len(plans)
-    check_paths(last, task_dag(last), plans)
 
 
 def test_a_plan_space_shows_its_layers() -> None:
