@@ -34,6 +34,7 @@ from coordlang.tasks.candidates import from_problems
 from coordlang.use.export.pddl import PddlExport, export_pddl
 from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 from planners.errors import CoordlangError, OutOfMemory
+from planners.limits import time_limit
 from planners.loading import ModelOptions
 from planners.pddl import read_domain, read_problem
 from planners.search.plans import Plans
@@ -227,11 +228,12 @@ def by_symk(folder: Path, exported: PddlExport, seconds: float) -> int | None:
 
 
 def by_fast_downward(exported: PddlExport, seconds: float) -> int | None:
-    """The optimal cost by Fast Downward, through unified-planning."""
+    """The optimal cost by Fast Downward."""
     from planners.classical.fast_downward import total_cost
 
     try:
-        return total_cost(exported.classical, time_limit=seconds)
+        with time_limit(seconds):
+            return total_cost(exported.classical)
     except CoordlangError:
         return None
 

@@ -97,8 +97,8 @@ COMMANDS = {
         choices @one.json D problem.pddl "w1 w0" --check
         choices @one.json D problem.pddl "w1 w0" --format json -o @choices.json
         choices @one.json D problem.pddl "w1 w0" --format dot
-        choices @one.json D problem.pddl "w1 w0" --robot r2 --visit "(at r2 c)"
-        choices @one.json D problem.pddl "w1 w0" --robot r2 --history idle --visit "(at r2 a)" --json
+        choices @one.json D problem.pddl "w1 w0" --robot r2 --visit "(at r2 c)" --json
+        choices @one.json D problem.pddl "w1 w0" --robot r2 --history idle --visit "(at r2 a)"
         export @one.json D problem.pddl "w1 w0"
         export @one.json D problem.pddl "w1 w0" --json
         export @one.json D problem.pddl "w1 w0" --max-actions 0

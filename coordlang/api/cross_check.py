@@ -58,7 +58,7 @@ def check(
     factored: File | None = None,
     **model: Unpack[ModelKeywords],
 ) -> CrossCheck:
-    """Compare our optimal cost with Fast Downward's (through unified-planning).
+    """Compare our optimal cost with Fast Downward's.
 
     Parameters
     ----------

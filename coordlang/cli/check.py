@@ -21,7 +21,7 @@ from coordlang.cli.terminal import working
 @planning_files("DOMAIN PROBLEM", most=1)
 @limits
 def command(as_json: bool, pddl: PlanningFiles, model: ModelKeywords) -> int:
-    """Compare our optimal cost with Fast Downward's (through unified-planning).
+    """Compare our optimal cost with Fast Downward's.
 
     Exit 0: equal.  1: they differ.  11: both prove that there is no plan.
     """

@@ -72,11 +72,6 @@ class PlanTable:
         """Count the tasks that require coordination."""
         return len(self.plans)
 
-    @property
-    def task_of_plan(self) -> Ints:
-        """(plans) The task of each plan."""
-        return np.repeat(np.arange(len(self)), self.plans)
-
     def failures(self, word: Ints, tasks: Ints) -> Floats:
         """How often robots fail in some of the tasks, under the word of each state.
 

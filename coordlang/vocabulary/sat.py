@@ -60,10 +60,6 @@ class PartitionProblem:
         for clause in clauses:
             self._solver.add_clause(clause)
 
-    def forbid(self, partition: Mapping[int, int]) -> None:
-        """Rule out a partition that `solve` has found."""
-        self._solver.add_clause([-own[partition[state]] for state, own in self._word.items()])
-
     def add_lex_leaders(self, symmetries: Sequence[Sequence[int]], pairs: Sequence[Pair]) -> None:
         """Of partitions that are images of each other, allow the lexicographic leader.
 

@@ -184,11 +184,6 @@ def _sort_states(graph: PlanSpace) -> PlanSpace:
     return replace(graph, rows=rows, state=number[graph.state])
 
 
-def search_each(model: JointModel, tasks: Sequence[PlanningTask]) -> PlanSpace:
-    """`search` for each task, as one plan space in which every task has a goal of its own."""
-    return joined([search(model, task) for task in tasks])
-
-
 def joined(spaces: Sequence[PlanSpace]) -> PlanSpace:
     """Plan spaces of one task each as one plan space in which every task has a goal of its own."""
     if len(spaces) == 1:

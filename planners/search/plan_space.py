@@ -304,19 +304,6 @@ class PlanSpace:
             starts=number[self.starts],
         )
 
-    def with_robots_merged(self, groups: Sequence[Sequence[int]]) -> PlanSpace:
-        """The same graph for fewer robots: each of the groups acts as one.
-
-        The labels of a group number the label tuples of its robots, in their order.
-        """
-        merged = []
-        for group in groups:
-            _, number = np.unique(self.labels[:, list(group)], axis=0, return_inverse=True)
-            merged.append(number.reshape(-1))
-        order = np.lexsort((*merged[::-1], self.sources))
-        labels = np.stack(merged, axis=1)[order].astype(np.int32)
-        return replace(self, target=self.target[order], labels=labels, cost=self.cost[order])
-
     def reordered(self, order: Ints) -> PlanSpace:
         """The same graph with its nodes in another order: new node k is old node ``order[k]``."""
         number = np.empty(len(order), np.int64)

@@ -75,11 +75,6 @@ class Projections:
             total += true.reduced(np.maximum, table, 0)
         return total
 
-    @property
-    def informative(self) -> bool:
-        """Whether any variable says more than nothing."""
-        return bool(self._of_fact.any())
-
     def value(self, rows: Rows) -> Ints:
         """The lower bound for each state, `FAR` where the goal cannot be reached."""
         true = TrueFacts.of(self._codec.facts_part(rows))

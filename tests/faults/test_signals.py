@@ -97,7 +97,7 @@ def test_fast_downward_leaves_nothing(number: signal.Signals, tmp_path: Path) ->
         stderr=subprocess.PIPE,
         text=True,
     )
-    while not list(tmp_path.glob("coordlang-*/task.json")):
+    while not list(tmp_path.glob("coordlang-*/problem.pddl")):
         assert process.poll() is None, process.communicate()
         time.sleep(0.005)
     process.send_signal(number)

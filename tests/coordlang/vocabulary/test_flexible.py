@@ -21,9 +21,9 @@ from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Assignment, Outcome
 from coordlang.vocabulary.objective import Objective
-from coordlang.vocabulary.pairwise import divided
 from planners.errors import ProvedImpossible
 from planners.pddl import read_domain, read_problem
+from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan
 from tests.support import naive
 from tests.support.candidates import (
@@ -244,6 +244,19 @@ def test_bounds_are_the_largest_sets_that_mix(robots: int) -> None:
     assert coordinated >= 10
 
 
+def divided(space: PlanSpace, robot: int) -> PlanSpace:
+    """The plan space of two robots: one, and all others as one."""
+    _, others = np.unique(np.delete(space.labels, robot, axis=1), axis=0, return_inverse=True)
+    labels = np.stack((space.labels[:, robot], others.reshape(-1)), axis=1)
+    order = np.lexsort((*labels.T[::-1], space.sources))
+    return replace(
+        space,
+        target=space.target[order],
+        labels=labels[order].astype(np.int32),
+        cost=space.cost[order],
+    )
+
+
 def test_every_division_counts_in_the_bound() -> None:
     """Three robots push a box: for some plans one robot's freedom is the limit, for others another
     one's.
@@ -255,8 +268,8 @@ def test_every_division_counts_in_the_bound() -> None:
     (space,) = candidates.spaces
     (bound,) = flexibility_bounds(candidates.spaces, [walk(space).requires])
     alone = [
-        flexibility_bounds([divided(space, [robot])], [walk(divided(space, [robot])).requires])[0]
-        for robot in range(3)
+        flexibility_bounds([space], [walk(space).requires])[0]
+        for space in [divided(space, robot) for robot in range(3)]
     ]
     assert bound < min(alone)
 

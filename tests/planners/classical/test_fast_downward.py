@@ -1,31 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fast Downward, through unified-planning, finds the same optimal costs, and leaves nothing behind."""
+"""Fast Downward finds the same optimal costs, and leaves nothing behind."""
 
 from __future__ import annotations
 
-import errno
 import os
 import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
-from collections.abc import Sequence
 from contextlib import suppress
 from functools import cache
 from itertools import pairwise
-from multiprocessing.connection import wait
 from pathlib import Path
-from typing import Any, NoReturn
 
 import pytest
 
 from planners import classical as plain_module
-from planners.classical import fast_downward_searches
+from planners.classical import fast_downward
 from planners.classical.fast_downward import FastDownwardFailed, optimal_cost
-from planners.classical.fast_downward_searches import SEARCHES
 from planners.errors import OutOfMemory, OutOfTime, ProvedImpossible
 from planners.joint.model import Cost
+from planners.limits import time_limit
 from planners.loading import ModelOptions, PlanningInstance, build, load
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.robots import RobotSelection
@@ -34,8 +31,6 @@ from planners.search.optimal_plans import search
 from tests.support.domains import ROOT, SHARED
 
 FOREIGN = SHARED / "foreign"
-#: The searches without a head start for the first.
-AT_ONCE = [(how, 0.0) for how, _ in SEARCHES]
 
 #: A formula that demands a partner without effects, a conditional effect, a disjunction,
 #: interference over a tool.
@@ -164,109 +159,28 @@ def test_fast_downward_agrees(texts: tuple[str, str], cost: Cost, limit: int) ->
     assert answer.seconds > 0
 
 
-@pytest.mark.parametrize("how", SEARCHES)
-@pytest.mark.parametrize(
-    "texts", [(WORKSHOP, WORKSHOP_TASK.format(goal=GOAL)), (RELAY, RELAY_TASK)]
-)
-def test_each_search_alone_agrees(
-    texts: tuple[str, str], how: tuple[str, float], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(fast_downward_searches, "SEARCHES", [how])
-    loaded = read(*texts, "makespan+actions")
-    answer = optimal_cost(loaded.model, loaded.tasks[0], limit=0)
-    assert answer.cost == search(loaded.model, loaded.tasks[0]).cost_of(0)
-
-
-def test_a_search_that_breaks_down_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The next one begins at once."""
-    searches = [("astar(nonsense())", 0.0), ("astar(lmcut())", 1000.0)]
-    monkeypatch.setattr(fast_downward_searches, "SEARCHES", searches)
-    loaded = workshop(GOAL)
-    expected = search(loaded.model, loaded.tasks[0]).cost_of(0)
-    assert optimal_cost(loaded.model, loaded.tasks[0]).cost == expected
-    monkeypatch.setattr(fast_downward_searches, "SEARCHES", searches[:1] * 2)
-    with pytest.raises(FastDownwardFailed, match="exit code 33"):
-        optimal_cost(loaded.model, loaded.tasks[0])
-
-
-def test_the_searches_run_beside_each_other(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    monkeypatch.setattr(fast_downward_searches, "SEARCHES", AT_ONCE)
-    loaded = big()
-
-    def until_both_search(pipes: list[int], seconds: float | None) -> Sequence[object]:
-        lines = processes(tmp_path)
-        if all(any(f"--search {how}" in line for line in lines) for how, _ in AT_ONCE):
-            monkeypatch.undo()
-            raise KeyboardInterrupt
-        return wait(pipes, 0.05 if seconds is None else min(seconds, 0.05))
-
-    monkeypatch.setattr(fast_downward_searches, "wait", until_both_search)
-    with pytest.raises(KeyboardInterrupt):
-        optimal_cost(loaded.model, loaded.tasks[0], time_limit=60)
-    wait_until(lambda: not processes(tmp_path))  # what is killed takes a moment to end
-    assert [*tmp_path.iterdir()] == []
-
-
-def test_a_search_that_cannot_begin_does_not_end_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fast_downward_searches, "SEARCHES", AT_ONCE)
-    begin = fast_downward_searches._started
-    began: list[object] = []
-
-    def once(*arguments: Any) -> subprocess.Popen[bytes]:
-        if began:
-            raise BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")
-        began.append(arguments)
-        return begin(*arguments)
-
-    monkeypatch.setattr(fast_downward_searches, "_started", once)
-    loaded = workshop(GOAL)
-    expected = search(loaded.model, loaded.tasks[0]).cost_of(0)
-    assert optimal_cost(loaded.model, loaded.tasks[0]).cost == expected
-    with pytest.raises(FastDownwardFailed, match="cannot be started: Resource"):
-        optimal_cost(loaded.model, loaded.tasks[0])
-
-
-def test_what_a_library_prints_is_not_the_end_of_a_search(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Else nobody would watch the time limit and signals until it ends."""
-    (tmp_path / "sitecustomize.py").write_text("print('hello', flush=True)\n")
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    ended: list[int] = []
-
-    def end(worker: Any) -> int:
-        ended.append(worker.pipe)
-        return whole(worker)
-
-    whole = fast_downward_searches._Worker.end
-    monkeypatch.setattr(fast_downward_searches._Worker, "end", end)
-    loaded = big()
-    with pytest.raises(OutOfTime):
-        optimal_cost(loaded.model, loaded.tasks[0], time_limit=4)
-    assert len(ended) == 2  # both when the time was over
-
-
 def test_a_search_that_the_system_kills_had_too_little_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    monkeypatch.setattr(fast_downward_searches, "SEARCHES", SEARCHES[:1])
-    loaded = big()
+    loaded, done = big(), threading.Event()
 
-    def killing(pipes: list[int], seconds: float | None) -> Sequence[object]:
-        for line in processes(tmp_path):
-            number, _, command = line.partition(" ")
-            if command.split(" ")[0].endswith("/downward"):
-                with suppress(ProcessLookupError):
-                    os.kill(int(number), signal.SIGKILL)
-        return wait(pipes, 0.05 if seconds is None else min(seconds, 0.05))
+    def kill() -> None:
+        while not done.wait(0.05):
+            for line in processes(tmp_path):
+                number, _, command = line.partition(" ")
+                if command.split(" ")[0].endswith("/downward"):
+                    with suppress(ProcessLookupError):
+                        os.kill(int(number), signal.SIGKILL)
 
-    monkeypatch.setattr(fast_downward_searches, "wait", killing)
-    with pytest.raises(OutOfMemory):
-        optimal_cost(loaded.model, loaded.tasks[0], time_limit=60)
+    killer = threading.Thread(target=kill)
+    killer.start()
+    try:
+        with time_limit(60), pytest.raises(OutOfMemory):
+            optimal_cost(loaded.model, loaded.tasks[0])
+    finally:
+        done.set()
+        killer.join()
 
 
 def test_a_wrong_model_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -302,15 +216,9 @@ def test_a_step_cost_that_was_too_small_is_raised() -> None:
     ).cost_of(0)
 
 
-@pytest.mark.parametrize("searches", [SEARCHES, AT_ONCE], ids=["usual", "at-once"])
 def test_nothing_is_written_or_printed(
-    searches: Sequence[tuple[str, float]],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """Whichever search ends first: the other one is ended."""
-    monkeypatch.setattr(fast_downward_searches, "SEARCHES", searches)
     work, temporary = tmp_path / "work", tmp_path / "tmp"
     work.mkdir()
     temporary.mkdir()
@@ -328,12 +236,12 @@ def test_nothing_is_written_or_printed(
 def test_the_time_limit_ends_everything(
     seconds: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Once while unified-planning is being imported, once while Fast Downward searches."""
+    """Once while its translator runs, once while it searches."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     loaded = big()
     start = time.monotonic()
-    with pytest.raises(OutOfTime):
-        optimal_cost(loaded.model, loaded.tasks[0], time_limit=seconds)
+    with pytest.raises(OutOfTime), time_limit(seconds):
+        optimal_cost(loaded.model, loaded.tasks[0])
     assert time.monotonic() - start < seconds + 2
     wait_until(lambda: not processes(tmp_path))  # what is killed takes a moment to end
     assert [*tmp_path.iterdir()] == []
@@ -341,14 +249,9 @@ def test_the_time_limit_ends_everything(
 
 def test_an_interrupt_ends_everything(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-
-    def interrupted(*_: object) -> NoReturn:
-        monkeypatch.undo()
-        time.sleep(0.2)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(fast_downward_searches, "wait", interrupted)
-    loaded = workshop(GOAL)
+    loaded = big()
+    again = threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT))
+    again.start()
     with pytest.raises(KeyboardInterrupt):
         optimal_cost(loaded.model, loaded.tasks[0])
     wait_until(lambda: not processes(tmp_path))  # what is killed takes a moment to end
@@ -384,20 +287,27 @@ def wait_until(condition: object) -> None:
         time.sleep(0.05)
 
 
-@pytest.mark.parametrize("limit", [20_000_000, 35_000_000])
-def test_the_memory_limit_is_an_error_of_its_own(limit: int) -> None:
-    """Once too little for its translator, once for its search."""
+@pytest.mark.parametrize("limit", [20_000_000, 60_000_000])
+def test_too_little_memory_is_an_error_of_its_own(
+    limit: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Once for its translator, once for its search."""
+    monkeypatch.setattr(fast_downward, "default_memory_limit", lambda: limit)
     loaded = big()
-    with pytest.raises(OutOfMemory):
-        optimal_cost(loaded.model, loaded.tasks[0], memory_limit=limit, time_limit=60)
-
-
-def test_a_crash_of_the_worker_shows_what_it_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    loaded = workshop(GOAL)
-    monkeypatch.setattr(fast_downward_searches, "as_json", lambda *_: "no json")
-    with pytest.raises(FastDownwardFailed, match="exit code 1") as caught:
+    with time_limit(60), pytest.raises(OutOfMemory):
         optimal_cost(loaded.model, loaded.tasks[0])
-    assert "JSONDecodeError" in str(caught.value)
+
+
+def test_a_crash_shows_what_was_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    loaded = workshop(GOAL)
+    monkeypatch.setattr(fast_downward, "to_pddl", lambda *_: ("no domain", "no problem"))
+    with pytest.raises(FastDownwardFailed, match="exit code 31") as caught:
+        optimal_cost(loaded.model, loaded.tasks[0])
+    assert "Expected '('" in str(caught.value)
+    monkeypatch.undo()
+    monkeypatch.setattr(fast_downward, "SEARCH", "astar(nonsense())")
+    with pytest.raises(FastDownwardFailed, match="exit code 33"):
+        optimal_cost(loaded.model, loaded.tasks[0])
 
 
 def test_importing_is_cheap() -> None:
