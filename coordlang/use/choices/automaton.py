@@ -111,10 +111,6 @@ class Automaton:
         found: Ints = self.target[edges]
         return found
 
-    def step_of(self, state: int) -> int:
-        """The number of steps done in a state."""
-        return next(step for step, states in enumerate(self.layers) if state in states)
-
 
 def determinise(
     space: PlanSpace, robot: int, truth: Mapping[int, int] | None = None, most: int | None = None

@@ -66,7 +66,7 @@ def check_automata(found: Choices, twin: Listed) -> None:
         for part in parts:
             state = 0
             for step in range(len(part) + 1):
-                assert automaton.step_of(state) == step
+                assert state in automaton.layers[step]
                 true, possible = automaton.known[state]
                 said = (
                     frozenset(f for n, f in enumerate(facts) if true >> n & 1),
