@@ -250,8 +250,12 @@ def test_the_time_limit_ends_everything(
 def test_an_interrupt_ends_everything(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     loaded = big()
-    again = threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT))
-    again.start()
+
+    def interrupt() -> None:
+        wait_until(lambda: any("/downward " in line for line in processes(tmp_path)))
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=interrupt, daemon=True).start()
     with pytest.raises(KeyboardInterrupt):
         optimal_cost(loaded.model, loaded.tasks[0])
     wait_until(lambda: not processes(tmp_path))  # what is killed takes a moment to end
