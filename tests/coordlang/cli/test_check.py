@@ -41,7 +41,7 @@ def test_both_prove_that_there_is_no_plan(coordlang: Command, tmp_path: Path) ->
 
 
 def test_a_disagreement_is_refuted(coordlang: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    answer = FastDownwardAnswer((3, 0), "explicit", 1, 0.0)
+    answer = FastDownwardAnswer((3, 0), "explicit", 1)
     monkeypatch.setattr("coordlang.api.cross_check.optimal_cost", lambda *_, **__: answer)
     outcome = coordlang("check", T_MAP / "domain.pddl", T_MAP / "problem.pddl")
     assert outcome.code == 1

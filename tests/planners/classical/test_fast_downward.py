@@ -156,7 +156,6 @@ def test_fast_downward_agrees(texts: tuple[str, str], cost: Cost, limit: int) ->
     assert answer.cost == search(loaded.model, loaded.tasks[0]).cost_of(0)
     assert answer.form == ("explicit" if limit else "select-then-apply")
     assert answer.actions > 0
-    assert answer.seconds > 0
 
 
 def test_a_search_that_the_system_kills_had_too_little_memory(
