@@ -102,16 +102,17 @@ def find_world(model: JointModel, states: Sequence[Sequence[str]]) -> World:
     locations = find_locations(model)
     roles = _without_ambiguous(_location_roles(model, locations), states)
     located = {role[1] for _, role in roles.values()}
+    places = frozenset(role[2] for _, role in roles.values())
     for atom in model.codec.facts.atoms:
         text = show(atom)
         if text not in roles:
-            roles[text] = atom, _other_role(atom, locations.places, located | {*model.robots})
+            roles[text] = atom, _other_role(atom, places, located | {*model.robots})
     carried = {thing for _, role in roles.values() if role[0] == "with" for thing in role[1:]}
     others = sorted((located | carried) - {*model.robots}, key=natural)
     return World(
         things=(*model.robots, *others),
-        places=tuple(sorted(locations.places, key=natural)),
-        links=tuple(_links(model, locations)),
+        places=tuple(sorted(places, key=natural)),
+        links=tuple(_links(model, locations.predicates, places)),
         roles={text: role for text, (_, role) in roles.items()},
     )
 
@@ -140,17 +141,25 @@ def _owner(predicate: LocationPredicate, model: JointModel) -> str:
 def _without_ambiguous(
     roles: dict[str, tuple[Atom, Role]], states: Sequence[Sequence[str]]
 ) -> dict[str, tuple[Atom, Role]]:
-    """Drop the atoms of a thing and predicate that put the thing into two places at once."""
+    """Drop the atoms of a thing and predicate that put the thing into two places at once.
+
+    Of two predicates the one that locates more things is kept: ``(at plane1 city0)``, as said of
+    passengers, tells where a plane is, and ``(fuel-level plane1 fl3)`` does not.
+    """
+    located: dict[str, set[str]] = {}
+    for atom, (_, thing, _) in roles.values():
+        located.setdefault(atom.predicate, set()).add(thing)
     ambiguous: set[tuple[str, str]] = set()
     for state in states:
-        seen: dict[str, str] = {}
+        said: dict[str, list[str]] = {}
         for text in state:
-            if text not in roles:
-                continue
-            atom, (_, thing, _) = roles[text]
-            if thing in seen:
-                ambiguous |= {(thing, atom.predicate), (thing, seen[thing])}
-            seen[thing] = atom.predicate
+            if text in roles:
+                atom, (_, thing, _) = roles[text]
+                said.setdefault(thing, []).append(atom.predicate)
+        for thing, predicates in said.items():
+            number = {predicate: len(located[predicate]) for predicate in predicates}
+            best = [one for one in predicates if number[one] == max(number.values())]
+            ambiguous |= {(thing, one) for one in predicates if len(best) > 1 or one != best[0]}
     return {
         text: (atom, role)
         for text, (atom, role) in roles.items()
@@ -170,19 +179,21 @@ def _other_role(atom: Atom, places: frozenset[str], things: set[str]) -> Role:
     return _OTHER
 
 
-def _links(model: JointModel, locations: Locations) -> Iterator[Link]:
+def _links(
+    model: JointModel, predicates: Sequence[LocationPredicate], places: frozenset[str]
+) -> Iterator[Link]:
     """What moves join, and what static atoms relate."""
     moved = {
         tuple(sorted(pair))
-        for predicate in locations.predicates
+        for predicate in predicates
         for action in model.actions
         for pair in predicate.changes(action)
-        if locations.places.issuperset(pair)
+        if places.issuperset(pair)
     }
     related = {
         tuple(sorted(pair))
         for atom in model.statics
-        for pair in combinations([arg for arg in atom.args if arg in locations.places], 2)
+        for pair in combinations([arg for arg in atom.args if arg in places], 2)
         if pair[0] != pair[1]
     }
     for first, second in sorted(moved | related):

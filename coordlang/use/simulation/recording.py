@@ -86,19 +86,27 @@ def _even(inches: float) -> float:
 
 
 def _gif(record: SimulationRecord, run: RunRecord) -> bytes:
-    text: bytes = _imageio().v3.imwrite(
-        "<bytes>",
-        list(frames(record, run)),
-        extension=".gif",
+    # Not by imageio: its writer writes again when a signal has ended it.
+    from PIL import Image as Pillow
+
+    first, *further = [
+        Pillow.fromarray(image).quantize(colors=2**_BITS) for image in frames(record, run)
+    ]
+    written = BytesIO()
+    first.save(
+        written,
+        format="GIF",
+        save_all=True,
+        append_images=further,
         duration=1000 / _RATE,
         loop=0,
         bits=_BITS,
     )
-    return text
+    return written.getvalue()
 
 
 def _mp4(record: SimulationRecord, run: RunRecord) -> bytes:
-    imageio = _imageio().v2
+    imageio = _imageio()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "run.mp4")
         with imageio.get_writer(path, fps=_RATE, macro_block_size=_BLOCK, quality=7) as film:
@@ -142,7 +150,7 @@ def _sheet(record: SimulationRecord, run: RunRecord) -> bytes:
 
 
 def _imageio() -> Any:
-    """Return imageio, which writes films by the ffmpeg that its other package brings.
+    """Return imageio.v2, which writes films by the ffmpeg that its other package brings.
 
     Raises
     ------
@@ -151,14 +159,13 @@ def _imageio() -> Any:
     """
     try:
         import imageio.v2
-        import imageio.v3
         import imageio_ffmpeg  # noqa: F401  # imageio finds it by itself
     except ImportError as error:
         raise UsageError(
             f"films need the package {echoed(error.name)}, which is not installed",
             remedy="Install it: pip install 'coordlang[sim]'.",
         ) from None
-    return imageio
+    return imageio.v2
 
 
 _WRITERS: dict[str, Callable[[SimulationRecord, RunRecord], bytes]] = {

@@ -278,7 +278,7 @@ class _Going:
         for pair in sorted(touching - self.touching):
             self.collisions += 1
             robots = [name for name in pair if name in self.robots]
-            others = [name for name in pair if name not in self.robots]
+            others = [name.removeprefix("the ") for name in pair if name not in self.robots]
             self.collided.update(robots)
             self._event("collision", robots, touched=others[0] if others else None)
         self.touching = touching

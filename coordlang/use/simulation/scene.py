@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 #: Okabe and Ito's colours (2008), distinguishable with every kind of colour vision.
 _ROBOTS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _FLOOR, _GRID, _WALL, _HUMAN, _ALARM = "#f4f4f4", "#d9d9d9", "#444444", "#555555", "#c1121f"
+#: Key of the human among what moves: with a space, as no robot is called.
+_THE_HUMAN = "the human"
 #: Seconds for which an event is written below the floor.
 _SHOWN = 3.0
 
@@ -121,8 +123,8 @@ class Scene:
             )
             self._moving[f"{name} way"].set_data([p[0] for p in poses], [p[1] for p in poses])
         if self.run.human:
-            self._moving["human"].set_center(self.run.human[index])
-            self._moving["human name"].set_position(self.run.human[index])
+            self._moving[_THE_HUMAN].set_center(self.run.human[index])
+            self._moving[f"{_THE_HUMAN} name"].set_position(self.run.human[index])
         self._mark_collisions(index * self.record.interval)
 
     def _draw_floor(self) -> None:
@@ -173,7 +175,7 @@ class Scene:
         body = Circle((0, 0), self.record.radius, facecolor=_HUMAN, zorder=4)
         self.axes.add_patch(body)
         text = self._text("human", 0.45)
-        self._moving |= {"human": body, "human name": text}
+        self._moving |= {_THE_HUMAN: body, f"{_THE_HUMAN} name": text}
 
     def _text(self, text: str, share: float) -> Any:
         """Text in a disc, as high as this share of its radius."""

@@ -23,8 +23,8 @@ from coordlang.use.simulation.settings import Settings
 from coordlang.use.simulation.tracking import Pose, Velocity
 from planners.errors import UsageError
 
-#: The name of the human.
-HUMAN = "human"
+#: The names of the human and of walls: with a space, as no robot is called.
+HUMAN, WALL = "the human", "the wall"
 #: Beams of a lidar, and the angle that they cover, in radians.
 _BEAMS, _ANGLE = 61, 2 * math.pi
 #: What a lidar sees within this many metres of the human's surface is the human.
@@ -139,11 +139,11 @@ class Simulator:
         return [ray for ray, is_hit in zip(rays, scan["valid"], strict=True) if is_hit]
 
     def touching(self) -> set[tuple[str, str]]:
-        """Return the pairs that touch: robots by name, ``human`` and ``wall``, in order."""
+        """Return the pairs that touch, in order: robots by name, `HUMAN` and ``the wall``."""
         found = set()
         for name, robot in self._robots.items():
             for other in robot.collision_obj:
-                what = "wall" if other.name.startswith("wall ") else other.name
+                what = WALL if other.name.startswith(WALL) else other.name
                 found.add((min(name, what), max(name, what)))
         return found
 
@@ -190,7 +190,7 @@ def _world(
     ]
     walls: list[dict[str, Any]] = [
         {
-            "name": f"wall {number}",
+            "name": f"{WALL} {number}",
             "shape": {"name": "linestring", "vertices": [list(point) for point in outline]},
             "state": [0, 0, 0],
         }

@@ -19,7 +19,7 @@ from coordlang.use.choices.file import to_data
 from coordlang.use.choices.monitor import FORMAT, IDLE, VERSION, Monitor
 from coordlang.use.sentence.task_language import TaskLanguage
 from coordlang.use.simulation.pace import OwnWords
-from planners.errors import BadInput, UsageError
+from planners.errors import BadInput, UsageError, note
 from planners.joint.model import JointModel
 from planners.messages import echoed
 from planners.search.plan_space import PlanSpace
@@ -200,6 +200,8 @@ def mission(
     path = space.nodes_on(task_language.start, space.first_path(task_language.start))
     states = [model.codec.decode(space.rows[space.state[node]]) for node in path]
     world = find_world(model, states)
+    starts = _starts(world, model.robots, states[0])
+    _note_what_is_left_out(world, model.robots, space)
     given: dict[str, Given] = {}
     if agreement == "sentence":
         found = choices(task_language, sentence)
@@ -211,7 +213,7 @@ def mission(
         agreement,
         tuple(sentence),
         world,
-        _starts(world, model.robots, states[0]),
+        starts,
         _robots_in(world, model.robots, states[-1]),
         {name: _leads(world, space, robot) for robot, name in enumerate(model.robots)},
         space.cost_of(task_language.task)[0],
@@ -267,10 +269,37 @@ def _starts(world: World, robots: Sequence[str], state: Sequence[str]) -> dict[s
     lost = [name for name in robots if name not in located]
     if lost:
         raise BadInput(
-            f"no atom says where {' and '.join(lost)} is at the start",
+            f"no atom says where {' and '.join(lost)} {'is' if len(lost) == 1 else 'are'} at the "
+            "start",
             remedy="Simulate a domain whose robots move from place to place.",
         )
     return located
+
+
+def _note_what_is_left_out(world: World, robots: Sequence[str], space: PlanSpace) -> None:
+    """Give notes on what the simulator does not do as the domain says."""
+    located = {role[1] for role in world.roles.values() if role[0] == "at"}
+    others = [name for name in world.things if name in located and name not in robots]
+    if others:
+        more = f" and {len(others) - 3} more" if len(others) > 3 else ""
+        note(
+            "only robots are on the floor; what is left out, so that nothing collides with it: "
+            f"{', '.join(others[:3])}{more}",
+            remedy="Subactions that move no robot are waiting.",
+        )
+    for number in sorted(set(space.state.tolist())):
+        places = _robots_in(world, robots, space.model.codec.decode(space.rows[number]))
+        taken: dict[str, str] = {}
+        for name, place in places.items():
+            other = taken.setdefault(place, name)
+            if other != name:
+                note(
+                    f"plans may bring {other} and {name} to {place} at once, where robots on a "
+                    "floor collide",
+                    remedy="Collisions are then none of the language: simulate a domain in which "
+                    "robots share no place.",
+                )
+                return
 
 
 def _robots_in(world: World, robots: Sequence[str], state: Sequence[str]) -> dict[str, str]:

@@ -85,7 +85,7 @@ def test_every_kind_of_event_has_words() -> None:
 def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(UsageError, match=r"imageio_ffmpeg(.|\n)*coordlang\[sim\]"):
-        recorded(record(), record().runs[0], ".gif")
+        recorded(record(), record().runs[0], ".mp4")
 
 
 def test_a_record_that_cannot_be_played_is_refused(tmp_path: Path) -> None:
