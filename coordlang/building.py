@@ -26,7 +26,7 @@ from coordlang.vocabulary.hidden_slack import hidden_differences
 from coordlang.vocabulary.job import Assignment, Evidence
 from coordlang.vocabulary.minimal import refuting_clauses
 from planners.errors import UsageError
-from planners.limits import run_until_stopped, start_clock, time_left
+from planners.limits import little_time_after, run_until_stopped, start_clock, time_left
 from planners.messages import echoed
 from planners.pieces.processes import Processes
 from planners.pieces.work import Runner
@@ -238,7 +238,8 @@ def _outcome(
             clock.note(options.prefer)
         if not any(known.assignment is outcome.partition for known in verified):
             job.progress("verifying by definition")
-            job.check(outcome.partition)
+            with little_time_after(outcome.stopped):
+                job.check(outcome.partition)
         found.append(outcome)
 
     stopped = run_until_stopped(run)

@@ -28,6 +28,7 @@ from coordlang.vocabulary.greedy import greedy
 from coordlang.vocabulary.hidden_slack import hidden_differences
 from coordlang.vocabulary.job import Assignment, Job
 from planners.errors import UsageError
+from planners.limits import little_time_after
 from planners.messages import echoed
 from planners.pieces.processes import Processes
 from planners.pieces.work import Runner
@@ -121,11 +122,13 @@ def build_few_words(
     partition = Partition.of_states(candidates.rows, found.partition)
     verdict = Verdict(False, candidates.count, 0, None)
     if not found.failures.worst:
-        verdict = verify_candidates(partition, candidates, runner, progress)
+        with little_time_after(found.stopped):
+            verdict = verify_candidates(partition, candidates, runner, progress)
         if not verdict.holds:
             raise AssertionError(f"no robot fails, but these words do: {verdict.witness}")
     clock.note("verify")
     size = len(partition.words)
+    is_interrupted = isinstance(found.stopped, KeyboardInterrupt)
     is_least = verdict.holds and size == job.lower_bound
     guarantee = Guarantee(METHOD, size, job.lower_bound, is_least, verdict.holds)
     failures = Failures(found.failures.mean, found.failures.worst)
@@ -141,7 +144,8 @@ def build_few_words(
         verdict=verdict,
         figures=_figures(found),
         seconds=clock.seconds,
-        stopped=found.stopped,
+        # No search was left where nothing fails.
+        stopped=None if verdict.holds and not is_interrupted else found.stopped,
         job=job,
         evidence={},
         failures=failures,

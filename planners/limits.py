@@ -34,6 +34,8 @@ _AGAIN = 5.0
 _SOON = 0.01
 #: Seconds that no timer counts to the end (some cannot be set to more).
 _FOR_EVER = 1e9
+#: Seconds for what has to follow on work that a limit ended: the clock has been stopped by then.
+_LITTLE = 0.5
 #: What ends work early, so that an anytime method returns what it has.
 STOPPING = (OutOfTime, OutOfMemory, MemoryError, KeyboardInterrupt)
 #: How loaders and libraries say that there is no memory.
@@ -126,6 +128,23 @@ def run_until_stopped(
             stop_clock()
         return error.with_traceback(None)
     return None
+
+
+@contextmanager
+def little_time_after(stopped: BaseException | None) -> Iterator[None]:
+    """Raise an error again where a block that follows on work which it ended takes long, too.
+
+    ``stopped`` is what `run_until_stopped` returned.  After work that was not stopped, and after an
+    error of memory, the block has the time that is left.
+    """
+    if not isinstance(stopped, OutOfTime | KeyboardInterrupt):
+        yield
+        return
+    try:
+        with time_limit(_LITTLE):
+            yield
+    except OutOfTime:
+        raise stopped from None
 
 
 def time_left() -> float:

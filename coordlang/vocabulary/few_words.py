@@ -9,16 +9,19 @@ are recounted exactly.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from math import inf
 from random import Random
 
 import numpy as np
 
+from coordlang.tolerance.failure import TooManyToCount
 from coordlang.tolerance.plan_table import PlanTable, plan_table
 from coordlang.vocabulary.fewest_failures import EQUAL, RECOUNTED, FewWords, Search
 from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.word_annealing import FewWordsSettings, anneal, measure_of
-from planners.limits import run_until_stopped
+from planners.errors import OutOfTime
+from planners.limits import little_time_after, run_until_stopped
 from planners.search.plan_space import PlanSpace
 
 #: Partitions up to which all are tried.
@@ -93,7 +96,8 @@ def few_words(
     stopped = run_until_stopped(run)
     if stopped is not None and search.candidates:
         search.candidates = search.candidates[:1]
-        search.recount()
+        with suppress(TooManyToCount, OutOfTime, KeyboardInterrupt), little_time_after(stopped):
+            search.recount()
     best = search.best
     assert best is not None
     is_best |= search.is_language

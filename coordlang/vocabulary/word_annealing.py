@@ -124,7 +124,7 @@ def anneal(
     settings: FewWordsSettings,
     progress: Callable[[str], None],
 ) -> None:
-    """Cool again and again, until a cooling finds nothing better.
+    """Cool again and again, until nothing fails or a cooling finds nothing better.
 
     ``search`` keeps the best partitions.
 
@@ -155,7 +155,7 @@ def anneal(
     ]
     at = min((measured(search.word_of(begin)) for begin in begins), key=lambda at: at.energy)
     for cooling in range(1, settings.coolings + 1):
-        before = search.best
+        before, is_counted = search.best, False
         moves = settings.moves * len(movable) * (search.words - 1)
         moves = min(max(moves, settings.least_moves), settings.most_moves)
         for number, heat in enumerate(
@@ -167,6 +167,11 @@ def anneal(
                     f"at {at.energy:.4f}"
                 )
             at = _moved(search, measure, at, movable, random, heat)
+            if not is_counted and search.candidates and search.candidates[0][0] < EQUAL:
+                search.recount()
+                if search.is_language:
+                    return
+                is_counted = True  # the measure knows some of the plans only
         search.recount()
         if search.is_language or search.best is before:
             return

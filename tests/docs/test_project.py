@@ -18,6 +18,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 PACKAGES: dict[str, set[str]] = {
     "imageio-ffmpeg": {"imageio_ffmpeg"},
     "ir-sim": {"irsim"},
+    "pillow": {"PIL"},
     "python-sat": {"pysat"},
     "unified-planning": {"unified_planning"},
     "up-fast-downward": set(),  # an engine that unified-planning finds by itself

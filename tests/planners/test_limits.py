@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import gc
+import math
 import sys
 import time
 from collections.abc import Sequence
@@ -24,7 +25,14 @@ from planners.errors import OutOfMemory, OutOfTime
 from planners.grounding import instantiate
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import Options, Stepper, Steps
-from planners.limits import limited_memory, reaching, time_left, time_limit
+from planners.limits import (
+    limited_memory,
+    little_time_after,
+    reaching,
+    run_until_stopped,
+    time_left,
+    time_limit,
+)
 from planners.loading import PlanningInstance, load
 from planners.search.edge_index import EdgeIndex
 from planners.search.optimal_plans import plan_spaces, search
@@ -347,3 +355,21 @@ def test_what_linux_says_of_memory_is_what_psutil_says(monkeypatch: pytest.Monke
         monkeypatch.setattr(module, name, Path("/nowhere"))
     assert module.address_space() == pytest.approx(psutil.Process().memory_info().vms, rel=0.02)
     assert module._machine_memory_left() == pytest.approx(left, rel=0.1)
+
+
+def test_what_follows_on_stopped_work_is_stopped_soon() -> None:
+    def busy() -> None:
+        while True:
+            pass
+
+    with time_limit(60):
+        stopped = run_until_stopped(lambda: _raise(OutOfTime("the time limit of the test is over")))
+        assert isinstance(stopped, OutOfTime)
+        with pytest.raises(OutOfTime, match="limit of the test"), little_time_after(stopped):
+            busy()
+        with little_time_after(None):
+            assert time_left() == math.inf  # the clock is stopped
+
+
+def _raise(error: BaseException) -> None:
+    raise error

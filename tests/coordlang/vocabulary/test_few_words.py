@@ -23,6 +23,7 @@ from coordlang.vocabulary import few_words as module
 from coordlang.vocabulary.few_words import few_words, partitions
 from coordlang.vocabulary.fewest_failures import canonical
 from coordlang.vocabulary.word_annealing import FewWordsSettings
+from planners.errors import OutOfTime
 from tests.support import naive
 from tests.support.candidates import on_graph
 from tests.support.command import Command
@@ -248,3 +249,23 @@ def test_a_function_gives_words_too() -> None:
 def test_what_is_no_number_of_words_is_refused(words: object) -> None:
     with pytest.raises(library.UsageError, match="a language has a word at least, not"):
         library.build(*SQUARE, words=words)  # type: ignore[arg-type]
+
+
+def test_the_search_ends_as_soon_as_nothing_fails_and_then_nothing_is_missing() -> None:
+    """A time limit that comes early leaves words that fail; one that comes late finds it ended."""
+    problem = DOMAINS / "grid" / "gw2-2x3.pddl"
+    ends = []
+    for after in (1, 4, 1_000):
+        heard = 0
+
+        def limited(text: str, after: int = after) -> None:
+            nonlocal heard
+            heard += text.startswith("annealing")
+            if heard == after:
+                raise OutOfTime("the time limit of the test is over")
+
+        built = library.build(SQUARE[0], problem, tasks="all", words=6, progress=limited)
+        assert built.built.verdict.holds == (built.stopped is None)
+        ends.append(built.built.verdict.holds)
+    assert ends == [False, False, True]
+    assert heard * 50 < FewWordsSettings().most_moves
