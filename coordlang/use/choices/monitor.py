@@ -34,6 +34,11 @@ IDLE = "idle"
 #: The largest choices file that is read, in bytes before and after decompression.
 MAX_BYTES = 1 << 28
 
+#: The most nodes that `Monitor.can` explores: pairs of a state and the visits and dos made there.
+#: In files with many states it is 16 for each, which is enough for four visits and dos.
+MAX_NODES = 1 << 18
+_NODES_OF_STATE = 16
+
 _SHOWN = 8  # things that a message lists
 _SHOWN_TEXT = 200  # characters of a text that a message shows
 _AROUND_PARENTHESES = re.compile(r"\s*([()])\s*")
@@ -46,7 +51,7 @@ Texts = str | Iterable[str | None] | None
 
 
 class MonitorError(ValueError):
-    """A choices file that is none, a robot or an atom that it does not have."""
+    """A choices file that is none, a robot or an atom that it lacks, a detour of too much work."""
 
 
 class NotAllowed(MonitorError):
@@ -353,7 +358,11 @@ class Monitor:
 
         ``can(visit="(at r1 c)", never="idle")``; see `Detour`.
 
-        O(automaton * 2^(visits and dos)), of the automaton's steps that are still to be done.
+        O(automaton * 2^(visits and dos)), of the automaton's steps that are still to be done; more
+        than `MAX_NODES` nodes are not explored.  (With any number of visits the question is
+        NP-complete.)
+
+        Raises `MonitorError` beyond that: ask for fewer at once.
         """
         walk = self._making((detour or Detour()) & Detour.of(**wanted))
         if walk is None:
@@ -415,6 +424,7 @@ class Monitor:
         made_in = cache(partial(self._made_in, detour))
         made = made_in(walk.state[self._here])
         nodes = [(self._here, made)] if made is not None else []
+        most = max(MAX_NODES, _NODES_OF_STATE * (len(self._true.first) - 1))
         numbers = {node: number for number, node in enumerate(nodes)}
         moves: list[list[tuple[int, int]]] = []
         for node, before in nodes:  # which grows meanwhile
@@ -426,6 +436,12 @@ class Monitor:
                     continue
                 after = (to, before | now | then)
                 if after not in numbers:
+                    if len(nodes) >= most:
+                        raise MonitorError(
+                            f"{len(detour.visit) + len(detour.do)} visits and dos at once are too "
+                            f"many here: there are more than {most:,} ways to have made some of "
+                            "them; ask for fewer"
+                        )
                     numbers[after] = len(nodes)
                     nodes.append(after)
                 moves[-1].append((label, numbers[after]))

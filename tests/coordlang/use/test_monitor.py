@@ -365,3 +365,38 @@ def spoil(random: Random, data: Any) -> None:
         else:
             data[key] = random.choice([None, -1, 0, 1, 2, 3, 99, "idle", "(x)", [], {}, True, 1.5])
         return
+
+
+def crossings(number: int) -> Monitor:
+    """So many steps, in each of which the robot goes left or right; atoms say where it went."""
+    facts = [f"(at{step} {side})" for step in range(number) for side in ("left", "right")]
+    states: list[dict[str, Any]] = [{"step": 0, "left": 2**number, "true": [], "unknown": []}]
+    for step in range(number):
+        states += [
+            {"step": step + 1, "left": 2 ** (number - step - 1), "true": [fact], "unknown": []}
+            for fact in (2 * step, 2 * step + 1)
+        ]
+    for state in states:
+        first = 2 * state["step"] + 1
+        sides = enumerate(("(go left)", "(go right)"), first)
+        state["next"] = {text: to for to, text in sides if to < len(states)}
+    entry = {"robot": "r", "atoms": "exact", "facts": facts, "others": [], "states": states}
+    data = {"format": "coordlang/choices", "version": 1, "sentence": "w0", "choices": [entry]}
+    return Monitor(data)
+
+
+def test_detours_with_too_many_visits_are_refused_and_change_nothing() -> None:
+    """Every set of the visits may be made at a time: twice as many with each further visit."""
+    few = [f"(at{step} left)" for step in range(12)]
+    assert crossings(12).can(visit=few).subplans == 1
+    robot = crossings(40)
+    for visits in (few, 20 * few):
+        assert robot.can(visit=visits).subplans == 2**28
+    many = [f"(at{step} left)" for step in range(40)]
+    for ask in (robot.can, robot.commit):
+        with pytest.raises(MonitorError, match=r"40 visits and dos at once .* more than 262,144"):
+            ask(visit=many)
+    assert robot.remaining == 2**40
+    for atom in many:  # one after the other they are kept
+        robot.commit(visit=atom)
+    assert robot.remaining == 1
