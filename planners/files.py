@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import errno
 import gzip
 import re
 import sys
@@ -179,6 +180,8 @@ def read_stored_bytes(path: str | Path, *, most: int = MAX_TEXT) -> bytes:
     position = Position(str(path))
     try:
         if str(path) == "-":
+            if sys.stdin is None:
+                raise OSError(errno.EBADF, "stdin is closed")
             data = b"".join(_pieces(sys.stdin.buffer, most))
         else:
             with open(path, "rb") as file:

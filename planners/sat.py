@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import threading
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -19,6 +20,9 @@ _BLOCK = 1 << 16
 #: Rounds of elimination: what one leaves, the next one may eliminate.  Three take up to twice as
 #: long as one, and the questions that follow fewer conflicts (logistics 14-0: a sixth fewer).
 _ROUNDS = 3
+
+#: Has ``now``: whether this thread is in a solver.
+_SOLVING = threading.local()
 
 #: The solvers in use.  None of MapleChrono and MapleCM: they take SIGALRM for themselves, below
 #: Python, so that no time limit would be heard any more.
@@ -68,15 +72,22 @@ def propagates(solver: Any, assumptions: Sequence[int]) -> bool:
 
 @contextmanager
 def _deaf() -> Iterator[None]:
-    """Solvers take no signals inside, as they take none in another thread."""
-    from pysat.solvers import MainThread
-
-    own = MainThread.check
-    MainThread.check = staticmethod(lambda: False)
+    """Solvers of this thread take no signals inside, as they take none in another one."""
+    _hear_only_outside()
+    _SOLVING.now = True
     try:
         yield
     finally:
-        MainThread.check = staticmethod(own)
+        _SOLVING.now = False
+
+
+@cache
+def _hear_only_outside() -> None:
+    """Let python-sat ask `_SOLVING`, too, whether it is in the main thread; for good."""
+    from pysat.solvers import MainThread
+
+    own = MainThread.check
+    MainThread.check = staticmethod(lambda: not getattr(_SOLVING, "now", False) and own())
 
 
 def simplified(clauses: array[int], kept: Sequence[int]) -> list[list[int]]:

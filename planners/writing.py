@@ -6,6 +6,7 @@ from __future__ import annotations
 import errno
 import gzip
 import os
+import secrets
 import stat
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -48,6 +49,15 @@ def why_unwritable(path: str | Path, *, makes_folder: bool = False) -> str | Non
 def is_device(path: str | Path) -> bool:
     """Whether this is a device or a pipe: written to, and never replaced."""
     return os.path.exists(path) and not os.path.isfile(path)
+
+
+def file_version(path: str | Path) -> tuple[int, ...] | None:
+    """What changes whenever a file is replaced or written; None where there is no file."""
+    try:
+        found = os.stat(path)
+    except FileNotFoundError:
+        return None
+    return found.st_dev, found.st_ino, found.st_mtime_ns, found.st_size
 
 
 def remove_file(path: str | Path | None) -> None:
@@ -167,14 +177,18 @@ def _copy_folder(source: Path, copy: Path) -> None:
 
 @contextmanager
 def _written_beside(target: Path, data: bytes) -> Iterator[str]:
-    """Write a temporary file beside a target, to the disk; it is gone after the block."""
+    """Write a temporary file beside a target, to the disk; it is gone after the block.
+
+    Its permissions are those of the target, or of any new file.
+    """
     handle, beside = _temporary(target)
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(data)
             file.flush()
+            with suppress(FileNotFoundError):
+                os.fchmod(handle, stat.S_IMODE(target.stat().st_mode) & 0o777)
             os.fsync(file.fileno())
-        os.chmod(beside, 0o666 & ~_umask())
         yield beside
     finally:
         with suppress(FileNotFoundError):
@@ -182,7 +196,10 @@ def _written_beside(target: Path, data: bytes) -> Iterator[str]:
 
 
 def _temporary(target: Path) -> tuple[int, str]:
-    return tempfile.mkstemp(prefix=f".{target.name[:_REPEATED]}.", dir=target.parent)
+    """A new file beside a target, open; only the owner may read it if the target exists."""
+    beside = target.parent / f".{target.name[:_REPEATED]}.{secrets.token_hex(8)}"
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+    return os.open(beside, flags, 0o600 if target.exists() else 0o666), str(beside)
 
 
 def _replace(target: Path, beside: str, outdated: str | Path | None) -> None:
@@ -246,9 +263,3 @@ def _denied(path: str | Path, mode: int) -> str | None:
     # Another process may have removed it since it was seen: that denies nothing.
     allowed = os.access(path, mode) or not os.path.exists(path)
     return None if allowed else os.strerror(errno.EACCES)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

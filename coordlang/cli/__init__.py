@@ -23,7 +23,7 @@ from coordlang.cli.exit_codes import BROKEN_PIPE, INTERRUPTED, interrupted_by
 from coordlang.cli.failure import Failure, usage_failure, wants_json
 from coordlang.cli.group import cli
 from coordlang.cli.standard_error import drop_stdout
-from planners.errors import CoordlangError, Note, OutOfMemory
+from planners.errors import CoordlangError, Note, OutOfMemory, UsageError
 from planners.limits import lacks_memory
 from planners.messages import sentence, visible
 from planners.signals import Interruptions
@@ -61,13 +61,16 @@ def run(arguments: list[str], interruptions: Interruptions | None = None) -> int
 
 def _run(arguments: list[str], output: Output) -> int:
     """Run one command through click; the exit code."""
+    if sys.stdout is None:
+        raise UsageError(
+            "stdout is closed, and an answer goes there", remedy="Redirect it, to /dev/null say."
+        )
     try:
         with _notes_on_stderr():
             result = cli.main(
                 args=arguments, prog_name="coordlang", standalone_mode=False, obj=output
             )
-        if sys.stdout is not None:
-            sys.stdout.flush()
+        sys.stdout.flush()
         return result if isinstance(result, int) else 0
     except click.exceptions.Exit as done:
         return int(done.exit_code)

@@ -153,6 +153,7 @@ def command(
     hit).
     """
     from planners.limits import stop_clock, time_left
+    from planners.writing import file_version
 
     if words is not None and (certificate or was_given("method")):
         raise click.UsageError(
@@ -180,9 +181,10 @@ def command(
     )
     stop_clock()  # the work is done; from here on it is saved
     stopped = _save(built, output, certificate)
+    version = file_version(output)
     try:
         if certificate and stopped is None:
-            stopped = _certify(built, output, certificate, end)
+            stopped = _certify(built, output, version, certificate, end)
         figures = built.data()
         if as_json and output != "-":
             echo(json.dumps(figures))
@@ -238,14 +240,19 @@ def _save(built: BuiltLanguage, output: str, certificate: str | None) -> BaseExc
     return None
 
 
-def _certify(built: BuiltLanguage, output: str, path: str, end: float) -> BaseException | None:
+def _certify(
+    built: BuiltLanguage, output: str, version: tuple[int, ...] | None, path: str, end: float
+) -> BaseException | None:
     """Write the certificate, until the time ``end``; the error that ended it early, or None.
+
+    ``version`` is that of the language file as it was written: a certificate belongs to no other.
 
     Of a search that was stopped it proves the lower bound that was reached; not after an interrupt,
     which asks for an end.
     """
     from coordlang.certificate import write_certificate
     from planners.limits import run_until_stopped, start_clock, stop_clock
+    from planners.writing import file_version, is_device
 
     if isinstance(built.stopped, KeyboardInterrupt):
         return None
@@ -255,12 +262,18 @@ def _certify(built: BuiltLanguage, output: str, path: str, end: float) -> BaseEx
         with working("writing why fewer words do not suffice"):
             proof = built.certificate()
         stop_clock()
+        if file_version(output) != version and not is_device(output):
+            raise coordlang.UsageError(
+                f"{output} has been replaced meanwhile: no certificate is written beside it",
+                remedy="Let two commands write to different files.",
+            )
         write_certificate(proof, path)
 
     try:
         stopped = run_until_stopped(write)
     except coordlang.UsageError as error:
-        error.reached = _written(built, output)
+        if file_version(output) == version:
+            error.reached = _written(built, output)
         raise
     if stopped is not None and not isinstance(stopped, KeyboardInterrupt):
         echo(

@@ -165,7 +165,7 @@ def test_data_is_on_the_disk_before_the_name_is(
     assert done == ["fsync", "replace"]
 
 
-@pytest.mark.parametrize("step", ["fsync", "replace", "chmod"])
+@pytest.mark.parametrize("step", ["fsync", "replace", "fchmod"])
 def test_a_file_that_cannot_be_written_stays_as_it_was(
     step: str, here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -353,3 +353,72 @@ def test_a_file_that_goes_while_it_is_asked_for_denies_nothing(
     monkeypatch.setattr(os, "access", gone_first)
     write_atomically(path, b"new")
     assert path.read_bytes() == b"new"
+
+
+def test_no_certificate_is_written_beside_a_language_of_others(
+    coordlang: Command, here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another command writes to the same file while this one works out its certificate."""
+    from coordlang.api.languages import BuiltLanguage
+
+    own = BuiltLanguage.certificate
+
+    def meanwhile(built: BuiltLanguage) -> object:
+        write_atomically("l.json", b"a language of others")
+        return own(built)
+
+    monkeypatch.setattr(BuiltLanguage, "certificate", meanwhile)
+    outcome = coordlang(*BUILD, "-o", "l.json", "--certificate", "c.json")
+    assert outcome.code == 2
+    assert "l.json has been replaced meanwhile: no certificate is written" in outcome.err
+    assert [path.name for path in here.iterdir()] == ["l.json"]
+    assert Path("l.json").read_bytes() == b"a language of others"
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o666, 0o755])
+def test_a_file_that_is_replaced_keeps_its_permissions(mode: int, here: Path) -> None:
+    """And a new one has those of every new file; the mask of the process is never touched."""
+    path = Path("kept")
+    path.touch()
+    path.chmod(mode)
+    before = os.umask(0o077)
+    try:
+        write_atomically(path, b"new")
+        write_atomically("made", b"new")
+        assert os.umask(0o077) == 0o077
+    finally:
+        os.umask(before)
+    assert path.stat().st_mode & 0o777 == mode
+    assert Path("made").stat().st_mode & 0o777 == 0o600
+    assert len(list(here.iterdir())) == 2
+
+
+def test_the_mask_of_the_process_is_not_touched(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("os.umask", lambda _: pytest.fail("other threads see it"))
+    write_atomically("made", b"new")
+    write_atomically("made", b"newer")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "closed", "code", "message"),
+    [
+        ((*BUILD, "-o", "-"), ">&-", 2, "stdout is closed"),
+        (("plans", *CELLS, "--count"), ">&-", 2, "stdout is closed"),
+        (("plans", "-", CELLS[1]), "<&-", 31, "-: cannot be read: stdin is closed"),
+        (("verify", "-", *CELLS), "<&-", 31, "-: cannot be read: stdin is closed"),
+    ],
+)
+def test_closed_streams_are_said(
+    arguments: tuple[object, ...], closed: str, code: int, message: str
+) -> None:
+    script = f'exec {sys.executable} -m coordlang "$@" {closed}'
+    done = subprocess.run(
+        ["bash", "-c", script, "bash", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert (done.returncode, done.stdout) == (code, "")
+    assert done.stderr.startswith(f"coordlang: {message}")

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import threading
 from array import array
 from contextlib import closing
 from itertools import product
@@ -10,7 +11,7 @@ from itertools import product
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planners.sat import sat_solver, simplified, split_clauses
+from planners.sat import propagates, sat_solver, simplified, split_clauses
 from planners.search.questions import Questions
 
 VARIABLES = 6
@@ -83,3 +84,34 @@ def test_a_simplified_formula_is_as_python_sat_writes_it() -> None:
     chain = [[-k, k + 1, 60] for k in range(1, 50)]
     found = Processor(bootstrap_with=chain).process(rounds=3, freeze=[1, 50])
     assert simplified(flat(chain), [1, 50]) == found.clauses
+
+
+def test_only_the_thread_that_solves_is_deaf() -> None:
+    """Two threads enter one after the other, and leave in the same order."""
+    from pysat.solvers import MainThread
+
+    heard: list[bool] = []
+    entered, leave = threading.Event(), threading.Event()
+
+    class Solver:
+        def propagate(self, assumptions: list[int]) -> tuple[bool, list[int]]:
+            heard.append(MainThread.check())
+            entered.set()
+            leave.wait(10)
+            return True, []
+
+    first = threading.Thread(target=propagates, args=(Solver(), []))
+    first.start()
+    entered.wait(10)
+
+    class Second(Solver):
+        def propagate(self, assumptions: list[int]) -> tuple[bool, list[int]]:
+            heard.append(MainThread.check())
+            leave.set()
+            first.join()
+            return True, []
+
+    assert MainThread.check()
+    propagates(Second(), [])
+    assert heard == [False, False]
+    assert MainThread.check()
