@@ -197,7 +197,7 @@ def _written_beside(target: Path, data: bytes) -> Iterator[str]:
 
 def _temporary(target: Path) -> tuple[int, str]:
     """A new file beside a target, open; only the owner may read it if the target exists."""
-    beside = target.parent / f".{target.name[:_REPEATED]}.{secrets.token_hex(8)}"
+    beside = target.parent / f".{target.name[:_REPEATED]}.{secrets.token_hex(4)}"
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
     return os.open(beside, flags, 0o600 if target.exists() else 0o666), str(beside)
 

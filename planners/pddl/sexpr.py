@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from hashlib import sha256
 from itertools import accumulate
 from pathlib import Path
+from unicodedata import normalize
 
 from planners.errors import BadInput, Position
 from planners.files import not_utf8, read_stored_bytes, require_seen
@@ -196,10 +197,11 @@ def parse(source: Source) -> Document:
     """Read the one top-level expression of ``source``.
 
     Raises `BadInput` for unbalanced parentheses, text outside of them, nesting beyond `MAX_DEPTH`,
-    or names with characters of `planners.messages.UNSEEN`.
+    names with characters of `planners.messages.UNSEEN`, or two names that Unicode makes one.
     """
     reader = _Reader(source)
     _require_seen(source)
+    _require_told_apart(source)
     for match in _TOKEN.finditer(source.text):
         reader.take(match.group(), match.start())
     return reader.document()
@@ -212,6 +214,28 @@ def _require_seen(source: Source) -> None:
     for match in _TOKEN.finditer(source.text):
         if match[0][0] != ";":
             require_seen(match[0], source.position(match.start()))
+
+
+def _require_told_apart(source: Source) -> None:
+    """Raise `BadInput` for two names that are one under Unicode's folding, and not just in case.
+
+    Such as ``ß`` and ``ss``, the sign for Kelvin and ``k``, or an accent in one or two characters:
+    people would take them for one name, and programs now for one, now for two.
+    """
+    if source.text.isascii():
+        return
+    seen: dict[str, str] = {}
+    for match in _TOKEN.finditer(source.text):
+        name = match[0]
+        if name[0] == ";":
+            continue
+        other = seen.setdefault(normalize("NFKC", name).casefold(), name)
+        if (name.lower(), name.upper()) != (other.lower(), other.upper()):
+            raise BadInput(
+                f"the names {ascii(other)} and {ascii(name)} are one name to Unicode",
+                position=source.position(match.start()),
+                remedy="Give one of them another name.",
+            )
 
 
 class _Reader:

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+from planners.errors import BadInput
+from planners.pddl.sexpr import Source, parse
 from tests.support.command import Command
 
 DOMAIN = """(define (domain hall)
@@ -446,3 +448,30 @@ def test_odd(name: str, coordlang: Command, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ONCE_WRONG)
 def test_once_wrong(name: str, coordlang: Command, tmp_path: Path) -> None:
     _run(ONCE_WRONG[name], coordlang, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "is_refused"),
+    [
+        ("k1", "\N{KELVIN SIGN}1", True),
+        ("\N{KELVIN SIGN}1", "k1", True),
+        ("stra\N{LATIN SMALL LETTER SHARP S}e", "strasse", True),
+        ("\N{GREEK SMALL LETTER SIGMA}", "\N{GREEK SMALL LETTER FINAL SIGMA}", True),
+        ("caf\N{LATIN SMALL LETTER E WITH ACUTE}", "cafe\N{COMBINING ACUTE ACCENT}", True),
+        ("r\N{LATIN SMALL LETTER E WITH ACUTE}", "re", False),
+        ("\N{KELVIN SIGN}1", "k2", False),
+    ],
+)
+def test_names_that_are_one_name_to_unicode(one: str, other: str, is_refused: bool) -> None:
+    text = PROBLEM.replace("r1", one).replace("r2", other)
+    if is_refused:
+        with pytest.raises(BadInput, match="are one name to Unicode"):
+            parse(Source("problem.pddl", text))
+    else:
+        parse(Source("problem.pddl", text))
+
+
+def test_capital_letters_with_accents_are_the_small_ones() -> None:
+    accent = "r\N{LATIN SMALL LETTER E WITH ACUTE}"
+    text = PROBLEM.replace("r1", accent).replace(accent, accent.upper(), 1)
+    assert parse(Source("problem.pddl", text))
