@@ -232,7 +232,7 @@ def _require_told_apart(source: Source) -> None:
         other = seen.setdefault(normalize("NFKC", name).casefold(), name)
         if (name.lower(), name.upper()) != (other.lower(), other.upper()):
             raise BadInput(
-                f"the names {ascii(other)} and {ascii(name)} are one name to Unicode",
+                f"the names {other!a} and {name!a} are one name to Unicode",
                 position=source.position(match.start()),
                 remedy="Give one of them another name.",
             )
