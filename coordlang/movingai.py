@@ -3,9 +3,8 @@
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
@@ -18,6 +17,7 @@ from planners.messages import echoed
 #: The characters of a map: ground, ground, swamp | out of bounds, out of bounds, trees, water.
 PASSABLE = ".GS"
 BLOCKED = "@OTW"
+_UNKNOWN = re.compile(f"[^{PASSABLE}{BLOCKED}]")
 #: Characters of names that PDDL has in names, too.
 _UNNAMED = re.compile(r"[^a-z0-9_-]+")
 #: The columns of a scenario file.
@@ -29,11 +29,39 @@ Cell = tuple[int, int]
 
 @dataclass(frozen=True, slots=True)
 class MovingMap:
-    """A map: its size, and the cells that robots can be in."""
+    """A map, row by row; a character of `PASSABLE` is a cell that robots can be in."""
 
-    height: int
-    width: int
-    passable: frozenset[Cell]
+    rows: tuple[str, ...]
+
+    @property
+    def height(self) -> int:
+        """The number of rows."""
+        return len(self.rows)
+
+    @property
+    def width(self) -> int:
+        """The number of columns."""
+        return len(self.rows[0])
+
+    @property
+    def passable(self) -> frozenset[Cell]:
+        """All cells that robots can be in, which takes far more memory than the map."""
+        return frozenset(cell for row in range(self.height) for cell in self.in_row(row))
+
+    def in_row(self, row: int) -> Iterator[Cell]:
+        """The cells of a row that robots can be in, from the left."""
+        return ((row, at) for at, ground in enumerate(self.rows[row]) if ground in PASSABLE)
+
+    def __contains__(self, cell: Cell) -> bool:
+        row, column = cell
+        inside = 0 <= row < self.height and 0 <= column < self.width
+        return inside and self.rows[row][column] in PASSABLE
+
+    def near(self, name: str) -> list[str]:
+        """The up to four cells around a cell, by name: above, left, right, below."""
+        row, column = map(int, name[1:].split("-"))
+        around = ((row - 1, column), (row, column - 1), (row, column + 1), (row + 1, column))
+        return [cell_name(cell) for cell in around if cell in self]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,24 +86,20 @@ def read_map(path: Path) -> MovingMap:
         For anything else, with the line.
     """
     rows, first = _map_rows(path, _lines(path, "map"))
-    passable = set()
     for row, text in enumerate(rows):
-        for column, character in enumerate(text):
-            if character in PASSABLE:
-                passable.add((row, column))
-            elif character not in BLOCKED:
-                raise BadInput(
-                    f"unknown character {character!r} in the map",
-                    position=Position(str(path), first + row, column + 1),
-                    remedy=f"Passable: {' '.join(PASSABLE)}; blocked: {' '.join(BLOCKED)}.",
-                )
-    if not passable:
+        if unknown := _UNKNOWN.search(text):
+            raise BadInput(
+                f"unknown character {unknown[0]!r} in the map",
+                position=Position(str(path), first + row, unknown.start() + 1),
+                remedy=f"Passable: {' '.join(PASSABLE)}; blocked: {' '.join(BLOCKED)}.",
+            )
+    if not any(character in row for row in rows for character in PASSABLE):
         raise BadInput(
             "this map has no passable cell",
             position=Position(str(path), first, 1),
             remedy=f"Passable: {' '.join(PASSABLE)}; blocked: {' '.join(BLOCKED)}.",
         )
-    return MovingMap(len(rows), len(rows[0]), frozenset(passable))
+    return MovingMap(tuple(rows))
 
 
 def read_agents(path: Path, grid: MovingMap, agents: int) -> tuple[Agent, ...]:
@@ -136,30 +160,34 @@ def planning_files(map_file: Path, scenario: Path, agents: int) -> dict[str, str
     found = read_agents(scenario, grid, agents)
     stem = scenario.name.removesuffix(".scen")
     name = f"{_UNNAMED.sub('-', stem.lower()).strip('-')}-{agents}"
-    cells = {cell_name(cell): cell for cell in sorted(grid.passable)}
+    cells = [list(map(cell_name, grid.in_row(row))) for row in range(grid.height)]
     text = grid_problem_text(
         name if name[:1].isalpha() else f"map-{name}",
         "grid",
-        cells,
-        _neighbours(cells),
+        list(filter(None, cells)),
+        grid.near,
         [cell_name(agent.start) for agent in found],
         [cell_name(agent.goal) for agent in found],
         written_by="coordlang domains --map",
     )
-    places = {name: [column, row] for name, (row, column) in cells.items()}
+    places = (
+        f'"{cell_name((row, column))}": [{column}, {row}]'
+        for row in range(grid.height)
+        for _, column in grid.in_row(row)
+    )
     domain = shipped_domains() / "grid" / "domain.pddl"
     return {
         "domain.pddl": domain.read_text(encoding="utf-8"),
         f"{stem}-{agents}.pddl": text,
-        "coordinates.json": json.dumps({"coordinates": places}) + "\n",
+        "coordinates.json": f'{{"coordinates": {{{", ".join(places)}}}}}\n',
     }
 
 
 def grid_problem_text(
     name: str,
     domain: str,
-    cells: Mapping[str, Cell],
-    neighbours: Mapping[str, Sequence[str]],
+    rows: Sequence[Sequence[str]],
+    neighbours: Callable[[str], Sequence[str]],
     starts: Sequence[str],
     goals: Sequence[str],
     *,
@@ -170,33 +198,27 @@ def grid_problem_text(
 
     Parameters
     ----------
-    cells
-        Cell -> row and column, row by row.
+    rows
+        The cells, row by row.
     neighbours
-        Cell -> the adjacent ones, in the order in which they are written.
+        Gives the cells that are adjacent to a cell, in the order in which they are written.
     declare_robots
         Whether the robots are objects of the problem; else they are constants of the domain.
     """
     robots = [f"r{number}" for number in range(1, len(starts) + 1)]
-    rows = [
-        "    " + " ".join(names) for _, names in groupby(cells, key=lambda name: cells[name][0])
-    ]
+    listed = ["    " + " ".join(names) for names in rows]
     lines = [
         f"; Written by {written_by}.",
         f"(define (problem {name})",
         f"  (:domain {domain})",
         "  (:objects",
         *([f"    {' '.join(robots)} - robot"] if declare_robots else []),
-        *rows[:-1],
-        rows[-1] + " - cell",
+        *listed[:-1],
+        listed[-1] + " - cell",
         "  )",
         "  (:init",
         f"    {_positions(robots, starts)}",
-        *(
-            "    " + " ".join(f"(adjacent {cell} {other})" for other in near)
-            for cell in cells
-            if (near := neighbours[cell])
-        ),
+        *filter(None, ("\n".join(_adjacent(names, neighbours)) for names in rows)),
         "  )",
         f"  (:goal (and {_positions(robots, goals)}))",
         ")",
@@ -208,17 +230,16 @@ def _positions(robots: Iterable[str], cells: Iterable[str]) -> str:
     return " ".join(f"(at {robot} {cell})" for robot, cell in zip(robots, cells, strict=True))
 
 
-def _neighbours(cells: Mapping[str, Cell]) -> dict[str, list[str]]:
-    """The up to four cells around each cell: above, left, right, below."""
-    there = set(cells.values())
-    return {
-        name: [
-            cell_name(near)
-            for near in ((row - 1, column), (row, column - 1), (row, column + 1), (row + 1, column))
-            if near in there
-        ]
-        for name, (row, column) in cells.items()
-    }
+def _adjacent(names: Iterable[str], neighbours: Callable[[str], Sequence[str]]) -> Iterator[str]:
+    """A line of atoms for each cell that has neighbours."""
+    for cell in names:
+        if near := neighbours(cell):
+            yield "    " + " ".join(f"(adjacent {cell} {other})" for other in near)
+
+
+def in_rows(cells: Mapping[str, Cell]) -> list[list[str]]:
+    """The names of cells, which come row by row, in a list for each row."""
+    return [list(names) for _, names in groupby(cells, key=lambda name: cells[name][0])]
 
 
 def _lines(path: Path, what: str) -> list[str]:
@@ -314,7 +335,7 @@ def _agent(text: str, grid: MovingMap, position: Position) -> Agent:
 
 def _blocked(agent: Agent, grid: MovingMap) -> Iterator[tuple[str, Cell]]:
     for what, cell in (("start", agent.start), ("goal", agent.goal)):
-        if cell not in grid.passable:
+        if cell not in grid:
             yield what, cell
 
 
@@ -331,6 +352,7 @@ __all__ = [
     "MovingMap",
     "cell_name",
     "grid_problem_text",
+    "in_rows",
     "planning_files",
     "read_agents",
     "read_map",

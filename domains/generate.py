@@ -23,7 +23,7 @@ from typing import Literal
 from gridmap import GridMap, open_grid, read_map, ring, three_cells
 from picture import draw
 
-from coordlang.movingai import grid_problem_text
+from coordlang.movingai import grid_problem_text, in_rows
 from planners.errors import BadInput, CoordlangError, UsageError
 
 HERE = Path(__file__).resolve().parent
@@ -95,8 +95,8 @@ def problem_text(task: Scenario, domain: str, style: Style = "agents") -> str:
     return grid_problem_text(
         task.name,
         domain,
-        grid.cells,
-        {cell: grid.neighbours(cell) for cell in grid.cells},
+        in_rows(grid.cells),
+        grid.neighbours,
         task.starts,
         task.goals,
         written_by="domains/generate.py",

@@ -11,6 +11,7 @@ import click
 
 from coordlang.cli.echo import echo
 from coordlang.cli.files import FILE, FOLDER, check_outputs
+from coordlang.cli.shared_options import limits
 from planners.messages import visible
 from planners.notebook import counted
 
@@ -39,6 +40,7 @@ ALL = "all"
     "-o", "output", type=FOLDER, metavar="DIR", help="The folder for a map's domain and problem."
 )
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
+@limits
 def command(
     copy: tuple[str, str] | None,
     map_file: str | None,

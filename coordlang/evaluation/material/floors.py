@@ -16,7 +16,7 @@ from coordlang.evaluation.material.grid import cell_position, is_cell, placement
 from coordlang.evaluation.material.languages import language_for
 from coordlang.evaluation.material.suite import WORLDS, World
 from coordlang.language.words import Language
-from coordlang.movingai import Cell, cell_name, grid_problem_text, read_map
+from coordlang.movingai import Cell, cell_name, grid_problem_text, in_rows, read_map
 from coordlang.required.choices import Choices
 from coordlang.tasks.candidates import Candidates, from_listed
 from coordlang.tasks.listed import ListedTask
@@ -163,7 +163,8 @@ def _candidates(
 ) -> Candidates:
     """Tasks on a map, as candidates."""
     ends = [[text.strip("()").split()[-1] for text in atoms] for atoms in _ends(listed[0])]
-    text = grid_problem_text("floor", domain.name, cells, _adjacent(cells), *ends, written_by="")
+    near = _adjacent(cells).__getitem__
+    text = grid_problem_text("floor", domain.name, in_rows(cells), near, *ends, written_by="")
     return from_listed(domain, [parse_problem(Source("floor", text), domain)], listed)
 
 

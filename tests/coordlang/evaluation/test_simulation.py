@@ -121,10 +121,12 @@ def test_three_robots_on_the_t_map_need_no_word() -> None:
     from planners.pddl.sexpr import Source
 
     domain = read_domain(DOMAINS / "grid" / "domain.pddl")
-    cells = {"c0-1": (0, 1), "c1-0": (1, 0), "c1-1": (1, 1), "c1-2": (1, 2)}
-    near = {name: ["c1-1"] for name in cells} | {"c1-1": ["c0-1", "c1-0", "c1-2"]}
+    rows = [["c0-1"], ["c1-0", "c1-1", "c1-2"]]
+    near = {name: ["c1-1"] for row in rows for name in row} | {"c1-1": ["c0-1", "c1-0", "c1-2"]}
     starts, goals = ("c0-1", "c1-0", "c1-2"), ("c1-1", "c1-0", "c1-2")
-    text = grid_problem_text("t", domain.name, cells, near, starts, goals, written_by="a test")
+    text = grid_problem_text(
+        "t", domain.name, rows, near.__getitem__, starts, goals, written_by="a test"
+    )
     every = all_pairs(domain, [parse_problem(Source("t", text), domain)])
     assert every.count > 0
     for space in every.spaces:
