@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from os import PathLike
-from typing import TYPE_CHECKING, Literal, TypedDict, get_args
+from types import CodeType
+from typing import TYPE_CHECKING, Literal, TypedDict, Unpack, get_args
 
 if TYPE_CHECKING:
     from coordlang.language.words import Language
@@ -78,6 +81,14 @@ def require_seed(seed: int) -> None:
         raise UsageError(f"--seed {seed}: expected 0 or more", remedy="Say 0.")
 
 
+def _unexpected(keyword: str, function: CodeType) -> str:
+    """What Python says of a keyword that a function does not have, with what was meant."""
+    own = function.co_varnames[: function.co_argcount + function.co_kwonlyargcount]
+    close = get_close_matches(keyword, [*own, *ModelKeywords.__annotations__], n=1)
+    meant = f"; did you mean {close[0]!r}?" if close else ""
+    return f"{function.co_name}() got an unexpected keyword argument {keyword!r}{meant}"
+
+
 def names_in(option: str, given: str | Sequence[str] | None) -> list[str]:
     """Return the names that an option is given, in one text or several; none for None.
 
@@ -110,27 +121,24 @@ class GivenOptions:
     words_see_slack: bool = False
 
     @classmethod
-    def of(
-        cls,
-        robots: str | Sequence[str] | None = None,
-        robot_type: str | None = None,
-        unowned: Unowned | None = None,
-        cost: Cost | None = None,
-        remember_actions: bool = False,
-        slack: int | None = None,
-        words_see_slack: bool = False,
-    ) -> GivenOptions:
-        """Check them.
+    def of(cls, **model: Unpack[ModelKeywords]) -> GivenOptions:
+        """Check the keywords that a public function passes on.
 
         Raises
         ------
         UsageError
             For no robots, for robots that are named in two ways, and for what is no value of an
             option.
+        TypeError
+            For another keyword, in the name of the calling function.
         """
         from planners.errors import UsageError
         from planners.messages import echoed
 
+        if unknown := sorted(model.keys() - ModelKeywords.__annotations__):
+            raise TypeError(_unexpected(unknown[0], sys._getframe(1).f_code))
+        robots, robot_type = model.get("robots"), model.get("robot_type")
+        remember_actions = model.get("remember_actions", False)
         names = names_in("--robots", robots)
         chosen = tuple(name.strip().lower() for name in names if name.strip())
         if robots is not None and not chosen:
@@ -150,11 +158,11 @@ class GivenOptions:
         return cls(
             chosen,
             robot_type and robot_type.lower(),
-            unowned,
-            cost,
+            model.get("unowned"),
+            model.get("cost"),
             remember_actions,
-            slack,
-            words_see_slack,
+            model.get("slack"),
+            model.get("words_see_slack", False),
         )
 
     def options(self) -> ModelOptions:

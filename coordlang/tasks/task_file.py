@@ -12,7 +12,7 @@ import msgspec
 from msgspec import Meta
 
 from coordlang.tasks.listed import ListedTask
-from planners.errors import Position
+from planners.errors import Position, note
 from planners.files import FileFormat, read_bytes
 
 
@@ -34,12 +34,13 @@ def json_schema() -> dict[str, Any]:
 
 def read_task_file(path: str | Path) -> tuple[ListedTask, ...]:
     """Read a task file (docs/formats.md).  Raises `BadInput` for anything else."""
-    return _plain(TASKS.decode(read_bytes(path), Position(str(path))))
+    position = Position(str(path))
+    return _plain(TASKS.decode(read_bytes(path), position), position)
 
 
 def tasks_from_data(data: Any, position: Position) -> tuple[ListedTask, ...]:
     """Read the data of a task file.  Raises `BadInput` for anything else."""
-    return _plain(TASKS.convert(data, position))
+    return _plain(TASKS.convert(data, position), position)
 
 
 def task_data(tasks: Sequence[ListedTask]) -> list[dict[str, list[str]]]:
@@ -53,10 +54,19 @@ def tasks_text(tasks: Sequence[ListedTask]) -> str:
     return f'{{"format": "{TASKS.format}", "version": {TASKS.version},\n "tasks": [\n{lines}]}}\n'
 
 
-def _plain(file: TaskFile) -> tuple[ListedTask, ...]:
-    """The tasks with their texts in lower case, with single spaces."""
+def _plain(file: TaskFile, position: Position) -> tuple[ListedTask, ...]:
+    """The tasks with their texts in lower case, with single spaces; each one once."""
 
     def plain(texts: Sequence[str]) -> tuple[str, ...]:
         return tuple(" ".join(text.lower().split()) for text in texts)
 
-    return tuple(ListedTask(plain(task.init), plain(task.goal)) for task in file.tasks)
+    once: dict[tuple[frozenset[str], frozenset[str]], ListedTask] = {}
+    for task in file.tasks:
+        init, goal = plain(task.init), plain(task.goal)
+        once.setdefault((frozenset(init), frozenset(goal)), ListedTask(init, goal))
+    if again := len(file.tasks) - len(once):
+        note(
+            f"{again:,} of {len(file.tasks):,} tasks repeat another one: every task counts once",
+            position=position,
+        )
+    return tuple(once.values())

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
@@ -388,3 +389,21 @@ def test_a_robot_that_is_none(robot: Any) -> None:
     sentence = coordlang.explain(language, *files).sentences[0].words
     with pytest.raises(coordlang.UsageError):
         coordlang.choices(language, *files, sentence, robot=robot)
+
+
+@pytest.mark.parametrize(
+    ("name", "keyword", "meant"),
+    [
+        ("build", "metod", "; did you mean 'method'?"),
+        ("plans", "cots", "; did you mean 'cost'?"),
+        ("verify", "taks", "; did you mean 'tasks'?"),
+        ("coordination", "robot", "; did you mean 'robots'?"),
+        ("build", "xyz", ""),
+    ],
+)
+def test_a_wrong_keyword_is_said_in_the_name_of_the_function(
+    name: str, keyword: str, meant: str
+) -> None:
+    text = f"{name}() got an unexpected keyword argument {keyword!r}{meant}"
+    with pytest.raises(TypeError, match=f"^{re.escape(text)}$"):
+        getattr(coordlang, name)("domain.pddl", "problem.pddl", **{keyword: None})
