@@ -102,7 +102,7 @@ class WordsExplained(Presented):
         default = self.used.language.default
         if not self.mapped.word.size:
             return "\n".join([*lines, f"No state is mapped: the word is always {default}."])
-        meant = "plan within the slack" if self.used.model.slack else "optimal plan"
+        meant = self.used.model.kept_plan
         lines.append(
             f"Exact in all {counted(sum(self.mapped.states), 'mapped state')}. No {meant} of "
             f"these tasks leaves them; elsewhere the word is {default}."
@@ -234,7 +234,7 @@ class Explanation(Presented):
         if self.with_demands and used.guaranteed:
             lines.append(
                 "Each robot may choose for itself: whatever the others choose, "
-                f"it is {'a plan within the slack' if used.model.slack else 'an optimal plan'}."
+                f"it is {'a' if used.model.slack else 'an'} {used.model.kept_plan}."
             )
         if self.with_demands:
             for asks in self.demands(SENTENCES_SHOWN):

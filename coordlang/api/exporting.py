@@ -116,8 +116,9 @@ class ExportedTask(Presented):
         numbers = self.exported.joint_plan(actions)
         plan = tuple(self.exported.model.texts(step) for step in numbers)
         if self.open_plans.rank(plan) is None:
+            kind = self.exported.model.kept_plan
             raise Refuted(
-                "this is no optimal plan of the exported problem",
+                f"this is no {kind} of the exported problem",
                 remedy="Ask the planner for an optimal plan: the one of least total-cost.",
             )
         return plan

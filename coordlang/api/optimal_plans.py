@@ -127,5 +127,5 @@ class OptimalPlans(Presented):
     def _known(self, plan: Sequence[Texts]) -> Plan:
         numbers = self._numbers(plan)
         if numbers is None or self._plans.rank(numbers) is None:
-            raise ValueError("this is no optimal plan of the task")
+            raise ValueError(f"this is no {self._plans.space.model.kept_plan} of the task")
         return numbers

@@ -51,7 +51,7 @@ def witness_text(witness: Miscoordination, width: int = WIDTH) -> str:
     for group in alike(list(zip(witness.plans, witness.states, strict=True))):
         follow = "follows" if len(group) == 1 else "follow"
         robots = named([witness.robots[number] for number in group])
-        lines += wrapped(f"{robots} {follow} this optimal plan:", width, "  ", "      ")
+        lines += wrapped(f"{robots} {follow} this {witness.kind}:", width, "  ", "      ")
         for number, step in enumerate(witness.plans[group[0]], 1):
             lines += steps.lines(number, step)
         state = witness.states[group[0]][-1] or NO_FACT

@@ -119,7 +119,9 @@ def _clause(reason: Reason, tasks: _Tasks) -> Clause:
     ]
     if _follow(space, start, mixture) is not None:
         raise Refuted(
-            "the mixture of its plans is an optimal plan: they need no separation", remedy=_REBUILD
+            f"the mixture of its plans is one of the {space.model.kept_plans}: they need no "
+            "separation",
+            remedy=_REBUILD,
         )
     clause: set[Pair] = set()
     for path in reason.paths:
@@ -150,7 +152,7 @@ def _joins_all(links: Sequence[tuple[int, int]], plans: int) -> bool:
 def _states(space: PlanSpace, start: int, plan: PlanTexts, name: str) -> list[int]:
     states = _follow(space, start, plan)
     if states is None:
-        raise Refuted(f"{name} is no optimal plan of the task", remedy=_REBUILD)
+        raise Refuted(f"{name} is no {space.model.kept_plan} of the task", remedy=_REBUILD)
     return states
 
 

@@ -343,7 +343,7 @@ def _summary(built: BuiltLanguage, figures: dict[str, Any], output: str) -> str:
     return (
         f"{words} ({figures['method']}, {proof}{verified}) for {tasks}, "
         f"{figures['tasks_requiring_coordination']:,} of which require coordination\n"
-        f"{figures['states_on_plans']:,} states on optimal plans, "
+        f"{figures['states_on_plans']:,} states on {built.candidates.model.kept_plans}, "
         f"{figures['divergences']:,} divergences, "
         f"{figures['walk_nodes']:,} nodes of plans, {total:.2f} s\n"
         f"{_failures(built)}{_flexibility(figures)}{_readability(figures)}"

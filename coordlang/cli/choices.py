@@ -182,7 +182,9 @@ def _text(found: RobotsChoices, check: bool) -> str:
     if check and mixtures is not None and mixtures.holds:
         number = counted(found.combinations, "combination")
         nodes = counted(mixtures.nodes, "node")
-        lines.append(f"checked: {number} of own subplans, all optimal plans ({nodes} walked)")
+        lines.append(
+            f"checked: {number} of own subplans, all {used.model.kept_plans} ({nodes} walked)"
+        )
     tables = [_table(found, found.found.robots[robot], width) for robot in found.chosen]
     for group in alike(tables):
         robots = named([used.model.robots[found.chosen[number]] for number in group])

@@ -61,7 +61,7 @@ class Choices:
         def so_far() -> str:
             return (
                 f"the robots' choices in {len(self.sets):,} sets, over {len(space):,} states on "
-                "optimal plans"
+                f"{space.model.kept_plans}"
             )
 
         with reaching(so_far, self.space.model.smaller("smaller tasks")):

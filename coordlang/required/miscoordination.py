@@ -30,7 +30,8 @@ class Miscoordination:
     ``states[i]`` are the states that plan i passes through (keys); ``mixture`` the joint steps of
     the mixture up to and with the one that breaks, ``mixed_states`` the states before each of them;
     ``step`` the number of the breaking step (from 0) and ``reason`` why it breaks.  ``sentence`` is
-    the plans' common sentence where a language was checked.
+    the plans' common sentence where a language was checked.  ``kind`` is what the plans are: an
+    "optimal plan" each, or one within the slack.
     """
 
     task: str
@@ -42,6 +43,7 @@ class Miscoordination:
     step: int
     reason: str
     sentence: tuple[str, ...] | None = None
+    kind: str = "optimal plan"
 
 
 def miscoordination(space: PlanSpace, task: int) -> Miscoordination | None:
@@ -130,6 +132,7 @@ def describe_failure(
         step=len(mixture) - 1,
         reason=_reason(space, mixed_nodes[len(mixture) - 1], mixture[-1]),
         sentence=sentence,
+        kind=model.kept_plan,
     )
 
 
@@ -178,4 +181,4 @@ def _reason(space: PlanSpace, node: int, labels: tuple[int, ...]) -> str:
             f"it is possible, but too late: the goal is then {makespan} steps away and {left} "
             "are left"
         )
-    return "it is possible and in time, but costs more than an optimal plan"
+    return f"it is possible and in time, but costs more than any {model.kept_plan}"

@@ -165,7 +165,7 @@ class FailureCount:
         def so_far() -> str:
             return (
                 f"failures counted with {self._sets.work:,} additions, over {len(self.space):,} "
-                "states on optimal plans"
+                f"states on {self.space.model.kept_plans}"
             )
 
         with reaching(so_far, self.space.model.smaller("smaller tasks")):

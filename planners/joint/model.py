@@ -141,6 +141,17 @@ class JointModel:
     slack_facts: tuple[int, ...] = ()
 
     @property
+    def kept_plan(self) -> str:
+        """What one of the plans is called in messages: an optimal one, or one within the slack."""
+        steps = f"{self.slack} step{'s' * (self.slack != 1)}"
+        return f"plan within {steps} of the optimum" if self.slack else "optimal plan"
+
+    @property
+    def kept_plans(self) -> str:
+        """`kept_plan`, for several."""
+        return self.kept_plan.replace("plan", "plans", 1)
+
+    @property
     def without_slack(self) -> JointModel:
         """The same model, of which optimal plans are meant."""
         return replace(self, slack=0, slack_facts=())

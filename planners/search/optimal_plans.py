@@ -253,7 +253,8 @@ def plan_spaces(
 
         def so_far(done: int = start) -> str:
             return (
-                f"the optimal plans to {done:,} of {len(tasks):,} goals, over {len(space):,} states"
+                f"the {space.model.kept_plans} to {done:,} of {len(tasks):,} goals, over "
+                f"{len(space):,} states"
             )
 
         with reaching(so_far, "fewer candidate tasks"):

@@ -93,7 +93,7 @@ class PlanSpace:
             edges = int(self.first[span.stop] - self.first[span.start])
             numbers = (layer, span.stop - span.start, states, edges)
             rows.append([f"{number:,}" for number in numbers])
-        caption = f"optimal plans of {counted(len(self.starts), 'task')}"
+        caption = f"{self.model.kept_plans} of {counted(len(self.starts), 'task')}"
         return html_table(("steps left", "nodes", "states", "edges"), rows, caption)
 
     @property

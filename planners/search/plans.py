@@ -167,6 +167,6 @@ class Plans:
         """The state numbers (in ``space.rows``) that a plan passes through, first to last."""
         path = self.space.path_with(self.start, plan)
         if path is None:
-            raise ValueError("this is no optimal plan of the task")
+            raise ValueError(f"this is no {self.space.model.kept_plan} of the task")
         found: list[int] = self.space.state[self.space.nodes_on(self.start, path)].tolist()
         return found

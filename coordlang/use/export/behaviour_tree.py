@@ -58,7 +58,9 @@ def behaviour_trees(choices: Choices) -> str:
 def _comment(choices: Choices) -> str:
     sentence = " ".join(choices.task_language.partition.words[word] for word in choices.words)
     if choices.guaranteed:
-        promise = "Whatever each robot chooses, all of them together follow an optimal plan."
+        kind = choices.task_language.model.kept_plan
+        article = "a" if choices.task_language.model.slack else "an"
+        promise = f"Whatever each robot chooses, all of them together follow {article} {kind}."
     elif choices.task_language.covered:
         promise = "This is no coordination language: choices of different robots need not mix."
     else:

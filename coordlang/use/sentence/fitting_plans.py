@@ -41,6 +41,7 @@ class NoPlanFits(Refuted):
         length: int,
         next_words: Sequence[int | None],
         names: Sequence[str],
+        kept_plan: str,
     ) -> None:
         text = " ".join(names[word] for word in sentence)
         prefix = " ".join(names[word] for word in sentence[:length])
@@ -48,7 +49,7 @@ class NoPlanFits(Refuted):
         where = f'after "{prefix}"' if length else "at the beginning"
         wrong = f"says {echoed(names[sentence[length]])}" if length < len(sentence) else "ends"
         super().__init__(
-            f'no optimal plan has the sentence "{text}": {where} no plan {wrong}',
+            f'no {kept_plan} has the sentence "{text}": {where} no plan {wrong}',
             remedy=f"There plans {' or '.join(following)}.",
         )
         self.fitting = tuple(sentence[:length])
@@ -90,7 +91,7 @@ def plans_with_sentence(
     start = int(space.starts[task])
     length = len(sentence)
     if not length or word[start] != sentence[0]:
-        raise NoPlanFits(sentence, 0, [int(word[start])], names)
+        raise NoPlanFits(sentence, 0, [int(word[start])], names, space.model.kept_plan)
     next_word = np.array([*sentence[1:], -1, -1])
     #: For each layer the node of ``space`` and the index in the sentence of its word.
     layers: list[tuple[Ints, Ints]] = [(np.array([start]), np.array([0]))]
@@ -127,4 +128,4 @@ def _no_plan(
             if not after:
                 following.add(None)
     next_words = sorted(following, key=lambda w: (w is None, w))
-    return NoPlanFits(sentence, furthest + 1, next_words, names)
+    return NoPlanFits(sentence, furthest + 1, next_words, names, space.model.kept_plan)

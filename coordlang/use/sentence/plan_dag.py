@@ -78,6 +78,8 @@ class PlanDag:
         Sorted by source and target.
     cut
         How many states were merged; 0: nothing is missing.
+    kind
+        What the plans are called: "optimal plans", or those within the slack.
     """
 
     sentence: tuple[str, ...]
@@ -87,6 +89,7 @@ class PlanDag:
     nodes: tuple[DagNode, ...]
     edges: tuple[DagEdge, ...]
     cut: int
+    kind: str = "optimal plans"
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -137,6 +140,7 @@ def plan_dag(open_plans: OpenPlans, most: int | None = None) -> PlanDag:
         nodes=tuple(nodes),
         edges=_edges(space, number, nodes),
         cut=sum(node.merged for node in nodes),
+        kind=task_language.model.kept_plans,
     )
 
 

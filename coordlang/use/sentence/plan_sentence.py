@@ -168,7 +168,7 @@ def read_plan_file(path: str | Path, model: JointModel) -> list[tuple[Texts, ...
         raise BadInput(
             "there is no plan in it",
             position=Position(str(path)),
-            remedy="`coordlang plans DOMAIN PROBLEM` writes optimal plans.",
+            remedy="`coordlang plans DOMAIN PROBLEM` writes plans.",
         )
     return [tuple(tuple(map(_spelling, step)) for step in plan) for plan in plans]
 
