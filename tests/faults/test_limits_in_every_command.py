@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every command hears ``--time-limit``: on an input that is too large it ends soon after it.
+
+One table line for each command is printed (``-s``).
+"""
+
+from __future__ import annotations
+
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+import coordlang
+from coordlang.cli.group import COMMANDS
+from coordlang.movingai import planning_files
+from tests.support.command import own_process
+from tests.support.domains import DOMAINS
+
+LIMIT = 3.0
+#: Seconds after the limit in which a command has to end, and what a busy machine may add to them.
+AFTER, BUSY = 2.0, 8.0
+#: Commands that do no work that grows, and one that has a limit for each piece of its work.
+WITHOUT = {"schema", "evaluate"}
+HUGE = ("DOMAIN", "HUGE")
+BUILD = ("build", *HUGE, "-o", "out.json")
+SPOKEN = ("LANGUAGE", *HUGE)
+EVERY: tuple[tuple[object, ...], ...] = (
+    ("inspect", "DOMAIN", "MAP"),
+    ("plans", *HUGE, "--count"),
+    ("check", *HUGE),
+    ("coordination", *HUGE),
+    ("tasks", *HUGE, "--start", "(at r1 ?)", "--start", "(at r2 ?)", "-o", "tasks.json"),
+    BUILD,
+    (*BUILD, "--method", "separating"),
+    (*BUILD, "--method", "minimal"),
+    (*BUILD, "--words", "2"),
+    (*BUILD, "--slack", "1", "--words-see-slack"),
+    (*BUILD, "--tasks", "all"),
+    ("build", *HUGE, "--start", "LANGUAGE", "-o", "out.json"),
+    ("build", "GRID", "SMALL", "--tasks", "all", "--method", "minimal", "-o", "out.json"),
+    ("build", "GRID", "SMALL", "--tasks", "all", "--words", "6", "-o", "out.json"),
+    ("verify", *SPOKEN, "--tasks", "all"),
+    ("lift", "GRID", "SMALL", "TWO", "-o", "lifted.json"),
+    ("ground", "LIFTED", "GRID", "TWO", "-o", "out.json"),
+    ("say", *SPOKEN, "PLAN"),
+    ("understand", *SPOKEN, "w0"),
+    ("plan", *SPOKEN, "w0", "--heuristic", "blind"),
+    ("choices", *SPOKEN, "w0"),
+    ("simulate", *SPOKEN),
+    ("export", *SPOKEN, "w0", "-o", "exported"),
+    ("explain", *SPOKEN, "--task"),
+    ("report", *SPOKEN, "-o", "report.html"),
+    ("domains", "--map", "BIG-MAP", "--scen", "BIG-SCEN", "--agents", "2", "-o", "map"),
+)
+
+
+def on_open_floor(folder: Path, name: str, side: int, ways: list[tuple[int, ...]]) -> Path:
+    """The problem of robots on a floor without walls: their start and goal, x and y."""
+    grid, scenario = folder / f"{name}.map", folder / f"{name}.scen"
+    grid.write_text(f"type octile\nheight {side}\nwidth {side}\nmap\n" + f"{'.' * side}\n" * side)
+    lines = ["\t".join(map(str, (0, "m", side, side, *way, 0))) for way in ways]
+    scenario.write_text("\n".join(["version 1", *lines, ""]))
+    texts = planning_files(grid, scenario, len(ways))
+    for file, text in texts.items():
+        (folder / file).write_text(text)
+    return folder / f"{name}-{len(ways)}.pddl"
+
+
+@pytest.fixture(scope="module")
+def given(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """What `EVERY` has names for."""
+    folder = tmp_path_factory.mktemp("given")
+    corners = [(0, 0, 19, 19), (19, 19, 0, 0), (0, 19, 19, 0), (19, 0, 0, 19)]
+    huge = on_open_floor(folder, "huge", 20, corners)
+    still = on_open_floor(folder, "still", 20, [(*way[:2], *way[:2]) for way in corners])
+    found = {
+        "DOMAIN": folder / "domain.pddl",
+        "HUGE": huge,
+        "TWO": on_open_floor(folder, "two", 60, [(0, 0, 59, 59), (59, 59, 0, 0)]),
+        "MAP": on_open_floor(folder, "wide", 150, corners),
+        "GRID": DOMAINS / "grid" / "domain.pddl",
+        "SMALL": DOMAINS / "grid" / "gw4-3x3.pddl",
+        "LANGUAGE": folder / "language.json",
+        "LIFTED": folder / "lifted.json",
+        "PLAN": folder / "plan.plan",
+        "BIG-MAP": folder / "big.map",
+        "BIG-SCEN": folder / "big.scen",
+    }
+    coordlang.build(found["DOMAIN"], still).language.save(found["LANGUAGE"])
+    coordlang.lift(found["GRID"], DOMAINS / "grid" / "gw1-2x2.pddl").save(found["LIFTED"])
+    found["PLAN"].write_text("0: (move r1 c0-0 c0-1)\n")
+    side = 1500
+    found["BIG-MAP"].write_text(f"height {side}\nwidth {side}\nmap\n" + f"{'.' * side}\n" * side)
+    ways = [f"0\tm\t{side}\t{side}\t{k}\t0\t{k}\t9\t0" for k in range(2)]
+    found["BIG-SCEN"].write_text("\n".join([*ways, ""]))
+    return found
+
+
+def test_every_command_is_in_the_table() -> None:
+    assert {str(arguments[0]) for arguments in EVERY} | WITHOUT == set(COMMANDS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("arguments", EVERY, ids=lambda arguments: " ".join(map(str, arguments)))
+def test_it_ends_soon_after_its_limit(
+    arguments: tuple[object, ...], given: dict[str, Path], tmp_path: Path
+) -> None:
+    command = [str(given.get(str(argument), argument)) for argument in arguments]
+    begin = time.monotonic()
+    done = subprocess.run(
+        own_process(*command, "--time-limit", LIMIT),
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    seconds = time.monotonic() - begin
+    print(f"{' '.join(map(str, arguments))}: {done.returncode} after {seconds:.1f} s")
+    assert done.returncode in (3, 23), done
+    assert "Traceback" not in done.stderr
+    assert f"the time limit of {LIMIT:g} s is over" in done.stderr
+    assert LIMIT - 0.5 < seconds < LIMIT + AFTER + BUSY
+    if done.returncode == 23:
+        assert not [path for path in tmp_path.iterdir() if path.is_file()]
