@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import subprocess
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -56,7 +57,9 @@ EVERY: tuple[tuple[object, ...], ...] = (
 )
 
 
-def on_open_floor(folder: Path, name: str, side: int, ways: list[tuple[int, ...]]) -> Path:
+def on_open_floor(
+    folder: Path, name: str, side: int, ways: Sequence[tuple[int, int, int, int]]
+) -> Path:
     """The problem of robots on a floor without walls: their start and goal, x and y."""
     grid, scenario = folder / f"{name}.map", folder / f"{name}.scen"
     grid.write_text(f"type octile\nheight {side}\nwidth {side}\nmap\n" + f"{'.' * side}\n" * side)
@@ -74,7 +77,7 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("given")
     corners = [(0, 0, 19, 19), (19, 19, 0, 0), (0, 19, 19, 0), (19, 0, 0, 19)]
     huge = on_open_floor(folder, "huge", 20, corners)
-    still = on_open_floor(folder, "still", 20, [(*way[:2], *way[:2]) for way in corners])
+    still = on_open_floor(folder, "still", 20, [(x, y, x, y) for x, y, _, _ in corners])
     found = {
         "DOMAIN": folder / "domain.pddl",
         "HUGE": huge,

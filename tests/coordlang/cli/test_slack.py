@@ -114,7 +114,7 @@ def test_commands_that_follow(made: Path, coordlang: Command, tmp_path: Path) ->
     sentence = library.say(made, *CORNERS, plan=plan).sentences[0]
     explained = coordlang("explain", made, *CORNERS, "--task")
     assert explained.code == 0
-    assert "No plan within the slack of these tasks" in " ".join(explained.out.split())
+    assert "No plan within 1 step of the optimum of these tasks" in " ".join(explained.out.split())
     assert "has 514 plans within slack 1, of at most 5 steps" in explained.out
     trees = tmp_path / "trees.xml"
     assert coordlang("export", made, *CORNERS, sentence, "--to", "bt", "-o", trees).code == 0
