@@ -7,8 +7,8 @@ Tarski gets a relaxed core of the domain: one sort, types as static predicates, 
 of each conjunctive precondition, and add effects.  What is left out (negation, disjunction,
 quantifiers, inequality, other robots' actions) only makes the answer larger;
 `planners.grounding.instantiate` evaluates it exactly.  The program that Tarski makes of it is
-Datalog without negation, so clingo's grounder alone finds its least model; that nothing is missing
-in it is checked (`planners.grounding.closure`).
+Datalog without negation, so clingo's grounder alone finds its least model (tests compare it with
+matching rules one by one).
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from threading import current_thread, main_thread
 from typing import TYPE_CHECKING, Any
 
 from planners.errors import CoordlangError, OutOfMemory
-from planners.grounding.closure import Arguments, RelaxedModel, require_closed
 from planners.limits import memory_left
 from planners.pddl.formula_tree import required_atoms
 from planners.pddl.lifted import Atom, Domain, Formula, Schema, Variable
@@ -31,6 +30,7 @@ from planners.pddl.robots import natural
 if TYPE_CHECKING:
     from clingo import Control, Symbol
 
+Arguments = tuple[str, ...]
 
 #: Combinations of values from which on clingo may look for an instance of a rule for seconds.
 _LONG_JOIN = 10**8
@@ -65,11 +65,10 @@ def reachable_arguments(
     MemoryError
         If clingo meets the memory limit.
     CoordlangError
-        If clingo does not ground the program, or not all of it (`require_closed`).
+        If clingo does not ground the program.
     """
     from tarski.reachability import create_reachability_lp
 
-    init = list(init)
     _require_memory(domain, objects)
     core = _Core(domain, objects)
     for atom in init:
@@ -77,14 +76,11 @@ def reachable_arguments(
     for schema in domain.schemas:
         core.add_action(schema)
     program, _ = create_reachability_lp(core.problem)
-    model = core.translated(
-        _least_model([_interruptible(rule, len(objects)) for rule in program.rules])
-    )
-    require_closed(model, domain, objects, init)
+    found = _least_model([_interruptible(rule, len(objects)) for rule in program.rules])
     number = {name: n for n, name in enumerate(core.objects.values())}
     return {
-        name: sorted(instances, key=lambda args: [number[a] for a in args])
-        for name, instances in model.instances.items()
+        name: sorted(core.named(found, f"action_{symbol}"), key=lambda a: [number[o] for o in a])
+        for name, symbol in core.actions.items()
     }
 
 
@@ -267,16 +263,9 @@ class _Core:
         parameters = [variables[p.name] for p in schema.parameters]
         self.problem.action(symbol, parameters, self._all(body), effects)
 
-    def translated(self, found: Mapping[str, Iterable[Arguments]]) -> RelaxedModel:
-        """The model of Tarski's program in the names of the domain."""
-
-        def named(predicate: str) -> set[Arguments]:
-            return {tuple([self.objects[o] for o in args]) for args in found.get(predicate, ())}
-
-        return RelaxedModel(
-            atoms={key: named(f"atom_{symbol.name}") for key, symbol in self._symbols.items()},
-            instances={name: named(f"action_{symbol}") for name, symbol in self.actions.items()},
-        )
+    def named(self, found: Mapping[str, Iterable[Arguments]], predicate: str) -> set[Arguments]:
+        """The argument tuples of a predicate of Tarski's program in the names of the domain."""
+        return {tuple([self.objects[o] for o in args]) for args in found.get(predicate, ())}
 
     def _predicate(self, name: str, arity: int) -> Any:
         key = (name, arity)

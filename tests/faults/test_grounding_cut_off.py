@@ -17,11 +17,6 @@ import pytest
 
 import coordlang
 from coordlang.cli import run
-from planners.errors import CoordlangError
-from planners.grounding import reachability
-from planners.grounding.reachability import reachable_arguments
-from planners.pddl import parse_domain, parse_problem
-from planners.pddl.sexpr import Source
 from tests.support.domains import DOMAINS
 from tests.support.forks import fork_command
 
@@ -136,62 +131,3 @@ def test_a_language_is_whole_or_none_at_every_length(language: bytes, tmp_path: 
     print(codes)
     assert codes[0] > 1000
     assert codes[2] > 1000
-
-
-# The answer of clingo
-
-PROBLEMS = {"grid": "gw1-2x2", "handover": "exchange", "elevator": "two-calls"}
-
-
-def cut_off(place: str, monkeypatch: pytest.MonkeyPatch, every: int) -> tuple[dict[str, int], int]:
-    """Cut the atoms that clingo finds after every ``every``-th, and leave out each of these."""
-    folder = DOMAINS / place
-    domain = parse_domain(Source("domain", (folder / "domain.pddl").read_text()))
-    text = (folder / f"{PROBLEMS[place]}.pddl").read_text()
-    problem = parse_problem(Source("problem", text), domain)
-    init = sorted(problem.init, key=str)
-    given: list[Any] = []
-    least = reachability._least_model
-
-    def noted(rules: Any) -> Any:
-        given.append(least(rules))
-        return given[0]
-
-    monkeypatch.setattr(reachability, "_least_model", noted)
-    whole = reachable_arguments(domain, problem.objects, init)
-    answer = [(predicate, args) for predicate, found in given[0].items() for args in found]
-    outcomes = {"error": 0, "the same": 0}
-    for at in range(0, len(answer), every):
-        for part in (answer[:at], answer[:at] + answer[at + 1 :]):
-            found: dict[str, list[Any]] = {}
-            for predicate, args in part:
-                found.setdefault(predicate, []).append(args)
-            monkeypatch.setattr(reachability, "_least_model", lambda _, found=found: found)
-            try:
-                found_too = reachable_arguments(domain, problem.objects, init)
-            except CoordlangError as error:
-                said = str(error)
-                outcomes["error"] += 1
-                assert said.startswith("the reachable instances are not complete")
-            else:
-                outcomes["the same"] += 1
-                assert found_too == whole
-    return outcomes, len(answer)
-
-
-@pytest.mark.parametrize("place", PROBLEMS)
-def test_some_atoms_of_the_grounding_are_left_out(
-    place: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    outcomes, _ = cut_off(place, monkeypatch, 29)
-    assert outcomes["error"] > outcomes["the same"]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("place", PROBLEMS)
-def test_each_atom_of_the_grounding_is_left_out(
-    place: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    outcomes, atoms = cut_off(place, monkeypatch, 1)
-    print(place, atoms, outcomes)
-    assert outcomes["error"] > outcomes["the same"]

@@ -3,17 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from itertools import product
+from pathlib import Path
 from random import Random
 from typing import Any
 
 import pytest
 
-from planners.errors import CoordlangError
-from planners.grounding import reachability
-from planners.grounding.closure import RelaxedModel, require_closed
 from planners.grounding.reachability import reachable_arguments
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.formula_tree import required_atoms
@@ -21,22 +18,13 @@ from planners.pddl.lifted import Atom, Domain, Problem, Variable
 from planners.pddl.robots import objects_of
 from planners.pddl.sexpr import Source
 from tests.support.domains import DOMAINS
+from tests.support.naive_closure import NotClosed, clingo_model, require_closed
 from tests.support.random_pddl import KINDS, Kind, random_model
-
-Checked = tuple[RelaxedModel, Domain, Mapping[str, Any], list[Atom]]
 
 
 def read(domain: str, problem: str) -> tuple[Domain, Problem]:
     parsed = parse_domain(Source("domain", domain))
     return parsed, parse_problem(Source("problem", problem), parsed)
-
-
-def checked(domain: Domain, problem: Problem, monkeypatch: pytest.MonkeyPatch) -> Checked:
-    """What the closure check is given when a problem is grounded."""
-    given: list[Checked] = []
-    monkeypatch.setattr(reachability, "require_closed", lambda *args: given.append(args))
-    reachable_arguments(domain, problem.objects, sorted(problem.init, key=str))
-    return given[0]
 
 
 def least_model(domain: Domain, problem: Problem) -> tuple[set[Atom], dict[str, set[Any]]]:
@@ -70,11 +58,12 @@ def least_model(domain: Domain, problem: Problem) -> tuple[set[Atom], dict[str, 
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_least_model_and_what_lacks_in_it(kind: Kind, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_least_model_and_what_lacks_in_it(kind: Kind) -> None:
     for seed in range(25):
         text = random_model(seed, kind)
         domain, problem = read(text.domain, text.problem)
-        model, domain, objects, init = checked(domain, problem, monkeypatch)
+        objects, init = problem.objects, sorted(problem.init, key=str)
+        model = clingo_model(domain, objects, init)
         true, instances = least_model(domain, problem)
         atoms = [(signature, args) for signature, found in model.atoms.items() for args in found]
         assert {Atom(predicate, args) for (predicate, _), args in atoms} == true
@@ -82,12 +71,12 @@ def test_the_least_model_and_what_lacks_in_it(kind: Kind, monkeypatch: pytest.Mo
         require_closed(model, domain, objects, init)
         for signature, args in Random(seed).sample(atoms, min(4, len(atoms))):
             less = {**model.atoms, signature: model.atoms[signature] - {args}}
-            with pytest.raises(CoordlangError, match="missing"):
+            with pytest.raises(NotClosed, match="missing"):
                 require_closed(replace(model, atoms=less), domain, objects, init)
         for name, found in model.instances.items():
             if found:
                 fewer = {**model.instances, name: found - {min(found)}}
-                with pytest.raises(CoordlangError, match="missing"):
+                with pytest.raises(NotClosed, match="missing"):
                     require_closed(replace(model, instances=fewer), domain, objects, init)
 
 
@@ -108,18 +97,16 @@ def test_conditions_with_constants_repeated_variables_and_more_types() -> None:
     assert set(found["go"]) == instances["go"] != set()
 
 
-def test_a_grounder_that_leaves_something_out_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    real = reachability._least_model
+PROBLEMS = sorted(path for path in DOMAINS.glob("*/*.pddl") if path.name != "domain.pddl")
 
-    def less(rules: Any) -> Any:
-        found = real(rules)
-        found["action_a0"].pop()
-        return found
 
-    monkeypatch.setattr(reachability, "_least_model", less)
-    folder = DOMAINS / "grid"
-    domain, problem = read(
-        (folder / "domain.pddl").read_text(), (folder / "corners-3x3.pddl").read_text()
-    )
-    with pytest.raises(CoordlangError, match=r"\(move r\d .*\) is missing"):
-        reachable_arguments(domain, problem.objects, sorted(problem.init, key=str))
+@pytest.mark.parametrize("path", PROBLEMS, ids=lambda path: f"{path.parent.name}-{path.stem}")
+def test_what_is_found_in_shipped_problems_is_closed(path: Path) -> None:
+    domain, problem = read((path.parent / "domain.pddl").read_text(), path.read_text())
+    init = sorted(problem.init, key=str)
+    model = clingo_model(domain, problem.objects, init)
+    require_closed(model, domain, problem.objects, init)
+    name, instances = max(model.instances.items(), key=lambda item: len(item[1]))
+    fewer = {**model.instances, name: instances - {min(instances)}}
+    with pytest.raises(NotClosed, match=rf"\({name} .*\) is missing"):
+        require_closed(replace(model, instances=fewer), domain, problem.objects, init)

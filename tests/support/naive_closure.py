@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Check that a relaxed model is closed: that no rule derives an atom which it lacks.
+"""Check that what clingo finds is closed: that no rule derives an atom which it lacks.
 
 The check shares no code with Tarski and clingo, which find the model.  A set of atoms that holds
 the initial ones and is closed contains the least such set, so nothing reachable is missing.
@@ -10,8 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
+from unittest.mock import patch
 
-from planners.errors import CoordlangError
+from planners.grounding import reachability
+from planners.grounding.reachability import reachable_arguments
 from planners.pddl.formula_tree import required_atoms
 from planners.pddl.lifted import Atom, Domain, Effect, Schema, Term, Variable
 
@@ -31,10 +34,43 @@ class RelaxedModel:
     instances: Mapping[str, Set[Arguments]]
 
 
+class NotClosed(AssertionError):
+    """Something is missing in a relaxed model."""
+
+
+def clingo_model(
+    domain: Domain, objects: dict[str, tuple[str, ...]], init: Iterable[Atom]
+) -> RelaxedModel:
+    """What clingo finds when a problem is grounded, in the names of the domain."""
+    found: dict[str, list[Arguments]] = {}
+    cores: list[Any] = []
+    real = reachability._least_model
+
+    class Core(reachability._Core):
+        def __init__(self, *args: Any) -> None:
+            super().__init__(*args)
+            cores.append(self)
+
+    def least_model(rules: Sequence[str]) -> dict[str, list[Arguments]]:
+        found.update(real(rules))
+        return found
+
+    with (
+        patch.object(reachability, "_Core", Core),
+        patch.object(reachability, "_least_model", least_model),
+    ):
+        reachable_arguments(domain, objects, init)
+    (core,) = cores
+    return RelaxedModel(
+        {key: core.named(found, f"atom_{s.name}") for key, s in core._symbols.items()},
+        {name: core.named(found, f"action_{symbol}") for name, symbol in core.actions.items()},
+    )
+
+
 def require_closed(
     model: RelaxedModel, domain: Domain, objects: Mapping[str, Sequence[str]], init: Iterable[Atom]
 ) -> None:
-    """Raise `CoordlangError` unless ``model`` holds the initial atoms and all that follows.
+    """Raise `NotClosed` unless ``model`` holds the initial atoms and all that follows.
 
     Parameters
     ----------
@@ -68,7 +104,7 @@ def require_closed(
 def _require_effect(
     joins: _Joins, schema: Schema, effect: Effect, instances: Iterable[Arguments]
 ) -> None:
-    """Raise `CoordlangError` if an instance of the schema adds an atom that is missing."""
+    """Raise `NotClosed` if an instance of the schema adds an atom that is missing."""
     names = [parameter.name for parameter in schema.parameters]
     scope = [*names, *(variable.name for variable in effect.variables)]
     column = {name: n for n, name in enumerate(scope)}  # an inner variable hides an outer one
@@ -78,12 +114,8 @@ def _require_effect(
         joins.require(atom.predicate, args)
 
 
-def _missing(name: str, args: Arguments) -> CoordlangError:
-    text = " ".join((name, *args))
-    return CoordlangError(
-        f"the reachable instances are not complete: ({text}) is missing",
-        remedy="This is a defect of the grounder (clingo), not of the input: please report it.",
-    )
+def _missing(name: str, args: Arguments) -> NotClosed:
+    return NotClosed(f"({' '.join((name, *args))}) is missing")
 
 
 class _Joins:
@@ -106,7 +138,7 @@ class _Joins:
         ] = {}
 
     def require(self, predicate: str, args: Arguments) -> None:
-        """Raise `CoordlangError` if the atom is missing."""
+        """Raise `NotClosed` if the atom is missing."""
         if args not in self._atoms.get((predicate, len(args)), ()):
             raise _missing(predicate, args)
 
