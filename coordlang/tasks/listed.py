@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 from msgspec import Meta
@@ -106,9 +106,7 @@ def ground_task(
 
 def _names(domain: Domain, problem: Problem, text: str, position: Position | None) -> Names:
     document = parse(Source(position.file if position else "task", text))
-    return Names(
-        document, frozenset(domain.types), domain.predicates, {}, {}, frozenset(problem.objects)
-    )
+    return replace(Names.of(document, domain), functions={}, objects=problem.objects)
 
 
 def _read_init(

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from planners.limits import reaching
 from planners.messages import echoed
-from planners.pddl.lifted import Domain
+from planners.pddl.lifted import Domain, Signatures
 from planners.pddl.names import Names, group, read_objects, token, typed_list
 from planners.pddl.network import read_network
 from planners.pddl.schemas import action_name, arity_of, check_parts, read_schema
@@ -35,7 +36,8 @@ def parse_domain(source: Source) -> Domain:
     document = parse(source)
     name, sections = read_header(document, "domain")
     types = _read_types(document, sections)
-    names = Names(document, frozenset(types), _read_predicates(document, sections))
+    signatures = _read_predicates(document, sections, types)
+    names = Names(document, types, _arities(signatures), signatures)
     constants: dict[str, tuple[str, ...]] = {}
     for section in sections.get(":constants", ()):
         read_objects(names, section.items[1:], constants)
@@ -49,13 +51,11 @@ def parse_domain(source: Source) -> Domain:
             remedy="Write at least one '(:action NAME :parameters (..) :precondition "
             ".. :effect ..)'.",
         )
-    names = Names(
-        document,
-        names.types,
-        names.predicates,
-        _read_functions(document, sections),
-        {name: arity_of(names, item) for name, item in actions.items()},
-        frozenset(constants),
+    names = replace(
+        names,
+        functions=_read_functions(document, sections),
+        actions={name: arity_of(names, item) for name, item in actions.items()},
+        objects=constants,
     )
     schemas = tuple(read_schema(names, item) for item in actions.values())
     check_parts(document, schemas, actions)
@@ -71,11 +71,12 @@ def parse_domain(source: Source) -> Domain:
         source,
         types,
         constants,
-        names.predicates,
-        names.functions,
+        dict(names.predicates),
+        dict(names.functions),
         schemas,
         constraints,
         dependences,
+        signatures,
     )
 
 
@@ -125,8 +126,11 @@ def _cycle(types: dict[str, tuple[str, ...]]) -> list[str] | None:
     return None
 
 
-def _read_predicates(document: Document, sections: Sections) -> dict[str, frozenset[int]]:
-    predicates: dict[str, frozenset[int]] = {}
+def _read_predicates(
+    document: Document, sections: Sections, types: Mapping[str, object]
+) -> Signatures:
+    """The types of arguments; ``object`` for those without a declared type."""
+    signatures: Signatures = {}
 
     def declare(items: Sequence[Expression]) -> None:
         for item in items:
@@ -144,16 +148,18 @@ def _read_predicates(document: Document, sections: Sections) -> dict[str, frozen
             name = token(document, entry.items[0], "the name of a predicate").text
             if name == "=":  # some domains declare it; it stays the equality of objects
                 continue
-            arity = len(typed_list(document, entry.items[1:], "a variable"))
-            predicates[name] = predicates.get(name, frozenset()) | {arity}
+            entries = typed_list(document, entry.items[1:], "a variable")
+            own = [frozenset(t if t in types else "object" for t in one.types) for one in entries]
+            known = signatures.get((name, len(own)), own)
+            signatures[name, len(own)] = tuple(a | b for a, b in zip(known, own, strict=True))
 
     for section in sections.get(":predicates", ()):
         declare(section.items[1:])
-    return predicates
+    return signatures
 
 
 def _read_functions(document: Document, sections: Sections) -> dict[str, frozenset[int]]:
-    functions: dict[str, frozenset[int]] = {}
+    found: list[tuple[str, int]] = []
     for section in sections.get(":functions", ()):
         for item in section.items[1:]:
             if isinstance(item, Token):  # "- number" behind a function
@@ -161,9 +167,16 @@ def _read_functions(document: Document, sections: Sections) -> dict[str, frozens
             name = (
                 token(document, item.items[0], "the name of a function").text if len(item) else ""
             )
-            arity = len(typed_list(document, item.items[1:], "a variable"))
-            functions[name] = functions.get(name, frozenset()) | {arity}
-    return functions
+            found.append((name, len(typed_list(document, item.items[1:], "a variable"))))
+    return _arities(found)
+
+
+def _arities(found: Iterable[tuple[str, int]]) -> dict[str, frozenset[int]]:
+    """Names with all their numbers of arguments."""
+    arities: dict[str, frozenset[int]] = {}
+    for name, arity in found:
+        arities[name] = arities.get(name, frozenset()) | {arity}
+    return arities
 
 
 def _complain_about_double_action(document: Document, sections: Sections) -> None:

@@ -25,6 +25,7 @@ from planners.pddl.lifted import (
     Formula,
     Problem,
     Schema,
+    Signatures,
     StepAtom,
     Term,
     Variable,
@@ -153,6 +154,7 @@ def _join_domains(domains: list[Domain], name: str) -> Domain:
             )
         ),
         dependences=tuple(dict.fromkeys(d for domain in domains for d in domain.dependences)),
+        signatures=_joined_signatures([domain.signatures for domain in domains]),
     )
 
 
@@ -256,6 +258,15 @@ def _union(tables: list[dict[str, frozenset[int]]]) -> dict[str, frozenset[int]]
     for table in tables:
         for name, arities in table.items():
             joined[name] = joined.get(name, frozenset()) | arities
+    return joined
+
+
+def _joined_signatures(tables: list[Signatures]) -> Signatures:
+    """The types that arguments may have in some file."""
+    joined: Signatures = {}
+    for table in tables:
+        for key, own in table.items():
+            joined[key] = tuple(a | b for a, b in zip(joined.get(key, own), own, strict=True))
     return joined
 
 

@@ -192,7 +192,7 @@ class _EffectReader:
         listed = group(names.document, item.items[1], "a list of variables")
         variables = names.read_variables(listed.items)
         # An inner variable may shadow an outer one: give it a name of its own.
-        taken = {v.name for v in scope.variables} | names.variables
+        taken = {v.name for v in scope.variables} | set(names.variables)
         clash = next((v.name for v in variables if v.name in taken), None)
         if clash:
             self.read(scope, _rename(item, clash, _fresh(clash, taken)))
@@ -248,7 +248,9 @@ def _constant_cost(names: Names, item: Group, amount: Token) -> int:
 
 def _atom(names: Names, item: Group, head: str) -> Atom:
     _require_arity(names, item, names.predicates[head], "predicate")
-    return Atom(head, tuple(names.term(term) for term in item.items[1:]))
+    atom = Atom(head, tuple(names.term(term) for term in item.items[1:]))
+    names.check_arguments(item)
+    return atom
 
 
 def _require_arity(names: Names, item: Group, arities: Iterable[int], what: str) -> None:

@@ -6,10 +6,13 @@ All names are in lower case.  Formulas keep the user's structure; nothing is nor
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from planners.pddl.sexpr import Source
 
+#: The types that each argument of a predicate may have, by the predicate's name and arity.
+Signatures = dict[tuple[str, int], tuple[frozenset[str], ...]]
 #: A term is a variable (``?x``) or the name of an object.
 Term = str
 
@@ -158,7 +161,8 @@ class Constraint:
 class Domain:
     """A domain as read: types, predicates and actions.
 
-    ``types`` maps each type to its direct supertypes, ``predicates`` a name to its arities.
+    ``types`` maps each type to its direct supertypes, ``predicates`` a name to its arities;
+    ``signatures`` are what texts are checked against, and mean nothing for states and plans.
 
     ``constraints`` and ``dependences`` are the concurrency network: a pair (v, w) says that whoever
     matches w needs somebody who matches v with the same binding, in the same step.
@@ -173,6 +177,7 @@ class Domain:
     schemas: tuple[Schema, ...]
     constraints: tuple[Constraint, ...] = ()
     dependences: tuple[tuple[str, str], ...] = ()
+    signatures: Signatures = field(default_factory=dict, compare=False)
 
     @property
     def is_joint_action(self) -> bool:
@@ -181,14 +186,19 @@ class Domain:
 
     def supertypes(self, name: str) -> frozenset[str]:
         """The type itself, every type above it, and ``object``."""
-        seen = {name, "object"}
-        todo = [name]
-        while todo:
-            for parent in self.types.get(todo.pop(), ()):
-                if parent not in seen:
-                    seen.add(parent)
-                    todo.append(parent)
-        return frozenset(seen)
+        return supertypes(self.types, name)
+
+
+def supertypes(types: Mapping[str, tuple[str, ...]], name: str) -> frozenset[str]:
+    """A type itself, every type above it, and ``object``; ``types`` have direct supertypes."""
+    seen = {name, "object"}
+    todo = [name]
+    while todo:
+        for parent in types.get(todo.pop(), ()):
+            if parent not in seen:
+                seen.add(parent)
+                todo.append(parent)
+    return frozenset(seen)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence, Set
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence, Set
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 
 from planners.errors import BadInput, Unsupported, note
 from planners.messages import echoed, visible
-from planners.pddl.lifted import Variable
+from planners.pddl.lifted import Domain, Signatures, Variable, supertypes
 from planners.pddl.sexpr import Document, Expression, Group, Token
 
 #: Characters of a wrong name that are compared with the declared names.
@@ -115,28 +115,28 @@ def _types(document: Document, item: Expression) -> tuple[str, ...]:
 class Names:
     """What a formula may speak of: types, predicates, actions, objects and the variables in scope.
 
-    ``actions`` maps each action to its number of arguments (the agent counted, first).
+    ``types`` have their direct supertypes, ``objects`` and ``variables`` their types.  ``actions``
+    maps each action to its number of arguments (the agent counted, first).
     """
 
     document: Document
-    types: frozenset[str]
-    predicates: dict[str, frozenset[int]]
-    functions: dict[str, frozenset[int]] = field(default_factory=dict)
-    actions: dict[str, int] = field(default_factory=dict)
-    objects: frozenset[str] = frozenset()
-    variables: frozenset[str] = frozenset()
+    types: Mapping[str, tuple[str, ...]]
+    predicates: Mapping[str, frozenset[int]]
+    signatures: Signatures = field(default_factory=dict)
+    functions: Mapping[str, frozenset[int]] = field(default_factory=dict)
+    actions: Mapping[str, int] = field(default_factory=dict)
+    objects: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    variables: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, document: Document, domain: Domain) -> Names:
+        """What a text about a domain may speak of, without objects."""
+        return cls(document, domain.types, domain.predicates, domain.signatures, domain.functions)
 
     def with_variables(self, variables: Iterable[Variable]) -> Names:
         """The same names with more variables in scope; a variable of the same name is shadowed."""
-        return Names(
-            self.document,
-            self.types,
-            self.predicates,
-            self.functions,
-            self.actions,
-            self.objects,
-            self.variables | {v.name for v in variables},
-        )
+        more = {variable.name: variable.types for variable in variables}
+        return replace(self, variables={**self.variables, **more})
 
     def read_variables(self, items: Sequence[Expression]) -> tuple[Variable, ...]:
         """A typed list of variables; their types must be declared."""
@@ -197,6 +197,31 @@ class Names:
                 remedy += " An object that a domain names belongs in its (:constants ..)."
             raise self.document.fail(f"object {echoed(item.text)} is not declared", item, remedy)
         return item.text
+
+    def check_arguments(self, item: Group) -> None:
+        """Raise `BadInput` for an argument that has no type in common with what is declared.
+
+        A type above the declared one will do: its objects may be of that one.
+        """
+        signature = self.signatures.get((item.head, len(item) - 1), ())
+        for number, (term, allowed) in enumerate(zip(item.items[1:], signature, strict=False), 1):
+            assert isinstance(term, Token)
+            own = (self.variables if term.text in self.variables else self.objects)[term.text]
+            if not any(self._related(t, allowed) for t in own):
+                declared = " ".join(" or ".join(sorted(types)) for types in signature)
+                raise self.document.fail(
+                    f"argument {number} of {echoed(item.head)}, {echoed(term.text)}, is of type "
+                    f"{' or '.join(own)}, not {' or '.join(sorted(allowed))}",
+                    term,
+                    f"It is declared as ({visible(item.head[:_SHOWN])} {declared}): are arguments "
+                    "swapped, or is a type missing there?",
+                )
+
+    def _related(self, name: str, allowed: frozenset[str]) -> bool:
+        above = supertypes(self.types, name)
+        return not above.isdisjoint(allowed) or any(
+            name in supertypes(self.types, other) for other in allowed
+        )
 
     def arity(self, item: Group, name: str, arities: Iterable[int], what: str) -> BadInput | None:
         """The error for a wrong number of arguments, or None."""

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from planners.errors import Unsupported
@@ -41,11 +42,11 @@ def parse_problem(source: Source, domain: Domain) -> Problem:
                 section,
                 f"The domain was read from {domain.source.name}.",
             )
-    names = Names(document, frozenset(domain.types), domain.predicates, domain.functions)
+    names = Names.of(document, domain)
     objects = dict(domain.constants)
     for section in sections.get(":objects", ()):
         read_objects(names, section.items[1:], objects)
-    names = Names(document, names.types, names.predicates, names.functions, {}, frozenset(objects))
+    names = replace(names, objects=objects)
     init: set[Atom] = set()
     values: dict[Atom, float] = {}
     for section in sections.get(":init", ()):

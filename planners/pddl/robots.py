@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Literal
 
 from planners.errors import BadInput, UsageError, note
@@ -246,6 +247,8 @@ def _guessed(domain: Domain, problem: Problem, kind: str) -> tuple[tuple[str, ..
         doubt = f"are {len(robots):,}"
     elif not any(kind in domain.supertypes(t) for types in first for t in types):
         doubt = "are never the first argument of an action"
+    elif not _acts(domain, kind):
+        doubt = "never move or hold anything"
     if doubt:
         what = f"Every action takes objects of type {echoed(kind)}, but they {doubt}"
         raise _unclear(domain, problem, what, _taken(domain, problem))
@@ -256,6 +259,44 @@ def _guessed(domain: Domain, problem: Problem, kind: str) -> tuple[tuple[str, ..
         remedy=f"Say --robot-type {kind} if that is so; --robots NAME,NAME names others.",
     )
     return robots, f"type {kind}"
+
+
+def _acts(domain: Domain, kind: str) -> bool:
+    """Whether objects of a type move or hold something, by actions that take just one of them.
+
+    Moving changes another argument of a fact about the object, as (at ?r ?from) to (at ?r ?to).
+    Holding adds a fact that has it first, as (holding ?r ?x), which another action deletes.
+    """
+    changed: dict[bool, set[str]] = {True: set(), False: set()}
+    for schema in domain.schemas:
+        own = [
+            p.name for p in schema.parameters if all(kind in domain.supertypes(t) for t in p.types)
+        ]
+        if len(own) != 1:
+            continue
+        facts = [e for e in schema.effects if own[0] in e.atom.args]
+        if any(
+            a.adds > b.adds and _moves(a.atom, b.atom, own[0]) for a, b in product(facts, repeat=2)
+        ):
+            return True
+        for effect in facts:
+            if effect.atom.args[0] == own[0] and _others(effect.atom, own[0]):
+                changed[effect.adds].add(effect.atom.predicate)
+    return not changed[True].isdisjoint(changed[False])
+
+
+def _moves(after: Atom, before: Atom, robot: str) -> bool:
+    """Whether two atoms say the same of a robot and some other variable."""
+    return (
+        after.predicate == before.predicate
+        and [arg == robot for arg in after.args] == [arg == robot for arg in before.args]
+        and _others(after, robot) != _others(before, robot)
+    )
+
+
+def _others(atom: Atom, robot: str) -> list[str]:
+    """The variables of an atom besides the robot; constants are phases, not places or things."""
+    return [arg for arg in atom.args if arg.startswith("?") and arg != robot]
 
 
 def _unclear(domain: Domain, problem: Problem, why: str, candidates: Sequence[str]) -> BadInput:

@@ -31,7 +31,14 @@ _NOT_DECODED = re.compile("[\udc80-\udcff]")
 #: A character that no name may hold, and that separates no names.
 _UNSEEN_IN_NAME = re.compile(rf"(?!\s){UNSEEN.pattern}")
 
-_TOKEN = re.compile(r";[^\n\r]*|[()]|[^\s();]+")
+#: A variable may follow a name without a space, as in ``(aircraft?a)``.
+_TOKEN = re.compile(r";[^\n\r]*|[()]|\?*[^\s();?]+|\?+")
+
+#: Lists that stand directly in ``(define ..)``, and nowhere deeper.
+_SECTIONS = {
+    *(":action", ":constants", ":derived", ":durative-action", ":functions", ":goal", ":init"),
+    *(":metric", ":objects", ":predicates", ":requirements", ":types"),
+}
 
 
 def _read_tokens(text: str) -> Iterator[str]:
@@ -196,8 +203,9 @@ def _with_old_comments(data: bytes, name: str) -> str:
 def parse(source: Source) -> Document:
     """Read the one top-level expression of ``source``.
 
-    Raises `BadInput` for unbalanced parentheses, text outside of them, nesting beyond `MAX_DEPTH`,
-    names with characters of `planners.messages.UNSEEN`, or two names that Unicode makes one.
+    Raises `BadInput` for unbalanced parentheses, a section in another one (where a parenthesis is
+    missing), text outside of parentheses, nesting beyond `MAX_DEPTH`, names with characters of
+    `planners.messages.UNSEEN`, or two names that Unicode makes one.
     """
     reader = _Reader(source)
     _require_seen(source)
@@ -273,7 +281,21 @@ class _Reader:
                 remedy="Give a PDDL file: DOMAIN first, then PROBLEM.",
             )
         else:
+            self._require_place(text.lower())
             self._open[-1][1].append(Token(text.lower(), offset))
+
+    def _require_place(self, text: str) -> None:
+        """Raise `BadInput` if a section begins within another one."""
+        if text not in _SECTIONS or len(self._open) < 3 or self._open[-1][1]:
+            return
+        outer, items = self._open[1]
+        name = items[0].text if items and isinstance(items[0], Token) else ""
+        raise self._error(
+            f"{text!r} begins inside of another list: a ')' is missing before it",
+            self._open[-1][0],
+            f"'({name}' opens at {self._source.position(outer)} and is not closed: add "
+            f"{len(self._open) - 2} ')' before this position.",
+        )
 
     def _close(self, offset: int) -> None:
         if not self._open:
@@ -294,10 +316,12 @@ class _Reader:
         if self._open:
             start, items = self._open[-1]
             first = items[0].text if items and isinstance(items[0], Token) else ""
+            inner = items[-1] if items and isinstance(items[-1], Group) else None
+            last = f", after {self._source.position(inner.offset)}" if inner else ""
             raise self._error(
                 f"the '({first}' that opens here is never closed",
                 start,
-                f"Expected {len(self._open)} more ')' before the end of the file.",
+                f"Expected {len(self._open)} more ')' before the end of the file{last}.",
             )
         if self._root is None:
             raise BadInput(

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -156,11 +157,9 @@ def test_unparsed_formulas_read_as_they_were(kind: Kind) -> None:
         for schema in domain.schemas:
             document = parse(Source("f", formula_text(schema.precondition)))
             actions = {s.name: len(s.parameters) for s in domain.schemas}
-            scope = {v.name for v in schema.parameters}
-            constants, types = frozenset(domain.constants), frozenset(domain.types)
-            names = Names(
-                document, types, domain.predicates, {}, actions, constants, frozenset(scope)
-            )
+            names = replace(
+                Names.of(document, domain), actions=actions, objects=domain.constants
+            ).with_variables(schema.parameters)
             assert read_formula(names, document.root) == schema.precondition
             read += 1
     assert read >= 40

@@ -74,7 +74,7 @@ class _Writer:
             )
         ]
         predicates = " ".join(
-            f"({name}{''.join(f' ?{i} - {t}' for i, t in enumerate(types))})"
+            f"({name}{''.join(f' ?{i}' for i in range(len(types)))})"
             for name, types in (*self.fluents.items(), *self.statics.items())
         )
         domain = (

@@ -62,6 +62,17 @@ WRONG_DOMAINS = {
         "d.pddl:1:1: the '(define' that opens here is never closed",
     ),
     "one too many": (DOMAIN + ")", "d.pddl:8:1: unexpected ')' after the end of the definition"),
+    "a ')' is missing in an action": (
+        DOMAIN.replace("(door ?x ?y))\n", "(door ?x ?y)\n").rstrip()[:-1]
+        + "(:action wait :agent ?r - robot :parameters () :effect (and)))",
+        "d.pddl:7:47: ':action' begins inside of another list: a ')' is missing before it\n"
+        "  '(:action' opens at ",
+    ),
+    "swapped arguments": (
+        DOMAIN.replace("(at ?r ?y) (not", "(at ?y ?r) (not"),
+        "d.pddl:7:22: argument 1 of 'at', '?y', is of type room, not robot\n"
+        "  It is declared as (at robot room): are arguments swapped",
+    ),
     "unknown predicate": (
         DOMAIN.replace("(door ?x ?y))\n", "(dor ?x ?y))\n"),
         "d.pddl:6:35: unknown predicate 'dor'",

@@ -97,7 +97,10 @@ COSTLY_PROBLEM = problem(("(:init", f"(:init (= (total-cost) 0) {VALUES}"))
 MOBILE = with_action(
     "fly :agent ?d - drone :parameters (?x ?y - room) :precondition (and (at ?d ?x) (not (= ?x ?y))) :effect "
     "(and (at ?d ?y) (not (at ?d ?x)))",
-    domain(("(:types robot room)", "(:types robot drone - mobile mobile room - object)")),
+    domain(
+        ("(:types robot room)", "(:types robot drone - mobile mobile room - object)"),
+        ("(at ?r - robot ", "(at ?r - mobile "),
+    ),
 )
 MEET = with_action(
     "meet :parameters (?p ?q - robot ?x - room) :precondition (and (at ?p ?x) (at ?q ?x) (not (= ?p ?q))) "
@@ -194,6 +197,9 @@ CASES = {
         domain(("(:pred", f"(:constants {OBJECTS}) (:pred")),
         problem((f"(:objects {OBJECTS})", "")),
     ),
+    "no space before variables": Case(
+        2, domain(("(at ?r - robot ?x", "(at?r - robot?x"), ("(door ?x ?y))", "(door?x?y))"))
+    ),
     "private predicates": Case(
         2,
         domain(
@@ -270,7 +276,10 @@ CASES = {
     "a quantifier shadowed": Case(2, where("(forall (?x - room) (exists (?x - room) (at ?r ?x)))")),
     "quantifier without variables": Case(2, where("(forall () (and))")),
     "forall over nothing": Case(
-        2, change(where("(forall (?g - ghost) (door ?g ?g))"), ("robot room)", "robot room ghost)"))
+        2,
+        change(
+            where("(forall (?g - ghost) (not (= ?g ?g)))"), ("robot room)", "robot room ghost)")
+        ),
     ),
     "exists over nothing": Case(
         (11, ""), change(where("(exists (?g - ghost) (and))"), ("robot room)", "robot room ghost)"))

@@ -11,6 +11,7 @@ import pytest
 from planners.errors import BadInput, Note
 from planners.loading import PlanningInstance, build
 from planners.pddl import parse_domain, parse_problem
+from planners.pddl.robots import RobotSelection, find_team
 from planners.pddl.sexpr import Source
 from tests.support.command import Command
 
@@ -82,6 +83,75 @@ def test_an_implausible_guess_is_an_error_with_candidates(
     assert text.startswith("domain.pddl:1:21: which objects are the robots? Every action takes")
     assert why in text
     assert "Say --robot-type TYPE or --robots NAME,NAME. Candidates: " in text
+
+
+#: All actions take one type, whose objects are phases of a game, crossings or squares.
+FEAST = """(define (domain d) (:types night - object part dish) (:constants dusk dawn - part)
+ (:predicates (now ?n - night) (is ?n - night ?p - part) (next ?n ?m - night) (eaten ?d - dish))
+ (:action eat :parameters (?n - night ?d - dish) :precondition (is ?n dusk) :effect (eaten ?d))
+ (:action sleep :parameters (?n - night) :precondition (is ?n dusk)
+  :effect (and (is ?n dawn) (not (is ?n dusk))))
+ (:action wake :parameters (?n ?m - night) :precondition (and (is ?n dawn) (next ?n ?m))
+  :effect (and (is ?m dusk) (not (is ?n dawn)))))"""
+CROSSINGS = """(define (domain d) (:types crossing cart lane)
+ (:predicates (on ?c - cart ?l - lane) (at ?c - cart ?x - crossing) (gone ?c - cart ?x - crossing)
+  (empty ?x - crossing) (joins ?l - lane ?x ?y - crossing))
+ (:action enter :parameters (?x ?y - crossing ?c - cart ?l - lane)
+  :precondition (and (at ?c ?x) (joins ?l ?x ?y)) :effect (and (on ?c ?l) (empty ?x) (not (at ?c ?x))))
+ (:action leave :parameters (?x ?y - crossing ?c - cart ?l - lane)
+  :precondition (and (on ?c ?l) (joins ?l ?x ?y) (empty ?y))
+  :effect (and (at ?c ?y) (not (empty ?y)) (not (on ?c ?l))))
+ (:action pave :parameters (?x ?y - crossing ?l - lane) :effect (joins ?l ?x ?y))
+ (:action tear :parameters (?x ?y - crossing ?l - lane)
+  :precondition (joins ?l ?x ?y) :effect (not (joins ?l ?x ?y)))
+ (:action park :parameters (?x - crossing ?c - cart) :precondition (at ?c ?x)
+  :effect (and (gone ?c ?x) (empty ?x) (not (at ?c ?x)))))"""
+SQUARES = """(define (domain d) (:types square level)
+ (:predicates (at ?s - square) (high ?s - square ?n - level) (up ?n ?m - level) (brick))
+ (:action walk :parameters (?s ?t - square ?n - level)
+  :precondition (and (at ?s) (high ?s ?n) (high ?t ?n)) :effect (and (at ?t) (not (at ?s))))
+ (:action lay :parameters (?s ?t - square ?n ?m - level)
+  :precondition (and (at ?s) (brick) (high ?t ?n) (up ?n ?m))
+  :effect (and (high ?t ?m) (not (high ?t ?n)) (not (brick))))
+ (:action fetch :parameters (?s - square) :precondition (at ?s) :effect (brick)))"""
+#: They stand still, and hold things.
+CRANES = """(define (domain d) (:types crane box)
+ (:predicates (holds ?c - crane ?b - box) (idle ?c - crane) (down ?b - box))
+ (:action take :parameters (?c - crane ?b - box) :precondition (and (idle ?c) (down ?b))
+  :effect (and (holds ?c ?b) (not (idle ?c)) (not (down ?b))))
+ (:action put :parameters (?c - crane ?b - box) :precondition (holds ?c ?b)
+  :effect (and (idle ?c) (down ?b) (not (holds ?c ?b))))
+ (:action rest :parameters (?c - crane)))"""
+
+
+def team(domain_text: str, objects: str) -> tuple[str, ...]:
+    lifted = parse_domain(Source("domain.pddl", domain_text))
+    text = f"(define (problem p) (:domain d) (:objects {objects}) (:goal (and)))"
+    problem = parse_problem(Source("problem.pddl", text), lifted)
+    return find_team(lifted, problem, RobotSelection()).robots
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "objects"),
+    [
+        (FEAST, "night", "n1 n2 - night fish - dish"),
+        (CROSSINGS, "crossing", "x y - crossing c - cart l - lane"),
+        (SQUARES, "square", "s t - square n0 n1 - level"),
+    ],
+    ids=["phases", "crossings", "squares"],
+)
+def test_what_never_moves_or_holds_anything_is_no_robot(text: str, kind: str, objects: str) -> None:
+    with pytest.raises(BadInput, match="they never move or hold anything") as caught:
+        team(text, objects)
+    assert caught.value.what.startswith("which objects are the robots?")
+    assert f"{kind} (" in (caught.value.remedy or "")
+
+
+def test_what_moves_or_holds_something_may_be_robots() -> None:
+    with pytest.warns(Note, match="the robots are taken to be c1, c2"):
+        assert team(CRANES, "c1 c2 - crane b - box") == ("c1", "c2")
+    with pytest.warns(Note, match="the robots are taken to be h1, h2"):
+        assert team(HIKERS.replace("hike", "d"), "h1 h2 - hiker a - place") == ("h1", "h2")
 
 
 def test_all_of_ferry_are_objects() -> None:
