@@ -4,12 +4,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import get_args
 
 from planners.errors import BadInput, Position, UsageError
-from planners.grounding import FEWER, ground_actions, ground_goal, idling_costs
+from planners.grounding import (
+    FEWER,
+    ground_actions,
+    ground_goal,
+    idling_costs,
+    impossible_actions,
+)
 from planners.grounding.networks import apply_network
 from planners.joint.assembly import SLACK_LEFT, assemble
 from planners.joint.model import Cost, JointModel, PlanningTask, show
@@ -151,6 +157,8 @@ def build(
             slack=options.slack,
             sees_slack=options.sees_slack,
         )
+        never = impossible_actions(domain, first, team, actions, extra)
+        model = replace(model, impossible=never)
     tasks = tuple(task_of(model, domain, problem) for problem in problems)
     return PlanningInstance(domain, tuple(problems), model, tasks, options, team)
 

@@ -5,6 +5,7 @@ Tarski finds the reachable arguments, we evaluate the rest exactly.
 """
 
 from planners.grounding.actions import GroundAction, GroundEffect
+from planners.grounding.impossible import Impossible, impossible_actions
 from planners.grounding.instantiate import (
     FEWER,
     ground_actions,
@@ -17,8 +18,10 @@ __all__ = [
     "FEWER",
     "GroundAction",
     "GroundEffect",
+    "Impossible",
     "ground_actions",
     "ground_goal",
     "idling_costs",
     "idling_schemas",
+    "impossible_actions",
 ]

@@ -15,7 +15,7 @@ from typing import Literal, Protocol
 import numpy as np
 
 from planners.errors import Position
-from planners.grounding import GroundAction
+from planners.grounding import GroundAction, Impossible
 from planners.joint.conditions import Evaluator, Labels
 from planners.joint.states import StateCodec
 from planners.pddl.formula_tree import label
@@ -123,7 +123,7 @@ class JointModel:
     ``idling_costs[i]`` is what that adds to the second cost.  ``slack`` is how many steps more
     than the least makespan plans may take (`planners.search.slack`); ``slack_facts``, where states
     on plans say how many of them are left, are the numbers of the facts that do: none left, one
-    left, and so on.
+    left, and so on.  ``impossible`` says what robots can never do, for messages.
     """
 
     name: str
@@ -139,6 +139,7 @@ class JointModel:
     is_joint_action: bool = False
     slack: int = 0
     slack_facts: tuple[int, ...] = ()
+    impossible: tuple[Impossible, ...] = ()
 
     @property
     def kept_plan(self) -> str:

@@ -167,7 +167,9 @@ class BoundedSearch:
         raise ProvedImpossible(
             f"task {self._task.name}: the goal cannot be reached",
             position=self._task.position,
-            remedy=searched(self._model, self.table.rows(seen), len(self.table) - len(seen)),
+            remedy=searched(
+                self._model, self._task.goal, self.table.rows(seen), len(self.table) - len(seen)
+            ),
         )
 
     def _cheap(self, costs: CostLimit, start: Ints) -> bool:

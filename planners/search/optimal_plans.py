@@ -275,7 +275,7 @@ def _batch(space: Space, tasks: Sequence[tuple[Goal, Rows | None]]) -> PlanSpace
         if len(bad):
             raise ProvedImpossible(
                 f"the goal cannot be reached from {space.model.state_text(inits[bad[0]])}",
-                remedy=searched(space.model, space.rows),
+                remedy=searched(space.model, tasks[number][0], space.rows),
             )
         states.append(found)
     second, graph = _second_costs(space, distance)

@@ -3,18 +3,24 @@
 
 from __future__ import annotations
 
-from planners.joint.model import JointModel
+from planners.grounding.impossible import never_true
+from planners.joint.model import FullState, Goal, JointModel, show
+from planners.pddl.formula_tree import required_atoms
 from planners.tables import Rows
 
 #: States in which the reason why actions cannot share a step is looked for.
 _LOOK_AT = 1_000
+#: Actions that are never possible, of which a message says why.
+_SHOWN = 3
 
 
-def searched(model: JointModel, seen: Rows, left_out: int = 0) -> str:
-    """What was searched without reaching a goal, and what kept robots from acting together.
+def searched(model: JointModel, goal: Goal, seen: Rows, left_out: int = 0) -> str:
+    """What was searched without reaching a goal, and why it may be out of reach.
 
-    ``seen`` are the states that were searched, ``left_out`` counts those next to them from which
-    not even actions that delete nothing lead to the goal.
+    Facts that no action makes true, of the goal or of what actions of a robot need, else what kept
+    robots from acting together most often.  ``seen`` are the states that were searched,
+    ``left_out`` counts those next to them from which not even actions that delete nothing lead to
+    the goal.
     """
     said = "No other state can be reached."
     if left_out:
@@ -25,6 +31,9 @@ def searched(model: JointModel, seen: Rows, left_out: int = 0) -> str:
         )
     elif len(seen) > 1:
         said = f"All {len(seen):,} reachable states were searched."
+    lacking = _lacking(model, goal)
+    if lacking:
+        return "\n  ".join((said, *lacking))
     looked_at = model.codec.facts_part(seen[:: len(seen) // _LOOK_AT + 1])
     found = model.stepper.frequent_conflict(looked_at)
     if found is None:
@@ -34,3 +43,17 @@ def searched(model: JointModel, seen: Rows, left_out: int = 0) -> str:
         f"{said}\n  Of pairs of actions that cannot share a step, the one met most often "
         f"({states:,} of {len(looked_at):,} states looked at): {why}."
     )
+
+
+def _lacking(model: JointModel, goal: Goal) -> list[str]:
+    """Sentences about what nothing makes true.
+
+    Of robots that lack something static (a tool, perhaps as it is meant) only if an atom of the
+    goal is out of reach of all.
+    """
+    atoms = () if isinstance(goal, FullState) else required_atoms(goal)
+    missing = [show(atom) for atom in atoms if atom not in model.codec.facts]
+    said = [f"The goal needs {atom}, and {never_true(atom)}." for atom in missing[:1]]
+    limited = () if missing else {one.robot for one in model.impossible if not one.is_fluent}
+    never = [one for one in model.impossible if one.robot not in limited]
+    return said + [str(one) for one in never[:_SHOWN]]

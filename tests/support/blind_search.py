@@ -77,7 +77,7 @@ def _forward(
             raise ProvedImpossible(
                 f"task {task.name}: the goal cannot be reached",
                 position=task.position,
-                remedy=searched(model, seen),
+                remedy=searched(model, task.goal, seen),
             )
         seen, _ = unique_rows(np.concatenate((seen, layer)))
         layers.append(layer)

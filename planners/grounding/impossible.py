@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Actions that a robot can never do, and what they lack.
+
+What is reachable when deletes and all but the required atoms are left out; so what is said here is
+true of every reachable state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from planners.grounding.actions import GroundAction
+from planners.pddl.formula_tree import label, required_atoms
+from planners.pddl.lifted import Atom, Domain, Problem, Schema
+from planners.pddl.robots import Team, fluent_predicates, objects_of
+
+
+@dataclass(frozen=True, slots=True)
+class Impossible:
+    """An action of a robot that needs an atom which nothing makes true.
+
+    ``atom`` has variables where no object would do; ``is_fluent``: actions of others can change
+    such atoms.
+    """
+
+    action: str
+    robot: str
+    atom: Atom
+    is_fluent: bool
+
+    def __str__(self) -> str:
+        """A sentence."""
+        atom = label(self.atom.predicate, self.atom.args)
+        return f"Action {self.action} of {self.robot} is never possible: {never_true(atom)}."
+
+
+def never_true(atom: str) -> str:
+    """What is said of an atom that no reachable state has."""
+    return f"nothing makes {atom} true"
+
+
+def impossible_actions(
+    domain: Domain,
+    problem: Problem,
+    team: Team,
+    actions: Sequence[GroundAction],
+    starts: Iterable[Atom],
+) -> tuple[Impossible, ...]:
+    """The actions whose robot can do no instance of them, for want of one atom.
+
+    Atoms without variables come first: what a robot lacks itself.  ``actions`` are all that are
+    ever possible, ``starts`` the true atoms of all initial states.
+    """
+    acting = {(action.schema, owner) for action in actions for owner in action.owners}
+    fluents = fluent_predicates(domain)
+    possible = {*starts, *(e.atom for a in actions for e in a.effects if e.adds)}
+    found = []
+    for schema in domain.schemas:
+        for number, robot in enumerate(team.robots):
+            if schema.parts or (schema.name, number) in acting:
+                continue
+            for name in _own_parameters(domain, problem, schema, robot):
+                atom = _lacking(schema, {name: robot}, possible)
+                if atom is not None:
+                    fluent = atom.predicate in fluents
+                    found.append(Impossible(schema.name, robot, atom, fluent))
+                    break
+    return tuple(sorted(found, key=lambda one: any(arg[0] == "?" for arg in one.atom.args)))
+
+
+def _own_parameters(domain: Domain, problem: Problem, schema: Schema, robot: str) -> Iterator[str]:
+    """The parameters that make the robot an owner of the action."""
+    for number, parameter in enumerate(schema.parameters):
+        if schema.agent in (None, number) and robot in objects_of(domain, problem, parameter.types):
+            yield parameter.name
+
+
+def _lacking(schema: Schema, binding: dict[str, str], possible: Iterable[Atom]) -> Atom | None:
+    """The first atom of the precondition that no possible atom matches."""
+    for atom in required_atoms(schema.precondition):
+        args = tuple(binding.get(arg, arg) for arg in atom.args)
+        if not any(
+            other.predicate == atom.predicate
+            and len(other.args) == len(args)
+            and all(a[0] == "?" or a == b for a, b in zip(args, other.args, strict=True))
+            for other in possible
+        ):
+            return Atom(atom.predicate, args)
+    return None
