@@ -16,6 +16,7 @@ from planners.loading import ModelOptions, PlanningInstance, build
 from planners.pddl import read_domain, read_problem
 from planners.pddl.factored import read_factored
 from planners.pddl.lifted import Domain, Problem
+from planners.search.doubled import note_doubled
 
 if TYPE_CHECKING:
     from coordlang.language.words import Language
@@ -45,7 +46,9 @@ class PlanningInput:
 
     def instance(self) -> PlanningInstance:
         """Return the joint model and the tasks of the problems."""
-        return build(self.domain, self.problems, self.given.options())
+        loaded = build(self.domain, self.problems, self.given.options())
+        note_doubled(self.domain, self.problems, loaded.model)
+        return loaded
 
     def candidates(
         self, tasks: TasksSource | None, options: ModelOptions, *, skip_unsolvable: bool = False
@@ -53,16 +56,16 @@ class PlanningInput:
         """Return the candidate tasks that ``tasks`` names; for None the problems' own."""
         from coordlang.tasks.candidates import all_pairs, from_listed, from_problems
 
+        files = self.domain, self.problems
         if tasks is None:
-            return from_problems(
-                self.domain, self.problems, options, skip_unsolvable=skip_unsolvable
-            )
-        if tasks == "all":
-            return all_pairs(self.domain, self.problems, options)
-        listed, position = read_tasks(tasks)
-        return from_listed(
-            self.domain, self.problems, listed, options, position, skip_unsolvable=skip_unsolvable
-        )
+            found = from_problems(*files, options, skip_unsolvable=skip_unsolvable)
+        elif tasks == "all":
+            found = all_pairs(*files, options)
+        else:
+            listed, position = read_tasks(tasks)
+            found = from_listed(*files, listed, options, position, skip_unsolvable=skip_unsolvable)
+        note_doubled(*files, found.model)
+        return found
 
 
 def read_planning(

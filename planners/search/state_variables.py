@@ -11,7 +11,7 @@ same fact interfere, so a joint step changes a variable at most once.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -19,7 +19,7 @@ from planners.grounding import GroundAction
 from planners.joint.conditions import split_condition
 from planners.joint.model import JointModel
 from planners.pddl.formula_tree import literals
-from planners.pddl.lifted import TRUE, StepAtom
+from planners.pddl.lifted import TRUE, Atom, StepAtom
 from planners.tables import Rows
 
 #: Predicates, each with a position of the object, that facts of one variable may have.
@@ -60,18 +60,7 @@ class _Touch:
 
 def state_variables(model: JointModel, init: Rows) -> list[StateVariable]:
     """Disjoint variables for the states that are reachable from ``init``, large ones first."""
-    true = set(model.codec.true_facts(model.codec.facts_part(init)))
-    touches = [_touch(model, action) for action in model.actions]
-    touching: dict[int, list[int]] = defaultdict(list)
-    for number, touch in enumerate(touches):
-        for fact in touch.adds | touch.deletes | touch.conditional:
-            touching[fact].append(number)
-    found = []
-    for facts in _candidates(model, true):
-        actions = sorted({number for fact in facts for number in touching.get(fact, ())})
-        changes = _changes(facts, [(number, touches[number]) for number in actions])
-        if changes is not None:
-            found.append(StateVariable(tuple(sorted(facts)), changes))
+    found = counted_groups(model, init, lambda count: count == 1)
     found.sort(key=lambda variable: (-len(variable.facts), variable.facts))
     taken: set[int] = set()
     chosen = []
@@ -80,6 +69,32 @@ def state_variables(model: JointModel, init: Rows) -> list[StateVariable]:
             taken.update(variable.facts)
             chosen.append(variable)
     return chosen
+
+
+def counted_groups(
+    model: JointModel, init: Rows, wanted: Callable[[int], bool]
+) -> list[StateVariable]:
+    """Groups with a common object whose number of true facts no action increases.
+
+    ``wanted`` says how many of their facts may be true at the start: 1 is a state variable.
+    """
+    true = set(model.codec.true_facts(model.codec.facts_part(init)))
+    touches: dict[int, _Touch] = {}
+    touching: dict[Atom, list[int]] = defaultdict(list)
+    for number, action in enumerate(model.actions):
+        for atom in {effect.atom for effect in action.effects}:
+            touching[atom].append(number)
+    found = []
+    for facts in _candidates(model, true, wanted):
+        atoms = [model.codec.facts.atoms[fact] for fact in facts]
+        own = sorted({number for atom in atoms for number in touching.get(atom, ())})
+        for number in own:
+            if number not in touches:
+                touches[number] = _touch(model, model.actions[number])
+        changes = _changes(facts, [(number, touches[number]) for number in own])
+        if changes is not None:
+            found.append(StateVariable(tuple(sorted(facts)), changes))
+    return found
 
 
 def _touch(model: JointModel, action: GroundAction) -> _Touch:
@@ -103,8 +118,10 @@ def _touch(model: JointModel, action: GroundAction) -> _Touch:
     )
 
 
-def _candidates(model: JointModel, true: set[int]) -> Iterator[frozenset[int]]:
-    """Groups with a common object, one fact of which is true at the start; without repetition."""
+def _candidates(
+    model: JointModel, true: set[int], wanted: Callable[[int], bool]
+) -> Iterator[frozenset[int]]:
+    """Groups with a common object and a number of true facts that is wanted; no group twice."""
     shapes: dict[str, dict[tuple[str, int], list[int]]] = defaultdict(lambda: defaultdict(list))
     for number, atom in enumerate(model.codec.facts.atoms):
         for position, name in enumerate(atom.args):
@@ -113,11 +130,11 @@ def _candidates(model: JointModel, true: set[int]) -> Iterator[frozenset[int]]:
     for name in sorted(shapes):
         own = shapes[name]
         count = {shape: sum(fact in true for fact in facts) for shape, facts in own.items()}
-        usable = sorted(shape for shape in own if count[shape] <= 1)
+        usable = sorted(shape for shape in own if not count[shape] or wanted(count[shape]))
         for size in range(min(_SHAPES, len(usable)), 0, -1):
             for chosen in combinations(usable, size):
                 facts = frozenset(fact for shape in chosen for fact in own[shape])
-                if sum(count[shape] for shape in chosen) == 1 and facts not in met:
+                if wanted(sum(count[shape] for shape in chosen)) and facts not in met:
                     met.add(facts)
                     if len(facts) > 1:
                         yield facts
