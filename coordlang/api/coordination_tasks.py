@@ -19,7 +19,7 @@ from coordlang.required.miscoordination import Miscoordination
 from coordlang.tolerance.failure import mean
 from coordlang.tolerance.failures import Failures, estimate_data, estimate_text
 from coordlang.tolerance.sampled import FailureEstimate
-from coordlang.tolerance.task_answers import answers
+from coordlang.tolerance.task_answers import FewestActions, answers
 from planners.notebook import counted, html_table
 from planners.search.plan_file import json_count
 
@@ -31,7 +31,8 @@ class TaskCoordination(Presented):
     ``witness`` has two optimal plans whose mixture is none, or is None.  ``failure`` is how often
     robots miscoordinate that draw their plans uniformly, independently and without a word: exact;
     None where that is too much to count, and ``estimate`` is drawn.  Plans take up to ``slack``
-    joint steps more than the (least) ``makespan``.
+    joint steps more than the (least) ``makespan``.  ``fewest`` says what would hold of the plans
+    with the fewest actions alone, if it is better.
     """
 
     problem: str
@@ -41,6 +42,7 @@ class TaskCoordination(Presented):
     failure: Fraction | None = Fraction(0)
     estimate: FailureEstimate | None = None
     slack: int = 0
+    fewest: FewestActions | None = None
 
     @property
     def required(self) -> bool:
@@ -71,6 +73,7 @@ class TaskCoordination(Presented):
             "failure": None if self.failure is None else float(self.failure),
             **({"failure_estimate": estimate_data(self.estimate)} if self.estimate else {}),
             **({"slack": self.slack} if self.slack else {}),
+            **({"fewest_actions": self.fewest.data()} if self.fewest else {}),
         }
 
     def __str__(self) -> str:
@@ -92,13 +95,15 @@ class TaskCoordination(Presented):
 
     def _failure_text(self) -> str:
         """How often robots fail in silence, as a line of its own."""
+        fewest = f"\n{self.fewest.text()}" if self.fewest else ""
         if self.failure is not None:
             share = percent(float(self.failure))
         elif self.estimate is not None:
             share = estimate_text(self.estimate)
         else:
-            return ""
-        return f"\nWithout a word, robots that choose by themselves fail in {share} of all runs."
+            return fewest
+        said = f"\nWithout a word, robots that choose by themselves fail in {share} of all runs."
+        return f"{said}{fewest}"
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -214,6 +219,7 @@ def coordination(
             answer.failures.mean,
             answer.failures.estimate,
             loaded.model.slack,
+            answer.fewest,
         )
         for problem, answer in zip(files.problems, found, strict=True)
     )

@@ -48,6 +48,7 @@ from coordlang.language.recorded import (
 from coordlang.language.tolerance import Tolerance, tolerance_data
 from coordlang.language.words import Language
 from coordlang.repairing import Repaired, repair_language
+from coordlang.required.fewest_actions import requiring
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.tasks.candidates import Candidates, require_solvable
 from coordlang.tolerance.failure import TooManyToCount
@@ -82,7 +83,8 @@ class BuiltLanguage(Presented):
 
     ``seconds`` are by phase.  ``stopped`` is the error that ended the method before its proof was
     complete, or None: the language is a verified one all the same.  ``repaired`` says what became
-    of the language that it started from, None without one.
+    of the language that it started from, None without one.  ``fewest`` counts the tasks that would
+    require coordination if only plans with the fewest actions counted, None if it is not known.
     """
 
     language: Language
@@ -92,6 +94,7 @@ class BuiltLanguage(Presented):
     seconds: Mapping[str, float]
     repaired: Repaired | None = None
     few_words: FewWords | None = None
+    fewest: int | None = None
 
     @property
     def guarantee(self) -> Guarantee:
@@ -147,8 +150,14 @@ class BuiltLanguage(Presented):
             "proved_minimal": guarantee.proved_minimal,
             **self.built.figures,
             **({"repair": repair_data(self.repaired)} if self.repaired else {}),
+            **self._fewest(first.requiring),
             "seconds": {name: round(value, 3) for name, value in self.seconds.items()},
         }
+
+    def _fewest(self, requiring: int) -> dict[str, int]:
+        if self.fewest is None or self.fewest == requiring:
+            return {}
+        return {"tasks_requiring_coordination_with_fewest_actions": self.fewest}
 
     def facts(self) -> Mapping[str, object]:
         """Return the main facts, as a notebook shows them."""
@@ -246,6 +255,7 @@ def build(
         old, candidates, contained = _to_repair(start, files, tasks, unsolvable)
     seconds = {"space": perf_counter() - begin}
     say_size(candidates, note or progress)
+    fewest = requiring(candidates.spaces) if candidates.kind != "all" else None
     repaired = few = None
     with opened_runner(jobs, scheduler, resume, note) as runner:
         say = progress or _silent
@@ -270,7 +280,7 @@ def build(
     }
     provenance = replace(built.language.provenance, producer=producer)
     language = replace(built.language, provenance=provenance)
-    return BuiltLanguage(language, options, candidates, built, seconds, repaired, few)
+    return BuiltLanguage(language, options, candidates, built, seconds, repaired, few, fewest)
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -346,10 +346,21 @@ def _summary(built: BuiltLanguage, figures: dict[str, Any], output: str) -> str:
         f"{figures['states_on_plans']:,} states on {built.candidates.model.kept_plans}, "
         f"{figures['divergences']:,} divergences, "
         f"{figures['walk_nodes']:,} nodes of plans, {total:.2f} s\n"
-        f"{_failures(built)}{_flexibility(figures)}{_readability(figures)}"
+        f"{_fewest(figures)}{_failures(built)}{_flexibility(figures)}{_readability(figures)}"
         f"{_repair(built, err=output == '-')}"
         f"written to {'stdout' if output == '-' else visible(output)}"
     )
+
+
+def _fewest(figures: dict[str, Any]) -> str:
+    """What another cost would change; a whole line."""
+    fewest = figures.get("tasks_requiring_coordination_with_fewest_actions")
+    if fewest is None:
+        return ""
+    does = figures["tasks_requiring_coordination"]
+    less = ": one word would do" if fewest == 0 else ""
+    would = f"{counted(fewest, 'task')} would require coordination"
+    return f"with --cost makespan+actions {would}, not {does:,}{less}\n"
 
 
 def _failures(built: BuiltLanguage) -> str:

@@ -6,10 +6,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import msgspec
 import numpy as np
 
+from coordlang.language.tolerance import percent
+from coordlang.required.choices import Choices
+from coordlang.required.fewest_actions import FEWEST, fewest_actions
 from coordlang.required.miscoordination import Miscoordination, miscoordination
 from coordlang.tolerance.failures import NONE, Failures, failures
 from coordlang.tolerance.sampled import FailureEstimate
@@ -17,7 +21,10 @@ from planners.cache import keeping_plans, search, shared_folder
 from planners.cache.folder import Folder
 from planners.joint.model import JointModel, PlanningTask
 from planners.loading import PlanningInstance
+from planners.notebook import counted
 from planners.pieces.work import Runner, Table, Work, digest, tables
+from planners.search.plan_file import json_count
+from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
 
 #: Additions after which the failures of one task are estimated, some seconds of work.
@@ -28,13 +35,39 @@ _ADDITIONS = 3_000_000
 class TaskAnswer:
     """One task: its optimal makespan and plans, and plans that miscoordinate, if there are any.
 
-    ``failures`` says how often robots do that draw their plans without a word.
+    ``failures`` says how often robots do that draw their plans without a word, ``fewest`` the same
+    of the plans with the fewest actions, if they fail less often.
     """
 
     makespan: int
     plans: int
     witness: Miscoordination | None
     failures: Failures
+    fewest: FewestActions | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class FewestActions:
+    """The optimal plans of a task with the fewest actions, and how often robots fail with them."""
+
+    plans: int
+    required: bool
+    failure: float
+
+    def data(self) -> dict[str, Any]:
+        """Return it as JSON data."""
+        return {
+            "plans": json_count(self.plans),
+            "requires_coordination": self.required,
+            "failure": self.failure,
+        }
+
+    def text(self) -> str:
+        """Return it as a line."""
+        line = f"With --cost {FEWEST}, which leaves {counted(self.plans, 'plan')}, "
+        if not self.required:
+            return f"{line}coordination is not required."
+        return f"{line}they fail in {percent(self.failure)}."
 
 
 def answers(loaded: PlanningInstance, runner: Runner) -> list[TaskAnswer]:
@@ -64,10 +97,27 @@ def _answer(shared: tuple[JointModel, Sequence[PlanningTask], Folder | None], nu
     found = NONE if witness is None else failures([space], [None], _ADDITIONS)
     return {
         "makespan": np.array(space.least_makespan(0)),
-        "plans": np.array(str(counts(space)[int(space.starts[0])])),
+        "plans": np.array(_plans(space)),
+        "fewest": np.frombuffer(b"null" if witness is None else _fewest(space, found), np.uint8),
         "witness": np.frombuffer(msgspec.json.encode(witness), np.uint8),
         "failures": np.frombuffer(_to_json(found), np.uint8),
     }
+
+
+def _plans(space: PlanSpace) -> str:
+    return str(counts(space)[int(space.starts[0])])
+
+
+def _fewest(space: PlanSpace, found: Failures) -> bytes:
+    """What holds of the plans with the fewest actions as JSON, null if it is no better."""
+    fewer = fewest_actions(space)
+    if fewer is None:
+        return b"null"
+    required = bool(Choices(fewer).requires[fewer.starts[0]])
+    own = failures([fewer], [None], _ADDITIONS) if required else NONE
+    if required and (own.mean is None or found.mean is None or own.mean >= found.mean):
+        return b"null"
+    return msgspec.json.encode((_plans(fewer), required, float(own.mean or 0)))
 
 
 def _to_json(found: Failures) -> bytes:
@@ -87,4 +137,8 @@ def _from_json(data: bytes) -> Failures:
 def _read_answer(table: Table) -> TaskAnswer:
     witness = msgspec.json.decode(table["witness"].tobytes(), type=Miscoordination | None)
     found = _from_json(table["failures"].tobytes())
-    return TaskAnswer(int(table["makespan"]), int(str(table["plans"])), witness, found)
+    fewest = msgspec.json.decode(table["fewest"].tobytes())
+    if fewest is not None:
+        plans, required, failure = fewest
+        fewest = FewestActions(int(plans), required, failure)
+    return TaskAnswer(int(table["makespan"]), int(str(table["plans"])), witness, found, fewest)

@@ -40,7 +40,7 @@ def _exchanged(domain: Domain) -> set[tuple[str, int]]:
         for new, old in product(schema.effects, repeat=2)
         if new.adds > old.adds and new.atom.predicate == old.atom.predicate
         for position, (a, b) in enumerate(zip(new.atom.args, old.atom.args, strict=False))
-        if a == b and True
+        if a == b and new.atom != old.atom
     }
 
 

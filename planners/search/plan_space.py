@@ -281,6 +281,24 @@ class PlanSpace:
         fewer = replace(self, starts=self.starts[tasks], second=self.second[tasks])
         return fewer._cut(kept).reduced()
 
+    def cheapest(self, cost: Ints) -> PlanSpace:
+        """The plans for which the sum of other costs of their edges (edges) is least; O(edges)."""
+        value = np.zeros(len(self), np.int64)
+        kept = np.zeros(len(self.target), np.bool_)
+        for below in self.edges_by_layer():
+            through = cost[below.edges] + value[below.target]
+            value[below.source] = np.iinfo(np.int64).max
+            np.minimum.at(value, below.source, through)
+            kept[below.edges] = through == value[below.source]
+        fewer = replace(
+            self,
+            first=np.concatenate(([0], np.cumsum(kept)))[self.first],
+            target=self.target[kept],
+            labels=self.labels[kept],
+            cost=self.cost[kept],
+        )
+        return fewer.reduced()
+
     def reduced(self) -> PlanSpace:
         """The part of the graph that the tasks' plans pass through."""
         return self._cut(self.descendants(self.starts))
