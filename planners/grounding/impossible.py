@@ -7,7 +7,7 @@ true of every reachable state.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from planners.grounding.actions import GroundAction
@@ -32,12 +32,7 @@ class Impossible:
     def __str__(self) -> str:
         """A sentence."""
         atom = label(self.atom.predicate, self.atom.args)
-        return f"Action {self.action} of {self.robot} is never possible: {never_true(atom)}."
-
-
-def never_true(atom: str) -> str:
-    """What is said of an atom that no reachable state has."""
-    return f"nothing makes {atom} true"
+        return f"Action {self.action} of {self.robot} is never possible: nothing makes {atom} true."
 
 
 def impossible_actions(
@@ -60,20 +55,17 @@ def impossible_actions(
         for number, robot in enumerate(team.robots):
             if schema.parts or (schema.name, number) in acting:
                 continue
-            for name in _own_parameters(domain, problem, schema, robot):
-                atom = _lacking(schema, {name: robot}, possible)
-                if atom is not None:
-                    fluent = atom.predicate in fluents
-                    found.append(Impossible(schema.name, robot, atom, fluent))
-                    break
+            own = [
+                parameter.name
+                for position, parameter in enumerate(schema.parameters)
+                if schema.agent in (None, position)
+                and robot in objects_of(domain, problem, parameter.types)
+            ]
+            lacking = (_lacking(schema, {name: robot}, possible) for name in own)
+            atom = next(filter(None, lacking), None)
+            if atom is not None:
+                found.append(Impossible(schema.name, robot, atom, atom.predicate in fluents))
     return tuple(sorted(found, key=lambda one: any(arg[0] == "?" for arg in one.atom.args)))
-
-
-def _own_parameters(domain: Domain, problem: Problem, schema: Schema, robot: str) -> Iterator[str]:
-    """The parameters that make the robot an owner of the action."""
-    for number, parameter in enumerate(schema.parameters):
-        if schema.agent in (None, number) and robot in objects_of(domain, problem, parameter.types):
-            yield parameter.name
 
 
 def _lacking(schema: Schema, binding: dict[str, str], possible: Iterable[Atom]) -> Atom | None:

@@ -14,7 +14,17 @@ from planners.errors import BadInput
 from planners.grounding.actions import GroundAction
 from planners.messages import echoed
 from planners.pddl.formula_tree import conjuncts
-from planners.pddl.lifted import And, Constraint, Domain, Formula, Not, Or, Problem, StepAtom
+from planners.pddl.lifted import (
+    And,
+    Constraint,
+    Domain,
+    Formula,
+    Not,
+    Or,
+    Problem,
+    StepAtom,
+    have_common,
+)
 from planners.pddl.robots import objects_of
 
 #: (constraint, binding of its parameters) -> the ground actions that match.
@@ -59,17 +69,14 @@ def _check_types(domain: Domain, problem: Problem, constraint: Constraint) -> No
     The constraint would never match.
     """
     schemas = {schema.name: schema for schema in domain.schemas}
-    types = {"object", *domain.types}
     for (name, positions), offset in zip(constraint.actions, constraint.offsets, strict=True):
         for parameter, position in zip(constraint.parameters, positions, strict=True):
             argument = schemas[name].parameters[position]
-            asked = {*parameter.types}, {*argument.types}
-            common = any(
-                all("object" in a or a & domain.supertypes(t) for a in asked) for t in types
+            asked, own = (
+                set(objects_of(domain, problem, types))
+                for types in (parameter.types, argument.types)
             )
-            if common or set(objects_of(domain, problem, parameter.types)) & {
-                *objects_of(domain, problem, argument.types)
-            }:  # an object of two types
+            if have_common(domain.types, parameter.types, argument.types) or asked & own:
                 continue
             raise BadInput(
                 f"argument {position} of {name} is {argument.name} "

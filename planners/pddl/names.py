@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Collection, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 
 from planners.errors import BadInput, Unsupported, note
 from planners.messages import echoed, visible
-from planners.pddl.lifted import Domain, Signatures, Variable, supertypes
+from planners.pddl.lifted import Domain, Signatures, Variable, have_common
 from planners.pddl.sexpr import Document, Expression, Group, Token
 
 #: Characters of a wrong name that are compared with the declared names.
@@ -127,6 +127,8 @@ class Names:
     actions: Mapping[str, int] = field(default_factory=dict)
     objects: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     variables: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    #: Whether types have one in common, as far as it was asked.
+    _common: dict[tuple[Collection[str], Collection[str]], bool] = field(default_factory=dict)
 
     @classmethod
     def of(cls, document: Document, domain: Domain) -> Names:
@@ -201,13 +203,15 @@ class Names:
     def check_arguments(self, item: Group) -> None:
         """Raise `BadInput` for an argument that has no type in common with what is declared.
 
-        A type above the declared one will do: its objects may be of that one.
+        A type above the declared one has: its objects may be of that one.
         """
         signature = self.signatures.get((item.head, len(item) - 1), ())
         for number, (term, allowed) in enumerate(zip(item.items[1:], signature, strict=False), 1):
             assert isinstance(term, Token)
             own = (self.variables if term.text in self.variables else self.objects)[term.text]
-            if not any(self._related(t, allowed) for t in own):
+            if (own, allowed) not in self._common:
+                self._common[own, allowed] = have_common(self.types, own, allowed)
+            if not self._common[own, allowed]:
                 declared = " ".join(" or ".join(sorted(types)) for types in signature)
                 raise self.document.fail(
                     f"argument {number} of {echoed(item.head)}, {echoed(term.text)}, is of type "
@@ -216,12 +220,6 @@ class Names:
                     f"It is declared as ({visible(item.head[:_SHOWN])} {declared}): are arguments "
                     "swapped, or is a type missing there?",
                 )
-
-    def _related(self, name: str, allowed: frozenset[str]) -> bool:
-        above = supertypes(self.types, name)
-        return not above.isdisjoint(allowed) or any(
-            name in supertypes(self.types, other) for other in allowed
-        )
 
     def arity(self, item: Group, name: str, arities: Iterable[int], what: str) -> BadInput | None:
         """The error for a wrong number of arguments, or None."""

@@ -54,10 +54,6 @@ def problem_text(problem: Problem, domain: Domain) -> str:
     return "\n".join((*lines, ")", ""))
 
 
-def _number(value: float) -> str:
-    return str(int(value)) if value == int(value) else f"{value!r}"
-
-
 def _requirements(domain: Domain) -> Iterator[str]:
     yield from (":adl", ":typing")
     if any(schema.agent is not None for schema in domain.schemas):

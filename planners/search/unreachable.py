@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from planners.grounding.impossible import never_true
 from planners.joint.model import FullState, Goal, JointModel, show
 from planners.pddl.formula_tree import required_atoms
 from planners.tables import Rows
@@ -53,7 +52,7 @@ def _lacking(model: JointModel, goal: Goal) -> list[str]:
     """
     atoms = () if isinstance(goal, FullState) else required_atoms(goal)
     missing = [show(atom) for atom in atoms if atom not in model.codec.facts]
-    said = [f"The goal needs {atom}, and {never_true(atom)}." for atom in missing[:1]]
+    said = [f"The goal needs {atom}, and nothing makes it true." for atom in missing[:1]]
     limited = () if missing else {one.robot for one in model.impossible if not one.is_fluent}
     never = [one for one in model.impossible if one.robot not in limited]
     return said + [str(one) for one in never[:_SHOWN]]

@@ -48,7 +48,7 @@ PUT = "Action put of r1 is never possible: nothing makes (holds r1 ?b) true."
 @pytest.mark.parametrize(
     ("forgotten", "goal", "said"),
     [
-        ("(empty r1)", TWO, ["needs (holds r1 b1), and nothing makes (holds r1 b1)", LIFT, PUT]),
+        ("(empty r1)", TWO, ["needs (holds r1 b1), and nothing makes it true.", LIFT, PUT]),
         ("(empty r1)", "(and (holds r2 b1) (holds r2 b2))", [LIFT, PUT]),
         (
             "(at r1 a)",
