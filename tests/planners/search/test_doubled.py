@@ -24,15 +24,14 @@ FIRST = [
     for d in DOMAINS.iterdir()
     if (d / "domain.pddl").is_file()
 ]
-#: Both hands are free, and what is held in the left one may be passed to the right one.
+#: A robot has as many free or holding hands as at the start, and may have two.
 HANDS = """(define (domain hands) (:types robot hand ball)
  (:predicates (free ?r - robot ?h - hand) (holds ?r - robot ?h - hand ?b - ball) (down ?b - ball))
  (:action take :agent ?r - robot :parameters (?h - hand ?b - ball)
   :precondition (and (free ?r ?h) (down ?b))
   :effect (and (holds ?r ?h ?b) (not (free ?r ?h)) (not (down ?b))))
- (:action swap :agent ?r - robot :parameters (?h ?g - hand ?b - ball)
-  :precondition (and (holds ?r ?h ?b) (free ?r ?g))
-  :effect (and (holds ?r ?g ?b) (free ?r ?h) (not (holds ?r ?h ?b)) (not (free ?r ?g)))))"""
+ (:action put :agent ?r - robot :parameters (?h - hand ?b - ball) :precondition (holds ?r ?h ?b)
+  :effect (and (free ?r ?h) (down ?b) (not (holds ?r ?h ?b)))))"""
 
 
 def noted(domain_path: Path, problem_path: Path, more: frozenset[Atom]) -> list[str]:
