@@ -46,7 +46,10 @@ def test_one_state(coordlang: Command, files: tuple[Path, Path]) -> None:
     assert (outcome.code, outcome.err) == (
         11,
         f"coordlang: {files[1]}: task x: the goal cannot be reached\n  "
-        "No other state can be reached.\n",
+        "No other state can be reached.\n"
+        "  The goal needs (q r1), and nothing makes it true.\n"
+        "  Action a of r1 is never possible: nothing makes (ok r1) true.\n"
+        "  Action a of r2 is never possible: nothing makes (ok r2) true.\n",
     )
 
 
