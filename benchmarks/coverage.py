@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which published tasks are solved: all their optimal plans counted, within a limit.
 
-    python benchmarks/coverage.py [--limit SECONDS] [--kept FILE] [--cost COST] [--first N]
-                                  [--heuristic NAME] [ROW ..]
-    python benchmarks/coverage.py --table NAME [--limit SECONDS] [--kept FILE] [--markdown] [ROW ..]
-    python benchmarks/coverage.py --list
+    python -m benchmarks.coverage [--table NAME|all] [--first N] [--limit SECONDS] [--kept FILE]
+                                  [--markdown] [ROW ..]
 
 Rows are the problems of the twelve CoDMAP domains in ../shared/data (``--first N`` of each, the
 smallest files first), robots in the corners of open grids, agents of a MovingAI scenario, and, on
@@ -13,10 +11,9 @@ where the next one is.
 Every row is a process of its own on one core with 8 GB of address space and ``--limit`` CPU
 seconds (60).  Columns: CPU seconds to load and to search, the least makespan and the second cost
 component, the exact number of optimal plans and the nodes of their graph; the states that the
-search met and what a state takes in its table, the joint steps that it composed, in how many
-rounds and by which bound; the process's peak memory.  With ``--kept`` lines are kept in a file, and
-rows that it has are printed from there: a long run can be resumed.  A row is kept with its cost and
-heuristic, so that one file does for all, and with the version of the project that it is of.
+search met, the joint steps that it composed and the bound that guided it; the process's peak
+memory.  A row is kept with its cost and heuristic, so that one file does for all, and with the
+version of the project that it is of.
 
 ``--table`` names a table of docs/coverage.md, ``all`` prints one after the other: `codmap`,
 `makespan`, `blind` and `blind-makespan` (the first three problems of each domain), and `grids`.
@@ -28,40 +25,31 @@ from __future__ import annotations
 
 import argparse
 import json
-import resource
-import subprocess
 import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from time import process_time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from foreign_rows import SHARED
-from kept_rows import KeptRows, asked_for
-from printed_table import PrintedTable
-from processes import run_python
-from scale import Grid
+from benchmarks import frame
+from benchmarks.frame import SHARED, Figures, KeptRows, PrintedTable, asked_for, run_python
+from benchmarks.scale import Grid
 
 if TYPE_CHECKING:
     from planners.loading import PlanningInstance
 
-MEMORY = 8 << 30
 COLUMNS = (
     ("row", -38),
-    ("load", 6),
-    ("search", 7),
-    ("makespan", 8),
-    ("second", 6),
-    ("plans", 16),
-    ("nodes", 8),
-    ("states", 9),
-    ("B/state", 7),
-    ("steps", 10),
-    ("rounds", 6),
+    ("CPU s", 7),
+    ("optimal cost", 12),
+    ("optimal plans", 16),
+    ("nodes", 10),
+    ("states", 11),
+    ("joint steps", 12),
     ("bound", -17),
     ("MB", 5),
 )
@@ -72,18 +60,6 @@ CORNERS = (
 )
 AGENTS = (2, 3, 4)
 SCENARIOS = SHARED / "mapf"
-#: The columns of docs/coverage.md, and whether they are numbers.
-PAGE = (
-    ("row", False),
-    ("CPU s", True),
-    ("optimal cost", True),
-    ("optimal plans", True),
-    ("nodes", True),
-    ("states", True),
-    ("joint steps", True),
-    ("bound", False),
-    ("MB", True),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +177,9 @@ def far_apart(name: str) -> PlanningInstance:
         return on_map(path, file, int(robots))
 
 
-def walked(passable: frozenset[tuple[int, int]], start: tuple[int, int]) -> dict[Any, int]:
+def walked(
+    passable: frozenset[tuple[int, int]], start: tuple[int, int]
+) -> dict[tuple[int, int], int]:
     """The steps from a cell to those that can be reached."""
     steps, queue = {start: 0}, [start]
     for y, x in queue:
@@ -225,13 +203,13 @@ def on_map(path: Path, file: Path, agents: int) -> PlanningInstance:
         return load_files(Path(folder) / "domain.pddl", [Path(folder) / problem])
 
 
-def one(name: str, cost: str, heuristic: str) -> dict[str, Any]:
+def one(name: str, cost: str, heuristic: str) -> Figures:
     """The figures of a row, in this process."""
     from planners.search.optimal_plans import search_with_effort
     from planners.search.plans import counts
 
     loaded = load(name, cost)
-    figures: dict[str, Any] = {"load": round(process_time(), 2)}
+    figures: Figures = {"load": round(process_time(), 2)}
     space, effort = search_with_effort(loaded.model, loaded.tasks[0], heuristic=heuristic)
     makespan, second = space.cost_of(0)
     return {
@@ -242,72 +220,33 @@ def one(name: str, cost: str, heuristic: str) -> dict[str, Any]:
         "plans": counts(space)[int(space.starts[0])],
         "nodes": len(space),
         "states": effort.states,
-        "state_bytes": effort.state_bytes,
         "steps": effort.steps,
-        "rounds": effort.rounds,
         "bound": effort.heuristic,
     }
 
 
-@cache
-def project() -> str:
-    """The version of this checkout: its commit, with a plus where files were changed."""
-    here = Path(__file__).parent
-    commit, changed = (
-        subprocess.run(
-            ["git", *command], cwd=here, capture_output=True, text=True, check=True
-        ).stdout
-        for command in (("rev-parse", "--short", "HEAD"), ("status", "--porcelain", "-uno"))
-    )
-    return commit.strip() + "+" * bool(changed)
-
-
-def measured(name: str, limit: int, asked: Asked) -> dict[str, Any]:
+def measured(name: str, limit: int, asked: Asked) -> Figures:
     """The figures of a row from a process of its own."""
-    how = ("--cost", asked.cost, "--limit", str(limit), "--heuristic", asked.heuristic)
-    arguments = (__file__, "--one", name, *how)
-    done = run_python(arguments, most=20 * limit)
-    figures: dict[str, Any] = {"row": asked.key(name), "version": project(), "limit": limit}
+    how = ("--cost", asked.cost, "--heuristic", asked.heuristic)
+    arguments = ("-m", "benchmarks.coverage", "--one", name, *how)
+    done = run_python(arguments, most=20 * limit, cpu=limit)
+    figures = {"row": asked.key(name), "version": frame.project(), "limit": limit}
     figures |= {**done.data, "memory": done.memory}
-    if "plans" not in figures:
-        last = (done.errors.strip().splitlines() or [""])[-1]
-        out_of_memory = "memory" in last.lower() or "bad_alloc" in last
-        figures["failed"] = "no memory" if out_of_memory else "no time" if done.code < 0 else last
-    return figures
+    return figures if "plans" in figures else {**figures, "failed": done.why}
 
 
-def cells(name: str, figures: dict[str, Any]) -> Iterator[object]:
+def cells(name: str, figures: Figures) -> list[object]:
     """The line of a row."""
-    yield name
     if "failed" in figures:
-        yield from (None, figures["failed"][:20], *[None] * (len(COLUMNS) - 3))
-        return
-    yield from (figures[key] for key in ("load", "search", "makespan", "second"))
-    yield plans_text(figures["plans"])
-    yield from (figures["nodes"], figures["states"])
-    yield round(figures["state_bytes"] / figures["states"], 1)
-    yield from (figures[key] for key in ("steps", "rounds", "bound", "memory"))
+        return [name, None, figures["failed"][:20], *[None] * (len(COLUMNS) - 3)]
+    get = figures.__getitem__
+    plans = f"{get('plans'):,}" if get("plans") < 10**15 else f"{get('plans'):.3e}"
+    seconds = f"{get('load') + get('search'):.1f}"
+    line = [name, seconds, f"{get('makespan')}, {get('second')}", plans]
+    return [*line, *map(get, ("nodes", "states", "steps", "bound", "memory"))]
 
 
-def plans_text(plans: int) -> str:
-    """A number of plans, rounded where it is large."""
-    return f"{plans:,}" if plans < 10**15 else f"{plans:.3e}"
-
-
-def page_line(name: str, figures: dict[str, Any]) -> str:
-    """The line of a row in docs/coverage.md."""
-    name = name.removeprefix("corners ").replace(" far apart", " robots far apart")
-    texts = [name, "", figures.get("failed", ""), *[""] * (len(PAGE) - 3)]
-    if "failed" not in figures:
-        get = figures.__getitem__
-        texts = [name, f"{get('load') + get('search'):.1f}", f"{get('makespan')}, {get('second')}"]
-        texts += [plans_text(get("plans"))]
-        texts += [f"{get(key):,}" for key in ("nodes", "states", "steps")]
-        texts += [get("bound"), str(get("memory"))]
-    return f"| {' | '.join(texts)} |".replace("  ", " ")
-
-
-def print_page(asked: Asked, limit: int, found: Sequence[tuple[str, dict[str, Any]]]) -> None:
+def print_page(asked: Asked, limit: int, found: Sequence[tuple[str, Figures]]) -> None:
     """Print a table as Markdown, how many rows are solved, and the versions that they are of."""
     solved = [name for name, figures in found if "plans" in figures]
     print(f"### {asked.title}: {len(solved)} of {len(found)} solved in {limit} CPU s\n")
@@ -316,32 +255,24 @@ def print_page(asked: Asked, limit: int, found: Sequence[tuple[str, dict[str, An
         print(f"{', '.join(f'{domain} {n}' for domain, n in by_domain.items())}.\n")
     versions = Counter(figures.get("version", "unknown") for _, figures in found)
     print("Versions:", ", ".join(f"`{v}` ({n} rows)" for v, n in sorted(versions.items())), "\n")
-    print(f"| {' | '.join(head for head, _ in PAGE)} |")
-    print(f"|{'|'.join('--:' if number else '---' for _, number in PAGE)}|")
-    print(*(page_line(*row) for row in found), sep="\n", end="\n\n")
+    names = [
+        n.removeprefix("corners ").replace(" far apart", " robots far apart") for n, _ in found
+    ]
+    lines = [cells(name, own) for name, (_, own) in zip(names, found, strict=True)]
+    print(frame.markdown([head for head, _ in COLUMNS], lines, left=[7]), end="\n\n")
 
 
 def main() -> None:
     """Print what the arguments say."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("rows", nargs="*", metavar="ROW", help="rows, or beginnings of their names")
-    parser.add_argument("--list", action="store_true", help="the names of all rows")
+    parser = frame.arguments(__doc__)
     parser.add_argument("--table", choices=[*TABLES, "all"], help="a table of docs/coverage.md")
     parser.add_argument("--markdown", action="store_true", help="print it as it stands there")
     parser.add_argument("--first", type=int, default=10, metavar="N", help="problems of a domain")
-    parser.add_argument("--limit", type=int, default=60, metavar="SECONDS", help="CPU seconds (60)")
     parser.add_argument("--cost", default="makespan+actions", help="of CoDMAP's tasks")
     parser.add_argument("--heuristic", default="auto", help="what bounds the search; or blind")
-    parser.add_argument("--kept", type=Path, metavar="FILE", help="where lines are kept")
-    parser.add_argument("--one", metavar="ROW", help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.one:
-        resource.setrlimit(resource.RLIMIT_CPU, (given.limit, given.limit + 1))
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
         print(json.dumps(one(given.one, given.cost, given.heuristic)))
-        return
-    if given.list:
-        print(*rows(given.first), sep="\n")
         return
     known = KeptRows(given.kept)
     for asked, names in chosen(given):

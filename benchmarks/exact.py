@@ -1,34 +1,32 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The exact method at its limits: bounds, work and time, row by row and seed by seed.
+"""The exact method at its limits: bounds, rounds, clauses and seconds, by seed.
 
-    python benchmarks/exact.py [ROW ..] [--time-limit SECONDS] [--seeds N] [--jobs N] [--kept FILE]
+    python -m benchmarks.exact [ROW ..] [--seeds N] [--jobs N] [--limit SECONDS] [--kept FILE]
 
-Rows are those of Table 1, ``open-RxC`` and ``ring-RxC`` (two robots, all pairs of states), and
-``open-RxC-N`` (N robots).  The columns: words, with the proved bound where that is smaller (7..8);
-refuted partitions (*rounds*), of abstract states and of equivariant words; failing tuples up to
-symmetry; walks of a part of the tasks; clauses; wall and CPU seconds of the whole build; and the
-load of the machine over the last minute.  Every number of words is that of a language verified by
-definition.  ``--kept`` keeps rows that are done in a file, so that a run that was killed goes on;
-the time limit is for each row and seed.
+Rows are those of Table 1, then ``open-RxC`` and ``ring-RxC`` (two robots, all pairs of states), and
+``open-RxC-N`` (N robots); without any, Table 1 and some larger ones.  The columns: words, with the
+proved bound where that is smaller (7..8); refuted partitions (*rounds*), of abstract states and of
+equivariant words; failing tuples up to symmetry; walks of a part of the tasks; clauses; wall and
+CPU seconds of the whole build; and the load of the machine over the last minute.  Every number of
+words is that of a language verified by definition.  The time limit is for each row and seed.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
+import re
 import resource
 from argparse import Namespace
 from functools import partial
-from pathlib import Path
 from time import perf_counter, process_time
 
-from kept_rows import Figures, KeptRows
-from minimal import inputs
-from printed_table import PrintedTable
+from gridmap import open_grid, ring
 
+from benchmarks import frame
+from benchmarks.frame import Figures, KeptRows, PrintedTable, on_grid
+from benchmarks.paper.suite import ROWS
 from coordlang.building import build_language
-from coordlang.evaluation.material.suite import ROWS
-from coordlang.tasks.candidates import Candidates
+from coordlang.tasks.candidates import Candidates, all_pairs
 from planners.limits import time_limit
 from planners.pieces.processes import Processes
 
@@ -52,27 +50,37 @@ COLUMNS = (
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("rows", nargs="*")
-    parser.add_argument("--time-limit", type=float, default=600, help="seconds for each row, seed")
+    parser = frame.arguments(__doc__, 600)
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1, help="processes of each search")
-    parser.add_argument("--kept", type=Path, help="a file with the rows that are done")
-    arguments = parser.parse_args()
-    wanted = arguments.rows or [*(row.name for row in ROWS), *FURTHER]
-    done, table = KeptRows(arguments.kept), PrintedTable(*COLUMNS)
-    for name, _, candidates in inputs(wanted):
-        for seed in range(arguments.seeds):
-            key = f"{name}/{seed}/{arguments.time_limit:g}/{arguments.jobs}"
-            row = done.get(key, partial(measured, key, candidates, seed, arguments))
+    given = parser.parse_args()
+    done, table = KeptRows(given.kept), PrintedTable(*COLUMNS)
+    for name in given.rows or [*(row.name for row in ROWS), *FURTHER]:
+        for seed in range(given.seeds):
+            key = f"{name}/{seed}/{given.limit:g}/{given.jobs}"
+            row = done.get(key, partial(measured, key, name, seed, given))
             table.print(name, seed, *row["cells"])
 
 
-def measured(key: str, candidates: Candidates, seed: int, arguments: Namespace) -> Figures:
+def candidates_of(name: str) -> Candidates:
+    """The candidate tasks of a row."""
+    for row in ROWS:
+        if row.name == name:
+            return row.candidates()
+    match = re.fullmatch(r"(open|ring)-(\d+)x(\d+)(?:-(\d))?", name)
+    if match is None:
+        raise SystemExit(f"there is no row {name}")
+    make = {"open": open_grid, "ring": ring}[match[1]]
+    domain, problem = on_grid(name, make(int(match[2]), int(match[3])), int(match[4] or 2))
+    return all_pairs(domain, [problem])
+
+
+def measured(key: str, name: str, seed: int, given: Namespace) -> Figures:
     """The columns of a row after its seed."""
+    candidates = candidates_of(name)
     wall, cpu = perf_counter(), _processor_time()
-    with time_limit(arguments.time_limit):
-        runner = Processes(arguments.jobs)
+    with time_limit(given.limit):
+        runner = Processes(given.jobs)
         built = build_language(candidates, "minimal", seed=seed, runner=runner)
     guarantee = built.language.guarantee
     low, high = guarantee.lower_bound, guarantee.size
@@ -83,7 +91,7 @@ def measured(key: str, candidates: Candidates, seed: int, arguments: Namespace) 
         f"{_processor_time() - cpu:.1f}",
         f"{os.getloadavg()[0]:.1f}",
     ]
-    return {"row": key, "cells": cells}
+    return {"row": key, "version": frame.project(), "cells": cells}
 
 
 def _processor_time() -> float:

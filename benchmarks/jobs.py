@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The same work by one process, by two, and by Dask workers: seconds, and whether bytes are equal.
 
-    python benchmarks/jobs.py [FOLDER/PROBLEM]
+    python -m benchmarks.jobs [FOLDER/PROBLEM]
 
 All pairs of states (``grid/corners-5x5`` without an argument), a greedy language, verified.
 Columns: who does it, wall seconds, processor seconds of the client with its processes and
@@ -14,65 +14,28 @@ from __future__ import annotations
 import json
 import os
 import resource
-import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from time import perf_counter, sleep
+from time import perf_counter
 
 import psutil
-from printed_table import PrintedTable
 
-ROOT = Path(__file__).resolve().parents[1]
-DASK = [sys.executable, "-m", "dask"]
+from benchmarks.frame import DOMAINS, PrintedTable
 
 
-def processor_seconds(processes: list[subprocess.Popen[bytes]]) -> float:
-    """Processor time of processes, of all below them, and of those that have ended there."""
-    total = 0.0
-    for process in processes:
-        top = psutil.Process(process.pid)
-        for each in (top, *top.children(recursive=True)):
-            times = each.cpu_times()
-            total += times.user + times.system + times.children_user + times.children_system
-    return total
+def cluster_seconds() -> float:
+    """Processor time of this process, which has the scheduler, and of the workers below it."""
+    here = psutil.Process()
+    times = [each.cpu_times() for each in (here, *here.children(recursive=True))]
+    return float(sum(time.user + time.system for time in times))
 
 
-@contextmanager
-def cluster(folder: Path, workers: int) -> Iterator[list[subprocess.Popen[bytes]]]:
-    """A scheduler and so many workers with one thread each, for the block."""
-    file = folder / f"scheduler-{workers}.json"
-    common = ["--scheduler-file", str(file), "--no-dashboard"]
-    scheduler = [*DASK, "scheduler", *common, "--host", "127.0.0.1", "--port", "0"]
-    worker = [*DASK, "worker", *common, "--nthreads", "1", "--memory-limit", "4GiB"]
-    started: list[subprocess.Popen[bytes]] = []
-    try:
-        for command in (scheduler, *[worker] * workers):
-            started.append(
-                subprocess.Popen(
-                    command,
-                    stdout=subprocess.DEVNULL,
-                    stderr=subprocess.DEVNULL,
-                    start_new_session=True,
-                )
-            )
-            while not file.exists():
-                sleep(0.05)
-        sleep(5)  # workers register
-        yield started
-    finally:
-        for process in reversed(started):
-            os.killpg(process.pid, signal.SIGTERM)
-            process.wait()
-
-
-def build(name: str, output: Path, *options: str) -> tuple[dict[str, object], float, float]:
-    """Build a language as a process of its own: its states, wall and processor seconds."""
+def build(name: str, output: Path, *options: str) -> tuple[object, float, float]:
+    """Build a language as a process of its own: what it is, wall and processor seconds."""
     folder, _, stem = name.partition("/")
-    files = [str(ROOT / "domains" / folder / f"{file}.pddl") for file in ("domain", stem)]
+    files = [str(DOMAINS / folder / f"{file}.pddl") for file in ("domain", stem)]
     before, since = resource.getrusage(resource.RUSAGE_CHILDREN), perf_counter()
     command = [sys.executable, "-m", "coordlang", "build", *files, "--tasks", "all"]
     command += ["-o", str(output), *options]
@@ -88,40 +51,32 @@ def build(name: str, output: Path, *options: str) -> tuple[dict[str, object], fl
 
 def main() -> None:
     """Print the table."""
+    from distributed import LocalCluster
+
     name = sys.argv[1] if len(sys.argv) > 1 else "grid/corners-5x5"
     print(f"{name}, all pairs; {os.cpu_count()} cores")
-    table = PrintedTable(
-        ("who", -16),
-        ("wall s", 8),
-        ("client cpu s", 12),
-        ("cluster cpu s", 13),
-        ("load", 5),
-        ("equal", 5),
-    )
-    with tempfile.TemporaryDirectory() as made:
-        folder = Path(made)
-        first: dict[str, object] = {}
+    heads = ("wall s", "client cpu s", "cluster cpu s", "load", "equal")
+    table = PrintedTable(("who", -16), *((head, 13) for head in heads))
+    first: object = None
+    with tempfile.TemporaryDirectory() as folder:
+        output = Path(folder) / "language.json"
         for jobs in (1, 2):
-            found, wall, cpu = build(name, folder / "l.json", "--jobs", str(jobs))
+            found, *seconds = build(name, output, "--jobs", str(jobs))
             first = first or found
-            show(table, f"--jobs {jobs}", wall, cpu, 0.0, found == first)
+            show(table, f"--jobs {jobs}", [*seconds, 0.0], found == first)
         for workers in (1, 2, 4):
-            with cluster(folder, workers) as processes:
-                before = processor_seconds(processes)
-                file = str(folder / f"scheduler-{workers}.json")
-                found, wall, cpu = build(name, folder / "l.json", "--scheduler", file)
-                theirs = processor_seconds(processes) - before
-            show(table, f"{workers} Dask workers", wall, cpu, theirs, found == first)
+            cluster = LocalCluster(workers, threads_per_worker=1, dashboard_address=None)
+            with cluster:
+                before = cluster_seconds()
+                found, *seconds = build(name, output, "--scheduler", cluster.scheduler_address)
+                seconds.append(cluster_seconds() - before)
+            show(table, f"{workers} Dask workers", seconds, found == first)
 
 
-def show(
-    table: PrintedTable, who: str, wall: float, cpu: float, cluster_cpu: float, equal: bool
-) -> None:
+def show(table: PrintedTable, who: str, seconds: list[float], equal: bool) -> None:
     """Print one row."""
-    load = f"{os.getloadavg()[0]:.1f}"
-    table.print(
-        who, f"{wall:.1f}", f"{cpu:.1f}", f"{cluster_cpu:.1f}", load, "yes" if equal else "NO"
-    )
+    times = (f"{each:.1f}" for each in seconds)
+    table.print(who, *times, f"{os.getloadavg()[0]:.1f}", "yes" if equal else "NO")
 
 
 if __name__ == "__main__":

@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The same tasks, solved by planners of others that list all optimal plans: K* and SymK.
 
-    python benchmarks/peers.py [--limit SECONDS] [--kept FILE] [--cost COST] [--first N]
+    python -m benchmarks.peers [--limit SECONDS] [--kept FILE] [--cost COST] [--first N]
                                [--python PYTHON] [ROW ..]
 
-Rows are those of coverage.py.  Each planner gets what ``coordlang export`` writes for planners: the
-joint model as plain PDDL, whose optimal plans stand one to one for the joint ones.  ``--limit`` are
-CPU seconds (60) of each of its processes, translation and search, with 8 GB of address space each.
+Rows are those of `benchmarks.coverage`.  Each planner gets what ``coordlang export`` writes for
+planners: the joint model as plain PDDL, whose optimal plans stand one to one for the joint ones.
+Rows ``whole 4x4``, 5x5, 6x6 and 8x8 are robots that trade the corners of open grids: K* gets the
+joint-action PDDL of the grid (domains/grid-joint), and beside it coordlang is a whole process, too,
+``coordlang plans .. --count --no-cache``.
+``--limit`` are CPU seconds (60) of each of a planner's processes, with 8 GB of address space each.
 ``--python`` is a Python that has both (``pip install '.[oracles]'``).  Columns: CPU seconds, peak
-memory, cost and number of the optimal plans; no number where a planner did not end by itself.
+memory and number of the optimal plans; no number where a planner did not end by itself.
 K* is asked for all plans of the best cost (``topq`` with q = 1 and its own default heuristic), SymK
 for the same by bidirectional symbolic search (``symq_bd``, quality 1).
 """
@@ -18,17 +21,15 @@ from __future__ import annotations
 import argparse
 import os
 import re
-import resource
+import shutil
 import subprocess
 import sys
 import tempfile
 from functools import partial
 from pathlib import Path
-from typing import Any
 
-import coverage
-from kept_rows import KeptRows, asked_for
-from printed_table import PrintedTable
+from benchmarks import coverage, frame
+from benchmarks.frame import DOMAINS, Figures, KeptRows, PrintedTable, asked_for
 
 KSTAR = """
 import json
@@ -52,13 +53,10 @@ subprocess.run([sys.executable, driver, "domain.pddl", "problem.pddl", "--search
 PLANNERS = {"K*": KSTAR, "SymK": SYMK}
 
 
-def limited(limit: int) -> None:
-    """What a planner's processes may take."""
-    resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 1))
-    resource.setrlimit(resource.RLIMIT_AS, (coverage.MEMORY, coverage.MEMORY))
+WHOLE = tuple(f"whole {size}" for size in ("4x4", "5x5", "6x6", "8x8"))
 
 
-def asked(python: str, planner: str, folder: Path, limit: int) -> dict[str, Any]:
+def asked(python: str, planner: str, folder: Path, limit: int) -> Figures:
     """What a planner answers about the files in a folder."""
     with (folder / f"{planner[0]}.txt").open("w+") as out:
         process = subprocess.Popen(
@@ -67,7 +65,7 @@ def asked(python: str, planner: str, folder: Path, limit: int) -> dict[str, Any]
             stdout=out,
             stderr=subprocess.STDOUT,
             stdin=subprocess.DEVNULL,
-            preexec_fn=partial(limited, limit),
+            preexec_fn=lambda: frame.limit(limit),
         )
         _, _, usage = os.wait4(process.pid, 0)
         out.seek(0)
@@ -81,44 +79,55 @@ def asked(python: str, planner: str, folder: Path, limit: int) -> dict[str, Any]
     }
 
 
-def measured(name: str, given: argparse.Namespace) -> dict[str, Any]:
+def measured(name: str, given: argparse.Namespace) -> Figures:
     """The figures of a row."""
     from planners.classical import compile_classical, to_pddl
 
-    loaded = coverage.load(name, given.cost)
-    compiled = compile_classical(loaded.model, loaded.tasks[0])
-    figures: dict[str, Any] = {"row": name, "form": compiled.form, "actions": len(compiled.actions)}
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as made:
+        folder = Path(made)
+        if name in WHOLE:
+            return {"row": name, "form": "joint actions", **whole(name.split()[1], folder, given)}
+        loaded = coverage.load(name, given.cost)
+        compiled = compile_classical(loaded.model, loaded.tasks[0])
         for file, text in zip(("domain", "problem"), to_pddl(compiled), strict=True):
-            (Path(folder) / f"{file}.pddl").write_text(text)
-        for planner in PLANNERS:
-            figures[planner] = asked(given.python, planner, Path(folder), given.limit)
-    return figures
+            (folder / f"{file}.pddl").write_text(text)
+        found = {planner: asked(given.python, planner, folder, given.limit) for planner in PLANNERS}
+    return {"row": name, "form": compiled.form, "actions": len(compiled.actions), **found}
+
+
+def whole(corners: str, folder: Path, given: argparse.Namespace) -> Figures:
+    """Our process beside that of K*."""
+    files = [DOMAINS / "grid" / f"{name}.pddl" for name in ("domain", f"corners-{corners}")]
+    command = ("-m", "coordlang", "plans", *files, "--count", "--no-cache", "--json")
+    done = frame.run_python(command, cpu=given.limit)
+    ours = {"seconds": done.cpu, "memory": done.memory, "plans": int(done.data["count"])}
+    for name, file in (("domain", "domain"), ("problem", f"corners-{corners}")):
+        shutil.copy(DOMAINS / "grid-joint" / f"{file}.pddl", folder / f"{name}.pddl")
+    return {"coordlang": ours, "K*": asked(given.python, "K*", folder, given.limit)}
 
 
 def main() -> None:
     """Print what the arguments say."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("rows", nargs="*", metavar="ROW", help="rows, or beginnings of their names")
+    parser = frame.arguments(__doc__)
     parser.add_argument("--first", type=int, default=3, metavar="N", help="problems of a domain")
-    parser.add_argument("--limit", type=int, default=60, metavar="SECONDS", help="CPU seconds (60)")
     parser.add_argument("--cost", default="makespan+actions", help="of CoDMAP's tasks")
-    parser.add_argument("--kept", type=Path, metavar="FILE", help="where lines are kept")
     parser.add_argument("--python", default=sys.executable, help="a Python that has the planners")
     given = parser.parse_args()
     known = KeptRows(given.kept)
+    shown = (*PLANNERS, "coordlang")
     columns = [("row", -38), ("form", -17), ("actions", 8)]
-    for planner in PLANNERS:
-        columns += [(planner, 7), ("MB", 5), ("plans", 9)]
+    for planner in shown:
+        columns += [(planner, 9), ("MB", 5), ("plans", 9)]
     table = PrintedTable(*columns)
-    for name in asked_for(coverage.rows(given.first), given.rows):
+    for name in asked_for([*WHOLE, *coverage.rows(given.first)], given.rows):
         found = known.get(name, partial(measured, name, given))
-        cells = [found["row"], found["form"], found["actions"]]
-        for planner in PLANNERS:
-            cells += [found[planner][key] for key in ("seconds", "memory", "plans")]
+        cells = [found["row"], found["form"], found.get("actions")]
+        for planner in shown:
+            cells += [found.get(planner, {}).get(key) for key in ("seconds", "memory", "plans")]
         table.print(*cells)
     for planner in PLANNERS:
-        print(planner, sum(found[planner]["plans"] is not None for found in known.rows.values()))
+        solved = [row for row in known.rows.values() if row.get(planner, {}).get("plans")]
+        print(planner, len(solved))
 
 
 if __name__ == "__main__":

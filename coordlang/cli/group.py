@@ -29,7 +29,6 @@ COMMANDS = {
     "export": "Write a task under a sentence as PDDL or LTLf, for other programs.",
     "explain": "Show a language: words as formulas, sentences of a task.",
     "report": "Write a page that shows a language: words, sentences, plans played.",
-    "evaluate": "Run the paper's experiments again, beside its own values.",
     "domains": "List or copy the domains that come with coordlang.",
     "schema": "Print the JSON Schema of a file format.",
 }

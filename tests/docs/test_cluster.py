@@ -104,8 +104,6 @@ def test_two_terminals_with_a_worker_killed_in_the_middle(folder: Path) -> None:
         assert language(folder / "4x4.json") == language(alone)
         assert succeeds(command("verify"), folder).startswith("verified: ")
         cluster.add_worker()
-        assert "detour" in succeeds(command("evaluate"), folder)
-        assert (folder / "results" / "scenario.jsonl").exists()
 
 
 @needs_distributed

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from plan_features import Feature, Plan, agreement, exactly, who, who_does_what
 
 from coordlang.building import build_language
 from coordlang.language.words import Language
@@ -23,6 +22,14 @@ from coordlang.verification.by_definition import Verdict, verify
 from planners.joint.states import split_atoms
 from tests.support.console import run_command
 from tests.support.domains import DOMAINS
+from tests.support.foreign_tasks import (
+    Feature,
+    Plan,
+    agreement,
+    exactly,
+    who,
+    who_does_what,
+)
 from tests.support.pages import blocks, commands
 from tests.support.readme_tables import Row, candidates, tables
 

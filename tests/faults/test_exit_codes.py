@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-import errno
 import json
-import os
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -18,7 +16,6 @@ from tests.support.domains import DOMAINS
 
 CELLS = [str(DOMAINS / "three-cells" / name) for name in ("domain.pddl", "problem.pddl")]
 COUNT = ("plans", *CELLS, "--count")
-EVALUATE = ("evaluate", "game", "--quick", "--domains", str(DOMAINS), "--results")
 
 
 def shell(
@@ -71,48 +68,6 @@ def test_too_little_memory_for_the_libraries(mebibytes: int, tmp_path: Path) -> 
         assert done.stderr.startswith("coordlang: ")
         assert "Traceback" not in done.stderr
         assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize(("name", "code"), [(".lock", 2), ("game.jsonl", 31)])
-def test_a_folder_of_results_in_which_a_file_is_a_folder(
-    name: str, code: int, coordlang: Command, tmp_path: Path
-) -> None:
-    (tmp_path / name).mkdir()
-    outcome = coordlang(*EVALUATE, tmp_path)
-    assert outcome.code == code
-    assert str(tmp_path / name) in outcome.err
-    assert "internal error" not in outcome.err
-
-
-@pytest.mark.parametrize("folder", ["", "file", "file/results", "readonly", "x" * 300])
-def test_results_that_cannot_be_kept_are_refused_before_the_work(
-    folder: str, coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(
-        "coordlang.evaluation.lab.runner.run", lambda *_: pytest.fail("no work before")
-    )
-    Path("file").touch()
-    Path("readonly").mkdir()
-    access = os.access  # the superuser may write everywhere
-    monkeypatch.setattr(
-        "os.access", lambda path, mode: Path(path).name != "readonly" and access(path, mode)
-    )
-    outcome = coordlang(*EVALUATE, folder)
-    assert outcome.code == 2
-    assert "cannot be" in outcome.err
-
-
-def test_results_on_a_full_disk(
-    coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def full(_: int) -> None:
-        raise OSError(errno.EDQUOT, os.strerror(errno.EDQUOT))
-
-    monkeypatch.setattr(os, "fsync", full)
-    outcome = coordlang(*EVALUATE, tmp_path)
-    assert outcome.code == 2
-    assert "cannot be written: Disk quota exceeded" in outcome.err
 
 
 @pytest.mark.parametrize("robots", [["r1", "r3"], ["r1"], ["a", "b"]])

@@ -27,8 +27,6 @@ from tests.support.writing_commands import OLD, WRITING, Writing, given, normal
 
 QUICK = ("certificate", "tasks", "export")
 TWO = ("t-map", "three-cells")
-#: What an evaluation keeps besides its outputs: each of these is whole, or not there.
-KEPT = re.compile(r"cache|cache/[0-9a-f]{24}\.json\.gz(\.lock)?|png|png/\w+\.png|\w+\.svg|\.lock")
 
 
 @pytest.fixture(scope="module")
@@ -83,8 +81,7 @@ def run(
     work.mkdir(parents=True)
     other.mkdir()
     for name in writing.outputs:
-        if not name.endswith(".jsonl"):
-            (work / name).write_bytes(OLD)
+        (work / name).write_bytes(OLD)
 
     def before() -> None:
         os.chdir(work)
@@ -96,7 +93,7 @@ def run(
     ended = fork_command(*arguments, before=before).join(300)
     found = {str(p.relative_to(root)) for root in (work, other) for p in root.rglob("*")}
     outputs = {name: (work / name).read_bytes() for name in writing.outputs if name in found}
-    return ended, outputs, {name for name in found - {*outputs} if not KEPT.fullmatch(name)}
+    return ended, outputs, found - {*outputs}
 
 
 def check(
@@ -112,12 +109,8 @@ def check(
         assert re.search("No space left on device|File too large|is full", ended.err), ended
         assert "Traceback" not in ended.err
         for at, held in outputs.items():
-            if at.endswith(".jsonl"):  # a line is added when its work is done
-                lines = normal(at, held[: held.rfind(b"\n") + 1])
-                assert {*lines.split(b"\n")} <= {*whole[at].split(b"\n"), b""}
-            else:
-                assert held == OLD or normal(at, held) == whole[at]
-        replaced = {at for at in WRITING[name].outputs if not at.endswith(".jsonl")}
+            assert held == OLD or normal(at, held) == whole[at]
+        replaced = {*WRITING[name].outputs}
         if name == "certificate":  # the old one never stands beside a new language
             assert {at for at, held in outputs.items() if held == OLD} in (replaced, set())
             assert replaced - {*outputs} <= {"c.json.gz"}
@@ -210,6 +203,6 @@ def test_the_disk_is_full_at_every_change_of_every_command(
 def test_the_disk_is_full_at_fifty_lengths_of_every_output(
     name: str, said: dict[str, str], tmp_path: Path
 ) -> None:
-    met = fill_at_every_length(name, said, tmp_path, 10 if name == "evaluate" else 50)
+    met = fill_at_every_length(name, said, tmp_path, 50)
     print(f"{name}: {met} lengths")
     assert met >= 5

@@ -55,9 +55,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (*BUILD, "-o"),
         (*BUILD, "-o", "l.json", "--certificate"),
         ("tasks", *CELLS, "-o"),
-        ("evaluate", "game", "--page"),
     ],
-    ids=["build", "certificate", "tasks", "evaluate"],
+    ids=["build", "certificate", "tasks"],
 )
 def test_what_cannot_be_written_is_refused_before_the_work(
     command: tuple[object, ...],

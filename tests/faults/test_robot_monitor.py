@@ -19,13 +19,57 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from monitor import choices_file  # benchmarks/monitor.py
 
 from coordlang.use.choices import monitor as monitor_module
 from coordlang.use.choices.monitor import Monitor, MonitorError, NotAllowed, NotPossible
 
 LENGTH = 10_000
 DEEP = 100_000
+CELLS = 50
+
+
+def choices_file(length: int) -> dict[str, Any]:
+    """The data of a choices file of one robot, which goes around a ring and may wait once.
+
+    States 2k - 1 and 2k are those after k steps in which it has waited already, or not yet.
+    """
+    states = [_state(0, 0, waited=False, length=length)]
+    for step in range(1, length + 1):
+        states.append(_state(step, 2 * step - 1, waited=True, length=length))
+        states.append(_state(step, 2 * step, waited=False, length=length))
+    entry = {
+        "robot": "r1",
+        "steps": length,
+        "subplans": length + 1,
+        "atoms": "own",
+        "facts": [f"(at r1 c{cell})" for cell in range(CELLS)],
+        "others": ["(at r2 c0)"],
+        "states": states,
+    }
+    return {
+        "format": "coordlang/choices",
+        "version": 1,
+        "robots": ["r1", "r2"],
+        "sentence": "w0",
+        "choices": [entry],
+    }
+
+
+def _state(step: int, number: int, *, waited: bool, length: int) -> dict[str, Any]:
+    cell = (step - waited) % CELLS
+    following = {}
+    if step < length:
+        after = 2 * step + 1 if waited else 2 * step + 2
+        following[f"(move r1 c{cell} c{(cell + 1) % CELLS})"] = after
+        if not waited:
+            following["idle"] = 2 * step + 1
+    return {
+        "step": step,
+        "left": 1 if waited else length - step + 1,
+        "next": following,
+        "true": [cell],
+        "unknown": [],
+    }
 
 
 @pytest.fixture(scope="module")

@@ -472,7 +472,6 @@ def test_other_files_and_arguments(coordlang: Command, corridor: World, bad: str
         ("plan", *spoken, "--prefer", f"avoid:(at r1 {short})"),
         ("plan", *spoken, "--prefer", f"first:{short}"),
         ("tasks", *corridor.pddl, "--start", f"(at r1 {short})", "-o", "-"),
-        ("evaluate", short),
         ("schema", short),
     ):
         refused(coordlang(*command), bad)

@@ -54,13 +54,6 @@ WRITING = {
     ),
     "report": Writing(("report", "LANGUAGE", *FILES, "-o", "page.html"), ("page.html",)),
     "check": Writing(("check", *FILES)),
-    "evaluate": Writing(
-        (
-            *("evaluate", "scenario", "--quick", "--samples", "1", "--jobs", "2"),
-            *("--results", ".", "--domains", str(DOMAINS)),
-        ),
-        ("scenario.jsonl", "evaluation.md"),
-    ),
 }
 
 

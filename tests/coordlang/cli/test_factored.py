@@ -19,7 +19,7 @@ from tests.support.hall import factored
 
 UNIFIED = "ma-basic", "ma-loader", "ma_buttons"
 DRIVERLOG = SHARED / "foreign" / "driverlog-factored"
-NO_TASK = {"evaluate", "schema", "domains"}
+NO_TASK = {"schema", "domains"}
 
 
 @cache

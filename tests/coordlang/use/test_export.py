@@ -5,12 +5,10 @@ plans.
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import re
 import subprocess
-import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -18,7 +16,6 @@ from functools import cache
 from itertools import islice, product
 from pathlib import Path
 from random import Random
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -47,6 +44,7 @@ from planners.search.reachable import explore
 from tests.support.command import Command, own_process
 from tests.support.domains import DOMAINS
 from tests.support.naive_classical import optimal_plans
+from tests.support.other_planners import rows as answers
 from tests.support.random_chores import random_chores
 from tests.support.random_models import random_model
 
@@ -517,23 +515,11 @@ def test_a_task_that_the_language_does_not_cover(coordlang: Command, tmp_path: P
     assert (tmp_path / "out" / "domain.pddl").exists()
 
 
-# Other planners (benchmarks/export_counts.py).
+# Other planners.
 
 
-@pytest.fixture(scope="module")
-def export_counts() -> ModuleType:
-    path = DOMAINS.parent / "benchmarks" / "export_counts.py"
-    spec = importlib.util.spec_from_file_location("coordlang_export_counts", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_the_table_without_other_planners(export_counts: ModuleType) -> None:
-    rows = [*export_counts.rows(["three-cells", "t-map"], 60.0, other=False)]
+def test_the_table_without_other_planners() -> None:
+    rows = [row for name in ("three-cells", "t-map") for row in answers(name, 60.0, other=False)]
     assert {row.form for row in rows} == {"explicit", "select-then-apply"}
     assert all(row.agrees and row.graph == row.listing for row in rows)
     assert not replace(rows[0], listing=rows[0].graph + 1).agrees
@@ -557,11 +543,9 @@ FOLDERS = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize("folder", FOLDERS)
-def test_other_planners_find_exactly_the_plans_that_fit(
-    folder: str, export_counts: ModuleType
-) -> None:
+def test_other_planners_find_exactly_the_plans_that_fit(folder: str) -> None:
     pytest.importorskip("kstar_planner", reason="K* is not installed (extra oracles)")
-    rows = [*export_counts.rows([folder], 300.0)]
+    rows = [*answers(folder, 300.0)]
     assert rows
     for row in rows:
         assert row.agrees, row

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How much shorter a sentence is than the plan that it describes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+from benchmarks.paper.plots import Series, per_task
+from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
+from benchmarks.paper.reported import DIFFERING, SAVING_ALL, SAVING_DIFFERING
+from benchmarks.paper.sentences import (
+    MOST_LISTED,
+    Comparison,
+    SentenceStatistics,
+    compare,
+    comparison_units,
+)
+from benchmarks.paper.suite import ROW, TITLES, method_of, world_and_method
+from benchmarks.paper.tables import percent, rounded_mean, table
+from coordlang.language.flexibility import Flexibility
+
+#: Tasks that the paper's figure shows.
+SHOWN = 100
+
+
+def run(unit: Unit, settings: Settings) -> Result:
+    """Measure the savings of one language, or those of the greedy method in many orders."""
+    return compare(unit, settings, measures, _of_order)
+
+
+def _of_order(found: Flexibility) -> list[float]:
+    shorter = found.first_words < found.steps + 1
+    return [int(shorter.sum()), round(float(found.first_saving.mean()), 6)]
+
+
+def measures(tasks: Sequence[SentenceStatistics]) -> Result:
+    """Return the mean savings of the tasks' first plans, and of other plans.
+
+    ``differing``: tasks whose first plan's sentence is shorter than its state sequence.
+    """
+    first = [task.saving(len(task.first)) for task in tasks]
+    shorter = [saving for saving in first if saving > 0]
+    return {
+        "tasks": len(tasks),
+        "differing": len(shorter),
+        "saving_differing": rounded_mean(shorter, 6),
+        "saving": rounded_mean(first, 6),
+        "saving_last": rounded_mean([task.saving(len(task.last)) for task in tasks], 6),
+        "saving_expected": rounded_mean([task.saving(task.expected_words) for task in tasks], 6),
+        "saving_most": rounded_mean([task.saving(task.fewest_words) for task in tasks], 6),
+        "states": [task.steps + 1 for task in tasks][:MOST_LISTED],
+        "first_words": [len(task.first) for task in tasks][:MOST_LISTED],
+    }
+
+
+def section(records: Sequence[Record]) -> Section:
+    """Render the savings by method, the paper's figure, and the savings on other domains."""
+    found = Comparison.of(records)
+    row = found.row
+    paper = ["paper", 4, f"{DIFFERING} of 956", percent(SAVING_DIFFERING), percent(SAVING_ALL)]
+    above = [[*paper, None, None, None]] if found.of_paper else []
+    blocks: list[str | Figure] = [
+        f"{_DEFINITION}{row}.",
+        table("language", method_of, _COLUMNS, found.languages, above),
+    ]
+    if found.languages:
+        alt = (
+            f"Plan and sentence lengths of the first {SHOWN} tasks of {row} "
+            "whose sentence is shorter"
+        )
+        blocks += [
+            Figure("communication-tasks", alt, partial(_first_tasks, found.languages)),
+            f"The first {SHOWN} tasks whose greedy sentence is shorter than the plan, as in the "
+            "paper's figure.",
+        ]
+    if found.orders:
+        savings, systematic = found.in_orders(1)
+        named = ", ".join(f"{name} {percent(saving)}" for name, saving in systematic.items())
+        blocks.append(
+            f"With the states in {len(savings)} random orders, the greedy method saves "
+            f"{percent(savings[0])} to {percent(savings[-1])} over all tasks (median "
+            f"{percent(savings[len(savings) // 2])}); in systematic orders, {named}."
+        )
+    if found.others:
+        others = table("language", world_and_method, _COLUMNS, found.others)
+        blocks += ["Domains that are not grids, all tasks:", others]
+    return Section(blocks, _differences(found), _headlines(found.of_paper))
+
+
+_COLUMNS = {
+    "words": lambda r: r.result["words"],
+    "sentence shorter": lambda r: f"{r.result['differing']:,} of {r.result['tasks']:,}",
+    "saving there": lambda r: (
+        percent(r.result["saving_differing"]) if r.result["differing"] else None
+    ),
+    "saving, all": lambda r: percent(r.result["saving"]),
+    "last plan": lambda r: percent(r.result["saving_last"]),
+    "any plan": lambda r: percent(r.result["saving_expected"]),
+    "shortest": lambda r: percent(r.result["saving_most"]),
+}
+
+_DEFINITION = f"""\
+The *communication saving* of a plan is `1 - words / states`: the number of words of its sentence
+relative to the number of states that it passes through, which is one more than its joint actions.
+The paper's two values, {percent(SAVING_DIFFERING)} over {DIFFERING} tasks and \
+{percent(SAVING_ALL)} over all 956, agree with each other only if
+the tasks that do not differ save nothing, as they do when states are counted. *Sentence shorter*
+are the tasks that differ; *last plan* uses each task's last plan instead of the first, *any plan*
+the expectation over all plans, *shortest* the plan with the shortest sentence. Measured on """
+
+
+def _headlines(of: dict[str, Result]) -> list[tuple[str, str, str, str]]:
+    if not {"greedy", "minimal"} <= of.keys():
+        return []
+    both = of["greedy"], of["minimal"]
+    all_tasks, shorter = (
+        [percent(r[what]) for r in both] for what in ("saving", "saving_differing")
+    )
+    number = [str(r["differing"]) for r in both]
+    return [
+        (f"{ROW}: saving, all tasks", percent(SAVING_ALL), all_tasks[0], all_tasks[1]),
+        (f"{ROW}: saving where shorter", percent(SAVING_DIFFERING), shorter[0], shorter[1]),
+        (f"{ROW}: tasks with a shorter sentence", f"{DIFFERING}", number[0], number[1]),
+    ]
+
+
+def _first_tasks(records: Sequence[Record]) -> Any:
+    reference = records[0].result
+    lengths = zip(reference["states"], reference["first_words"], strict=True)
+    shown = [n for n, (states, words) in enumerate(lengths) if words < states][:SHOWN]
+    of = {record.parameters["method"]: record.result["first_words"] for record in records}
+    series = [
+        Series(method, TITLES[method], [of[method][n] for n in shown])
+        for method in ("greedy", "minimal")
+        if method in of
+    ]
+    return per_task([reference["states"][n] for n in shown], series, "length (states; words)")
+
+
+def _differences(found: Comparison) -> list[str]:
+    greedy = found.of_paper.get("greedy")
+    if greedy is None:
+        return []
+    text = (
+        f"**Communication.** The paper saves {percent(SAVING_ALL)} over all tasks of {ROW}, our "
+        f"greedy language {percent(greedy['saving'])}. The value depends on the order in which the "
+        "greedy method tries the states and on which plan is the first; the paper does not give "
+        "them."
+    )
+    if found.orders:
+        savings = [saving for _, saving in found.orders.values()]
+        inside = min(savings) <= SAVING_ALL <= max(savings)
+        reached = "the paper's value is in this range" if inside else "none gives the paper's value"
+        text += (
+            f" {len(savings)} orders give {percent(min(savings))} to {percent(max(savings))} for "
+            f"first plans; {reached}."
+        )
+    return [
+        f"{text} The last plans in our order save {percent(greedy['saving_last'])}, the plans with "
+        f"the shortest sentences {percent(greedy['saving_most'])}."
+    ]
+
+
+RECIPE = Recipe(
+    "communication",
+    "Communication: plans and sentences",
+    partial(comparison_units, "communication"),
+    run,
+    section,
+)

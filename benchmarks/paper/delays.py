@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Delays: each robot is late with some probability a step, and goes on with its part.
+
+Coordination languages promise that mixtures of plans done in step are plans again.  Robots that are
+late are not in step.  How often does a run still end in the goal, and how late?
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from random import Random
+from typing import Any
+
+from benchmarks.frame import markdown
+from benchmarks.paper.late_robots import DelayTrials
+from benchmarks.paper.plots import Lines, Series, lines
+from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
+from benchmarks.paper.suite import OTHERS, TITLES, WORLDS, language_for
+from benchmarks.paper.tables import by_world, rate
+from coordlang.use.sentence.task_language import languages_in_tasks
+
+#: What is said: the whole plan, or a sentence of one of these languages.
+SAID = ("plan", "minimal", "flexible", "slack", "few", "silence")
+#: Probabilities with which a robot is delayed in a step.
+DELAYS = (0.0, 0.05, 0.1, 0.2, 0.3)
+_WORLDS = ("GW1", "GWB5", *(world.name for world in OTHERS if world.name != "push-box"))
+#: Whether robots wait for each other where they cannot all do their steps.
+_YIELDING = {"as they come": False, "yielding": True}
+#: Runs, for each of the samples that are asked for.
+_RUNS = 20
+
+
+def units(settings: Settings) -> list[Unit]:
+    """List a unit for each world and what is said in it."""
+    runs = _RUNS * settings.samples
+    return [
+        Unit("delays", f"{name}/{said}", {"world": name, "said": said, "runs": runs})
+        for name in (("GW1", OTHERS[0].name) if settings.quick else _WORLDS)
+        for said in SAID
+    ]
+
+
+def run(unit: Unit, settings: Settings) -> Result:
+    """Count the runs that end in the goal, and how late, for each probability, with and without."""
+    said, together = unit.parameters["said"], unit.parameters["said"] == "plan"
+    method, world = "minimal" if together else said, WORLDS[unit.parameters["world"]]
+    candidates, language = language_for(world, method, settings.seed)
+    trials = DelayTrials(list(languages_in_tasks(language, candidates)), together=together)
+    found: Result = {"words": None if together else len(language.words), "tasks": candidates.count}
+    for name, yields in _YIELDING.items():
+        found[name] = []
+        for delay in DELAYS:
+            random = Random(f"{settings.seed} {unit.key} {name} {delay}")
+            found[name].append(trials.sample(delay, yields, unit.parameters["runs"], random))
+    return found
+
+
+def section(records: Sequence[Record]) -> Section:
+    """Render a table and a figure for each world."""
+    blocks: list[str | Figure] = [_DEFINITION]
+    for name, here in by_world(records).items():
+        alt = (
+            f"Runs on {name} that end in the goal, by the probability of a delay: as they come "
+            "and with robots that yield"
+        )
+        figure = Figure(f"delays-{name}", alt, partial(_figure, here))
+        blocks += [f"{name}, {here[0].result['tasks']:,} tasks:", _table(here), figure]
+    return Section(blocks)
+
+
+_DEFINITION = """\
+A task is drawn, and one of its plans, uniformly. The whole *plan* is said, or its sentence, and
+then each robot draws one of the plans with this sentence by itself. They do their parts step by
+step; but in each step every robot that is not done is delayed with probability *p*: it does
+nothing, and goes on with its part afterwards. *As they come*: if what they do together is no joint
+step, the run has failed. *Yielding*: as many as can do their steps do, and the others wait; the run
+fails if all wait for ever, or the goal does not hold when all are done. Cells: runs that end in the
+goal, in percent, and how many steps more than the least makespan these take on average. For
+*p* = 0 a coordination language never fails. Lines in the figures: 95 % intervals (Wilson)."""
+
+
+def _table(records: Sequence[Record]) -> str:
+    rows = []
+    for record in records:
+        result, title = record.result, TITLES[record.parameters["said"]]
+        for name in _YIELDING:
+            cells = []
+            for runs, well, late in result[name]:
+                mean = f" (+{late / well:.2f})" if well else ""
+                cells.append(f"{100 * well / runs:.1f}{mean}")
+            rows.append([f"{title}, {name}", result["words"], *cells])
+    return markdown(("said", "words", *(f"p = {delay:g}" for delay in DELAYS)), rows)
+
+
+def _figure(records: Sequence[Record]) -> Any:
+    def series(record: Record, name: str) -> Series:
+        said = record.parameters["said"]
+        points = [rate(well, runs) for runs, well, _ in record.result[name]]
+        return Series(said, TITLES[said], *zip(*points, strict=True))
+
+    unit = "runs that end in the goal (%)"
+    panels = [Lines(name, unit, [series(r, name) for r in records]) for name in _YIELDING]
+    return lines(panels, DELAYS, "probability of a delay", len(panels))
+
+
+RECIPE = Recipe("delays", "Robots that are late", units, run, section)

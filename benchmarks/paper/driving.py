@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Robots with wheels do tasks: runs, and how they ended beside what the joint model says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from random import Random
+from typing import Any
+
+from benchmarks.paper.task_choices import sentence_of
+from coordlang.coordinates import Point
+from coordlang.language.sentences import Sentence
+from coordlang.use.sentence.task_language import TaskLanguage
+from coordlang.use.simulation.floor import floor_of
+from coordlang.use.simulation.record import RunRecord, WishRecord
+from coordlang.use.simulation.runs import runs_of
+from coordlang.use.simulation.settings import Settings
+from coordlang.use.simulation.team import Agreement, Mission, mission
+from planners.search.plans import Plan, Plans
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """A task, an optimal plan of it, drawn uniformly, and its sentence."""
+
+    used: TaskLanguage
+    plan: Plan
+    words: Sentence
+
+    def mission(self, agreement: Agreement) -> Mission:
+        """Return the mission of robots that have agreed on the sentence, a plan, or nothing."""
+        return mission(self.used, agreement, self.words if agreement == "sentence" else ())
+
+
+def said(used: TaskLanguage, random: Random) -> Said:
+    """Draw a plan of a task; what is said is its sentence."""
+    plans = Plans.of(used.space, used.task)
+    return said_of(used, plans.unrank(random.randrange(plans.count)))
+
+
+def said_of(used: TaskLanguage, plan: Plan) -> Said:
+    """Return what is said to agree on the sentence of a plan."""
+    return Said(used, plan, sentence_of(used, plan))
+
+
+def drive(
+    prepared: Mission,
+    how: Settings,
+    seed: int,
+    known: Mapping[str, Point] | None = None,
+    wishes: Sequence[WishRecord] = (),
+) -> RunRecord:
+    """Let robots do a mission once; ``known`` are coordinates that names do not say."""
+    floor = floor_of(prepared.world, known or {}, how.cell)
+    [found] = runs_of(prepared, floor, how, 1, seed, wishes)
+    return found
+
+
+def is_well(found: RunRecord) -> bool:
+    """Say whether all arrived in time and nobody touched anything."""
+    return found.arrived and not found.late and not found.collisions
+
+
+def counted(found: Sequence[RunRecord]) -> dict[str, Any]:
+    """Count how runs ended, and how often the joint model says the same of the robots' choices.
+
+    Returns
+    -------
+    dict
+        ``well``, ``collisions``, ``deadlocks``, ``late``: runs; ``late_steps``, ``messages``,
+        ``seconds`` (simulated): sums; ``nearest``: the least distance of two robots, in metres;
+        ``mixes``: runs in which the robots' own subplans, done in step, are an optimal plan;
+        ``agree``: runs that ended well iff they are.
+    """
+    distances = [record.nearest for record in found if record.nearest is not None]
+    return {
+        "runs": len(found),
+        "well": sum(map(is_well, found)),
+        "collisions": sum(record.collisions > 0 for record in found),
+        "deadlocks": sum(record.deadlock for record in found),
+        "late": sum(record.late > 0 for record in found),
+        "late_steps": sum(record.late for record in found),
+        "messages": sum(record.messages for record in found),
+        "seconds": round(sum(record.seconds for record in found), 1),
+        "nearest": min(distances, default=None),
+        "mixes": sum(record.mixes for record in found),
+        "agree": sum(is_well(record) == record.mixes for record in found),
+    }

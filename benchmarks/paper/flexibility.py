@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How many plans a sentence leaves open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+from benchmarks.paper.plots import Histogram, histograms
+from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
+from benchmarks.paper.reported import OPEN_ALL, OPEN_SEVERAL, SEVERAL
+from benchmarks.paper.sentences import (
+    MOST_LISTED,
+    Comparison,
+    SentenceStatistics,
+    compare,
+    comparison_units,
+)
+from benchmarks.paper.suite import ROW, TITLES, method_of, world_and_method
+from benchmarks.paper.tables import rounded_mean, table
+from coordlang.language.flexibility import Flexibility
+
+
+def run(unit: Unit, settings: Settings) -> Result:
+    """Measure the plans that one language leaves open, or the greedy method in many orders."""
+    return compare(unit, settings, measures, _of_order)
+
+
+def _of_order(found: Flexibility) -> list[float]:
+    return [round(float(values.mean()), 3) for values in (found.first, found.expected)]
+
+
+def measures(tasks: Sequence[SentenceStatistics]) -> Result:
+    """Return the mean numbers of open plans: after first plans, last plans, and in expectation.
+
+    ``several``: tasks in which the first plan's sentence leaves more than one plan open.
+    """
+    first = [task.plans[task.first] for task in tasks]
+    several = [number for number in first if number > 1]
+    return {
+        "tasks": len(tasks),
+        "plans": rounded_mean([task.count for task in tasks], 4),
+        "open": rounded_mean(first, 4),
+        "several": len(several),
+        "open_several": rounded_mean(several, 4),
+        "open_last": rounded_mean([task.plans[task.last] for task in tasks], 4),
+        "expected": rounded_mean([float(task.expected_open) for task in tasks], 4),
+        "first": first[:MOST_LISTED],
+    }
+
+
+def section(records: Sequence[Record]) -> Section:
+    """Render the open plans by method, their distribution, and those of other domains."""
+    found = Comparison.of(records)
+    row = found.row
+    paper = ["paper", 4, OPEN_ALL, f"{SEVERAL} of 956", OPEN_SEVERAL, None, None, None]
+    above = [paper] if found.of_paper else []
+    blocks: list[str | Figure] = [
+        _DEFINITION.format(row=row),
+        table("language", method_of, _COLUMNS, found.languages, above),
+    ]
+    if found.languages:
+        alt = (
+            f"Distribution over the tasks of {row} of the number of plans open after the first "
+            "plan's sentence"
+        )
+        blocks.append(Figure("flexibility", alt, partial(_figure, found.languages)))
+    if found.orders:
+        blocks.append(_orders_text(found))
+    if found.others:
+        others = table("language", world_and_method, _COLUMNS, found.others)
+        blocks += ["Domains that are not grids, all tasks:", others]
+    return Section(blocks, _differences(found), _headlines(found.of_paper))
+
+
+_COLUMNS = {
+    "words": lambda r: r.result["words"],
+    "open": lambda r: f"{r.result['open']:.1f}",
+    "several": lambda r: f"{r.result['several']:,} of {r.result['tasks']:,}",
+    "open there": lambda r: f"{r.result['open_several']:.1f}" if r.result["several"] else None,
+    "last plan": lambda r: f"{r.result['open_last']:.1f}",
+    "any plan": lambda r: f"{r.result['expected']:.1f}",
+    "optimal plans": lambda r: f"{r.result['plans']:.1f}",
+}
+
+_DEFINITION = """\
+*Open* are the optimal plans with the sentence of the first plan found, as in the paper; *several*
+counts the tasks with more than one. *Any plan* is the expectation when the speaker draws one of the
+N optimal plans uniformly, `sum of n_s^2 / N` over the sentences s with n_s plans each: it does not
+depend on the order in which plans are found. Measured on {row}; *optimal plans* is the upper bound
+for every language."""
+
+
+def _headlines(of: dict[str, Result]) -> list[tuple[str, str, str, str]]:
+    if not {"greedy", "minimal"} <= of.keys():
+        return []
+    both = of["greedy"], of["minimal"]
+    plans, there = ([f"{r[what]:.1f}" for r in both] for what in ("open", "open_several"))
+    number = [str(r["several"]) for r in both]
+    return [
+        (f"{ROW}: plans open, all tasks", f"{OPEN_ALL}", plans[0], plans[1]),
+        (f"{ROW}: plans open where several", f"{OPEN_SEVERAL}", there[0], there[1]),
+        (f"{ROW}: tasks with several", f"{SEVERAL}", number[0], number[1]),
+    ]
+
+
+def _orders_text(found: Comparison) -> str:
+    first, systematic = found.in_orders(0)
+    expected, _ = found.in_orders(1)
+    middle = len(first) // 2
+    named = ", ".join(f"{name} {value:.1f}" for name, value in systematic.items())
+    return (
+        f"With the states in {len(first)} random orders, the greedy method leaves {first[0]:.1f} "
+        f"to {first[-1]:.1f} plans open (median {first[middle]:.1f}), in expectation "
+        f"{expected[0]:.1f} to {expected[-1]:.1f} (median {expected[middle]:.1f}); in systematic "
+        f"orders, {named}."
+    )
+
+
+def _figure(records: Sequence[Record]) -> Any:
+    panels = []
+    for record in records:
+        r, method = record.result, record.parameters["method"]
+        paper = OPEN_ALL if record.parameters["world"] == ROW else None
+        title = f"{TITLES[method]} ({r['words']} words)"
+        panels.append(Histogram(method, title, r["first"], r["open"], paper))
+    most = max(max(r.result["first"]) for r in records)
+    width = max(1, -(-most // 20))
+    bounds = [0.5 + width * k for k in range(-(-most // width) + 1)]
+    return histograms(panels, bounds, "plans open to the listener", "tasks")
+
+
+def _differences(found: Comparison) -> list[str]:
+    greedy = found.of_paper.get("greedy")
+    if greedy is None:
+        return []
+    spread = ""
+    if found.orders:
+        first = [measures[0] for measures in found.orders.values()]
+        spread = (
+            f" It depends on the order of the states: {len(first)} orders give {min(first):.1f} to "
+            f"{max(first):.1f}."
+        )
+    return [
+        f"**Flexibility.** The paper leaves {OPEN_ALL} plans open on average over all tasks of "
+        f"{ROW} and {OPEN_SEVERAL} over {SEVERAL}, our greedy language {greedy['open']:.1f} and "
+        f"{greedy['open_several']:.1f} over {greedy['several']}.{spread}"
+    ]
+
+
+RECIPE = Recipe(
+    "flexibility",
+    "Flexibility: plans left to the listener",
+    partial(comparison_units, "flexibility"),
+    run,
+    section,
+)

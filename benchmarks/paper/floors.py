@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Floors: maps that robots with wheels drive on, with tasks that require coordination."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+
+from benchmarks.frame import DOMAINS, SHARED
+from benchmarks.paper.grid import cell_position, is_cell, placement
+from benchmarks.paper.suite import CORRIDOR, WORLDS, World, language_for
+from coordlang.building import build_language
+from coordlang.coordinates import Point
+from coordlang.language.words import Language
+from coordlang.movingai import Cell, cell_name, grid_problem_text, in_rows, read_map
+from coordlang.required.choices import Choices
+from coordlang.tasks.candidates import Candidates, from_listed
+from coordlang.tasks.listed import ListedTask
+from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
+from planners.errors import BadInput, ProvedImpossible
+from planners.pddl import parse_problem, read_domain, read_problem
+from planners.pddl.lifted import Domain
+from planners.pddl.sexpr import Source
+
+#: Tasks of a floor whose tasks are drawn, and draws after which there are as many as there are.
+TASKS, DRAWS = 10, 400
+#: The folder of maps that others made.
+FOREIGN = SHARED / "mapf"
+
+
+@dataclass(frozen=True, slots=True)
+class Floor:
+    """A map and a number of robots.
+
+    Attributes
+    ----------
+    name
+        What tables call it.
+    robots
+        How many robots are on it.
+    world
+        A shipped domain with its candidate tasks; or one whose map is used, with drawn tasks; or
+        the grid domain, for a foreign map.
+    draws
+        Whether tasks are drawn.
+    foreign
+        The name of a map in `FOREIGN`, read there and only there.
+    known
+        Coordinates of places whose names do not say them.
+    """
+
+    name: str
+    robots: int
+    world: World
+    draws: bool = False
+    foreign: str = ""
+    known: tuple[tuple[str, Point], ...] = ()
+
+    @property
+    def key(self) -> str:
+        """Its name among all floors."""
+        return f"{self.name}, {self.robots} robots"
+
+
+_GRID = World("grid", "grid", "gw1-2x2", "problem")
+_DOORS = (
+    ("west", (0.0, 1.0)),
+    ("west-north", (1.0, 0.0)),
+    ("west-south", (1.0, 2.0)),
+    ("east-north", (2.0, 0.0)),
+    ("east-south", (2.0, 2.0)),
+    ("east", (3.0, 1.0)),
+)
+#: No task of three robots on the T-map requires coordination: nobody can pass anybody there.
+FLOORS = {
+    floor.key: floor
+    for floor in (
+        Floor("T-map", 2, World("t-map", "t-map", "problem")),
+        Floor("corridor", 2, CORRIDOR),
+        Floor("GWB7", 2, WORLDS["GWB7"]),
+        Floor("maze 11x11", 2, _GRID, draws=True, foreign="maze-11-11.map"),
+        Floor("corridor", 3, CORRIDOR, draws=True),
+        Floor("GWB7", 3, WORLDS["GWB7"], draws=True),
+        Floor("maze 11x11", 3, _GRID, draws=True, foreign="maze-11-11.map"),
+        Floor("handover", 2, WORLDS["handover"], known=_DOORS),
+    )
+}
+
+
+def foreign_map(floor: Floor) -> Path:
+    """Return where the foreign map of a floor would be."""
+    return FOREIGN / floor.foreign
+
+
+def tasks_of(floor: Floor, seed: int) -> tuple[Language, list[TaskLanguage]]:
+    """Return a language for the tasks of a floor, in those that require coordination.
+
+    A floor whose tasks are drawn has a greedy language, for up to `TASKS` tasks: starts and goals
+    are drawn until so many require coordination.  Others have a minimal one for all tasks of their
+    world.
+    """
+    if floor.draws:
+        candidates, language = _drawn(floor, seed)
+    else:
+        candidates, language = language_for(floor.world, "minimal", seed)
+    requiring = {id(space): Choices(space).requires[space.starts] for space in candidates.spaces}
+    every = languages_in_tasks(language, candidates)
+    return language, [used for used in every if requiring[id(used.space)][used.task]]
+
+
+def _drawn(floor: Floor, seed: int) -> tuple[Candidates, Language]:
+    domain = read_domain(DOMAINS / "grid" / "domain.pddl")
+    cells = {cell_name(cell): cell for cell in _cells(floor)}
+    random = Random(f"{seed} {floor.key}")
+    found: list[ListedTask] = []
+    for _ in range(DRAWS):
+        start, goal = (random.sample(list(cells), floor.robots) for _ in range(2))
+        task = ListedTask(placement(start), placement(goal))
+        if _requires(task, domain, cells) and _is_in_one_world([*found[:1], task], domain, cells):
+            found.append(task)
+        if len(found) == TASKS:
+            break
+    candidates = _candidates(found, domain, cells)
+    built = build_language(candidates, "greedy", seed=seed)
+    if built.stopped is not None:
+        raise built.stopped
+    return candidates, built.language
+
+
+def _requires(task: ListedTask, domain: Domain, cells: Mapping[str, Cell]) -> bool:
+    try:
+        (space,) = _candidates([task], domain, cells).spaces
+    except ProvedImpossible:
+        return False
+    return bool(Choices(space).requires[space.starts[0]])
+
+
+def _is_in_one_world(
+    listed: Sequence[ListedTask], domain: Domain, cells: Mapping[str, Cell]
+) -> bool:
+    """Say whether the first task's robots can get to where the others start: not so on rings."""
+    try:
+        _candidates(listed, domain, cells)
+    except BadInput:
+        return False
+    return True
+
+
+def _candidates(
+    listed: Sequence[ListedTask], domain: Domain, cells: Mapping[str, Cell]
+) -> Candidates:
+    """Tasks on a map, as candidates."""
+    first = listed[0].init, listed[0].goal
+    ends = [[text.strip("()").split()[-1] for text in atoms] for atoms in first]
+    near = _adjacent(cells).__getitem__
+    text = grid_problem_text("floor", domain.name, in_rows(cells), near, *ends, written_by="")
+    return from_listed(domain, [parse_problem(Source("floor", text), domain)], listed)
+
+
+def _cells(floor: Floor) -> list[Cell]:
+    if floor.foreign:
+        return sorted(read_map(foreign_map(floor)).passable)
+    folder = DOMAINS / floor.world.folder
+    domain = read_domain(folder / "domain.pddl")
+    names = read_problem(folder / f"{floor.world.problem}.pddl", domain).objects
+    return sorted(cell_position(name) for name in names if is_cell(name))
+
+
+def _adjacent(cells: Mapping[str, Cell]) -> dict[str, list[str]]:
+    name = {cell: own for own, cell in cells.items()}
+    ways = ((-1, 0), (0, -1), (0, 1), (1, 0))
+    return {
+        own: [name[near] for dy, dx in ways if (near := (row + dy, column + dx)) in name]
+        for own, (row, column) in cells.items()
+    }

@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A coordination game: the speaker proposes plans, or sentences, until the listener accepts.
+
+The listener likes ``k`` of the task's optimal plans, drawn at random.  It accepts a plan that it
+likes, and a sentence that some plan which it likes has.  The speaker does not know these plans and
+proposes nothing twice.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from fractions import Fraction
+from functools import partial
+from math import comb, sqrt
+from random import Random
+from statistics import fmean, stdev
+from typing import Any
+
+from benchmarks.frame import markdown
+from benchmarks.paper.plots import Lines, Series, lines
+from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
+from benchmarks.paper.sentences import candidate_statistics
+from benchmarks.paper.suite import METHODS, OTHERS, TITLES, WORLDS, language_for, method_of
+from benchmarks.paper.tables import by_world
+
+#: The row of Table 1 that the paper plays on.
+ROW = "GWB5"
+#: How many plans the listener likes.
+LIKED = (1, 2, 3, 4, 5)
+
+
+def units(settings: Settings) -> list[Unit]:
+    """List a unit for each method and world."""
+    worlds = (ROW, *(world.name for world in OTHERS[: 1 if settings.quick else None]))
+    runs = settings.samples
+    return [
+        Unit("game", f"{name}/{method}", {"world": name, "method": method, "runs": runs})
+        for name in worlds
+        for method in METHODS
+    ]
+
+
+def run(unit: Unit, settings: Settings) -> Result:
+    """Play the games of one language and world, and compute their expectations."""
+    world = WORLDS[unit.parameters["world"]]
+    candidates, language = language_for(world, unit.parameters["method"], settings.seed)
+    # A task's game depends on its numbers of plans alone; a language makes few different ones.
+    tasks = [
+        tuple(sorted(task.plans.values(), reverse=True))
+        for task in candidate_statistics(candidates, language)
+    ]
+    # The same games for every language.
+    randoms = {
+        liked: [
+            Random(f"{settings.seed} {world.name} {liked} {n}") for n in range(settings.samples)
+        ]
+        for liked in LIKED
+    }
+    games = [
+        [play(random.choice(tasks), liked, random) for random in randoms[liked]] for liked in LIKED
+    ]
+    exact = [_expectations(Counter(tasks), liked) for liked in LIKED]
+    return {
+        "words": len(language.words),
+        "tasks": len(tasks),
+        "liked": list(LIKED),
+        "exact": {
+            name: [values[n] for values in exact]
+            for n, name in enumerate(("plan", "sentence", "widest"))
+        },
+        "played": {
+            name: [[game[n] for game in one] for one in games]
+            for n, name in enumerate(("plan", "sentence"))
+        },
+    }
+
+
+def _expectations(tasks: Counter[tuple[int, ...]], liked: int) -> list[float]:
+    """The mean expectations over tasks: plans, sentences, sentences with most plans first."""
+    sums = [Fraction(0)] * 3
+    for sizes, number in tasks.items():
+        k = min(liked, sum(sizes))
+        values = (
+            expected_for_plans(sum(sizes), k),
+            expected_for_sentences(sizes, k),
+            expected_widest_first(sizes, k),
+        )
+        sums = [total + number * value for total, value in zip(sums, values, strict=True)]
+    return [round(float(total / tasks.total()), 6) for total in sums]
+
+
+def play(sizes: Sequence[int], liked: int, random: Random) -> tuple[int, int]:
+    """Play one game with plans and one with sentences; the numbers of proposals.
+
+    ``sizes`` are the numbers of plans of the sentences, ``liked`` the number of liked plans.
+    """
+    owner = [sentence for sentence, number in enumerate(sizes) for _ in range(number)]
+    likes = set(random.sample(range(len(owner)), min(liked, len(owner))))
+    plans = random.sample(range(len(owner)), len(owner))
+    sentences = random.sample(range(len(sizes)), len(sizes))
+    accepted = {owner[plan] for plan in likes}
+    by_plan = next(turn for turn, plan in enumerate(plans, 1) if plan in likes)
+    by_sentence = next(turn for turn, sentence in enumerate(sentences, 1) if sentence in accepted)
+    return by_plan, by_sentence
+
+
+def expected_for_plans(plans: int, liked: int) -> Fraction:
+    """Return the expected proposals until one of k liked plans among N is proposed.
+
+    In random order it is (N + 1) / (k + 1).
+    """
+    return Fraction(plans + 1, liked + 1)
+
+
+def expected_for_sentences(sizes: Sequence[int], liked: int) -> Fraction:
+    """Return the expected proposals of sentences in random order.
+
+    With m of D sentences acceptable it is (D + 1) / (m + 1).  How many of the sets of ``liked``
+    plans meet exactly m sentences is the coefficient of ``x^liked y^m`` in the product of ``1 + y
+    ((1 + x)^n - 1)`` over the sentences with n plans each.
+    """
+    ways = {(0, 0): 1}
+    for n in sizes:
+        after: dict[tuple[int, int], int] = dict(ways)
+        for (taken, met), number in ways.items():
+            for more in range(1, min(n, liked - taken) + 1):
+                key = (taken + more, met + 1)
+                after[key] = after.get(key, 0) + number * comb(n, more)
+        ways = after
+    shares = (
+        number * Fraction(len(sizes) + 1, met + 1)
+        for (taken, met), number in ways.items()
+        if taken == liked
+    )
+    return sum(shares, Fraction(0)) / comb(sum(sizes), liked)
+
+
+def expected_widest_first(sizes: Sequence[int], liked: int) -> Fraction:
+    """Return the expected proposals of sentences, those with most plans first.
+
+    It is the sum over j of the probability that the first j are all rejected.
+    """
+    left = sum(sizes)
+    ways = comb(left, liked)
+    result = Fraction(0)
+    for n in sorted(sizes, reverse=True):
+        result += Fraction(comb(left, liked), ways)
+        left -= n
+    return result
+
+
+def section(records: Sequence[Record]) -> Section:
+    """Render the numbers of proposals, world by world."""
+    blocks: list[str | Figure] = [_DEFINITION]
+    worlds = by_world(records)
+    for name, here in worlds.items():
+        runs, tasks = here[0].parameters["runs"], here[0].result["tasks"]
+        text = f"{name}, {tasks:,} tasks, means of {runs} games and exact expectations:"
+        blocks += [text, _table(here)]
+        if name == ROW:
+            alt = f"Proposals until accepted on {ROW}, plans against sentences, by liked plans"
+            blocks.append(Figure("game", alt, partial(_figure, here)))
+    return Section(blocks, _differences(worlds.get(ROW, [])))
+
+
+_DEFINITION = """\
+The listener likes k of the task's optimal plans, drawn at random (all of them where there are
+fewer). The speaker, who does not know them, proposes plans in random order until one is
+accepted; or sentences in random order, accepted when some liked plan has the sentence; *widest
+first* proposes the sentences with most plans first. A task is drawn at random for each game.
+*Exact* is the expectation over tasks, liked plans and orders, in closed form: (N + 1) / (k + 1)
+for N plans."""
+
+
+def _table(records: Sequence[Record]) -> str:
+    plan = records[0].result
+    kinds = [("plan", plan, "plan")]
+    for record in records:
+        kinds.append((f"sentence, {method_of(record)}", record.result, "sentence"))
+        kinds.append((f"{method_of(record)}, widest first", record.result, "widest"))
+    rows = []
+    for label, result, what in kinds:
+        row: list[object] = [label]
+        for n, exact in enumerate(result["exact"][what]):
+            played = f"{fmean(result['played'][what][n]):.2f}, " if what in result["played"] else ""
+            row.append(f"{played}exact {exact:.2f}")
+        rows.append(row)
+    return markdown(("proposals of", *(f"k = {k}" for k in plan["liked"])), rows)
+
+
+def _figure(records: Sequence[Record]) -> Any:
+    def series(kind: str, label: str, result: Result, what: str) -> Series:
+        games = result["played"][what]
+        ends = [1.959963984540054 * stdev(one) / sqrt(len(one)) if one[1:] else 0 for one in games]
+        means = [fmean(one) for one in games]
+        low, high = ([m + s * e for m, e in zip(means, ends, strict=True)] for s in (-1, 1))
+        return Series(kind, label, means, low, high, result["exact"][what])
+
+    runs, first = records[0].parameters["runs"], records[0].result
+    shown = [series("plan", f"plan ({runs} games, 95 %)", first, "plan")]
+    for record in records:
+        method = record.parameters["method"]
+        shown.append(series(method, f"sentence, {TITLES[method]}", record.result, "sentence"))
+    panel = Lines("", "proposals until accepted", shown)
+    return lines([panel], first["liked"], "plans that the listener likes (k)")
+
+
+def _differences(records: Sequence[Record]) -> list[str]:
+    if not records:
+        return []
+    plans = records[0].result["exact"]["plan"][0]
+    sentences = ", ".join(
+        f"{record.result['exact']['sentence'][0]:.2f} sentences ({method_of(record)})"
+        for record in records
+    )
+    return [
+        "**Coordination game.** The paper does not give the order of its proposals, nor the values "
+        f"of its figure; our expectations on {ROW} for k = 1 are {plans:.2f} plans against "
+        f"{sentences}."
+    ]
+
+
+RECIPE = Recipe("game", "Coordination game: proposals until accepted", units, run, section)

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Robust navigation: a human stands in the way, detected only once execution has started.
+
+Robots deliver in a warehouse (`benchmarks.paper.warehouse`).  For both tasks of a delivery they
+agree on plans or sentences beforehand.  Then a human is detected in a random cell that is no
+corner, and stays there.  A plan fails if any robot would enter that cell.  Under a sentence each
+robot selects among its own choices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from random import Random
+from typing import Any
+
+from benchmarks.paper.disruptions import subaction_trials, warehouse_trials
+from benchmarks.paper.plots import Series, by_category
+from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
+from benchmarks.paper.suite import METHODS, OTHERS, TITLES, WORLDS, language_for, method_of
+from benchmarks.paper.tables import Columns, percent, rate, share_of_runs, table
+from benchmarks.paper.warehouse import LAYOUTS, WAREHOUSES, deliveries, listed_tasks
+
+#: Languages that take more than minutes to build: an unfinished one would depend on the machine.
+UNFINISHED = {
+    *((f"open {n}", layout, m) for n in ("4x4", "5x5") for layout in LAYOUTS for m in METHODS[1:]),
+    *((f"ring {size}", "along", "minimal") for size in ("3x4", "3x5", "4x4")),
+    ("ring 3x5", "across", "minimal"),
+}
+
+
+def units(settings: Settings) -> list[Unit]:
+    """List a unit for each warehouse, layout and method, and for each other world and method."""
+    maps = ("open 3x3", "ring 3x4") if settings.quick else tuple(WAREHOUSES)
+    samples = {"samples": settings.samples}
+    found = [
+        Unit(
+            "navigation",
+            f"{name}/{layout}/{method}",
+            {"warehouse": name, "layout": layout, "method": method, **samples},
+        )
+        for name in maps
+        for layout in LAYOUTS
+        for method in METHODS
+        if (name, layout, method) not in UNFINISHED
+    ]
+    for world in OTHERS[: 1 if settings.quick else None]:
+        for method in METHODS:
+            parameters = {"world": world.name, "method": method, **samples}
+            found.append(Unit("navigation", f"{world.name}/{method}", parameters))
+    return found
+
+
+def run(unit: Unit, settings: Settings) -> Result:
+    """Measure the success rates of plans and sentences, exactly and in random trials."""
+    asked, seed = unit.parameters, settings.seed
+    if "world" in asked:
+        candidates, language = language_for(WORLDS[asked["world"]], asked["method"], seed)
+        trials = subaction_trials(candidates, language)
+    else:
+        world, rows, columns = WAREHOUSES[asked["warehouse"]]
+        every = deliveries(rows, columns, asked["layout"])
+        candidates, language = language_for(world, asked["method"], seed, listed_tasks(every))
+        trials = warehouse_trials(candidates, language, every)
+    # The same draws for every language.
+    random = Random(f"{seed} {unit.key.rsplit('/', 1)[0]}")
+    return {
+        "words": len(language.words),
+        "trials": len(trials.trials),
+        "exact": trials.exact(),
+        "few": trials.sample(settings.samples, random),
+        "many": trials.sample(100 * settings.samples, random),
+    }
+
+
+def section(records: Sequence[Record]) -> Section:
+    """Render the success rates by map and method, and those on other domains."""
+    mine = [record for record in records if "warehouse" in record.parameters]
+    others = [record for record in records if "world" in record.parameters]
+    blocks: list[str | Figure] = [_DEFINITION]
+    for layout in LAYOUTS:
+        here = [record for record in mine if record.parameters["layout"] == layout]
+        if here:
+            alt = (
+                f"Success rates of deliveries {layout} the warehouse under an agreed plan and "
+                "under sentences, by map"
+            )
+            figure = Figure(f"navigation-{layout}", alt, partial(_figure, here))
+            blocks += [f"Deliveries {layout} the warehouse:", _table(here), figure]
+    if others:
+        blocks += [_OTHERS, _table(others)]
+    return Section(blocks, _differences(mine))
+
+
+_DEFINITION = """\
+Two robots on a map whose corners are storage (S1, S2, left) and dispatch (D1, D2, right). They
+start in random corners; robot i fetches at Si and brings to Di, or the other way round. These
+are two tasks one after the other, and the robots agree on both beforehand. Then a human is
+detected in a random cell that is no corner, and stays. The agreed plan fails if a robot would
+enter that cell. Under the sentence of the same plan each robot selects among its own choices
+only (those of `coordlang choices`), without observing the other robot and without further
+communication; it fails if none of its choices avoids the cell. *Exact* is over all starts,
+directions, cells and plans, where there are not too many sentences; *possible* is the rate of
+robots that agree again, on any optimal plan. In brackets 95 % intervals (Wilson). Plan and
+sentence get the same draws. The maps, their sizes and the positions of the corners are our
+choice: maps are full rectangles (*open*) or their border cells (*ring*); *across* puts D1
+opposite S1, so that the deliveries cross, *along* on the same side."""
+
+_OTHERS = """\
+Domains that are not grids. There one subaction, drawn from those that optimal plans of the task
+use, becomes impossible when execution starts. All tasks, one each:"""
+
+
+def _table(records: Sequence[Record]) -> str:
+    def name(record: Record) -> str:
+        asked = record.parameters
+        return f"{asked.get('warehouse', asked.get('world'))}, {method_of(record)}"
+
+    def exact(what: str, record: Record) -> str | None:
+        known = record.result["exact"]
+        return percent(known[what]) if known else None
+
+    def few(what: str, record: Record) -> str:
+        return f"{record.result['few'][what]} / {record.result['few']['runs']}"
+
+    def many(what: str, record: Record) -> str:
+        return share_of_runs(record.result["many"][what], record.result["many"]["runs"])
+
+    runs = f"{records[0].result['many']['runs']:,} runs"
+    columns: Columns = {
+        "words": lambda r: r.result["words"],
+        "plan": partial(few, "plan"),
+        "sentence": partial(few, "sentence"),
+        f"plan, {runs}": partial(many, "plan"),
+        f"sentence, {runs}": partial(many, "sentence"),
+        "plan, exact": partial(exact, "plan"),
+        "sentence, exact": partial(exact, "sentence"),
+        "possible": partial(exact, "possible"),
+    }
+    return table("map, language", name, columns, records)
+
+
+def _figure(records: Sequence[Record]) -> Any:
+    maps = list(dict.fromkeys(r.parameters["warehouse"] for r in records))
+    of = {(r.parameters["warehouse"], r.parameters["method"]): r.result for r in records}
+
+    def series(kind: str, label: str, method: str, what: str) -> Series:
+        points = [_point(of.get((name, method)), what) for name in maps]
+        return Series(kind, label, *zip(*points, strict=True))
+
+    shown = [series("plan", "plan", "greedy", "plan")]
+    shown += [series(m, f"sentence, {TITLES[m]}", m, "sentence") for m in METHODS]
+    few = records[0].result["few"]["runs"]
+    return by_category(maps, shown, f"success rate (%), {few} runs; line: 95 %")
+
+
+def _point(result: Result | None, what: str) -> tuple[float | None, ...]:
+    """A success rate in per cent, the ends of its interval, and the exact rate."""
+    if result is None:
+        return None, None, None, None
+    few, exact = result["few"], result["exact"]
+    return *rate(few[what], few["runs"]), 100 * exact[what] if exact else None
+
+
+def _rate(result: Result, what: str) -> float:
+    """A success rate in per cent: exact, or of many runs if it is not known."""
+    many, exact = result["many"], result["exact"]
+    return 100 * float(exact[what] if exact else many[what] / many["runs"])
+
+
+def _differences(records: Sequence[Record]) -> list[str]:
+    if not records:
+        return []
+    gains = [_rate(r.result, "sentence") - _rate(r.result, "plan") for r in records]
+    lower = [gain for gain in gains if gain < 0]
+    worse = f"and on {len(lower)} of {len(records)} it loses" if lower else "and never loses"
+    return [
+        "**Robust navigation.** The paper does not give its map and rates, so nothing can be "
+        f"compared. On our maps a sentence adds {min(gains):.1f} to {max(gains):.1f} points to the "
+        f"plan's success rate, {worse}."
+    ]
+
+
+RECIPE = Recipe("navigation", "Robust navigation: a human in the way", units, run, section)

@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What each further word buys: how often robots fail in silence, with few words, with enough."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from benchmarks.frame import markdown
+from benchmarks.paper.plots import MARKERS, Lines, Series, lines
+from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
+from benchmarks.paper.suite import CORRIDOR, OTHERS, ROWS, World
+from coordlang.building import build_language
+from coordlang.language.tolerance import percent
+from coordlang.required.divergences import required_nodes, states_on_plans
+from coordlang.required.miscoordination import Inseparable
+from coordlang.symmetry.group import symmetry_group
+from coordlang.tasks.candidates import Candidates
+from coordlang.tolerance.bits import plan_bits, sentence_bits
+from coordlang.vocabulary.few_words import few_words
+from coordlang.vocabulary.flexibility_bound import bits_bounds
+from coordlang.vocabulary.job import Assignment
+from coordlang.vocabulary.word_annealing import FewWordsSettings
+from planners.search.plan_space import PlanSpace
+
+#: Worlds besides the rows of Table 1; those of three robots last.
+WORLDS = (
+    CORRIDOR,
+    *OTHERS,
+    World("handover, 3 robots", "handover", "three-rooms"),
+    World("charger, 3 robots", "charger", "three-robots", "problem"),
+    World("push-box, 3 robots", "push-box", "three-robots", "problem"),
+    World("3x3, 3 robots", "grid", "three-robots-3x3", "problem"),
+)
+#: Words up to which the curve is drawn where no language is found before.
+_MOST = 8
+#: How long each number of words is annealed.
+_ANNEALING = FewWordsSettings(moves=15, least_moves=300, most_moves=1_000, coolings=2)
+
+
+def units(settings: Settings) -> list[Unit]:
+    """List a unit for each world."""
+    worlds = (ROWS[0], OTHERS[2]) if settings.quick else (*ROWS, *WORLDS)
+    names = ("folder", "problem", "tasks")
+    return [Unit("silence", w.name, {name: getattr(w, name) for name in names}) for w in worlds]
+
+
+def run(unit: Unit, settings: Settings) -> Result:
+    """Find the best words of each number until no robot fails."""
+    return curve(World(unit.key, **unit.parameters), settings.seed)
+
+
+def curve(world: World, seed: int, most: int = _MOST) -> Result:
+    """How often robots fail with 1, 2, .. words, at most so many, and what is said with them."""
+    candidates = world.candidates()
+    spaces = list(candidates.spaces)
+    bounds = bits_bounds(spaces, [required_nodes(space) for space in spaces])
+    return {
+        "robots": len(candidates.model.robots),
+        "tasks": candidates.count,
+        "plan_bits": round(float(plan_bits(spaces).mean()), 4),
+        "least_bits": round(float(bounds.mean()), 4),
+        "points": list(_points(candidates, spaces, seed, most)),
+    }
+
+
+def _points(
+    candidates: Candidates, spaces: Sequence[PlanSpace], seed: int, most: int
+) -> Iterator[Result]:
+    """One number of words after the other; the last is that of a coordination language."""
+    states = states_on_plans(spaces).tolist()
+    language, size = _language(candidates, states, seed)
+    symmetries = symmetry_group(candidates).permutations
+    start: Assignment | None = None
+    for words in range(1, most + 1):
+        if words == size and language is not None:
+            yield _point(candidates, spaces, language, words, 0.0, 0.0, is_best=True)
+            return
+        found = few_words(
+            spaces,
+            states,
+            len(candidates.rows),
+            words,
+            seed=seed,
+            language=language,
+            start=start,
+            symmetries=symmetries,
+            settings=_ANNEALING,
+        )
+        if found.stopped is not None:
+            raise found.stopped
+        start = found.partition
+        mean, worst = float(found.failures.mean), float(found.failures.worst)
+        yield _point(candidates, spaces, start, words, mean, worst, is_best=found.is_best)
+        if not worst:
+            return
+
+
+def _language(
+    candidates: Candidates, states: Sequence[int], seed: int
+) -> tuple[Assignment | None, int]:
+    """A language with the fewest words, as states and words, and how many words it has.
+
+    None, and 0 words, where plans are inseparable: then there is none.
+    """
+    try:
+        built = build_language(candidates, "minimal", seed=seed)
+    except Inseparable:
+        return None, 0
+    if built.stopped is not None:
+        raise built.stopped
+    word = built.language.partition(candidates.model).word_of(candidates.rows)
+    found = {state: int(word[state]) for state in states}
+    return found, len(built.language.words)
+
+
+def _point(
+    candidates: Candidates,
+    spaces: Sequence[PlanSpace],
+    partition: Assignment,
+    words: int,
+    mean: float,
+    worst: float,
+    *,
+    is_best: bool,
+) -> Result:
+    word = np.zeros(len(candidates.rows), np.int64)
+    word[list(partition)] = list(partition.values())
+    bits = sentence_bits(spaces, [word[space.state] for space in spaces])
+    return {
+        "words": words,
+        "mean": mean,
+        "worst": worst,
+        "bits": round(float(bits.mean()), 4),
+        "most_bits": round(float(bits.max()), 4),
+        "is_best": is_best,
+    }
+
+
+def section(records: Sequence[Record]) -> Section:
+    """Render the curves as a table and two figures."""
+    fails, bits = "robots fail (% of runs)", "bits of a sentence, mean"
+    both = {"mean": fails, "worst": "in the worst task (% of runs)"}
+    words_alt = "How often robots fail on average and in the worst task, by the number of words"
+    bits_alt = "How often robots fail on average over the tasks, by the bits of a sentence"
+    words = partial(_drawn, records, "words", "words", both)
+    sentences = partial(_drawn, records, "bits", bits, {"mean": fails})
+    return Section(
+        [
+            _DEFINITION,
+            _table(records),
+            Figure("silence-words", words_alt, words),
+            Figure("silence-bits", bits_alt, sentences),
+        ]
+    )
+
+
+_DEFINITION = """\
+The speaker draws one of a task's optimal plans uniformly and says its sentence; each robot then
+draws, by itself, one of the plans with that sentence. *Fail* is how often the mixture is no
+optimal plan, counted exactly: the mean over all tasks with the best words that were found, with 1
+word (silence), 2, 3 and so on, down to 0 with a coordination language; in brackets the worst task.
+An asterisk: no partition into so many words is better, for all were tried, or there is nothing to
+improve. *Bits* is the entropy of the sentence, in the mean over the tasks, with the words of the
+last column but one and of the language; *at least*: no division of the plans into sets that mix
+freely takes fewer, whatever its words; *plan*: saying which plan is meant."""
+
+
+def _table(records: Sequence[Record]) -> str:
+    most = max(len(record.result["points"]) for record in records)
+    head = ["tasks", *(f"{n + 1}" for n in range(most)), "bits", "at least", "plan"]
+    rows = []
+    for record in records:
+        r = record.result
+        points = r["points"]
+        cells: list[object] = [_fails(point) for point in points]
+        bits = [f"{point['bits']:.2f}" for point in points[-2:]]
+        rows.append(
+            [
+                record.key,
+                *cells,
+                *([None] * (most - len(cells))),
+                " / ".join(bits),
+                f"{r['least_bits']:.2f}",
+                f"{r['plan_bits']:.2f}",
+            ]
+        )
+    return markdown(head, rows)
+
+
+def _fails(point: Result) -> str:
+    mark = "*" if point["is_best"] else ""
+    if not point["worst"]:
+        return f"0{mark}"
+    return f"{percent(point['mean'])}{mark} ({percent(point['worst'])})"
+
+
+def _drawn(records: Sequence[Record], x: str, x_label: str, units: dict[str, str]) -> Any:
+    """A row for each unit, with a panel for open grids, one for rings, one for the other worlds."""
+    groups: dict[str, list[Record]] = {"open grids, all pairs": [], "rings": [], "other worlds": []}
+    for record in records:
+        ring, row = record.key.startswith("GWB"), record.key.startswith("GW")
+        groups["rings" if ring else "open grids, all pairs" if row else "other worlds"] += [record]
+    panels = []
+    for what, unit in units.items():
+        for title, here in groups.items():
+            series = [
+                Series(
+                    kind,
+                    record.key,
+                    [100 * point[what] for point in record.result["points"]],
+                    x=[point[x] for point in record.result["points"]],
+                )
+                for record, kind in zip(here, _KINDS, strict=False)
+            ]
+            panels.append(Lines(title, unit, series))
+    return lines(panels, range(1, _MOST + 1) if x == "words" else (), x_label, len(groups))
+
+
+#: One kind of series for each colour.
+_KINDS = list({hue: kind for kind, (hue, _) in MARKERS.items()}.values())
+
+RECIPE = Recipe("silence", "What each word buys: silence, few words, enough", units, run, section)

@@ -1,0 +1,353 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Robots with wheels in a simulator: what is promised of joint steps, looked at on a floor.
+
+Three experiments: tasks that require coordination, with a language and without, robots keeping step
+in three ways; deliveries with a human in the way, whom only lidars see; and the detour of the
+motivating scenario.  Each run stands beside what the joint model says of the same choices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from random import Random
+from typing import Any
+
+from benchmarks.frame import markdown
+from benchmarks.paper.driving import Said, counted, drive, is_well, said, said_of
+from benchmarks.paper.floors import FLOORS, foreign_map, tasks_of
+from benchmarks.paper.grid import task_cells
+from benchmarks.paper.recipe import Recipe, Record, Result, Section, Settings, Unit
+from benchmarks.paper.scenario import GOAL, PLACE, START, detour, drawn_task, trading_rooms
+from benchmarks.paper.suite import CORRIDOR, language_for, method_of
+from benchmarks.paper.tables import share_of_runs
+from benchmarks.paper.task_choices import TaskChoices
+from benchmarks.paper.warehouse import WAREHOUSES, deliveries, human_in, listed_tasks
+from coordlang.use.sentence.task_language import languages_in_tasks
+from coordlang.use.simulation.pace import PACES
+from coordlang.use.simulation.record import RunRecord, WishRecord
+from coordlang.use.simulation.settings import Settings as How
+from coordlang.use.simulation.simulator import require_simulator
+from coordlang.use.simulation.team import Agreement
+from planners.errors import UsageError
+from planners.search.plans import Plans
+
+#: How robots drive: by each way to keep step, and where no lidar stops who was about to collide.
+_BLIND = "clock, no lidar"
+_WAYS = {**{pace: How(step=pace) for pace in PACES}, _BLIND: How(step="clock", lidar=False)}
+#: What robots have agreed on, and how they drive then: without a sentence there is no word.
+_DRIVEN: Mapping[Agreement, Sequence[str]] = {
+    "sentence": tuple(_WAYS),
+    "nothing": tuple(way for way in _WAYS if way != "word"),
+}
+#: Warehouses, with the layout and the method of the language.
+_WAREHOUSES = (
+    ("open 3x3", "across", "minimal"),
+    ("open 3x3", "along", "minimal"),
+    ("open 4x4", "along", "greedy"),
+    ("ring 3x4", "across", "minimal"),
+)
+#: Steps that r1 has done when the place becomes interesting.
+_LEARNED = 3
+
+
+def units(settings: Settings) -> list[Unit]:
+    """List a unit for each floor and agreement, for each warehouse, and for the detour."""
+    floors = ("T-map, 2 robots", "handover, 2 robots") if settings.quick else tuple(FLOORS)
+    found: dict[str, dict[str, Any]] = {
+        name: {"world": FLOORS[name].world.name, "floor": name} for name in floors
+    }
+    for name, layout, method in _WAREHOUSES[: 1 if settings.quick else None]:
+        parameters = {"warehouse": name, "layout": layout, "method": method}
+        found[f"{name}/{layout}/{method}"] = parameters
+    if not settings.quick:
+        found["detour"] = {"detour": PLACE}
+    runs = {"runs": settings.samples}
+    return [Unit("simulation", key, {**own, **runs}) for key, own in found.items()]
+
+
+def run(unit: Unit, settings: Settings) -> Result:
+    """Run what a unit says; ``absent`` names what there is not, if there is something."""
+    try:
+        require_simulator()
+    except UsageError:
+        return {"absent": "the package ir-sim"}
+    if "floor" in unit.parameters:
+        return _run_floor(unit, settings)
+    if "warehouse" in unit.parameters:
+        return _run_warehouse(unit, settings)
+    return _run_detour(unit, settings)
+
+
+def _run_floor(unit: Unit, settings: Settings) -> Result:
+    """Draw tasks that require coordination; run each with every way to keep step."""
+    floor = FLOORS[unit.parameters["floor"]]
+    if floor.foreign and not foreign_map(floor).is_file():
+        return {"absent": f"the map {floor.foreign}"}
+    language, tasks = tasks_of(floor, settings.seed)
+    found: dict[Agreement, dict[str, list[RunRecord]]] = {
+        agreement: {way: [] for way in ways} for agreement, ways in _DRIVEN.items()
+    }
+    for number in range(unit.parameters["runs"]):
+        random = Random(f"{settings.seed} {floor.key} {number}")
+        one = said(tasks[random.randrange(len(tasks))], random)
+        for agreement, by_way in found.items():
+            prepared = one.mission(agreement)
+            for way, runs in by_way.items():
+                runs.append(drive(prepared, _WAYS[way], number, dict(floor.known)))
+    return {
+        "words": len(language.words),
+        "method": "greedy" if floor.draws else "minimal",
+        "tasks": len(tasks),
+        **{
+            agreement: {way: counted(runs) for way, runs in by_way.items()}
+            for agreement, by_way in found.items()
+        },
+    }
+
+
+def _run_warehouse(unit: Unit, settings: Settings) -> Result:
+    """Draw tasks and where a human stands; run each with the plan, and with its sentence."""
+    parameters = unit.parameters
+    world, rows, columns = WAREHOUSES[parameters["warehouse"]]
+    listed = listed_tasks(deliveries(rows, columns, parameters["layout"]))
+    candidates, language = language_for(world, parameters["method"], settings.seed, listed)
+    tasks = list(languages_in_tasks(language, candidates))
+    choices = TaskChoices(tasks[0])
+    corners = {cell for used in tasks for cell in task_cells(used.space, used.task)[0]}
+    cells = sorted({atom.args[1] for atom in candidates.model.codec.facts.atoms} - corners)
+    found: dict[str, list[list[bool]]] = {"plan": [], "sentence": []}
+    touched = dict.fromkeys(found, 0)
+    for number in range(parameters["runs"]):
+        random = Random(f"{settings.seed} {unit.key} {number}")
+        used = tasks[random.randrange(len(tasks))]
+        human = random.choice(cells)
+        together = Said(used, (), ()).mission("plan")
+        one = said_of(used, together.agreed_plan(number))
+        forbidden = human_in(candidates.model, human)
+        model_says = {
+            "plan": not forbidden.breaks(one.plan),
+            "sentence": choices.succeeds(used.task, one.words, forbidden),
+        }
+        for agreement, prepared in (("plan", together), ("sentence", one.mission("sentence"))):
+            record = drive(prepared, How(human=human), number)
+            found[agreement].append([is_well(record), model_says[agreement]])
+            touched[agreement] += record.collisions > 0
+    return {
+        "words": len(language.words),
+        "tasks": len(tasks),
+        **{
+            agreement: {
+                "runs": len(pairs),
+                "well": sum(well for well, _ in pairs),
+                "collisions": touched[agreement],
+                "model": sum(says for _, says in pairs),
+                "model_only": sum(says and not well for well, says in pairs),
+                "floor_only": sum(well and not says for well, says in pairs),
+            }
+            for agreement, pairs in found.items()
+        },
+    }
+
+
+def _run_detour(unit: Unit, settings: Settings) -> Result:
+    """Let the place become interesting when r1 has done some steps; r2 is not informed."""
+    candidates, language = language_for(CORRIDOR, "minimal", settings.seed, trading_rooms())
+    used = drawn_task(list(languages_in_tasks(language, candidates)))
+    first = next(iter(Plans.of(used.space, used.task)))
+    prepared = said_of(used, first).mission("sentence")
+    wish = WishRecord("r1", _LEARNED, prepared.atom_at("r1", PLACE))
+    found: Result = {"words": len(language.words), "known": detour(used), "steps": prepared.steps}
+    for pace in PACES:
+        pairs = [
+            (drive(prepared, How(step=pace), n), drive(prepared, How(step=pace), n, wishes=[wish]))
+            for n in range(unit.parameters["runs"])
+        ]
+        found[pace] = {
+            "runs": len(pairs),
+            "granted": sum(
+                event.granted is True for _, with_wish in pairs for event in with_wish.events
+            ),
+            "by_chance": sum(_passes(without) for without, _ in pairs),
+            "passed": sum(_passes(with_wish) for _, with_wish in pairs),
+            "other_same": sum(
+                without.subplans["r2"] == with_wish.subplans["r2"] for without, with_wish in pairs
+            ),
+            "well": sum(is_well(with_wish) for _, with_wish in pairs),
+            "collisions": sum(with_wish.collisions > 0 for _, with_wish in pairs),
+            "messages": [
+                sum(one.messages for one in column) for column in zip(*pairs, strict=True)
+            ],
+        }
+    return found
+
+
+def _passes(found: RunRecord) -> bool:
+    """Say whether r1 was in the place of interest."""
+    return any(
+        step.robot == "r1" and step.place == PLACE and step.end is not None for step in found.steps
+    )
+
+
+def section(records: Sequence[Record]) -> Section:
+    """Render the tables, and where robots with wheels and joint steps disagree."""
+    found = [record for record in records if "absent" not in record.result]
+    floors = [record for record in found if "floor" in record.parameters]
+    warehouses = [record for record in found if "warehouse" in record.parameters]
+    blocks = [_DEFINITION]
+    if floors:
+        blocks += [_FLOORS, _floor_table(floors), *_ends(floors), _computed(floors)]
+    if warehouses:
+        blocks += [_HUMAN, _human_table(warehouses)]
+    blocks += [_detour_text(record) for record in found if "detour" in record.parameters]
+    blocks += [
+        f"Not run: {record.key}, for want of {record.result['absent']}."
+        for record in records
+        if "absent" in record.result
+    ]
+    return Section(blocks)
+
+
+_DEFINITION = """\
+Discs of 0.2 m with two driven wheels, in cells of 1 m, in ir-sim: `coordlang simulate`. What their
+wheels do has 10 % noise; where they believe to be is right but for a standard deviation of 1 cm and
+0.01 rad. Lidars look all around; robots stop for what is ahead. Every robot has logic of its own:
+it knows the task, the language and the sentence, and draws uniformly among its own choices. A
+*clock* begins each joint step at the same time for all; a *barrier* opens when all have told that
+they have done the step before; with barriers before *words* only, robots run freely within a word.
+A run ends well if all arrive in time and nobody touches anything."""
+
+_FLOORS = """\
+Tasks that require coordination, drawn uniformly, on shipped maps and on a maze of others (read, not
+shipped). *Sentence*: that of a plan drawn uniformly. *Nothing*: each robot follows an optimal plan
+of its own. *No lidar*: nothing stops robots that are about to collide. *Joint model*: runs in which
+the robots' own subplans, done in step, are an optimal plan: what joint steps promise. *Agree*: runs
+that end well exactly if they are. *Late*: runs, and how many joint steps together, where a joint
+step is a period of the clock, in which the longest way takes its time: who keeps step in another
+way has some to spare. *Messages* and simulated *seconds* are of one run on average, *nearest* is
+the least distance of two robots' middles in metres over all runs; discs touch at 0.4 m. The
+simulator moves robots and nothing else: that they stand at different doors of *handover* is seen by
+the joint model alone, so that its runs that end well are no evidence, with nothing agreed."""
+
+_HUMAN = """\
+A human stands in a cell that is no corner, drawn uniformly, and only lidars see that, up to two
+cells away. The tasks are the legs of deliveries, as in the section on navigation, drawn uniformly,
+with the same plan for *plan* and *sentence*, by the clock. *Floor*: runs that end well, of robots
+with wheels; a robot that sees the human asks its choices (`coordlang.use` monitor) for a way that
+avoids the cell. *Joint model*: the same tasks, plans and cells in joint steps, where all know of
+the human before they start. In brackets 95 % intervals (Wilson). *Only there*: runs that end well
+in the joint model and not on the floor; *only here*: the other way round."""
+
+
+def _floor_table(floors: Sequence[Record]) -> str:
+    rows: list[list[object]] = []
+    for record in floors:
+        for agreement, ways in _DRIVEN.items():
+            for way in ways:
+                r = record.result[agreement][way]
+                row: list[object] = [f"{record.parameters['floor']}, {agreement}, {way}"]
+                row.append(record.result["words"] if agreement == "sentence" else None)
+                row += [r["well"], r["collisions"], r["deadlocks"]]
+                row.append(f"{r['late']} ({r['late_steps']})" if r["late"] else 0)
+                row += [f"{r[what] / r['runs']:.1f}" for what in ("messages", "seconds")]
+                row.append(None if r["nearest"] is None else f"{r['nearest']:.2f}")
+                rows.append([*row, r["mixes"], r["agree"]])
+    head = (
+        f"floor, agreed, step; {floors[0].parameters['runs']} runs each",
+        *("words", "well", "collisions", "deadlocks", "late", "messages", "seconds", "nearest"),
+        *("joint model", "agree"),
+    )
+    return markdown(head, rows)
+
+
+def _computed(floors: Sequence[Record]) -> str:
+    """How many seconds of processor time a run takes on each floor."""
+    ways = sum(map(len, _DRIVEN.values()))
+    told = (
+        f"{record.parameters['floor']} {record.cpu / record.parameters['runs'] / ways:.2f}"
+        for record in floors
+    )
+    return f"Seconds of processor time for a run, with the search for tasks: {', '.join(told)}."
+
+
+def _ends(floors: Sequence[Record]) -> list[str]:
+    """How runs ended, by what was agreed and way by way."""
+    found = []
+    for way in _WAYS:
+        text = f"**With a sentence, {_KEPT[way]}**: {_summed(floors, 'sentence', way)}."
+        found.append(f"{text} {_WORDS}" if way == "word" else text)
+    told = (f"{_KEPT[way]} {_summed(floors, 'nothing', way)}" for way in _DRIVEN["nothing"])
+    return [*found, f"**With nothing agreed**: {'; '.join(told)}."]
+
+
+def _summed(floors: Sequence[Record], agreement: Agreement, way: str) -> str:
+    results = [record.result[agreement][way] for record in floors]
+    runs, well, touched, agree = (
+        sum(result[what] for result in results) for what in ("runs", "well", "collisions", "agree")
+    )
+    return (
+        f"{well:,} of {runs:,} runs end well, {touched:,} with a collision; {agree:,} end as the "
+        "joint model says"
+    )
+
+
+_WORDS = (
+    "The sentence promises that mixtures of joint steps are plans, and within a word nobody is in "
+    "step: who rests or turns less is ahead of the others, and meets them where they are only to "
+    "be when it has gone, or the other way round."
+)
+_KEPT = {
+    "clock": "by a common clock",
+    "barrier": "with a barrier before each step",
+    "word": "with a barrier before each word only",
+    _BLIND: "by a common clock and without a lidar",
+}
+
+
+def _human_table(warehouses: Sequence[Record]) -> str:
+    rows: list[list[object]] = []
+    for record in warehouses:
+        name = (
+            f"{record.parameters['warehouse']}, {record.parameters['layout']}, {method_of(record)}"
+        )
+        for agreement in ("plan", "sentence"):
+            r = record.result[agreement]
+            words = record.result["words"] if agreement == "sentence" else None
+            shares = [share_of_runs(r[what], r["runs"]) for what in ("well", "model")]
+            counts = [r[what] for what in ("model_only", "floor_only", "collisions")]
+            rows.append([f"{name}: {agreement}", words, *shares, *counts])
+    head = (
+        f"map, layout, language: agreed; {warehouses[0].result['plan']['runs']} runs each",
+        *("words", "floor", "joint model", "only there", "only here", "collisions"),
+    )
+    return markdown(head, rows)
+
+
+def _detour_text(record: Record) -> str:
+    result = record.result
+    known = result["known"]
+    counts = ("runs", "by_chance", "granted", "passed", "other_same", "well", "collisions")
+    rows = [
+        [
+            pace,
+            *(result[pace][what] for what in counts),
+            *(f"{total / result[pace]['runs']:.1f}" for total in result[pace]["messages"]),
+        ]
+        for pace in PACES
+    ]
+    head = (
+        *("step", "runs", "passed without the wish", "granted", "passed", "r2 does the same"),
+        *("well", "collisions", "messages without the wish", "messages"),
+    )
+    return (
+        f"The motivating scenario: r1 drives from {START[0]} to {GOAL[0]} and r2 from {START[1]} "
+        f"to {GOAL[1]} through the corridor, {result['steps']} joint steps, under the sentence "
+        f"`{' '.join(known['sentence'])}` of {result['words']} words. When r1 has done {_LEARNED} "
+        f"steps, {PLACE} becomes a place of interest, and only r1 learns of it: it asks its "
+        "choices for a way through it. Each run stands beside the run with the same seed in which "
+        "nothing becomes interesting; *r2 does the same* if its subactions are the same in "
+        f"both. In joint steps {known['ways']} of the {known['parts']} parts of r1 through {PLACE} "
+        "are open under the sentence, whatever r2 does.\n\n" + markdown(head, rows)
+    )
+
+
+RECIPE = Recipe("simulation", "Simulation: robots with wheels", units, run, section)

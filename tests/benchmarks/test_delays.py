@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Robots that are late: without delays the known results, and delays done by hand."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import replace
+from fractions import Fraction
+from itertools import combinations, product
+from random import Random
+
+import numpy as np
+import pytest
+
+from benchmarks.paper import delays
+from benchmarks.paper.late_robots import DelayTrials, Execution, Part
+from benchmarks.paper.recipe import Record, Settings
+from benchmarks.paper.suite import WORLDS, language_for
+from benchmarks.paper.task_choices import sentence_of
+from coordlang.tolerance.failure import failure_probability
+from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
+from planners.joint.model import JointModel, PlanningTask
+from planners.loading import load
+from planners.search.optimal_plans import search
+from planners.search.plans import Plan, Plans
+from planners.tables import Rows
+from tests.support.domains import DOMAINS
+
+
+def languages(said: str) -> list[TaskLanguage]:
+    candidates, language = language_for(WORLDS["GW1"], said, 0)
+    return list(languages_in_tasks(language, candidates))
+
+
+def failing_share(trials: DelayTrials, number: int, used: TaskLanguage) -> Fraction:
+    """How often a task's runs without delays fail, by trying all plans with each sentence."""
+    plans = Plans(used.space, used.start, Plans.of(used.space).counted)
+    by_sentence = defaultdict(list)
+    for plan in plans:
+        by_sentence[sentence_of(used, plan)].append(plan)
+    robots = len(used.model.robots)
+    execution = Execution(used.model)
+    share = Fraction(0)
+    for open_plans in by_sentence.values():
+        good = 0
+        for chosen in product(open_plans, repeat=robots):
+            parts = [execution.part_of(plan, robot) for robot, plan in enumerate(chosen)]
+            late = trials.lateness(number, parts, 0.0, False, Random(0))
+            good += late is not None and late <= used.model.slack
+        every = len(open_plans) ** robots
+        share += Fraction(len(open_plans), plans.count) * (1 - Fraction(good, every))
+    return share
+
+
+@pytest.mark.parametrize("said", ["minimal", "few"])
+def test_without_delays_the_exact_failure_probability(said: str) -> None:
+    used = languages(said)
+    trials = DelayTrials(used)
+    shares = [failing_share(trials, number, one) for number, one in enumerate(used)]
+    exact = failure_probability([used[0].space], [used[0].word])
+    assert sum(shares) / len(shares) == exact.mean
+    assert max(shares) == exact.worst
+    assert (exact.mean == 0) == (said == "minimal")
+
+
+def test_without_delays_plans_and_coordination_languages_never_fail() -> None:
+    for said in ("minimal", "slack"):
+        used = languages(said)
+        for together in (False, True):
+            for yields in (False, True):
+                trials = DelayTrials(used, together=together)
+                runs, well, late = trials.sample(0.0, yields, 20, Random(1))
+                assert well == runs
+                assert late <= runs * used[0].model.slack
+
+
+@pytest.mark.thorough
+def test_silence_within_slack_fails_as_often_as_counted() -> None:
+    used = [replace(one, word=np.zeros(len(one.space), np.int64)) for one in languages("slack")]
+    trials = DelayTrials(used)
+    space = used[0].space
+    for number in (3, 40):
+        alone = space.with_tasks(space.starts[[number]], space.second[[number]])
+        exact = failure_probability([alone], [None])
+        assert failing_share(trials, number, used[number]) == exact.mean
+
+
+def swap() -> tuple[Execution, PlanningTask, list[list[tuple[int, ...]]]]:
+    """The three cells: the four plans of the task in which the robots change places."""
+    loaded = load(
+        DOMAINS / "three-cells" / "domain.pddl", [DOMAINS / "three-cells" / "problem.pddl"]
+    )
+    execution = Execution(loaded.model)
+    text = ["(move r1 a c)", "(move r1 c b)"], ["(move r2 b a)"]
+    parts = [
+        [loaded.model.labels[robot].index(label) for label in own] for robot, own in enumerate(text)
+    ]
+    return execution, loaded.tasks[0], [[tuple(own) for own in parts]]
+
+
+class Script(Random):
+    """Draws that are given: below the probability means a delay."""
+
+    def __init__(self, *draws: float) -> None:
+        super().__init__(0)
+        self.left = list(draws)
+
+    def random(self) -> float:
+        return self.left.pop(0) if self.left else 1.0
+
+
+def test_a_delay_by_hand() -> None:
+    """r1 goes a c b and r2 goes b a.  If r2 is late by a step, all is well; if r1 is, r2 runs into
+    it, unless it yields.
+    """
+    execution, task, [parts] = swap()
+    rest = (0, parts[1][0])  # r2 waits first, as in plan 1
+    in_step = execution.run(task.init, [parts[0], rest], 0.5, False, Script())
+    assert in_step is not None
+    assert in_step[1] == 2
+    late = execution.run(task.init, [parts[0], rest], 0.5, False, Script(1.0, 1.0, 1.0, 0.0))
+    assert late is None  # r1 moves to b, where r2 still is
+    yields = execution.run(task.init, [parts[0], rest], 0.5, True, Script(1.0, 1.0, 1.0, 0.0))
+    assert yields is not None
+    assert yields[1] == 3
+    # r1 is late: r2 has not gone yet when it rests; then both go on in step, one step later.
+    first = execution.run(task.init, [parts[0], parts[1]], 0.5, False, Script(0.0, 1.0))
+    assert first is None  # r2 moves to a, where r1 still is
+
+
+def fails_late(model: JointModel, task: PlanningTask, plan: Plan, most: int) -> bool:
+    """Whether a plan fails in some run in which each robot is delayed at most so many steps."""
+    execution = Execution(model)
+    parts = [execution.part_of(plan, robot) for robot in range(len(model.robots))]
+    steps = range(len(plan) + most * len(parts))
+    for late in product(*(combinations(steps, most) for _ in parts)):
+        found = _with_delays(execution, task.init, parts, late)
+        if found is None or not model.holds(task.goal, found[None, :])[0]:
+            return True
+    return False
+
+
+def _with_delays(
+    execution: Execution, init: Rows, parts: list[Part], late: tuple[tuple[int, ...], ...]
+) -> Rows | None:
+    """The state at the end, where robot i is delayed in the joint steps ``late[i]``."""
+    done, state, step = [0] * len(parts), init, 0
+    while any(n < len(part) for n, part in zip(done, parts, strict=True)):
+        now = [
+            (part[n],) if n < len(part) and step not in late[robot] else ()
+            for robot, (n, part) in enumerate(zip(done, parts, strict=True))
+        ]
+        ended = execution.run(state, now, 0.0, False, Random(0)) if any(now) else (state, 1)
+        if ended is None:
+            return None
+        state = ended[0]
+        done = [n + len(own) for n, own in zip(done, now, strict=True)]
+        step += 1
+    return state
+
+
+def test_no_plan_of_a_swap_on_the_three_cells_survives_one_delay() -> None:
+    """So by Proposition 27 no language is 1-delay-robust there."""
+    loaded = load(
+        DOMAINS / "three-cells" / "domain.pddl", [DOMAINS / "three-cells" / "problem.pddl"]
+    )
+    plans = list(Plans.of(search(loaded.model, loaded.tasks[0])))
+    assert len(plans) == 4
+    assert all(fails_late(loaded.model, loaded.tasks[0], plan, 1) for plan in plans)
+    assert not any(fails_late(loaded.model, loaded.tasks[0], plan, 0) for plan in plans)
+
+
+def test_robots_that_wait_for_each_other_for_ever_fail() -> None:
+    execution, task, [_parts] = swap()
+    other = tuple(execution._model.labels[0].index(text) for text in ["(move r1 a b)"])
+    back = tuple(execution._model.labels[1].index(text) for text in ["(move r2 b a)"])
+    # Each is in the other's way, and swapping is no joint step.
+    assert execution.run(task.init, [other, back], 0.0, True, Random(0)) is None
+    assert execution.run(task.init, [other, back], 0.5, True, Random(0)) is None
+
+
+def test_units_are_reproducible_and_the_section_shows_them() -> None:
+    settings = Settings(samples=1, quick=True)
+    units = [unit for unit in delays.units(settings) if unit.parameters["world"] == "GW1"][:2]
+    results = [delays.run(unit, settings) for unit in units]
+    assert results[0] == delays.run(units[0], settings)
+    records = [
+        Record(unit.key, unit.parameters, "done", result)
+        for unit, result in zip(units, results, strict=True)
+    ]
+    section = delays.section(records)
+    text = "".join(block for block in section.blocks if isinstance(block, str))
+    assert "GW1, 132 tasks" in text
+    assert "100.0 (+0.00)" in text
+    assert [figure.name for figure in section.figures] == ["delays-GW1"]
+    section.figures[0].draw()

@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Success rates under disruptions: against listed plans, robot by robot."""
+
+from __future__ import annotations
+
+from random import Random
+
+import pytest
+
+from benchmarks.paper.disruptions import (
+    Trial,
+    Trials,
+    subaction_trials,
+    success_rates,
+    warehouse_trials,
+)
+from benchmarks.paper.scenario import subplans
+from benchmarks.paper.suite import language_for
+from benchmarks.paper.task_choices import Disruption, TaskChoices
+from benchmarks.paper.warehouse import LAYOUTS, WAREHOUSES, deliveries, human_in, listed_tasks
+from coordlang.tolerance.sampled import wilson
+from coordlang.use.sentence.task_language import TaskLanguage
+from planners.search.plans import Plan
+from tests.support import naive
+from tests.support.domains import all_tasks
+from tests.support.task_languages import task_languages, three_cells
+
+
+def groups(one: TaskLanguage) -> dict[tuple[int, ...], list[Plan]]:
+    """The plans of each sentence."""
+    of_state = dict(zip(one.space.state.tolist(), one.word.tolist(), strict=True))
+    found: dict[tuple[int, ...], list[Plan]] = {}
+    for plan in naive.listed(one.space, one.task, 10_000):
+        found.setdefault(
+            naive.sentence([of_state[s] for s in naive.states(one.space, one.task, plan)]), []
+        ).append(plan)
+    return found
+
+
+def succeed(plans: list[Plan], disruption: Disruption) -> bool:
+    """Every robot by itself has a part without anything forbidden."""
+    return all(
+        any(not {step[robot] for step in plan} & forbidden for plan in plans)
+        for robot, forbidden in enumerate(disruption.forbidden)
+    )
+
+
+def random_disruption(one: TaskLanguage, random: Random) -> Disruption:
+    labels = [range(1, len(own)) for own in one.model.labels]
+    return Disruption(
+        str(random.random()),
+        tuple(frozenset(random.sample(own, random.randint(0, 2))) for own in labels),
+    )
+
+
+@pytest.mark.parametrize(
+    ("folder", "stem"), [("grid", "gw2-2x3"), ("tray", "serve"), ("t-map", "problem")]
+)
+def test_against_listed_plans(folder: str, stem: str) -> None:
+    random = Random(5)
+    tasks = task_languages(folder, stem)
+    choices = TaskChoices(tasks[0])
+    disruptions = [random_disruption(tasks[0], random) for _ in range(8)]
+    rates = success_rates(tasks[0].space, tasks[0].word, disruptions)
+    told = set()
+    for one in random.sample(tasks, 25):
+        said = groups(one)
+        total = sum(map(len, said.values()))
+        for disruption, exact in zip(disruptions, rates[one.task], strict=True):
+            lives = {words: succeed(plans, disruption) for words, plans in said.items()}
+            assert lives == {words: choices.succeeds(one.task, words, disruption) for words in said}
+            assert exact.sentence == pytest.approx(
+                sum(len(said[w]) for w, yes in lives.items() if yes) / total
+            )
+            alone = sum(not disruption.breaks(plan) for plans in said.values() for plan in plans)
+            assert exact.plan == pytest.approx(alone / total)
+            assert exact.possible == (alone > 0)
+            assert exact.plan <= exact.sentence <= exact.possible
+            told |= {exact.plan < exact.sentence, exact.sentence < exact.possible, exact.possible}
+    assert told == {True, False}
+
+
+def test_three_cells_by_hand() -> None:
+    """Whoever does not wait passes c: a human in c stops every plan.  r1 goes from a to b in two of
+    the four plans.
+    """
+    one = three_cells()
+    labels = one.model.labels[0]
+    forbidden = frozenset([labels.index("(move r1 a b)")])
+    disruptions = [human_in(one.model, "c"), Disruption("a b", (forbidden, frozenset()))]
+    [[in_c, in_ab]] = success_rates(one.space, one.word, disruptions)
+    assert (in_c.plan, in_c.sentence, in_c.possible) == (0, 0, False)
+    # Under b c a r1 goes straight in both plans, under b a it goes through c in both: nothing to
+    # choose from.
+    assert (in_ab.plan, in_ab.sentence, in_ab.possible) == (0.5, 0.5, True)
+    assert TaskChoices(one).succeeds(0, (1, 0), disruptions[1])
+    assert not TaskChoices(one).succeeds(0, (1, 2, 0), disruptions[1])
+
+
+def test_plans_are_drawn_with_their_sentences() -> None:
+    one = task_languages("grid", "gw2-2x3")[100]
+    choices, said = TaskChoices(one), groups(one)
+    random = Random(2)
+    for _ in range(50):
+        plan, words = choices.draw(one.task, random)
+        assert plan in said[words]
+    first, words = choices.first(one.task)
+    assert first == naive.listed(one.space, one.task, 10_000)[0]
+    assert first in said[words]
+
+
+def test_optimal_choices_are_the_parts_of_all_plans() -> None:
+    one = task_languages("grid", "gw2-2x3")[50]
+    plans = naive.listed(one.space, one.task, 10_000)
+    for robot in range(2):
+        parts = {tuple(step[robot] for step in plan) for plan in plans}
+        assert sorted(subplans(TaskChoices(one).optimal_choices(one.task, robot))) == sorted(parts)
+
+
+def test_deliveries() -> None:
+    for rows, columns in ((3, 3), (3, 5)):
+        for layout in LAYOUTS:
+            every = deliveries(rows, columns, layout)
+            assert len(every) == len(set(every)) == 48
+            for one in every:
+                distances = {
+                    abs(int(a[1]) - int(b[1])) + abs(int(a[3]) - int(b[3]))
+                    for a, b in zip(one.fetch, one.bring, strict=True)
+                }
+                assert distances == {columns - 1 + (rows - 1 if layout == "across" else 0)}
+                assert one.legs[-1] == (one.fetch, one.bring)
+            # 12 starts times 4 places to fetch, less 4 that are there already; bringing is among
+            # these.
+            assert len(listed_tasks(every)) == 44
+
+
+def test_a_warehouse_by_enumeration() -> None:
+    """Success rates of the smallest warehouse: every delivery, cell and pair of plans looked at."""
+    world, rows, columns = WAREHOUSES["open 3x3"]
+    every = deliveries(rows, columns, "along")
+    candidates, language = language_for(world, "greedy", 0, listed_tasks(every))
+    trials = warehouse_trials(candidates, language, every)
+    assert len(trials.trials) == 48 * 5
+    base = trials.choices.language
+    plan, sentence = 0.0, 0.0
+    said = {}
+    for trial in trials.trials:
+        disruption, by_plan, by_sentence = trials.disruptions[trial.disruption], 1.0, 1.0
+        for task in trial.tasks:
+            if task not in said:
+                said[task] = groups(
+                    TaskLanguage(language, base.partition, base.space, task, base.word, True)
+                )
+            found = said[task]
+            total = sum(map(len, found.values()))
+            by_plan *= (
+                sum(not disruption.breaks(p) for plans in found.values() for p in plans) / total
+            )
+            by_sentence *= (
+                sum(len(plans) for plans in found.values() if succeed(plans, disruption)) / total
+            )
+        plan, sentence = plan + by_plan, sentence + by_sentence
+    exact = trials.exact()
+    assert exact is not None
+    assert exact["plan"] == pytest.approx(plan / len(trials.trials), abs=1e-6)
+    assert exact["sentence"] == pytest.approx(sentence / len(trials.trials), abs=1e-6)
+    drawn = trials.sample(2000, Random(3))
+    for what in ("plan", "sentence"):
+        low, high = wilson(drawn[what], drawn["runs"])
+        assert low < exact[what] < high
+
+
+def test_subactions_that_fail_are_needed_by_some_plan() -> None:
+    candidates = all_tasks("tray", "serve")
+    language = task_languages("tray", "serve")[0].language
+    trials = subaction_trials(candidates, language)
+    by_task: dict[int, set[str]] = {}
+    for trial in trials.trials:
+        by_task.setdefault(trial.tasks[0], set()).add(trials.disruptions[trial.disruption].name)
+    model, space = candidates.model, trials.choices.space
+    for task in Random(0).sample(range(len(space.starts)), 30):
+        used = {
+            (robot, label)
+            for plan in naive.listed(space, task, 1000)
+            for step in plan
+            for robot, label in enumerate(step)
+            if label
+        }
+        names = {f"{model.robots[r]} {model.labels[r][n]}" for r, n in used}
+        assert by_task.get(task, set()) == names
+
+
+def test_a_plan_succeeds_without_what_it_does_not_need() -> None:
+    one = three_cells()
+    nobody = Disruption("nothing", (frozenset(), frozenset()))
+    trials = Trials(
+        TaskChoices(one), (nobody, human_in(one.model, "c")), (Trial((0,), 0), Trial((0,), 1))
+    )
+    assert trials.exact() == {"plan": 0.5, "sentence": 0.5, "possible": 0.5}
+    runs = trials.sample(200, Random(0))
+    assert runs["plan"] == runs["sentence"]
+    assert 70 < runs["plan"] < 130

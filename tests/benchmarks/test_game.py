@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The coordination game: closed forms against all games played out."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import combinations, permutations
+from random import Random
+from statistics import fmean
+
+import pytest
+
+from benchmarks.paper.game import (
+    expected_for_plans,
+    expected_for_sentences,
+    expected_widest_first,
+    play,
+)
+
+
+def all_games(sizes: tuple[int, ...], liked: int) -> tuple[Fraction, Fraction, Fraction]:
+    """Mean proposals over all liked sets and all orders, by definition."""
+    owner = [s for s, n in enumerate(sizes) for _ in range(n)]
+    widest = sorted(range(len(sizes)), key=lambda s: -sizes[s])
+    by_plan, by_sentence, by_width = [], [], []
+    for likes in combinations(range(len(owner)), liked):
+        accepted = {owner[p] for p in likes}
+        by_plan += [
+            1 + next(n for n, p in enumerate(order) if p in likes)
+            for order in permutations(range(len(owner)))
+        ]
+        orders = permutations(range(len(sizes)))
+        by_sentence += [
+            1 + next(n for n, s in enumerate(order) if s in accepted) for order in orders
+        ]
+        by_width.append(1 + next(n for n, s in enumerate(widest) if s in accepted))
+    return (
+        Fraction(sum(by_plan), len(by_plan)),
+        Fraction(sum(by_sentence), len(by_sentence)),
+        Fraction(sum(by_width), len(by_width)),
+    )
+
+
+@pytest.mark.parametrize("sizes", [(1,), (3,), (2, 2), (3, 2, 1), (1, 1, 1, 1), (4, 1, 1)])
+def test_expectations(sizes: tuple[int, ...]) -> None:
+    for liked in range(1, sum(sizes) + 1):
+        ours = (
+            expected_for_plans(sum(sizes), liked),
+            expected_for_sentences(sizes, liked),
+            expected_widest_first(sizes, liked),
+        )
+        assert ours == all_games(sizes, liked)
+
+
+def test_three_cells_by_hand() -> None:
+    """Two sentences of two plans each."""
+    assert expected_for_plans(4, 1) == Fraction(5, 2)
+    assert expected_for_sentences((2, 2), 1) == Fraction(3, 2)
+    # Two liked plans are in one sentence in 2 of 6 cases, else in both.
+    assert expected_for_sentences((2, 2), 2) == Fraction(2, 6) * Fraction(3, 2) + Fraction(4, 6)
+
+
+def test_games_played() -> None:
+    random = Random(1)
+    games = [play((3, 2, 1), 2, random) for _ in range(4000)]
+    for what, expected in enumerate(
+        (expected_for_plans(6, 2), expected_for_sentences((3, 2, 1), 2))
+    ):
+        assert fmean(game[what] for game in games) == pytest.approx(float(expected), rel=0.05)
+    assert play((1,), 5, random) == (1, 1)  # it likes all there are

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sentences, savings and open plans: by hand on three cells, and against listed plans."""
+
+from __future__ import annotations
+
+from collections import Counter
+from fractions import Fraction
+from random import Random
+
+import numpy as np
+import pytest
+
+from benchmarks.paper import communication, flexibility
+from benchmarks.paper.sentences import SentenceStatistics, task_statistics
+from benchmarks.paper.state_orders import SYSTEMATIC, greedy_partitions, systematic_orders
+from benchmarks.paper.table1 import find_by_brute_force, pairs_of_plans
+from coordlang.language.flexibility import flexibility as measured
+from coordlang.language.partition import Partition
+from coordlang.language.sentences import sentence_counts
+from coordlang.required.divergences import states_on_plans
+from coordlang.tolerance.sampled import wilson
+from coordlang.verification.by_definition import verify
+from planners.errors import OutOfMemory
+from tests.support import naive
+from tests.support.domains import all_tasks
+from tests.support.task_languages import task_languages, three_cells
+
+#: r1 a..b, r2 b..a in two steps.  In between they may be in (a, c), (b, c), (c, a) or (c, b); (a,
+#: b) and (b, a) would swap. r2 is in b, c, a twice and in b, a twice.
+IN_A, IN_B, IN_C = 0, 1, 2
+
+
+def test_three_cells_by_hand() -> None:
+    one = three_cells()
+    [task] = task_statistics(one.space, one.word)
+    assert task.plans == {(IN_B, IN_C, IN_A): 2, (IN_B, IN_A): 2}
+    assert (task.steps, task.count, task.fewest_words) == (2, 4, 2)
+    assert task.expected_open == 2  # whatever is said, two plans are left
+    assert task.expected_words == Fraction(5, 2)
+    assert task.saving(3) == 0
+    assert task.saving(2) == pytest.approx(1 / 3)
+    # The first plan in the order of labels: r1 waits (label 0) and r2 steps to c.
+    assert task.first == (IN_B, IN_C, IN_A)
+    measures = flexibility.measures([task])
+    assert (
+        measures["open"],
+        measures["several"],
+        measures["open_several"],
+        measures["expected"],
+    ) == (2, 1, 2, 2)
+    savings = communication.measures([task])
+    assert (savings["differing"], savings["saving"], savings["saving_most"]) == (
+        0,
+        0,
+        round(1 / 3, 6),
+    )
+    assert savings["saving_expected"] == round(1 / 6, 6)
+
+
+def test_means_are_over_the_right_tasks() -> None:
+    """Two tasks of two steps: one sentence of three words with one plan, one of a single word with
+    five.
+    """
+    tasks = [
+        SentenceStatistics(2, {(0, 1, 2): 1}, (0, 1, 2), (0, 1, 2)),
+        SentenceStatistics(2, {(0,): 5}, (0,), (0,)),
+    ]
+    savings = communication.measures(tasks)
+    assert (savings["differing"], savings["tasks"]) == (1, 2)
+    assert savings["saving_differing"] == round(2 / 3, 6)
+    assert savings["saving"] == round(1 / 3, 6)
+    plans = flexibility.measures(tasks)
+    assert (plans["open"], plans["several"], plans["open_several"], plans["plans"]) == (3, 1, 5, 3)
+
+
+@pytest.mark.parametrize(
+    ("folder", "stem"), [("t-map", "problem"), ("tray", "serve"), ("grid", "gw2-2x3")]
+)
+def test_sentences_against_listed_plans(folder: str, stem: str) -> None:
+    tasks = task_languages(folder, stem)
+    lengths = set()
+    for one, counted in zip(
+        tasks[:150], task_statistics(tasks[0].space, tasks[0].word), strict=False
+    ):
+        of_state = dict(zip(one.space.state.tolist(), one.word.tolist(), strict=True))
+        plans = naive.listed(one.space, one.task, 10_000)
+        sentences = [
+            naive.sentence([of_state[s] for s in naive.states(one.space, one.task, plan)])
+            for plan in plans
+        ]
+        assert Counter(sentences) == counted.plans
+        assert (sentences[0], sentences[-1]) == (counted.first, counted.last)
+        assert counted.expected_open == Fraction(
+            sum(sentences.count(s) for s in sentences), len(plans)
+        )
+        assert counted.steps == len(plans[0])
+        lengths |= set(map(len, sentences))
+    assert len(lengths) > 1
+
+
+def test_the_same_as_the_library_measures() -> None:
+    tasks = task_languages("grid", "gw2-2x3")
+    space, word = tasks[0].space, tasks[0].word
+    ours, theirs = task_statistics(space, word), measured([space], [word])
+    assert [t.count for t in ours] == list(theirs.plans)
+    assert [float(t.expected_open) for t in ours] == pytest.approx(theirs.expected.tolist())
+    assert [t.plans[t.first] for t in ours] == pytest.approx(theirs.first.tolist())
+    assert [float(t.expected_words) for t in ours] == pytest.approx(theirs.words.tolist())
+
+
+def test_too_many_sentences_are_not_counted() -> None:
+    one = task_languages("grid", "gw2-2x3")[0]
+    with pytest.raises(OutOfMemory):
+        sentence_counts(one.space, one.word, most_steps=10)
+    with pytest.raises(OutOfMemory):
+        sentence_counts(one.space, one.word, most_of_node=1)
+
+
+def test_all_orders_make_languages_of_different_sizes() -> None:
+    candidates = all_tasks("grid", "gw2-2x3")
+    states = states_on_plans(candidates.spaces).tolist()
+    for order in systematic_orders(candidates, states).values():
+        assert sorted(order) == states
+    assert len({tuple(order) for order in systematic_orders(candidates, states).values()}) == len(
+        SYSTEMATIC
+    )
+    sizes = {}
+    for name, words in greedy_partitions(candidates, 15, Random(0)):
+        sizes[name] = int(words.max()) + 1
+        names = tuple(f"w{n}" for n in range(int(words.max()) + 1))
+        table = Partition(names, candidates.rows, words.astype(np.int64), 0)
+        assert verify(table, candidates.spaces).holds
+    assert list(sizes)[:6] == [*SYSTEMATIC, "random 1"]
+    assert len(set(sizes.values())) > 1
+
+
+def test_brute_force_says_why_it_has_nothing() -> None:
+    candidates = all_tasks("three-cells")
+    assert find_by_brute_force(candidates, 60.0, 0)["words"] == 3
+    pairs = sum(
+        len(naive.listed(space, task, 1000)) ** 2
+        for space in candidates.spaces
+        for task in range(len(space.starts))
+    )
+    assert pairs_of_plans(candidates) == pairs
+    assert find_by_brute_force(all_tasks("grid", "gw2-2x3"), 0.5, 0)["why"] == "out of time"
+
+
+@pytest.mark.parametrize(
+    ("successes", "runs", "low", "high"),
+    [
+        (0, 10, 0.0, 0.2775),
+        (10, 10, 0.7225, 1.0),
+        (5, 10, 0.2366, 0.7634),
+        (50, 100, 0.4038, 0.5962),
+    ],
+)
+def test_wilson(successes: int, runs: int, low: float, high: float) -> None:
+    """Newcombe (1998) and tables of the score interval."""
+    assert wilson(successes, runs) == pytest.approx((low, high), abs=5e-5)
+
+
+def test_intervals_of_nothing() -> None:
+    with pytest.raises(ValueError, match="0 runs"):
+        wilson(0, 0)

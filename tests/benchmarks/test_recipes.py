@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The recipes that search and draw: small runs of each, looked at."""
+
+from __future__ import annotations
+
+from random import Random
+
+import pytest
+
+from benchmarks.paper import planning_cost, scenario, table1
+from benchmarks.paper.__main__ import RECIPES
+from benchmarks.paper.grid import cell_position, entered_cells, is_cell, task_cells
+from benchmarks.paper.recipe import Record, Settings, Unit
+from benchmarks.paper.reported import (
+    DIFFERING,
+    OPEN_ALL,
+    OPEN_SEVERAL,
+    SAVING_ALL,
+    SAVING_DIFFERING,
+    SEVERAL,
+    TABLE_1,
+)
+from benchmarks.paper.suite import CORRIDOR, OTHERS, ROWS, WORLDS, language_for
+from coordlang.use.sentence.guided_search import ExpandedStates
+from coordlang.use.sentence.task_language import languages_in_tasks
+from coordlang.vocabulary.sat import PartitionProblem
+from planners.errors import OutOfTime
+from planners.search.plans import Plans
+from tests.support.domains import all_tasks
+from tests.support.task_languages import task_languages, three_cells
+
+
+def test_the_papers_figures_agree_with_each_other() -> None:
+    """Tasks that do not differ save nothing; tasks without several plans have one."""
+    assert pytest.approx(SAVING_DIFFERING * DIFFERING / 956, abs=5e-4) == SAVING_ALL
+    assert pytest.approx((OPEN_SEVERAL * SEVERAL + (956 - SEVERAL)) / 956, abs=0.05) == OPEN_ALL
+
+
+@pytest.mark.parametrize("name", ["GW1", "GW2", "GWB5", "GWB6"])
+def test_rows_are_the_papers(name: str) -> None:
+    candidates = WORLDS[name].candidates()
+    assert (candidates.count, candidates.states) == (TABLE_1[name].tasks, TABLE_1[name].states)
+
+
+def test_units_have_names_of_their_own() -> None:
+    assert [world.name for world in ROWS] == list(TABLE_1)
+    whole = Settings()
+    for settings in (Settings(quick=True), whole):
+        for recipe in RECIPES:
+            units = recipe.units(settings)
+            assert len({unit.key for unit in units}) == len(units)
+            assert {unit.experiment for unit in units} == {recipe.name}
+    # Each on grids and on worlds that are none.
+    for recipe in RECIPES:
+        worlds = {u.parameters.get("world", u.key.split("/")[0]) for u in recipe.units(whole)}
+        assert 0 < len(worlds & {w.name for w in OTHERS}) < len(worlds)
+
+
+def test_expansions_on_three_cells() -> None:
+    """By hand: the start, then a state after one step; from all but one of them the goal is a step
+    away, and comes up next.
+    """
+    one = three_cells()
+    terrain = ExpandedStates(one.model, one.partition)
+    assert planning_cost.expansions(one, "blind", terrain) == (2, 2, 2)
+    assert planning_cost.expansions(one, "relaxed", terrain) == (2, 2, 2)
+
+
+def test_a_sentence_saves_work() -> None:
+    tasks = task_languages("tray", "serve", "greedy")
+    terrain = ExpandedStates(tasks[0].model, tasks[0].partition)
+    counted = [
+        planning_cost.expansions(one, "relaxed", terrain) for one in Random(1).sample(tasks, 40)
+    ]
+    alone, pruned, bounded = (sum(column) for column in zip(*counted, strict=True))
+    assert bounded <= pruned < alone
+
+
+def test_the_detour_is_optimal_and_nobody_else_moves_otherwise() -> None:
+    candidates, language = language_for(CORRIDOR, "greedy", 0, scenario.trading_rooms())
+    assert candidates.count == 36 * 36
+    one = next(
+        s
+        for s in languages_in_tasks(language, candidates)
+        if task_cells(s.space, s.task) == (scenario.START, scenario.GOAL)
+    )
+    found = scenario.detour(one)
+    way, (agreed, other) = found["detour"], found["agreed"]
+    assert scenario.PLACE in way
+    assert scenario.PLACE not in agreed
+    assert found["optimal"] is True
+    # Looked at without the library: one step at a time, never in one cell, never through each
+    # other.
+    for r1, r2 in ((agreed, other), (way, other)):
+        assert (r1[0], r2[0], r1[-1], r2[-1]) == (*scenario.START, *scenario.GOAL)
+        assert len(r1) == len(r2) == len(agreed)
+        for (a, b), (c, d) in zip(
+            zip(r1, r2, strict=True), zip(r1[1:], r2[1:], strict=True), strict=False
+        ):
+            assert c != d
+            assert (a, b) != (d, c)
+            for before, after in ((a, c), (b, d)):
+                rows, columns = zip(cell_position(before), cell_position(after), strict=True)
+                assert abs(rows[0] - rows[1]) + abs(columns[0] - columns[1]) <= 1
+    # All parts of robot 1 through the place, by listing the plans.
+    wanted = {n for n, cell in enumerate(entered_cells(one.model, 0)) if cell == scenario.PLACE}
+    parts = {tuple(step[0] for step in plan) for plan in Plans.of(one.space, one.task)}
+    assert found["parts"] == sum(bool(wanted & set(part)) for part in parts)
+    assert 0 < found["ways"] <= found["parts_that_fit"] <= found["parts"]
+
+
+def test_freedom_on_three_cells() -> None:
+    """Agreed: r1 a..a..b with one move, r2 b..c..a with two.  Under b c a r1 may as well move
+    first: the same subaction.
+    """
+    one = three_cells()
+    found = scenario.freedom([one])
+    assert found == {
+        "plan": 3,
+        "sentence": 0,
+        "optimal": 3,
+    }  # r1 could go through c, and r2 straight
+
+
+def test_cells() -> None:
+    assert is_cell("c2-11")
+    assert not is_cell("b")
+    assert cell_position("c2-11") == (2, 11)
+    with pytest.raises(ValueError, match="unpack"):
+        cell_position("kitchen")
+    model = all_tasks("grid", "gw1-2x2").model
+    assert dict(zip(model.labels[0], entered_cells(model, 0), strict=True)) == {
+        text: text.strip("()").split()[-1] if text.startswith("(move") else None
+        for text in model.labels[0]
+    }
+    assert set(entered_cells(three_cells().model, 0)) == {None}  # called a, b and c
+
+
+def test_unfinished_languages_are_not_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    def late(*_: object) -> bool:
+        raise OutOfTime("the time limit is over")
+
+    monkeypatch.setattr(PartitionProblem, "solve", late)
+    with pytest.raises(OutOfTime):
+        language_for(WORLDS["GW2"], "minimal", 0)
+
+
+def record(world: str, column: str, **result: object) -> Record:
+    return Record(
+        f"{world}/{column}", {"world": world, "column": column}, "done", dict(result), 1.0
+    )
+
+
+def test_what_table_1_says_of_the_paper() -> None:
+    """Told from the results: other numbers, other sentences."""
+    base = {
+        "tasks": 132,
+        "states": 12,
+        "divergences": 68,
+        "proved_minimal": False,
+        "stopped": False,
+        "work": {},
+    }
+    least = {**base, "work": {"separating_lower_bound": 8}, "words": 8}
+    records = [
+        record("GW1", "greedy", **base, words=8),
+        record("GW1", "least alpha", **least),
+        record("GW1", "minimal", **{**base, "proved_minimal": True}, words=3),
+        record("GW1", "orders", words={"by number": 8, "random 1": 9}),
+    ]
+    section = table1.section(records)
+    assert "| GW1 | 132 | 12 | 68 | 7 (exact 3) | 8 | 8 to 9 | 8* |" in "\n".join(
+        map(str, section.blocks)
+    )
+    told = "\n".join(section.differences)
+    assert "On GW1 the paper's number is outside of what 2 orders gave" in told
+    assert "GW1 (7 against 8)" in told
+    assert "2.3 to 2.3 times smaller" in told
+    assert section.headlines == [("GW1: words", "7", "8", "3*")]
+    same = [
+        record("GW1", "greedy", **base, words=7),
+        record("GW1", "orders", words={"by number": 6, "random 1": 8}),
+    ]
+    assert table1.section(same).differences == []
+    wrong = [record("GW1", "greedy", **{**base, "tasks": 131}, words=7)]
+    assert "Tasks or states" in table1.section(wrong).differences[0]
+
+
+def test_random_numbers_belong_to_a_unit() -> None:
+    one, other = Unit("table1", "GW1/orders", {}), Unit("table1", "GW2/orders", {})
+    drawn = [unit.random(seed).random() for unit in (one, other) for seed in (0, 1)]
+    assert drawn == [unit.random(seed).random() for unit in (one, other) for seed in (0, 1)]
+    assert len(set(drawn)) == 4

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs of the paper's experiments: what is known is not run again, limits are kept, interrupts."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from benchmarks.paper import communication, game
+from benchmarks.paper.__main__ import main
+from benchmarks.paper.recipe import Recipe, Settings, Unit
+from benchmarks.paper.runner import attempt, is_known, kept, run
+from tests.support.domains import ROOT
+
+GAME, COMMUNICATION = game.RECIPE, communication.RECIPE
+QUICK = Settings(samples=2, quick=True)
+
+
+def lines(folder: Path) -> dict[str, Any]:
+    """The lines of a run, by key, without what depends on the clock and on the checkout."""
+    found = map(json.loads, (folder / "game.jsonl").read_text().splitlines())
+    clock = ("seconds", "cpu", "code")
+    return {line["key"]: {k: v for k, v in line.items() if k not in clock} for line in found}
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of `game` in one process at a time."""
+    folder = tmp_path_factory.mktemp("finished")
+    run(GAME, QUICK, folder)
+    return folder
+
+
+def test_a_line_says_what_it_was_made_with(finished: Path) -> None:
+    found = lines(finished)
+    assert set(found) == {unit.key for unit in GAME.units(QUICK)}
+    for line in found.values():
+        assert (line["status"], line["seed"], line["experiment"]) == ("done", 0, "game")
+        assert set(line["versions"]) >= {"coordlang", "python", "numpy", "python-sat"}
+
+
+def test_a_run_that_was_cut_off_goes_on(finished: Path, tmp_path: Path) -> None:
+    """Two lines, in another order, and the third cut off in the middle, as a kill leaves it."""
+    whole = (finished / "game.jsonl").read_text().splitlines(keepends=True)
+    (tmp_path / "game.jsonl").write_text(whole[3] + whole[0] + whole[1][:50])
+    run(GAME, QUICK, tmp_path, jobs=2)
+    again = (tmp_path / "game.jsonl").read_text().splitlines(keepends=True)
+    assert again[:2] == [whole[3], whole[0]]  # with their seconds: they were not run
+    assert lines(tmp_path) == lines(finished)
+    run(GAME, QUICK, tmp_path)
+    assert (tmp_path / "game.jsonl").read_text() == "".join(again)
+
+
+def test_other_parameters_are_other_results(finished: Path) -> None:
+    rows = kept(finished, GAME)
+
+    def known(settings: Settings) -> bool:
+        return all(is_known(unit, rows, settings) for unit in GAME.units(settings))
+
+    assert known(QUICK)
+    assert not known(replace(QUICK, seed=1))
+    assert not known(replace(QUICK, samples=3))
+
+
+def test_limits_of_units(tmp_path: Path) -> None:
+    short = replace(QUICK, limit=0.01)
+    unit = COMMUNICATION.units(short)[0]
+    rows = kept(tmp_path, COMMUNICATION)
+    rows.keep(attempt(COMMUNICATION, unit, short))
+    assert rows.rows[unit.key]["status"] == "out of time"
+    assert is_known(unit, rows, short)
+    assert not is_known(unit, rows, replace(short, limit=60))  # more time: tried again
+    line = rows.rows[unit.key]
+    for other in ({"status": "out of memory"}, {"status": "done", "result": {"absent": "a map"}}):
+        rows.keep({**line, **other})
+        assert not is_known(unit, rows, short)
+
+
+def failing(unit: Unit, settings: Settings) -> dict[str, Any]:
+    """A unit with an error, and one without."""
+    if unit.key == "GWB5/minimal":
+        raise ValueError("an error in a unit")
+    return {}
+
+
+def test_an_error_ends_the_run_and_keeps_what_is_done(tmp_path: Path) -> None:
+    recipe = Recipe("game", "", GAME.units, failing, GAME.section)
+    with pytest.raises(ValueError, match="an error in a unit"):
+        run(recipe, QUICK, tmp_path)
+    assert set(lines(tmp_path)) >= {"GWB5/greedy", "GWB5/separating"}
+
+
+def test_an_interrupt_leaves_no_process(tmp_path: Path) -> None:
+    command = [
+        sys.executable,
+        "-m",
+        "benchmarks.paper",
+        "game",
+        "--quick",
+        "--results",
+        str(tmp_path),
+    ]
+    process = subprocess.Popen(command, cwd=ROOT, start_new_session=True, stderr=subprocess.PIPE)
+    deadline = time.monotonic() + 120
+    while not (tmp_path / "game.jsonl").exists():
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGINT)
+    process.communicate(timeout=60)
+    assert process.returncode != 0
+    while time.monotonic() < deadline:
+        try:
+            os.killpg(process.pid, 0)
+        except ProcessLookupError:
+            break
+        time.sleep(0.05)
+    else:
+        pytest.fail("a process is left")
+    assert len(lines(tmp_path)) < len(GAME.units(QUICK))
+
+
+def test_command(finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "game.jsonl").write_bytes((finished / "game.jsonl").read_bytes())
+    common = ["--quick", "--samples", "2", "--results", str(tmp_path)]
+    main(["game", *common])
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "evaluation.md",
+        "game.jsonl",
+        "game.svg",
+    ]
+    page = (tmp_path / "evaluation.md").read_text()
+    assert "| plan |" in page
+    assert "![Proposals until accepted" in page
+    with pytest.raises(SystemExit) as caught:
+        main(["everything"])
+    assert caught.value.code == 2
+    assert "invalid choice: 'everything'" in capsys.readouterr().err

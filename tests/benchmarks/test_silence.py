@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What each word buys: bits against their definition, the curve on small worlds and on others'."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from itertools import product
+from math import log2
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.paper import silence
+from benchmarks.paper.recipe import Record, Settings
+from benchmarks.paper.suite import WORLDS, World
+from coordlang.movingai import planning_files
+from coordlang.required.divergences import required_nodes
+from coordlang.tolerance.bits import plan_bits, sentence_bits
+from coordlang.vocabulary.flexibility_bound import bits_bounds
+from planners.search.plans import Plan
+from tests.support import naive
+from tests.support.candidates import listed, on_graph
+from tests.support.domains import SHARED
+from tests.support.random_spaces import random_spaces
+
+foreign = pytest.mark.foreign
+there = pytest.mark.skipif(not SHARED.is_dir(), reason=f"{SHARED} is not there")
+
+
+def test_bits_are_the_entropy_of_the_sentences() -> None:
+    compared = 0
+    for seed, (_, space) in enumerate(random_spaces(range(20), 2, 500)):
+        word = np.random.default_rng(seed).integers(0, 3, int(space.state.max()) + 1)
+        found = sentence_bits([space], [word[space.state]])
+        whole = plan_bits([space])
+        for task in range(len(space.starts)):
+            try:
+                plans = naive.listed(space, task, 30)
+            except naive.TooLarge:
+                continue
+            said = Counter(
+                naive.sentence([int(word[s]) for s in naive.states(space, task, plan)])
+                for plan in plans
+            )
+            entropy = -sum(n / len(plans) * log2(n / len(plans)) for n in said.values())
+            assert found[task] == pytest.approx(entropy)
+            assert whole[task] == pytest.approx(log2(len(plans)))
+            compared += len(said) > 1
+    assert compared >= 10
+
+
+def divisions(plans: list[Plan]) -> Iterator[list[list[Plan]]]:
+    """All divisions of plans into sets."""
+    if not plans:
+        yield []
+        return
+    for rest in divisions(plans[1:]):
+        yield [[plans[0]], *rest]
+        for n, group in enumerate(rest):
+            yield [*rest[:n], [plans[0], *group], *rest[n + 1 :]]
+
+
+@pytest.mark.parametrize("robots", [2, 3])
+def test_no_division_into_sets_that_mix_takes_fewer_bits(robots: int) -> None:
+    """By trying all divisions; with two robots the bound is often met."""
+    compared = met = 0
+    for seed in range(40):
+        candidates = on_graph(seed, robots)
+        if candidates is None:
+            continue
+        bounds = bits_bounds(candidates.spaces, [required_nodes(s) for s in candidates.spaces])
+        for bound, (_, _, plans, _) in zip(bounds, listed(candidates), strict=True):
+            if not 1 < len(plans) <= 6:
+                continue
+            good = set(plans)
+            least = min(
+                sum(len(group) / len(plans) * log2(len(plans) / len(group)) for group in division)
+                for division in divisions(plans)
+                if all(not list(failing(group, good, robots)) for group in division)
+            )
+            assert bound <= least + 1e-9
+            compared += least > 0
+            met += least > 0 and bound == pytest.approx(least)
+    assert compared >= 10
+    assert met >= 5
+
+
+def failing(group: list[Plan], good: set[Plan], robots: int) -> Iterator[Plan]:
+    """The mixtures of a set of plans that are none of the task's."""
+    for chosen in product(group, repeat=robots):
+        if naive.mixture(chosen) not in good:
+            yield naive.mixture(chosen)
+
+
+def test_the_curve_of_the_smallest_grid() -> None:
+    found = silence.curve(WORLDS["GW1"], seed=0)
+    points = found["points"]
+    assert [point["words"] for point in points] == [1, 2, 3]
+    assert [point["mean"] for point in points] == [5 / 66, 5 / 132, 0]
+    assert points[0]["bits"] == 0 < found["least_bits"] <= points[2]["bits"] < found["plan_bits"]
+    units = silence.units(Settings(quick=True))
+    records = [Record(unit.key, unit.parameters, "done", found) for unit in units]
+    shown = silence.section(records)
+    assert "| GW1 | 7.58 %* (50 %) | 3.79 %* (50 %) | 0* |" in str(shown.blocks[1])
+    assert [figure.name for figure in shown.figures] == ["silence-words", "silence-bits"]
+    assert all(figure.draw() for figure in shown.figures)
+
+
+@foreign
+@there
+@pytest.mark.slow
+def test_inseparable_plans_leave_failures_whatever_is_said() -> None:
+    """Box pushing: there is no language over states, but two words are better than silence."""
+    world = World("boxpushing", "boxpushing", "p2_3_2_1_1_0", "problem", SHARED / "foreign")
+    found = silence.curve(world, seed=0, most=2)
+    silent, two = found["points"]
+    assert silent["mean"] == pytest.approx(0.8231, abs=1e-4)
+    assert 0.3 < two["mean"] < 0.8
+
+
+@foreign
+@there
+def test_two_words_through_a_tunnel(tmp_path: Path) -> None:
+    """One robot waits where the lane ends: a bit says which, and no division takes less."""
+    folder, scenario = tmp_path / "tunnel", tmp_path / "t.scen"
+    scenario.write_text(
+        "version 1\n1\ttunnel.map\t4\t6\t0\t2\t0\t5\t3\n1\ttunnel.map\t4\t6\t0\t5\t0\t0\t5\n"
+    )
+    texts = planning_files(SHARED / "maps" / "tunnel.map", scenario, 2)
+    folder.mkdir()
+    for name, text in texts.items():
+        (folder / name.replace("t-2", "problem")).write_text(text)
+    found = silence.curve(World("tunnel", "tunnel", "problem", "problem", tmp_path), seed=0)
+    assert [round(point["mean"], 3) for point in found["points"]] == [0.499, 0]
+    assert found["points"][1]["bits"] == found["least_bits"] == 0.9984

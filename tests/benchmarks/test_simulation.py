@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Robots with wheels, counted: by hand, and against what the joint model says."""
+
+from __future__ import annotations
+
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from benchmarks.paper import floors, simulation
+from benchmarks.paper.driving import counted, is_well
+from benchmarks.paper.floors import DRAWS, FLOORS, foreign_map, tasks_of
+from benchmarks.paper.recipe import Record, Settings, Unit
+from coordlang.use.sentence.task_language import TaskLanguage
+from coordlang.use.simulation.record import EventRecord, RunRecord
+from planners.search.plans import Plans
+from tests.support.domains import DOMAINS
+
+
+def record(**changed: Any) -> RunRecord:
+    """A run that ended well, but for what is changed."""
+    usual: dict[str, Any] = {
+        "seed": 0,
+        "collisions": 0,
+        "deadlock": False,
+        "late": 0,
+        "messages": 3,
+        "seconds": 10.0,
+        "arrived": True,
+        "mixes": True,
+        "subplans": {},
+        "steps": [],
+        "events": [
+            EventRecord(9.0, "stopped", ["r1"]),
+            EventRecord(10.0, "arrived", ["r1"], steps={"r1": 4}, places={"r1": ["c0-0", "c0-1"]}),
+        ],
+        "poses": {},
+        "nearest": 0.7,
+    }
+    return RunRecord(**usual | changed)
+
+
+def naive_requires(used: TaskLanguage) -> bool:
+    """By the definition: some mixture of two optimal plans is none."""
+    plans = list(Plans.of(used.space, used.task))
+    mixtures = {
+        tuple(zip([a for a, _ in one], [b for _, b in other], strict=True))
+        for one, other in product(plans, repeat=2)
+    }
+    return bool(mixtures - set(plans))
+
+
+def test_how_runs_end_is_counted() -> None:
+    found = [
+        record(),
+        record(late=2, nearest=0.6),
+        record(arrived=False, deadlock=True, mixes=False, seconds=20.0),
+        record(arrived=False, collisions=2, nearest=0.38),
+    ]
+    assert [is_well(run) for run in found] == [True, False, False, False]
+    assert counted(found) == {
+        "runs": 4,
+        "well": 1,
+        "collisions": 1,
+        "deadlocks": 1,
+        "late": 1,
+        "late_steps": 2,
+        "messages": 12,
+        "seconds": 50.0,
+        "nearest": 0.38,
+        "mixes": 3,
+        "agree": 2,
+    }
+
+
+def test_tasks_of_floors_require_coordination() -> None:
+    language, tasks = tasks_of(FLOORS["T-map, 2 robots"], 0)
+    assert (len(language.words), len(tasks)) == (3, 12)
+    assert all(naive_requires(used) for used in tasks)
+
+
+@pytest.mark.thorough
+def test_tasks_are_drawn_the_same_each_time() -> None:
+    floor = FLOORS["GWB7, 3 robots"]
+    first, again = (tasks_of(floor, 0) for _ in range(2))
+    assert dict(first[0].states) == dict(again[0].states)
+    assert len(first[1]) == 10 < DRAWS
+
+
+def test_three_robots_on_the_t_map_need_no_word() -> None:
+    """Which is why they are not simulated: by the definition, on every task."""
+    from coordlang.movingai import grid_problem_text
+    from coordlang.required.choices import Choices
+    from coordlang.tasks.candidates import all_pairs
+    from planners.pddl import parse_problem, read_domain
+    from planners.pddl.sexpr import Source
+
+    domain = read_domain(DOMAINS / "grid" / "domain.pddl")
+    rows = [["c0-1"], ["c1-0", "c1-1", "c1-2"]]
+    near = {name: ["c1-1"] for row in rows for name in row} | {"c1-1": ["c0-1", "c1-0", "c1-2"]}
+    starts, goals = ("c0-1", "c1-0", "c1-2"), ("c1-1", "c1-0", "c1-2")
+    text = grid_problem_text(
+        "t", domain.name, rows, near.__getitem__, starts, goals, written_by="a test"
+    )
+    every = all_pairs(domain, [parse_problem(Source("t", text), domain)])
+    assert every.count > 0
+    for space in every.spaces:
+        assert not Choices(space).requires[space.starts].any()
+
+
+def done(unit: Unit, result: dict[str, Any]) -> Record:
+    return Record(unit.key, unit.parameters, "done", result)
+
+
+def test_what_is_absent_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(floors, "FOREIGN", tmp_path)
+    floor = FLOORS["maze 11x11, 2 robots"]
+    assert not foreign_map(floor).exists()
+    (unit,) = (unit for unit in simulation.units(Settings()) if unit.key == floor.key)
+    result = simulation.run(unit, Settings())
+    assert result == {"absent": "the map maze-11-11.map"}
+    shown = simulation.section([done(unit, result)])
+    assert "Not run: maze 11x11, 2 robots, for want of the map maze-11-11.map." in shown.blocks
+
+
+def test_units_are_reproducible_and_the_section_shows_them() -> None:
+    settings = Settings(samples=1, quick=True)
+    units = simulation.units(settings)
+    assert [unit.key for unit in units] == [
+        "T-map, 2 robots",
+        "handover, 2 robots",
+        "open 3x3/across/minimal",
+    ]
+    records = [done(unit, simulation.run(unit, settings)) for unit in units]
+    assert simulation.run(units[0], settings) == records[0].result
+    for floor in records[:2]:
+        for pace in ("clock", "barrier"):
+            result = floor.result["sentence"][pace]
+            assert (result["well"], result["collisions"], result["agree"]) == (1, 0, 1)
+    for agreement in ("plan", "sentence"):
+        result = records[2].result[agreement]
+        assert result["well"] == result["model"] - result["model_only"] + result["floor_only"]
+    section = simulation.section(records)
+    text = "".join(block for block in section.blocks if isinstance(block, str))
+    assert "| T-map, 2 robots, sentence, clock | 3 | 1 | 0 |" in text
+    assert (
+        "**With a sentence, by a common clock**: 2 of 2 runs end well, 0 with a collision; 2 end"
+        in text
+    )
+    assert "| open 3x3, across, minimal: sentence |" in text
+
+
+@pytest.mark.thorough
+def test_the_detour_is_made_and_the_other_robot_does_the_same() -> None:
+    settings = Settings(samples=1)
+    (unit,) = (unit for unit in simulation.units(settings) if unit.key == "detour")
+    result = simulation.run(unit, settings)
+    for pace in ("clock", "barrier"):
+        found = result[pace]
+        assert found["granted"] == found["passed"] == found["other_same"] == found["well"] == 1
+        before, after = found["messages"]
+        assert before == after
+    (text,) = [
+        block
+        for block in simulation.section([done(unit, result)]).blocks
+        if isinstance(block, str) and "motivating" in block
+    ]
+    assert "50 of the 52 parts of r1 through c2-7" in text
