@@ -125,9 +125,6 @@ def main() -> None:
         for planner in shown:
             cells += [found.get(planner, {}).get(key) for key in ("seconds", "memory", "plans")]
         table.print(*cells)
-    for planner in PLANNERS:
-        solved = [row for row in known.rows.values() if row.get(planner, {}).get("plans")]
-        print(planner, len(solved))
 
 
 if __name__ == "__main__":

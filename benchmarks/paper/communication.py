@@ -31,8 +31,8 @@ def run(unit: Unit, settings: Settings) -> Result:
 
 
 def _of_order(found: Flexibility) -> list[float]:
-    shorter = found.first_words < found.steps + 1
-    return [int(shorter.sum()), round(float(found.first_saving.mean()), 6)]
+    saving = 1 - found.first_words / (found.steps + 1)
+    return [int((saving > 0).sum()), round(float(saving.mean()), 6)]
 
 
 def measures(tasks: Sequence[SentenceStatistics]) -> Result:

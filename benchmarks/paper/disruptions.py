@@ -26,7 +26,7 @@ from coordlang.use.sentence.task_language import languages_in_tasks
 from planners.errors import OutOfMemory
 from planners.joint.model import JointModel
 from planners.search.plan_space import PlanSpace
-from planners.tables import Bools, Ints
+from planners.tables import Ints
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,10 +172,12 @@ def subaction_trials(candidates: Candidates, language: Language) -> Trials:
     """Return the trials in which one subaction is impossible that an optimal plan needs."""
     choices = _choices(candidates, language)
     disruptions = _single_subactions(candidates.model, choices.space)
-    concerned = [_concerned(choices.space, disruption) for disruption in disruptions]
+    space = choices.space
+    hit = [space.sources[~disruption.spared(space)] for disruption in disruptions]
+    concerned = [space.ancestors(nodes)[space.starts] for nodes in hit]
     trials = [
         Trial((task,), number)
-        for task in range(len(choices.space.starts))
+        for task in range(len(space.starts))
         for number, tasks in enumerate(concerned)
         if tasks[task]
     ]
@@ -194,10 +196,3 @@ def _single_subactions(model: JointModel, space: PlanSpace) -> list[Disruption]:
             forbidden[robot] = frozenset([label])
             found.append(Disruption(f"{name} {text}", tuple(forbidden)))
     return found
-
-
-def _concerned(space: PlanSpace, disruption: Disruption) -> Bools:
-    """For each task, whether some optimal plan needs what is forbidden."""
-    hit = space.sources[~disruption.spared(space)]
-    concerned: Bools = space.ancestors(hit)[space.starts]
-    return concerned

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from random import Random
 from typing import Any
 
 from benchmarks.paper.task_choices import sentence_of
@@ -17,7 +16,7 @@ from coordlang.use.simulation.record import RunRecord, WishRecord
 from coordlang.use.simulation.runs import runs_of
 from coordlang.use.simulation.settings import Settings
 from coordlang.use.simulation.team import Agreement, Mission, mission
-from planners.search.plans import Plan, Plans
+from planners.search.plans import Plan
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,12 +30,6 @@ class Said:
     def mission(self, agreement: Agreement) -> Mission:
         """Return the mission of robots that have agreed on the sentence, a plan, or nothing."""
         return mission(self.used, agreement, self.words if agreement == "sentence" else ())
-
-
-def said(used: TaskLanguage, random: Random) -> Said:
-    """Draw a plan of a task; what is said is its sentence."""
-    plans = Plans.of(used.space, used.task)
-    return said_of(used, plans.unrank(random.randrange(plans.count)))
 
 
 def said_of(used: TaskLanguage, plan: Plan) -> Said:

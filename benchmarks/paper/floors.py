@@ -118,7 +118,7 @@ def _drawn(floor: Floor, seed: int) -> tuple[Candidates, Language]:
     for _ in range(DRAWS):
         start, goal = (random.sample(list(cells), floor.robots) for _ in range(2))
         task = ListedTask(placement(start), placement(goal))
-        if _requires(task, domain, cells) and _is_in_one_world([*found[:1], task], domain, cells):
+        if _fits(task, found[:1], domain, cells):
             found.append(task)
         if len(found) == TASKS:
             break
@@ -129,23 +129,18 @@ def _drawn(floor: Floor, seed: int) -> tuple[Candidates, Language]:
     return candidates, built.language
 
 
-def _requires(task: ListedTask, domain: Domain, cells: Mapping[str, Cell]) -> bool:
+def _fits(
+    task: ListedTask, first: Sequence[ListedTask], domain: Domain, cells: Mapping[str, Cell]
+) -> bool:
+    """Say whether a task requires coordination, and robots can get there from the first one."""
     try:
         (space,) = _candidates([task], domain, cells).spaces
-    except ProvedImpossible:
-        return False
-    return bool(Choices(space).requires[space.starts[0]])
-
-
-def _is_in_one_world(
-    listed: Sequence[ListedTask], domain: Domain, cells: Mapping[str, Cell]
-) -> bool:
-    """Say whether the first task's robots can get to where the others start: not so on rings."""
-    try:
-        _candidates(listed, domain, cells)
-    except BadInput:
-        return False
-    return True
+        if Choices(space).requires[space.starts[0]]:
+            _candidates([*first, task], domain, cells)  # not so where robots are on a ring
+            return True
+    except (ProvedImpossible, BadInput):
+        pass
+    return False
 
 
 def _candidates(

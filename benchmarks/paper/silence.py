@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
+from math import log2
+from statistics import fmean
 from typing import Any
 
 import numpy as np
@@ -14,17 +16,19 @@ from benchmarks.paper.plots import MARKERS, Lines, Series, lines
 from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
 from benchmarks.paper.suite import CORRIDOR, OTHERS, ROWS, World
 from coordlang.building import build_language
+from coordlang.language.sentences import sentence_counts
 from coordlang.language.tolerance import percent
 from coordlang.required.divergences import required_nodes, states_on_plans
 from coordlang.required.miscoordination import Inseparable
 from coordlang.symmetry.group import symmetry_group
 from coordlang.tasks.candidates import Candidates
-from coordlang.tolerance.bits import plan_bits, sentence_bits
 from coordlang.vocabulary.few_words import few_words
 from coordlang.vocabulary.flexibility_bound import bits_bounds
 from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.word_annealing import FewWordsSettings
 from planners.search.plan_space import PlanSpace
+from planners.search.plans import counts
+from planners.tables import Ints
 
 #: Worlds besides the rows of Table 1; those of three robots last.
 WORLDS = (
@@ -61,7 +65,7 @@ def curve(world: World, seed: int, most: int = _MOST) -> Result:
     return {
         "robots": len(candidates.model.robots),
         "tasks": candidates.count,
-        "plan_bits": round(float(plan_bits(spaces).mean()), 4),
+        "plan_bits": round(fmean(plan_bits(spaces)), 4),
         "least_bits": round(float(bounds.mean()), 4),
         "points": list(_points(candidates, spaces, seed, most)),
     }
@@ -134,10 +138,30 @@ def _point(
         "words": words,
         "mean": mean,
         "worst": worst,
-        "bits": round(float(bits.mean()), 4),
-        "most_bits": round(float(bits.max()), 4),
+        "bits": round(fmean(bits), 4),
         "is_best": is_best,
     }
+
+
+def sentence_bits(spaces: Sequence[PlanSpace], words: Sequence[Ints]) -> list[float]:
+    """Return the entropy ``sum_s n_s / N * log2(N / n_s)`` of each task's sentences, in bits.
+
+    The plan is drawn uniformly; ``words`` holds the word number of each node of each plan space.
+    """
+    found = []
+    for space, word in zip(spaces, words, strict=True):
+        said = sentence_counts(space, word)
+        for start in space.starts.tolist():
+            sizes = said[start].values()
+            total = sum(sizes)
+            found.append(sum(n / total * (log2(total) - log2(n)) for n in sizes))
+    return found
+
+
+def plan_bits(spaces: Sequence[PlanSpace]) -> list[float]:
+    """Return ``log2 N`` for each task, the bits that say which of its N plans is meant."""
+    counted = [(space.starts.tolist(), counts(space)) for space in spaces]
+    return [log2(number[start]) for starts, number in counted for start in starts]
 
 
 def section(records: Sequence[Record]) -> Section:

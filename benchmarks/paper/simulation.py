@@ -13,7 +13,7 @@ from random import Random
 from typing import Any
 
 from benchmarks.frame import markdown
-from benchmarks.paper.driving import Said, counted, drive, is_well, said, said_of
+from benchmarks.paper.driving import Said, counted, drive, is_well, said_of
 from benchmarks.paper.floors import FLOORS, foreign_map, tasks_of
 from benchmarks.paper.grid import task_cells
 from benchmarks.paper.recipe import Recipe, Record, Result, Section, Settings, Unit
@@ -89,7 +89,9 @@ def _run_floor(unit: Unit, settings: Settings) -> Result:
     }
     for number in range(unit.parameters["runs"]):
         random = Random(f"{settings.seed} {floor.key} {number}")
-        one = said(tasks[random.randrange(len(tasks))], random)
+        used = tasks[random.randrange(len(tasks))]
+        plans = Plans.of(used.space, used.task)
+        one = said_of(used, plans.unrank(random.randrange(plans.count)))
         for agreement, by_way in found.items():
             prepared = one.mission(agreement)
             for way, runs in by_way.items():

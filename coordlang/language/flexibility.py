@@ -64,11 +64,6 @@ class Flexibility:
         """Expected communication saving of each task's plans, against the states of a plan."""
         return 1 - self.words / (self.steps + 1)
 
-    @property
-    def first_saving(self) -> Floats:
-        """Communication saving of each task's first plan, against its states."""
-        return 1 - self.first_words / (self.steps + 1)
-
 
 def flexibility(spaces: Sequence[PlanSpace], words: Sequence[Ints]) -> Flexibility:
     """Measure a partition; ``words[k]`` holds the word number of each node of ``spaces[k]``.
