@@ -115,7 +115,7 @@ class Rules:
             if isinstance(found, str):
                 return f"{self.team.robots[robot]}: {found}"
             chosen.append(found)
-        together = _together(chosen)
+        together = [a for a in _together(chosen) if not self.is_idling(a.schema)]
         return (
             self._wrong_choice(chosen)
             or self._unmet(state, chosen)
@@ -152,8 +152,6 @@ class Rules:
         schema = self.schemas.get(name)
         if schema is None:
             return f"{label} is no action of the domain"
-        if not (schema.effects or schema.parts or self._is_named(name)):
-            return f"{label} has no effects, and nothing names {name}: it is idling, and left out"
         if len(args) != len(schema.parameters):
             return f"{label} has {len(args)} arguments, {name} takes {len(schema.parameters)}"
         for parameter, arg in zip(schema.parameters, args, strict=True):
@@ -161,14 +159,19 @@ class Rules:
                 return f"in {label}, {arg} is no object of type {' or '.join(parameter.types)}"
         return self.bind(schema, tuple(args))
 
-    def _is_named(self, name: str) -> bool:
-        """Whether an action formula or a concurrency network speaks of an action."""
-        domain = self.domain
+    def is_idling(self, schema: Schema) -> bool:
+        """Whether an action has no effects as written, and no formula or network speaks of it.
+
+        Where a step has it in words, its owner and its precondition count, and no interference.
+        """
+        if schema.effects or schema.parts:
+            return False
+        domain, name = self.domain, schema.name
         formulas = [
             f for s in domain.schemas for f in (s.precondition, *(e.condition for e in s.effects))
         ]
         listed = [action for constraint in domain.constraints for action, _ in constraint.actions]
-        return name in listed or any(name in _actions_in(formula) for formula in formulas)
+        return name not in listed and not any(name in _actions_in(f) for f in formulas)
 
     def bind(self, schema: Schema, args: tuple[str, ...]) -> Instance:
         """A schema with (type-correct) arguments."""

@@ -265,8 +265,16 @@ class _Grounder:
         )
 
     def costs_alone(self, schema: Schema) -> Iterator[tuple[int, int]]:
-        """The robot and the cost of each instance with one owner, as far as its cost is given."""
-        objects = [self._bindings.objects(p.types) for p in schema.parameters]
+        """The robot and the cost of each instance with one owner, as far as its cost is given.
+
+        Of arguments that matter neither for the owner nor for the cost only the first is taken.
+        """
+        term = schema.cost.args if isinstance(schema.cost, Atom) else ()
+        every = [(p.name, self._bindings.objects(p.types)) for p in schema.parameters]
+        objects = [
+            own if name in term or not {*own}.isdisjoint(self._team.robots) else [*own][:1]
+            for name, own in every
+        ]
         for args in product(*objects):
             binding = {p.name: a for p, a in zip(schema.parameters, args, strict=True)}
             owners = self._team.owners(schema, args)

@@ -170,10 +170,10 @@ def _require_agreement(
 
 
 def without_idle_environment(team: Team, owners: Iterable[int]) -> Team:
-    """The team without the environment if it owns no ground action."""
+    """The team without the environment if it owns no ground action: then nobody owns any."""
     if team.robots[-1] != ENVIRONMENT or len(team.robots) - 1 in set(owners):
         return team
-    return replace(team, robots=team.robots[:-1])
+    return replace(team, robots=team.robots[:-1], unowned="error")
 
 
 def _declared(domain: Domain, problem: Problem) -> tuple[tuple[str, ...], str] | None:

@@ -83,7 +83,8 @@ class NoSuchAction(BadInput):
         super().__init__(
             f"{action} is no action of this problem",
             position=position,
-            remedy="`coordlang inspect DOMAIN PROBLEM` shows what the robots can do.",
+            remedy="`coordlang inspect DOMAIN PROBLEM` shows what the robots can do. Leave out of "
+            "a plan what it calls idling.",
         )
         self.step = step
 

@@ -26,10 +26,11 @@ from planners.tables import Bools, Ints
 def wasteful_pairs(model: JointModel, variables: Sequence[StateVariable]) -> list[Bools]:
     """Per robot (labels, labels): no cheapest plan has the first and in the next step the second.
 
-    There is a third label, or idling, that costs less than both, leads to the same state where the
-    robot idles after it, and may share a step with whatever the first label may.  All that the
-    three change are facts that no other robot's labels speak of.  No pair is found where actions
-    have several owners or speak of other robots' subactions; the joint steps must be composed.
+    There is a third label, or idling, that costs less with idling than both, leads to the same
+    state where the robot idles after it, and may share a step with whatever the first label may.
+    All that the three change are facts that no other robot's labels speak of.  No pair is found
+    where actions have several owners or speak of other robots' subactions; the joint steps must be
+    composed.
     """
     stepper = model.stepper
     assert isinstance(stepper, ComposingStepper)

@@ -197,7 +197,8 @@ def _label_numbers(model: JointModel, step: Texts, number: int) -> tuple[int, ..
     raise NotAPlan(
         number,
         f"in step {number + 1}, {robot} has no subaction {text}",
-        remedy="It is misspelt, belongs to another robot, or can never be applied in this problem.",
+        remedy="It is misspelt, belongs to another robot, can never be applied in this problem, or "
+        "is idling, which is left out (`coordlang inspect DOMAIN PROBLEM`).",
     )
 
 

@@ -55,6 +55,7 @@ from planners.errors import (
     Unsupported,
     UsageError,
 )
+from planners.grounding import idling_schemas
 from planners.limits import time_limit
 from planners.loading import build
 from planners.search.optimal_plans import search
@@ -364,8 +365,13 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
             return None
         task_language = self._language_in(found)
         wanted = task_language.words_of(self._options.sentence)
+        idling = idling_schemas(found.domain)
+        acting = [
+            tuple(None if own and own[1:-1].split()[0] in idling else own for own in step)
+            for step in plan
+        ]
         try:
-            words = sentence_of_plan(task_language, plan)
+            words = sentence_of_plan(task_language, acting)
         except (NotAPlan, NotOptimal) as error:
             return str(error)
         if words == wanted:

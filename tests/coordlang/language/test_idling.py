@@ -11,6 +11,7 @@ import pytest
 
 import coordlang
 from coordlang.language.file import to_bytes
+from tests.support.command import Command
 from tests.support.domains import DOMAINS
 
 #: A do-nothing action that is possible for a robot that is awake.
@@ -75,6 +76,25 @@ def test_a_file_with_the_same_rule_is_read(files: tuple[Path, Path, Path], tmp_p
     path.write_text(json.dumps({**data, "model": {**data["model"], "idle": ["r2", "r1"]}}))
     assert coordlang.verify(path, domain, a)
     assert "idle" not in coordlang.load_language(path).provenance.model
+
+
+def test_a_plan_with_what_is_left_out(
+    files: tuple[Path, Path, Path], tmp_path: Path, coordlang: Command
+) -> None:
+    domain, a, _ = files
+    language, plan = tmp_path / "l.json", tmp_path / "plan"
+    assert coordlang("build", domain, a, "-o", language).code == 0
+    actions = [["(move r1 c0-1 c1-1)", "(rest r2)"]]
+    for text in (
+        "0: (rest r2)\n0: (move r1 c0-1 c1-1)\n",
+        json.dumps({"plans": [{"cost": 1, "actions": actions}], "count": 1}),
+    ):
+        plan.write_text(text)
+        refused = coordlang("say", language, domain, a, plan)
+        assert refused.code == 1
+        assert "(rest r2)" in refused.err
+        assert "idling" in refused.err
+    assert "rest: idling" in coordlang("inspect", domain, a).out
 
 
 def test_all_pairs_are_those_of_the_same_states(tmp_path: Path) -> None:

@@ -903,3 +903,33 @@ def test_the_example_script() -> None:
     assert [line.split("leaves")[1] for line in lines[3:]] == [
         " 1 open; SOLVED_OPTIMALLY VALID"
     ] * 2
+
+
+@pytest.mark.parametrize(("robot", "valid"), [("r2", True), ("r1", False)])
+def test_a_valid_plan_may_have_an_action_that_is_idling(robot: str, valid: bool) -> None:
+    """Only r2 is awake, so only r2 may rest, which does nothing."""
+    kind, place = up.UserType("robot"), up.UserType("place")
+    problem = up.Problem("rooms")
+    at = problem.add_fluent("at", up.BoolType(), default_initial_value=False, r=kind, p=place)
+    awake = problem.add_fluent("awake", up.BoolType(), default_initial_value=False, r=kind)
+    go = up.InstantaneousAction("go", r=kind, a=place, b=place)
+    go.add_precondition(at(go.r, go.a))
+    go.add_effect(at(go.r, go.a), False)
+    go.add_effect(at(go.r, go.b), True)
+    rest = up.InstantaneousAction("rest", r=kind)
+    rest.add_precondition(awake(rest.r))
+    wake = up.InstantaneousAction("wake", r=kind)
+    wake.add_effect(awake(wake.r), True)
+    problem.add_actions([go, rest, wake])
+    names = {"r1": kind, "r2": kind, "a": place, "b": place}
+    objects = {name: up.Object(name, own) for name, own in names.items()}
+    problem.add_objects(objects.values())
+    for fact in (at(objects["r1"], objects["a"]), awake(objects["r2"])):
+        problem.set_initial_value(fact, True)
+    problem.add_goal(at(objects["r1"], objects["b"]))
+    move = ActionInstance(go, tuple(up.ObjectExp(objects[name]) for name in ("r1", "a", "b")))
+    idle = ActionInstance(rest, (up.ObjectExp(objects[robot]),))
+    found = verdict(problem, SequentialPlan([move, idle]), robot_type="robot")
+    with up.PlanValidator(name="sequential_plan_validator") as validator:
+        assert validator.validate(problem, SequentialPlan([move, idle])).status == found.status
+    assert (found.status == Validity.VALID) == valid

@@ -14,7 +14,8 @@ from random import Random
 
 import pytest
 
-from planners.check.validate import Moment, State
+from planners.check.validate import Moment, State, validate
+from planners.classical import compile_classical
 from planners.errors import BadInput
 from planners.joint.model import show
 from planners.loading import ModelOptions, PlanningInstance, build, task_of
@@ -22,9 +23,13 @@ from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import And, Formula, Not
 from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
+from planners.search.guides import GUIDES
 from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plans import Plans
 from planners.search.reachable import explore
+from planners.search.state_variables import state_variables
+from planners.search.wasteful import wasteful_pairs
+from tests.support.naive_classical import optimal_plans
 from tests.support.naive_joint_steps import TooLarge, Twin
 from tests.support.random_pddl import Kind, random_model
 
@@ -142,9 +147,78 @@ def test_the_same_cost_and_the_same_number_of_plans(kind: Kind) -> None:
         (other,) = plan_spaces(explore(model, init), [(task.goal, init)])
         assert (*other.cost_of(0), Plans.of(other).count) == wanted, seed
         seen["costs"] += wanted[1] > 0
+        seen["idling costs"] += any(model.idling_costs)
         seen["several plans"] += wanted[2] > 1
     assert seen["costs"] >= 8
     assert seen["several plans"] >= 5
+    assert seen["idling costs"] >= 5
+
+
+_WAYS = """(define (domain ways) (:types robot place) (:constants hell - place)
+  (:predicates (at ?r - robot ?p - place) (next ?a ?b - place) (jumps ?r - robot))
+  (:functions (price ?r - robot))
+  (:action drive :agent ?r - robot :parameters (?a ?b - place)
+    :precondition (and (at ?r ?a) (next ?a ?b))
+    :effect (and (not (at ?r ?a)) (at ?r ?b) (increase (total-cost) 1)))
+  (:action jump :agent ?r - robot :parameters (?a ?b ?c - place)
+    :precondition (and (jumps ?r) (at ?r ?a) (next ?a ?b) (next ?b ?c))
+    :effect (and (not (at ?r ?a)) (at ?r ?c) (increase (total-cost) 1)))
+  (:action rest :agent ?r - robot :parameters () :precondition (at ?r hell)
+    :effect (increase (total-cost) (price ?r)))
+  (:action wait :agent ?r - robot :parameters (?p ?p2 ?p3 ?p4 ?p5 ?p6 ?p7 ?p8 ?p9 - place)
+    :effect (increase (total-cost) 7)))"""
+_OVER = """(define (problem over) (:domain ways) (:objects r1 r2 - robot a b c {more} - place)
+  (:init (at r1 a) (at r2 a) (next a b) (next b c) (jumps r1) {price} (= (price r2) 5))
+  (:goal (and (at r1 c) (at r2 c))))"""
+
+
+@pytest.mark.parametrize(
+    ("price", "cost", "count", "saves"),
+    [(0, 3, 2, True), (1, 4, 3, False), (2, 4, 1, False), (None, 4, 1, False)],
+)
+def test_idling_costs_what_the_cheapest_action_that_is_idling_costs(
+    price: int | None, cost: int, count: int, saves: bool
+) -> None:
+    """While r2 drives two steps, r1 drives too, or jumps and idles once, for ``price``.
+
+    It does not matter that nobody can ever rest.  Without a price only waiting is left, for 7,
+    with any of 24 ** 9 arguments.
+    """
+    domain = parse_domain(Source("d", _WAYS))
+    known = "" if price is None else f"(= (price r1) {price})"
+    problem = parse_problem(
+        Source("p", _OVER.format(price=known, more=" ".join(f"p{k}" for k in range(20)))), domain
+    )
+    loaded = build(domain, [problem], ModelOptions(cost="makespan+cost"))
+    model, task = loaded.model, loaded.tasks[0]
+    assert model.idling_costs == (7 if price is None else price, 5)
+    for heuristic in GUIDES:
+        space = search(model, task, heuristic=heuristic)
+        assert (space.cost_of(0), Plans.of(space).count) == ((2, cost), count)
+    for limit in (100_000, 0):
+        plain = compile_classical(model, task, limit)
+        found = optimal_plans(plain)
+        assert found.cost is not None
+        assert (plain.cost(found.cost), found.count()) == ((2, cost), count)
+    pairs = wasteful_pairs(model, state_variables(model, task.init))
+    assert [bool(own.any()) for own in pairs] == [saves, False]
+
+
+def test_what_belonged_to_an_environment_that_is_not_there_costs_nobody() -> None:
+    """The environment could do nothing but idle, so there is none; no robot pays for its idling."""
+    domain = """(define (domain d) (:types robot place) (:predicates (at ?r - robot ?p - place))
+      (:action go :parameters (?r - robot ?a ?b - place) :precondition (at ?r ?a)
+        :effect (and (not (at ?r ?a)) (at ?r ?b) (increase (total-cost) 3)))
+      (:action tick :parameters () :effect (increase (total-cost) 7)))"""
+    problem = """(define (problem p) (:domain d) (:objects r1 r2 - robot a b - place)
+      (:init (at r1 a) (at r2 a)) (:goal (at r1 b)))"""
+    read = parse_domain(Source("d", domain))
+    options = ModelOptions(RobotSelection(("r1", "r2"), unowned="environment"), "makespan+cost")
+    loaded = build(read, [parse_problem(Source("p", problem), read)], options)
+    assert loaded.model.robots == ("r1", "r2")
+    assert search(loaded.model, loaded.tasks[0]).cost_of(0) == (1, 3)
+    verdict = validate(read, loaded.problems[0], loaded.team, [["(go r1 a b)", "(tick)"]])
+    assert "it belongs to no robot" in verdict.reason
 
 
 def test_a_price_that_is_missing() -> None:
