@@ -8,7 +8,7 @@ the whole one does.  It is small, and may have symmetries that the whole has not
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations, islice
 
@@ -71,12 +71,8 @@ class ContainedInstance:
         self._refuter: Refuter | None = None
         self._partitions = Partitions(self.states, self.known.clauses, part.group.permutations)
 
-    def refute(
-        self, size: int, budget: SolverBudget, between: Callable[[], None] = lambda: None
-    ) -> Refutation | None:
+    def refute(self, size: int, budget: SolverBudget) -> Refutation | None:
         """That so many words do not suffice; None if they do for this part.
-
-        ``between`` is called now and then; what it raises ends this.
 
         Raises
         ------
@@ -88,7 +84,7 @@ class ContainedInstance:
             self._refuter = Refuter([space], self._part.group, len(space.rows), self._seed)
         word = np.zeros(len(space.rows), np.int64)
         for _ in range(budget.rounds):
-            partition = self._partitions.find(size, budget.conflicts, between)
+            partition = self._partitions.find(size, budget.conflicts)
             if partition is None:
                 self._partitions.drop(size)
                 return Refutation(size, self.known.evidence, len(self.known.clauses))

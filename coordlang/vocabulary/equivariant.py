@@ -11,7 +11,7 @@ docs/concepts.md).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 
@@ -139,7 +139,6 @@ class EquivariantSearch:
         size: int,
         rounds: int,
         abstractions: Sequence[Ints] | None = None,
-        between: Callable[[], None] = lambda: None,
     ) -> Assignment | None:
         """A language with at most ``size`` words, None if none was found with some effort.
 
@@ -155,8 +154,6 @@ class EquivariantSearch:
             Look at words that one of these decides, too, each (states) the abstract state of each
             state: there are so few of them that most kinds are decided at once.  In later calls
             with this size some may be left out.
-        between
-            Called before each partition.
         """
         kinds = self._of_size(size, abstractions)
         left = {id(abstract) for abstract in abstractions or ()}
@@ -169,7 +166,7 @@ class EquivariantSearch:
                 kind.close()
                 continue
             try:
-                found = self._of_kind(kind, size, kinds.next_effort(), between)
+                found = self._of_kind(kind, size, kinds.next_effort())
             except Undecided:
                 kinds.leave_undecided(kind)
                 continue
@@ -245,15 +242,13 @@ class EquivariantSearch:
         """Whether it is soon seen that no language has words on which an element acts so."""
         kind = _Kind(self._group.cyclic_action(element, words))
         try:
-            return self._of_kind(kind, len(words), _PROBE, lambda: None) is None
+            return self._of_kind(kind, len(words), _PROBE) is None
         except Undecided:
             return False
         finally:
             kind.close()
 
-    def _of_kind(
-        self, kind: _Kind, size: int, effort: SolverBudget, between: Callable[[], None]
-    ) -> Assignment | None:
+    def _of_kind(self, kind: _Kind, size: int, effort: SolverBudget) -> Assignment | None:
         """A language of one kind; None if there is none.  Raises `Undecided`, and can go on."""
         if kind.problem is None:
             words = OrbitWords.of(self._states, self._group, kind.action, size, kind.tied)
@@ -267,7 +262,6 @@ class EquivariantSearch:
         word = np.zeros(len(self._group.elements[0]), np.int64)
         images = self._group.right_cosets(frozenset(kind.action.words))
         while kind.rounds < effort.rounds:
-            between()
             partition = problem.solve(effort.conflicts)
             if partition is None:
                 return None

@@ -3,19 +3,13 @@
 
 Words that an abstraction of the states decides, words that go to words under symmetries, and in
 large spaces local search.  **What is not found is no bound**: only a `Refutation` is.
-
-It is a conversation (`planners.pieces.conversation`): it may go on in a process of its own while
-bounds are proved from below.
 """
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Mapping, Sequence
-from contextlib import closing
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import isqrt
-
-import numpy as np
 
 from coordlang.vocabulary.abstract_words import AbstractSearch
 from coordlang.vocabulary.equivariant import EquivariantSearch
@@ -45,8 +39,6 @@ class Start:
         Tells what is wrong with a partition; it is changed.
     abstractions
         (states) the abstract state of each state, of each abstraction.
-    upper
-        A number of words that suffices.
     seed
         Of what is drawn at random.
     """
@@ -54,98 +46,54 @@ class Start:
     states: Sequence[int]
     refuter: Refuter
     abstractions: Sequence[Ints]
-    upper: int
     seed: int
-
-
-@dataclass(frozen=True, slots=True)
-class Trying:
-    """What the search does next, in words."""
-
-    what: str
-
-
-@dataclass(frozen=True, slots=True)
-class Fewer:
-    """A language with fewer words: (states) the word of each of `Start.states`."""
-
-    words: Ints
-
-
-@dataclass(frozen=True, slots=True)
-class TurnOver:
-    """Nothing is found any more with the effort of this turn; ``figures``: the work done so far."""
-
-    figures: Mapping[str, float]
-
-
-#: What the search answers; a turn ends with `TurnOver`.
-Answer = Trying | Fewer | TurnOver
-
-
-def from_above(start: Start, lowers: Iterator[int]) -> Generator[Answer]:
-    """Languages with fewer and fewer words, turn by turn, each with more effort; a conversation.
-
-    Parameters
-    ----------
-    start
-        What is known.
-    lowers
-        For each turn a number of words that is needed: fewer are not tried.
-    """
-    upper = start.upper
-    with closing(SearchFromAbove(start)) as search:
-        for lower in lowers:
-            while lower < upper and (fewer := (yield from _descend(search, start, lower, upper))):
-                upper = fewer
-                if upper == lower + 1:
-                    break  # the number that is left is mostly refuted before the next turn
-            yield TurnOver(search.figures())
-
-
-def _descend(
-    search: SearchFromAbove, start: Start, lower: int, upper: int
-) -> Generator[Answer, None, int | None]:
-    """Look for a language with fewer words than ``upper``; how many it has, None without one."""
-    # The number that is not refuted yet is tried last: mostly there is no such language.
-    size = isqrt(min(lower + 1, upper - 1) * upper)
-    while size < upper:
-        found = yield from search.find(size, symmetric=size > lower)
-        if found is not None:
-            return (yield from _with_merged_words(found, start))
-        size = (size + upper + 1) // 2
-    return None
-
-
-def _with_merged_words(found: Assignment, start: Start) -> Generator[Answer, None, int]:
-    """A language, and those with merged words, while it stays one; small ones have none to spare.
-
-    How many words the last one has.
-    """
-    yield Fewer(_words(found, start))
-    if len(start.states) > LOCAL_FROM:
-        for fewer in merged(found, start.states, start.refuter, start.seed):
-            found = fewer
-            yield Trying("merging words")
-            yield Fewer(_words(found, start))
-    return word_count(found)
-
-
-def _words(found: Assignment, start: Start) -> Ints:
-    return np.array([found[state] for state in start.states])
 
 
 class SearchFromAbove:
     """All searches for languages that prove nothing, with effort that grows from call to call."""
 
-    def __init__(self, start: Start) -> None:
+    def __init__(self, start: Start, progress: Callable[[str], None] = lambda _: None) -> None:
         states, refuter, seed = start.states, start.refuter, start.seed
+        self._start, self._progress = start, progress
         self._abstract = AbstractSearch(start.abstractions, states, refuter, seed)
         self._equivariant = EquivariantSearch(states, refuter, seed)
         self._local = LocalSearch(states, refuter, seed) if len(states) > LOCAL_FROM else None
         self._passes: dict[int, int] = {}
 
-    def find(self, size: int, symmetric: bool) -> Generator[Trying, None, Assignment | None]:
+    def turn(self, lower: int, upper: int) -> Iterator[Assignment]:
+        """Languages with fewer and fewer words, until the effort of this turn finds no more.
+
+        Parameters
+        ----------
+        lower
+            A number of words that is needed: fewer are not tried.
+        upper
+            A number of words that suffices.
+        """
+        start = self._start
+        while lower < upper and (found := self._fewer(lower, upper)) is not None:
+            yield found
+            upper = word_count(found)
+            if len(start.states) > LOCAL_FROM:  # small ones have no words to spare
+                self._progress("merging words")
+                for coarser in merged(found, start.states, start.refuter, start.seed):
+                    yield coarser
+                    upper = word_count(coarser)
+            if upper == lower + 1:
+                break  # the number that is left is mostly refuted before the next turn
+
+    def _fewer(self, lower: int, upper: int) -> Assignment | None:
+        """A language with fewer words than ``upper``; None if none is found."""
+        # The number that is not refuted yet is tried last: mostly there is no such language.
+        size = isqrt(min(lower + 1, upper - 1) * upper)
+        while size < upper:
+            found = self.find(size, symmetric=size > lower)
+            if found is not None:
+                return found
+            size = (size + upper + 1) // 2
+        return None
+
+    def find(self, size: int, symmetric: bool) -> Assignment | None:
         """A language with at most ``size`` words, None if none was found with some effort.
 
         ``symmetric`` says whether symmetric words are looked for, abstractions apart.
@@ -155,18 +103,18 @@ class SearchFromAbove:
         """
         rounds = self._passes.get(size, _FIRST)
         self._passes[size] = 2 * rounds
-        yield Trying(f"words of abstract states: trying {size}")
+        self._progress(f"words of abstract states: trying {size}")
         found = self._abstract.find(size)
         if found is None:
-            yield Trying(f"symmetric words of abstract states: trying {size}")
+            self._progress(f"symmetric words of abstract states: trying {size}")
             found = self._equivariant.find(size, rounds, self._abstract.left(size))
         if found is None and symmetric:
-            yield Trying(f"symmetric words: trying {size}")
+            self._progress(f"symmetric words: trying {size}")
             found = self._equivariant.find(size, rounds)
         if found is None and self._local is not None:
             behind = self._local.rounds + _AHEAD <= self.rounds
             if behind or self._is_over(size):
-                yield Trying(f"local search: trying {size}")
+                self._progress(f"local search: trying {size}")
                 found = self._local.find(size, self._equivariant.undecided(size))
         return found
 

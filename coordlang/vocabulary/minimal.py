@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import replace
 from itertools import count
 
@@ -21,11 +21,10 @@ import numpy as np
 
 from coordlang.language.warping import Clause
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
-from coordlang.vocabulary.above import Above
 from coordlang.vocabulary.abstractions import abstractions
 from coordlang.vocabulary.contained import ContainedInstance, parts, tasks_of_one_orbit
 from coordlang.vocabulary.equivariant import EquivariantSearch
-from coordlang.vocabulary.from_above import Start, from_above
+from coordlang.vocabulary.from_above import SearchFromAbove, Start
 from coordlang.vocabulary.job import Assignment, Evidence, Job, Outcome, word_count
 from coordlang.vocabulary.necessary_clauses import NecessaryClauses
 from coordlang.vocabulary.partitions import Partitions, Refutation
@@ -83,10 +82,6 @@ def refuting_clauses(job: Job, size: int) -> Mapping[Clause, Evidence]:
     return search.refuting.clauses
 
 
-class _Met(Exception):
-    """The bounds have met by a language that was found from above."""
-
-
 class _Search:
     """Closes in on the least number of words.
 
@@ -97,15 +92,12 @@ class _Search:
         self._job = job
         self.lower = job.lower_bound
         self.best: Assignment | None = job.incumbent
-        #: The best language that was not found from above.
-        self._own = job.incumbent
         self.known = NecessaryClauses(SymmetryGroup(()))
         self.refuting = Refutation(1, self.known.evidence, 1)  # any clause refutes one word
         self._partitions: Partitions | None = None
         self._refuter: Refuter | None = None
         self._abstractions: list[Ints] = []
         self._equivariant: EquivariantSearch | None = None
-        self._above: Above | None = None
         self._figures_above: dict[str, float] = {}
         self._contained: list[ContainedInstance] = []
         self._rounds = 0
@@ -120,7 +112,7 @@ class _Search:
             return
         self._prepare()
         self._look_for_separating_words()
-        separating = self._own
+        separating = self.best
         self._close_bounds()
         if self.best is separating:
             # It separates more than a language must: one that does not leaves more plans open.
@@ -140,7 +132,7 @@ class _Search:
         }
         if self._refuter is not None:
             figures |= {"counterexamples": len(self._refuter.pool), "walks": self._refuter.walks}
-        figures |= self._above.figures if self._above else self._figures_above
+        figures |= self._figures_above
         if self._equivariant is not None:
             rounds = figures.get("equivariant_rounds", 0) + self._equivariant.rounds
             figures["equivariant_rounds"] = rounds
@@ -193,31 +185,25 @@ class _Search:
         budget = self._decide_from_below(SolverBudget())
         if self.lower >= self._upper:
             return
-        job, refuter = self._job, self._prepare()
-        start = Start(job.states, refuter.copy(), self._abstractions, self._upper, job.seed)
-        conversation = job.runner.beside(from_above, start)
-        with closing(Above(conversation, job.states, self._offer, self._report_above)) as above:
-            self._above = above
-            self._meet(above, budget)
-        self.best = self._standing
-        self._above, self._figures_above = None, above.figures
+        start = Start(self._job.states, self._prepare().copy(), self._abstractions, self._job.seed)
+        with closing(SearchFromAbove(start, self._report_above)) as above:
+            try:
+                self._meet(above, budget)
+            finally:
+                self._figures_above = above.figures()
 
-    def _meet(self, above: Above, budget: SolverBudget) -> None:
-        """Go on in turns until the bounds meet; see `coordlang.vocabulary.above`."""
-        known = self._own
-        above.allow_turn(self.lower)
+    def _meet(self, above: SearchFromAbove, budget: SolverBudget) -> None:
+        """Go on in turns, each with more effort than the one before, until the bounds meet."""
         for turn in count(1):
-            above.allow_turn(self.lower)
-            above.begin_turn(turn, self.lower)
-            self._most_rounds = max(SolverBudget().rounds, _ROUNDS << turn)
-            with suppress(_Met):
-                self._listen()
-                budget = self._decide_from_below(budget.doubled())
-                self._look_for_symmetric_words(_SYMMETRIC_ROUNDS << (turn - 1))
-            if self._own is not known:
-                above.wait_for(turn + 1, self.lower)
+            for found in above.turn(self.lower, self._upper):
+                self._offer(found)
             if self.lower >= self._upper:
                 return
+            self._most_rounds = max(SolverBudget().rounds, _ROUNDS << turn)
+            budget = self._decide_from_below(budget.doubled())
+            if self.lower >= self._upper:
+                return
+            self._look_for_symmetric_words(_SYMMETRIC_ROUNDS << (turn - 1))
 
     def _decide_from_below(self, budget: SolverBudget) -> SolverBudget:
         """Decide numbers of words with some effort for each; the effort that was not enough."""
@@ -232,34 +218,16 @@ class _Search:
         The search from above leaves these to this one, which mostly proves its bounds long before
         the other one has come down to them.
         """
-        if self.lower >= self._upper:
-            return
         if self._equivariant is None:
             self._equivariant = EquivariantSearch(self._job.states, self._prepare(), self._job.seed)
         self._report_above(f"symmetric words: trying {self.lower}")
-        found = self._equivariant.find(self.lower, rounds, between=self._listen)
+        found = self._equivariant.find(self.lower, rounds)
         if found is not None:
             self._offer(found)
-            self._own = found
-
-    def _listen(self) -> None:
-        """Hear of languages from above; raises `_Met` where the bounds have met by one."""
-        if self._above is not None:
-            self._above.listen()
-            if self.lower >= self._upper:
-                raise _Met
-
-    @property
-    def _standing(self) -> Assignment | None:
-        """The best language; of two with as few words the one from above."""
-        above = self._above.best if self._above is not None else None
-        known = [language for language in (above, self._own) if language is not None]
-        return min(known, key=word_count, default=None)
 
     @property
     def _upper(self) -> int:
-        standing = self._standing
-        return len(self._job.states) if standing is None else word_count(standing)
+        return len(self._job.states) if self.best is None else word_count(self.best)
 
     def _report_above(self, what: str) -> None:
         self._job.progress(f"{what}, {self.lower} to {self._upper} needed")
@@ -276,7 +244,7 @@ class _Search:
         if sum(map(_combinations, spaces)) > most:
             return
         found = short_separating_search(replace(self._job, incumbent=self.best))
-        self.best = self._own = found.partition
+        self.best = found.partition
         # Its walk may be larger than ours, which needs none of it; but time that is over is over.
         if found.stopped is not None and not isinstance(found.stopped, OutOfMemory):
             raise found.stopped
@@ -296,7 +264,6 @@ class _Search:
             self.lower = found.size + 1
         else:
             self._offer(found)
-            self._own = found
         return True
 
     def _refuted_within(self, size: int, budget: SolverBudget) -> Refutation | None:
@@ -308,7 +275,7 @@ class _Search:
                 f"trying {size} words for {len(instance.states):,} of the states, "
                 f"{self.lower} to {self._upper} needed: {len(instance.known.clauses):,} clauses"
             )
-            refutation = instance.refute(size, budget, self._listen)
+            refutation = instance.refute(size, budget)
             self._rounds += instance.rounds
             instance.rounds = 0
             if refutation is not None:
@@ -329,9 +296,7 @@ class _Search:
             permutations = self.known.group.permutations
             self._partitions = Partitions(self._job.states, self.known.clauses, permutations)
         refuted = 0
-        while (
-            partition := self._partitions.find(size, budget.conflicts, self._listen)
-        ) is not None:
+        while (partition := self._partitions.find(size, budget.conflicts)) is not None:
             if refuted >= min(budget.rounds, self._most_rounds):
                 raise Undecided
             word = np.zeros(rows, np.int64)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
@@ -75,9 +75,7 @@ class Partitions:
         self._all = ProblemsBySize(self._start, require)
         self._up_to_symmetry = ProblemsBySize(self._start_up_to_symmetry, require)
 
-    def find(
-        self, size: int, conflicts: int, between: Callable[[], None] = lambda: None
-    ) -> dict[int, int] | None:
+    def find(self, size: int, conflicts: int) -> dict[int, int] | None:
         """A partition into ``size`` words, or None if there is none.
 
         Parameters
@@ -86,8 +84,6 @@ class Partitions:
             The number of words.
         conflicts
             Conflicts of the solver that are allowed.
-        between
-            Called before each slice of its work; what it raises ends the search.
 
         Raises
         ------
@@ -96,10 +92,10 @@ class Partitions:
         """
         if size not in self._hard:
             with suppress(Undecided):
-                return self._all.under(size, self._clauses).solve(_EASY, between)
+                return self._all.under(size, self._clauses).solve(_EASY)
             self._hard.add(size)
             self._all.drop(size)
-        return self._up_to_symmetry.under(size, self._clauses).solve(conflicts, between)
+        return self._up_to_symmetry.under(size, self._clauses).solve(conflicts)
 
     def drop(self, size: int) -> None:
         """Forget a number of words that is decided."""

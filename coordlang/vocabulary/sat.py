@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from coordlang.language.warping import Clause, Pair, pair
@@ -93,19 +93,15 @@ class PartitionProblem:
         self._solver.add_clause([*before, -here, -there, equal])
         return equal
 
-    def solve(
-        self, conflicts: int | None = None, between: Callable[[], None] = lambda: None
-    ) -> dict[int, int] | None:
+    def solve(self, conflicts: int | None = None) -> dict[int, int] | None:
         """A partition (state -> word), or None if it is proved that there is none.
-
-        ``between`` is called between slices of the work; what it raises ends it.
 
         Raises
         ------
         Undecided
             After about so many ``conflicts`` of the solver.
         """
-        if not satisfiable(self._solver, conflicts=conflicts, between=between):
+        if not satisfiable(self._solver, conflicts=conflicts):
             return None
         true = {v for v in self._solver.get_model() if v > 0}
         return {s: next(w for w, v in enumerate(own) if v in true) for s, own in self._word.items()}
@@ -201,7 +197,6 @@ def satisfiable(
     solver: Any,
     assumptions: Sequence[int] = (),
     conflicts: int | None = None,
-    between: Callable[[], None] = lambda: None,
 ) -> bool:
     """Whether the clauses of a solver of python-sat can be satisfied.
 
@@ -213,8 +208,6 @@ def satisfiable(
         Literals that are assumed besides.
     conflicts
         Conflicts of the solver that are allowed, None without limit.
-    between
-        Called before each slice of its work; what it raises ends it.
 
     Raises
     ------
@@ -223,7 +216,6 @@ def satisfiable(
     """
     spent = 0
     while conflicts is None or spent < conflicts:
-        between()
         answer = solve_slice(solver, _SLICE, assumptions)
         if answer is not None:
             return answer

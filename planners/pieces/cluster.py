@@ -22,7 +22,6 @@ from uuid import uuid4
 
 from planners.errors import CoordlangError, OutOfMemory, UsageError
 from planners.messages import echoed
-from planners.pieces.conversation import Conversation, Here, Talk
 from planners.pieces.versions import versions_here
 from planners.pieces.work import Done, Report, Work, silent
 from planners.pieces.worker_process import packed_piece, packed_work
@@ -114,10 +113,6 @@ class Cluster:
                 self._client.cancel(list(futures), reason="no longer wanted")
                 futures.clear()
                 self._client.unregister_worker_plugin(name)
-
-    def beside(self, talk: Talk, shared: Any) -> Conversation:
-        """See `Runner.beside`: a cluster does pieces, and this process does this."""
-        return Here(talk, shared)
 
     def _submit(self, work: Work, name: str, futures: dict[Any, int]) -> None:
         """Send all pieces; the scheduler begins them in their order."""

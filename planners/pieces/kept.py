@@ -14,12 +14,10 @@ from contextlib import closing
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from planners.errors import UsageError
-from planners.pieces.conversation import Conversation, Talk
 from planners.pieces.versions import code_hash
 from planners.pieces.work import Done, Report, Runner, Table, Work, silent
 from planners.writing import write_atomically
@@ -87,10 +85,6 @@ class Kept:
                 if done.table is not None:
                     write_atomically(paths[number], as_bytes(done.table))
                 yield replace(done, number=number)
-
-    def beside(self, talk: Talk, shared: Any) -> Conversation:
-        """See `Runner.beside`; nothing of it is kept."""
-        return self._runner.beside(talk, shared)
 
     def _read(self, path: Path) -> Table | None:
         """The table of a file, None where there is none."""

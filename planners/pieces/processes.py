@@ -6,11 +6,8 @@ from __future__ import annotations
 import os
 from collections.abc import Generator
 from multiprocessing.connection import wait
-from typing import Any
 
 from planners.limits import has_memory_limit, memory_left
-from planners.pieces.beside import Beside
-from planners.pieces.conversation import Conversation, Here, Talk
 from planners.pieces.work import Done, Report, Work, silent
 from planners.pieces.worker_process import (
     WorkerLost,
@@ -70,13 +67,6 @@ class Processes:
         jobs = min(jobs, max(1, left // _LEAST_MEMORY))
         memory = left // max(1, jobs) if has_memory_limit() else None
         yield from _Pool(work, jobs, memory, report).run()
-
-    def beside(self, talk: Talk, shared: Any) -> Conversation:
-        """See `planners.pieces.work.Runner.beside`: a process where there may be two."""
-        memory = memory_left() // 2
-        if self._jobs < 2 or memory < _LEAST_MEMORY:
-            return Here(talk, shared)
-        return Beside(talk, shared, memory if has_memory_limit() else None)
 
 
 def in_process(work: Work, report: Report = silent) -> Generator[Done]:

@@ -16,8 +16,6 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.pieces.conversation import Conversation, Talk
-
 #: What a piece of work finds: arrays by name, no Python objects in them.
 Table = dict[str, NDArray[Any]]
 #: What does a piece: a function of a module (it is sent to other processes by name) that gets what
@@ -109,10 +107,6 @@ class Runner(Protocol):
         OutOfMemory
             For a piece that is not isolated and whose processes die.
         """
-        ...
-
-    def beside(self, talk: Talk, shared: Any) -> Conversation:
-        """Begin a conversation with work beside this one, in this process if there is no other."""
         ...
 
 

@@ -14,7 +14,6 @@ import signal
 import sys
 import threading
 import traceback
-from collections.abc import Iterator
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from time import perf_counter, process_time
@@ -48,16 +47,10 @@ def main() -> None:
 
 
 def _serve(connection: Connection) -> None:
-    """Answer messages: ``("work", bytes)`` is remembered, ``("piece", bytes)`` is done.
-
-    After ``("talk", bytes)`` there are only messages of that conversation.
-    """
+    """Answer messages: ``("work", bytes)`` is remembered, ``("piece", bytes)`` is done."""
     packed, work = b"", None
     while connection.poll(_IDLE):
         what, payload = connection.recv()
-        if what == "talk":
-            _converse(connection, payload)
-            return
         if what == "work":
             packed, work = payload, None
             continue
@@ -69,22 +62,6 @@ def _serve(connection: Connection) -> None:
         except (Exception, KeyboardInterrupt) as error:
             answer = ("error", *_as_sent(error))
         connection.send((answer, perf_counter() - since, process_time() - busy))
-
-
-def _converse(connection: Connection, packed: bytes) -> None:
-    """Send the answers of a conversation, see `planners.pieces.conversation`."""
-    try:
-        talk, shared = pickle.loads(packed)
-        for answer in talk(shared, _messages(connection)):
-            connection.send(("done", answer))
-    except (Exception, KeyboardInterrupt) as error:
-        connection.send(("error", *_as_sent(error)))
-
-
-def _messages(connection: Connection) -> Iterator[Any]:
-    """What is said to this process; it waits as long as its parent is there."""
-    while True:
-        yield pickle.loads(connection.recv())
 
 
 def _as_sent(error: BaseException) -> tuple[bytes | None, str, str]:

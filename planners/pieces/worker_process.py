@@ -96,31 +96,6 @@ class WorkerProcess:
                 self._work = work
             self.connection.send(("piece", piece))
 
-    def begin_talk(self, talk: bytes) -> None:
-        """Begin a conversation, after which `say` and `heard` belong to it."""
-        with suppress(ConnectionError):
-            self.connection.send(("talk", talk))
-
-    def say(self, message: bytes) -> None:
-        """Send a message of the conversation."""
-        with suppress(ConnectionError):
-            self.connection.send(message)
-
-    def heard(self) -> Any:
-        """An answer of the conversation, which must be `ready`.
-
-        Raises
-        ------
-        WorkerLost
-            If the process is gone.
-        """
-        match self._received():
-            case "done", answer:
-                return answer
-            case "error", packed, text, where:
-                raise _as_raised(packed, text, where)
-        raise AssertionError
-
     def ready(self, seconds: float) -> bool:
         """Whether there is an answer, or the process is gone; waits so long for it."""
         return bool(wait([self.connection], timeout=seconds))

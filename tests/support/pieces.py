@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 import signal
 import time
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -39,16 +39,6 @@ def dies_once(folder: str, piece: int) -> Table:
 def takes_memory(_: object, piece: int) -> Table:
     """So many MiB at once."""
     return {"values": np.ones(piece << 17)[:1]}
-
-
-def sums(begin: int, messages: Iterator[int]) -> Generator[tuple[int, int]]:
-    """Of each message its sum with those before it, twice, and who answers; 0 is a bug."""
-    for message in messages:
-        begin += message
-        yield begin, os.getpid()
-        if message == 0:
-            raise ZeroDivisionError("a bug")
-        yield begin, os.getpid()
 
 
 def waits(folder: str, piece: int) -> Table:

@@ -135,35 +135,27 @@ def test_others_are_asked_where_no_abstraction_is_left(monkeypatch: pytest.Monke
     asked: list[int] = []
     monkeypatch.setattr(EquivariantSearch, "find", lambda self, size, *effort: asked.append(size))
     refuter, states = refuter_of(candidates), states_of(candidates)
-    known = Start(states, refuter, abstractions(candidates, states), len(states), 0)
-    above = SearchFromAbove(known)
-    assert finding(above, 12)[0] is not None
+    known = Start(states, refuter, abstractions(candidates, states), 0)
+    told: list[str] = []
+    above = SearchFromAbove(known, told.append)
+    assert above.find(12, symmetric=True) is not None
     assert not asked
-    found, told = finding(above, 2)
-    assert found is None
+    told.clear()
+    assert above.find(2, symmetric=True) is None
     assert asked == [2, 2]
     assert told == [
         "words of abstract states: trying 2",
         "symmetric words of abstract states: trying 2",
         "symmetric words: trying 2",
     ]
-    assert finding(SearchFromAbove(replace(known, abstractions=[])), 3)[0] is None
+    without = SearchFromAbove(replace(known, abstractions=[]))
+    assert without.find(3, symmetric=True) is None
     assert asked == [2, 2, 3, 3]
     # The last number is left to the search from below, but for words of abstract states.
-    assert finding(above, 2, symmetric=False)[1] == told[:2]
+    del told[2:]
+    above.find(2, symmetric=False)
+    assert told[2:] == told[:2]
     assert asked == [2, 2, 3, 3, 2]
-
-
-def finding(
-    above: SearchFromAbove, size: int, symmetric: bool = True
-) -> tuple[Assignment | None, list[str]]:
-    """What a search finds, and what it says meanwhile."""
-    search, told = above.find(size, symmetric), list[str]()
-    while True:
-        try:
-            told.append(next(search).what)
-        except StopIteration as over:
-            return over.value, told
 
 
 @pytest.mark.parametrize("least", [1, 20])

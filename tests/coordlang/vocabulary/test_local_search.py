@@ -287,9 +287,9 @@ def test_words_of_what_is_found_are_merged(monkeypatch: pytest.MonkeyPatch) -> N
     apart = {state: number for number, state in enumerate(states)}
     monkeypatch.setattr(from_above, "LOCAL_FROM", 0)
     monkeypatch.setattr(EquivariantSearch, "find", lambda self, size, *effort, **more: apart)
-    start = from_above.Start(states, refuter, [], len(states) + 1, 0)
-    answers = from_above.from_above(start, iter([2]))
-    told = list(islice((a.words.tolist() for a in answers if isinstance(a, from_above.Fewer)), 4))
+    search = from_above.SearchFromAbove(from_above.Start(states, refuter, [], 0))
+    answers = search.turn(2, len(states) + 1)
+    told = list(islice(([found[state] for state in states] for found in answers), 4))
     assert told[0] == list(range(len(states)))
     sizes = [len(set(words)) for words in told]
     assert sizes == sorted(set(sizes), reverse=True)
