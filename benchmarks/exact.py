@@ -28,7 +28,7 @@ from benchmarks.paper.suite import ROWS
 from coordlang.building import build_language
 from coordlang.tasks.candidates import Candidates, all_pairs
 from planners.limits import time_limit
-from planners.pieces.processes import Processes
+from planners.parallel.workers import Workers
 
 FURTHER = ("open-2x6", "open-3x4", "open-3x5", "open-4x4", "ring-4x5")
 FIGURES = ("rounds", "abstract_rounds", "equivariant_rounds", "counterexamples", "walks", "clauses")
@@ -80,8 +80,8 @@ def measured(key: str, name: str, seed: int, given: Namespace) -> Figures:
     candidates = candidates_of(name)
     wall, cpu = perf_counter(), _processor_time()
     with time_limit(given.limit):
-        runner = Processes(given.jobs)
-        built = build_language(candidates, "minimal", seed=seed, runner=runner)
+        workers = Workers(given.jobs)
+        built = build_language(candidates, "minimal", seed=seed, workers=workers)
     guarantee = built.language.guarantee
     low, high = guarantee.lower_bound, guarantee.size
     cells = [

@@ -106,13 +106,13 @@ class Clock:
 def build(grid: Grid) -> Figures:
     """From PDDL text to a verified greedy language, in this process."""
     from coordlang.language.partition import Partition
-    from coordlang.required.pieces import differences
+    from coordlang.required.all_differences import differences
     from coordlang.tasks.candidates import all_pairs, from_problems
-    from coordlang.verification.pieces import verify_candidates
+    from coordlang.verification.candidates import verify_candidates
     from coordlang.vocabulary import Job, greedy
-    from planners.pieces.processes import Processes
+    from planners.parallel.workers import Workers
 
-    clock, here = Clock(), Processes(jobs=1)
+    clock, here = Clock(), Workers()
     loaded = grid.load()
     candidates = (all_pairs if grid.every else from_problems)(loaded.domain, loaded.problems)
     figures: Figures = {"tasks": candidates.count, "plans": clock.look()}

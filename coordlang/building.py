@@ -14,12 +14,12 @@ from coordlang.language.partition import Partition
 from coordlang.language.provenance import Guarantee, provenance_of
 from coordlang.language.warping import Clause
 from coordlang.language.words import Language
+from coordlang.required.all_differences import differences
 from coordlang.required.divergences import FirstDifferences
-from coordlang.required.pieces import differences
 from coordlang.tasks.candidates import Candidates, require_solvable
 from coordlang.tolerance.failures import NONE, Failures
 from coordlang.verification.by_definition import Verdict
-from coordlang.verification.pieces import verify_candidates
+from coordlang.verification.candidates import verify_candidates
 from coordlang.vocabulary import EXACT, METHODS, Job, Outcome, greedy
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.hidden_slack import hidden_differences
@@ -28,8 +28,7 @@ from coordlang.vocabulary.minimal import refuting_clauses
 from planners.errors import UsageError
 from planners.limits import little_time_after, run_until_stopped, start_clock, time_left
 from planners.messages import echoed
-from planners.pieces.processes import Processes
-from planners.pieces.work import Runner
+from planners.parallel.workers import Workers
 from planners.search.portions import require_room
 
 #: What the language should be like, of those with the fewest words, by the value of ``--prefer``.
@@ -127,7 +126,7 @@ def build_language(
     prefer: BuildPreference | None = None,
     reserve: float = 0.0,
     progress: Callable[[str], None] = lambda _: None,
-    runner: Runner | None = None,
+    workers: Workers | None = None,
 ) -> Built:
     """Build a coordination language for candidate tasks and verify it by definition.
 
@@ -142,8 +141,8 @@ def build_language(
         `certificate_of`.
     progress
         Called with a line of text now and then.
-    runner
-        Who does pieces of the work; None: this process.  The language does not depend on it.
+    workers
+        Who does jobs; None: this process.  The language does not depend on it.
 
     Raises
     ------
@@ -158,7 +157,7 @@ def build_language(
     """
     options = BuildOptions(method, seed, alpha_only, prefer)
     require_solvable(candidates)
-    runner = runner or Processes(jobs=1)
+    workers = workers or Workers()
     clock = Clock()
     hidden = candidates.model.hides_slack
     if hidden and not options.is_exact:
@@ -168,7 +167,7 @@ def build_language(
             remedy="Add --words-see-slack, by which states say how much is left, or --method "
             "minimal.",
         )
-    found = (hidden_differences if hidden else differences)(candidates, runner, progress)
+    found = (hidden_differences if hidden else differences)(candidates, workers, progress)
     clock.note("coordination")
     states = tuple(found.states.tolist())
     verified: list[_Verified] = []
@@ -180,9 +179,9 @@ def build_language(
         alpha_only=alpha_only,
         progress=progress,
         check=lambda assignment: verified.append(
-            _verified(candidates, assignment, runner, progress)
+            _verified(candidates, assignment, workers, progress)
         ),
-        runner=runner,
+        workers=workers,
     )
     if method != "greedy":
         require_room(candidates.source)
@@ -275,11 +274,11 @@ class _Verified:
 def _verified(
     candidates: Candidates,
     assignment: Assignment,
-    runner: Runner,
+    workers: Workers,
     progress: Callable[[str], None],
 ) -> _Verified:
     partition = Partition.of_states(candidates.rows, assignment)
-    verdict = verify_candidates(partition, candidates, runner, progress)
+    verdict = verify_candidates(partition, candidates, workers, progress)
     if not verdict.holds:
         raise AssertionError(
             f"a method returned what is no coordination language: {verdict.witness}"

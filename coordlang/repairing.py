@@ -14,15 +14,14 @@ from coordlang.language.keys import keys_of, read_keys
 from coordlang.language.partition import Partition
 from coordlang.language.provenance import Guarantee, provenance_of
 from coordlang.language.words import Language
+from coordlang.required.all_differences import differences
 from coordlang.required.miscoordination import Miscoordination
-from coordlang.required.pieces import differences
 from coordlang.tasks.candidates import Candidates, require_solvable
 from coordlang.verification.by_definition import Verdict
-from coordlang.verification.pieces import verify_candidates
+from coordlang.verification.candidates import verify_candidates
 from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.repair import Repair, repair
-from planners.pieces.processes import Processes
-from planners.pieces.work import Runner
+from planners.parallel.workers import Workers
 from planners.tables import Ints, Rows, find_rows
 
 #: What a language file names as the method of a repaired language.
@@ -82,7 +81,7 @@ def repair_language(
     contained: bool = False,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
-    runner: Runner | None = None,
+    workers: Workers | None = None,
 ) -> tuple[Built, Repaired]:
     """Change the words of as few states as makes a language serve candidate tasks.
 
@@ -102,8 +101,8 @@ def repair_language(
         Recorded.
     progress
         Called with a line of text now and then.
-    runner
-        Who does pieces of the work; None: this process.
+    workers
+        Who does jobs; None: this process.
 
     Raises
     ------
@@ -111,15 +110,15 @@ def repair_language(
         As `coordlang.building.build_language` does.
     """
     require_solvable(candidates)
-    runner = runner or Processes(jobs=1)
+    workers = workers or Workers()
     clock = Clock()
-    found = differences(candidates, runner, progress)
+    found = differences(candidates, workers, progress)
     clock.note("coordination")
     states = tuple(found.states.tolist())
     old = _Old.of(start, candidates)
     new_states = len(states) - len(old.words_of(states))
     progress("verifying the old language")
-    verdict = verify_candidates(old.partition, candidates, runner, progress)
+    verdict = verify_candidates(old.partition, candidates, workers, progress)
     clock.note("verify")
     job = Job(candidates, states, found.first, seed=seed)
     before = start.guarantee if contained else replace(start.guarantee, lower_bound=1)
@@ -130,7 +129,7 @@ def repair_language(
 
     def check(assignment: Assignment) -> None:
         partition = old.repaired(assignment)
-        after = verify_candidates(partition, candidates, runner, progress)
+        after = verify_candidates(partition, candidates, workers, progress)
         if not after.holds:
             raise AssertionError(f"the repaired words are no language: {after.witness}")
         verified.append((assignment, partition, after))

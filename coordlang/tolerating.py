@@ -13,15 +13,15 @@ from coordlang.language.partition import Partition
 from coordlang.language.provenance import Guarantee, provenance_of
 from coordlang.language.tolerance import Tolerance
 from coordlang.language.words import Language
+from coordlang.required.all_differences import differences
 from coordlang.required.choices import Choices
 from coordlang.required.divergences import Divergences, FirstDifferences, states_on_plans
 from coordlang.required.miscoordination import Inseparable
-from coordlang.required.pieces import differences
 from coordlang.symmetry.group import symmetry_group
 from coordlang.tasks.candidates import Candidates, require_solvable
 from coordlang.tolerance.failures import Failures
 from coordlang.verification.by_definition import Verdict
-from coordlang.verification.pieces import verify_candidates
+from coordlang.verification.candidates import verify_candidates
 from coordlang.vocabulary.few_words import few_words
 from coordlang.vocabulary.fewest_failures import FewWords
 from coordlang.vocabulary.greedy import greedy
@@ -30,8 +30,7 @@ from coordlang.vocabulary.job import Assignment, Job
 from planners.errors import UsageError
 from planners.limits import little_time_after
 from planners.messages import echoed
-from planners.pieces.processes import Processes
-from planners.pieces.work import Runner
+from planners.parallel.workers import Workers
 from planners.search.portions import require_room
 
 #: What a file says of how the words were found.
@@ -73,7 +72,7 @@ def build_few_words(
     *,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
-    runner: Runner | None = None,
+    workers: Workers | None = None,
 ) -> tuple[Built, FewWords]:
     """Find words, at most so many, under which robots that choose by themselves fail least often.
 
@@ -89,8 +88,8 @@ def build_few_words(
         Of all random choices.
     progress
         Called with a line of text now and then.
-    runner
-        Who does pieces of the work; None: this process.
+    workers
+        Who does jobs; None: this process.
 
     Raises
     ------
@@ -101,9 +100,9 @@ def build_few_words(
     """
     require_solvable(candidates)
     require_room(candidates.source)
-    runner = runner or Processes(jobs=1)
+    workers = workers or Workers()
     clock = Clock()
-    first, language = _first_differences(candidates, runner, progress)
+    first, language = _first_differences(candidates, workers, progress)
     clock.note("coordination")
     states = tuple(states_on_plans(candidates.spaces).tolist())
     job = Job(candidates, states, first, seed=seed, progress=progress)
@@ -123,7 +122,7 @@ def build_few_words(
     verdict = Verdict(False, candidates.count, 0, None)
     if not found.failures.worst:
         with little_time_after(found.stopped):
-            verdict = verify_candidates(partition, candidates, runner, progress)
+            verdict = verify_candidates(partition, candidates, workers, progress)
         if not verdict.holds:
             raise AssertionError(f"no robot fails, but these words do: {verdict.witness}")
     clock.note("verify")
@@ -164,7 +163,7 @@ def _figures(found: FewWords) -> dict[str, float]:
 
 
 def _first_differences(
-    candidates: Candidates, runner: Runner, progress: Callable[[str], None]
+    candidates: Candidates, workers: Workers, progress: Callable[[str], None]
 ) -> tuple[FirstDifferences, Assignment | None]:
     """Where coordination is required, and a language if there is one.
 
@@ -173,7 +172,7 @@ def _first_differences(
     """
     hidden = candidates.model.hides_slack
     try:
-        found = (hidden_differences if hidden else differences)(candidates, runner, progress)
+        found = (hidden_differences if hidden else differences)(candidates, workers, progress)
     except Inseparable:
         return _without_divergences(candidates), None
     if hidden:

@@ -58,7 +58,7 @@ class CoordlangError(Exception):
         self.reached: str | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Errors of pieces of work are sent from one process to another, whatever they need."""
+        """Errors of jobs are sent from one process to another, whatever they need."""
         return _rebuilt, (type(self), self.args, self.__dict__)
 
     def __str__(self) -> str:

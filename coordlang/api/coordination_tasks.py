@@ -13,7 +13,7 @@ from coordlang.api.layout import WIDTH
 from coordlang.api.options import GivenOptions, ModelKeywords
 from coordlang.api.presenting import Presented
 from coordlang.api.witness import witness_data, witness_text
-from coordlang.api.workers import opened_runner
+from coordlang.api.workers import opened_workers
 from coordlang.language.tolerance import percent
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.tolerance.failure import mean
@@ -208,8 +208,8 @@ def coordination(
     """
     files = read_planning(domain, problems, factored, GivenOptions.of(**model))
     loaded = files.instance()
-    with opened_runner(jobs, scheduler, resume, note) as runner:
-        found = answers(loaded, runner)
+    with opened_workers(jobs, scheduler, resume, note) as workers:
+        found = answers(loaded, workers)
     tasks = tuple(
         TaskCoordination(
             problem.source.name,

@@ -20,10 +20,10 @@ from coordlang.lifted.grounding import Known, described, grounded, require_robot
 from coordlang.lifted.language import LiftedLanguage
 from coordlang.lifted.world import States, World
 from coordlang.tasks.candidates import Candidates, require_solvable
-from coordlang.verification.pieces import verify_candidates
+from coordlang.verification.candidates import verify_candidates
 from planners.errors import OutOfMemory, Position, note
+from planners.parallel.workers import Workers
 from planners.pddl.lifted import Problem
-from planners.pieces.work import Runner
 
 #: A lifted file or a lifted language.
 LiftedSource = File | LiftedLanguage
@@ -65,7 +65,7 @@ def ground_in(
     tasks: TasksSource | None,
     is_verified: bool,
     points: Mapping[str, Point],
-    runner: Runner,
+    workers: Workers,
     progress: Progress,
     every_word: bool = False,
 ) -> Grounded:
@@ -89,7 +89,7 @@ def ground_in(
     states = States(World.loaded(candidates.loaded, points), candidates.rows)
     known: Known = "unknown"
     if is_verified:
-        known = _known(lifted.partition(states), candidates, runner, progress)
+        known = _known(lifted.partition(states), candidates, workers, progress)
     producer = {"program": "coordlang", "version": coordlang.__version__}
     return Grounded(
         grounded(lifted, candidates, states, known, producer, every_word=every_word), known
@@ -97,10 +97,10 @@ def ground_in(
 
 
 def _known(
-    partition: Partition, candidates: Candidates, runner: Runner, progress: Progress
+    partition: Partition, candidates: Candidates, workers: Workers, progress: Progress
 ) -> Known:
     try:
-        verdict = verify_candidates(partition, candidates, runner, progress)
+        verdict = verify_candidates(partition, candidates, workers, progress)
     except OutOfMemory as error:
         note(f"the words are not verified here: {error.what}")
         return "unknown"

@@ -75,7 +75,7 @@ def language_for(
     if isinstance(read, Language):
         return read, position
     from coordlang.api.grounding import coordinates_of, ground_in
-    from planners.pieces.processes import Processes
+    from planners.parallel.workers import Workers
 
     found = ground_in(
         read,
@@ -84,7 +84,7 @@ def language_for(
         tasks=tasks,
         is_verified=is_verified,
         points=coordinates_of(coordinates, files.problems[0]),
-        runner=Processes(jobs=1),
+        workers=Workers(),
         progress=lambda _: None,
         every_word=is_verified,
     )

@@ -33,7 +33,7 @@ from coordlang.api.options import (
 from coordlang.api.presenting import Presented
 from coordlang.api.repair import repair_data
 from coordlang.api.witness import witness_data
-from coordlang.api.workers import opened_runner, say_size
+from coordlang.api.workers import opened_workers, say_size
 from coordlang.building import BuildOptions, Built, build_language, certificate_of
 from coordlang.certificate import Certificate, Checked, read_certificate
 from coordlang.certificate import check as check_certificate
@@ -54,7 +54,7 @@ from coordlang.tasks.candidates import Candidates, require_solvable
 from coordlang.tolerance.failure import TooManyToCount
 from coordlang.tolerance.failures import NONE, Failures, failures_under
 from coordlang.tolerating import WordLimit, build_few_words
-from coordlang.verification.pieces import verify_candidates
+from coordlang.verification.candidates import verify_candidates
 from coordlang.vocabulary.fewest_failures import FewWords
 from planners.errors import ProvedImpossible, UsageError
 from planners.loading import ModelOptions
@@ -227,8 +227,8 @@ def build(
     progress
         Called with a line of text when a phase begins.
     jobs, scheduler, resume, note
-        Who does the pieces of large work (docs/cli.md, cores and machines): how many processes, by
-        default one for each core; a running Dask cluster; a folder that keeps finished pieces.
+        Who does the jobs of large work (docs/cli.md, cores and machines): how many processes, by
+        default one for each core; a running Dask cluster; a folder that keeps finished jobs.
         ``note`` is called with what a person should read, by default a warning.  The language
         does not depend on them.
 
@@ -257,17 +257,19 @@ def build(
     say_size(candidates, note or progress)
     fewest = requiring(candidates.spaces) if candidates.kind != "all" else None
     repaired = few = None
-    with opened_runner(jobs, scheduler, resume, note) as runner:
+    with opened_workers(jobs, scheduler, resume, note) as workers:
         say = progress or _silent
         if limit is not None:
-            built, few = build_few_words(candidates, limit, seed=seed, progress=say, runner=runner)
+            built, few = build_few_words(
+                candidates, limit, seed=seed, progress=say, workers=workers
+            )
         elif start is None:
             built = build_language(
-                candidates, **asdict(options), reserve=reserve, progress=say, runner=runner
+                candidates, **asdict(options), reserve=reserve, progress=say, workers=workers
             )
         else:
             built, repaired = repair_language(
-                candidates, old, contained=contained, seed=seed, progress=say, runner=runner
+                candidates, old, contained=contained, seed=seed, progress=say, workers=workers
             )
     seconds |= built.seconds
     producer = {
@@ -412,8 +414,8 @@ def verify(
     require_solvable(candidates)
     partition = read.partition(candidates.model)
     say_size(candidates, note or progress)
-    with opened_runner(jobs, scheduler, resume, note) as runner:
-        verdict = verify_candidates(partition, candidates, runner, progress or _silent)
+    with opened_workers(jobs, scheduler, resume, note) as workers:
+        verdict = verify_candidates(partition, candidates, workers, progress or _silent)
         found = NONE
         if not verdict.holds:
             (progress or _silent)("counting how often robots fail")

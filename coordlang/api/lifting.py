@@ -20,7 +20,7 @@ from coordlang.api.inputs import DomainSource, File, ProblemSource, TasksSource,
 from coordlang.api.languages import Progress
 from coordlang.api.options import GivenOptions, ModelKeywords, require_one_of, require_seed
 from coordlang.api.presenting import Presented
-from coordlang.api.workers import opened_runner
+from coordlang.api.workers import opened_workers
 from coordlang.language.provenance import Guarantee, provenance_of, world_sha256
 from coordlang.language.words import Language
 from coordlang.lifted.file import write_lifted
@@ -156,7 +156,7 @@ def lift(
     known = len(every) - len(check)
     for other in every[1:]:
         _require_alike(every[0], other)
-    with opened_runner(jobs, None, None, None) as runner:
+    with opened_workers(jobs, None, None, None) as workers:
         learned = learn(
             every[:known],
             every[known:],
@@ -164,7 +164,7 @@ def lift(
             prefer=prefer,
             seed=seed,
             progress=progress or _silent,
-            runner=runner,
+            workers=workers,
         )
     words = learned.words
     first = every[0].candidates
@@ -223,7 +223,7 @@ def ground(
     """
     own, position = read_lifted_source(lifted)
     files = read_planning(domain, [problem], factored, GivenOptions.of(**model), most=1)
-    with opened_runner(jobs, None, None, None) as runner:
+    with opened_workers(jobs, None, None, None) as workers:
         found = ground_in(
             own,
             files,
@@ -231,7 +231,7 @@ def ground(
             tasks=tasks,
             is_verified=verified,
             points=coordinates_of(coordinates, files.problems[0]),
-            runner=runner,
+            workers=workers,
             progress=progress or _silent,
         )
     if found.known == "refuted":

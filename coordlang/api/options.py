@@ -35,11 +35,11 @@ TARGETS: tuple[str, ...] = get_args(Target)
 READERS: tuple[str, ...] = get_args(Reader)
 
 
-class PiecesKeywords(TypedDict, total=False):
-    """Who does the pieces of the work (docs/cli.md, cores and machines).
+class JobsKeywords(TypedDict, total=False):
+    """Who does the jobs of large work (docs/cli.md, cores and machines).
 
     ``jobs``: processes, one for each core by default; ``scheduler``: a running Dask cluster in
-    their place; ``resume``: a folder that keeps finished pieces; ``note`` is called with what a
+    their place; ``resume``: a folder that keeps finished jobs; ``note`` is called with what a
     person should read, which is a Python warning otherwise.
     """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Who does the pieces of the work: the options of a call, and a runner of pieces."""
+"""Who does jobs: the options of a call."""
 
 from __future__ import annotations
 
@@ -10,21 +10,20 @@ from os import PathLike, fspath
 
 from coordlang.tasks.candidates import Candidates
 from planners.errors import UsageError
-from planners.pieces.runners import Where, runner
-from planners.pieces.work import Runner
+from planners.parallel.workers import Workers, workers
 from planners.search.portions import estimate
 
-#: The packages whose code does pieces.
+#: The packages whose code does jobs.
 PACKAGES = ("planners", "coordlang")
 
 
-def opened_runner(
+def opened_workers(
     jobs: int | None = None,
     scheduler: str | PathLike[str] | None = None,
     resume: str | PathLike[str] | None = None,
     note: Callable[[str], None] | None = None,
-) -> AbstractContextManager[Runner]:
-    """Return a runner of pieces, for a block.
+) -> AbstractContextManager[Workers]:
+    """Return who does jobs, for a block.
 
     Raises
     ------
@@ -41,8 +40,8 @@ def opened_runner(
             "--jobs counts processes of this machine, and --scheduler sends the work elsewhere",
             remedy="Give one of them.",
         )
-    where = Where(jobs, None if scheduler is None else fspath(scheduler), resume)
-    return runner(where, PACKAGES, note or _warn)
+    where = None if scheduler is None else fspath(scheduler)
+    return workers(jobs, where, resume, PACKAGES, note or _warn)
 
 
 def say_size(candidates: Candidates, say: Callable[[str], None] | None) -> None:

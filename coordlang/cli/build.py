@@ -26,12 +26,12 @@ from coordlang.cli.exit_codes import UNPROVED, code_of_interrupt
 from coordlang.cli.failure import why_stopped
 from coordlang.cli.files import FILE, PlanningFiles, check_outputs, never_stdout, planning_files
 from coordlang.cli.shared_options import (
+    JobsKeywords,
     ModelKeywords,
-    PiecesKeywords,
+    jobs_options,
     kept_plans,
     limits,
     model_options,
-    pieces_options,
     slack_option,
     was_given,
 )
@@ -122,7 +122,7 @@ _FOR_CERTIFICATE = 0.25
     is_flag=True,
     help="States also say how many steps of the slack are left, and words may differ in that.",
 )
-@pieces_options
+@jobs_options
 @model_options
 @slack_option
 @kept_plans
@@ -142,7 +142,7 @@ def command(
     seed: int,
     as_json: bool,
     words_see_slack: bool,
-    pieces: PiecesKeywords,
+    on_workers: JobsKeywords,
     model: ModelKeywords,
 ) -> int:
     """Build a coordination language and verify it before it is written.
@@ -176,7 +176,7 @@ def command(
         seed=seed,
         reserve=_FOR_CERTIFICATE if certificate else 0.0,
         words_see_slack=words_see_slack,
-        **pieces,
+        **on_workers,
         **model,
     )
     stop_clock()  # the work is done; from here on it is saved

@@ -11,12 +11,12 @@ import coordlang
 from coordlang.cli.echo import echo
 from coordlang.cli.files import PlanningFiles, planning_files
 from coordlang.cli.shared_options import (
+    JobsKeywords,
     ModelKeywords,
-    PiecesKeywords,
+    jobs_options,
     kept_plans,
     limits,
     model_options,
-    pieces_options,
     slack_option,
 )
 from coordlang.cli.terminal import line_width, note_single_robot, working
@@ -25,13 +25,13 @@ from coordlang.cli.terminal import line_width, note_single_robot, working
 @click.command(name="coordination")
 @planning_files("DOMAIN PROBLEMS...")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
-@pieces_options
+@jobs_options
 @model_options
 @slack_option
 @kept_plans
 @limits
 def command(
-    pddl: PlanningFiles, as_json: bool, pieces: PiecesKeywords, model: ModelKeywords
+    pddl: PlanningFiles, as_json: bool, on_workers: JobsKeywords, model: ModelKeywords
 ) -> None:
     """Decide which tasks require coordination.
 
@@ -39,6 +39,6 @@ def command(
     take at most B steps more.
     """
     with working("finding all optimal plans"):
-        found = coordlang.coordination(*pddl.files, factored=pddl.factored, **pieces, **model)
+        found = coordlang.coordination(*pddl.files, factored=pddl.factored, **on_workers, **model)
     note_single_robot(found.robots)
     echo(json.dumps(found.data()) if as_json else found.text(line_width()))

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import click
 
-from coordlang.api.options import COSTS, UNOWNED, ModelKeywords, PiecesKeywords
+from coordlang.api.options import COSTS, UNOWNED, JobsKeywords, ModelKeywords
 from coordlang.cli.echo import echo
 from planners.errors import OutOfTime
 
@@ -130,8 +130,8 @@ def kept_plans(function: CommandFunction) -> CommandFunction:
     return wrapped
 
 
-def pieces_options(function: CommandFunction) -> CommandFunction:
-    """``--jobs``, ``--scheduler`` and ``--resume``; the command gets them as ``pieces``."""
+def jobs_options(function: CommandFunction) -> CommandFunction:
+    """``--jobs``, ``--scheduler`` and ``--resume``; the command gets them as ``on_workers``."""
 
     @click.option(
         "--jobs",
@@ -147,7 +147,7 @@ def pieces_options(function: CommandFunction) -> CommandFunction:
     @click.option(
         "--resume",
         metavar="DIR",
-        help="Keep finished pieces here, and go on with those that are kept.",
+        help="Keep finished jobs here, and go on with those that are kept.",
     )
     @functools.wraps(function)
     def wrapped(
@@ -157,16 +157,16 @@ def pieces_options(function: CommandFunction) -> CommandFunction:
 
         if resume is not None:
             check_outputs(
-                [("--resume", os.path.join(resume, ".piece") if resume else "")],
+                [("--resume", os.path.join(resume, ".job") if resume else "")],
                 [],
                 makes_folder=True,
             )
-        pieces = {"jobs": jobs, "scheduler": scheduler, "resume": resume, "note": note}
+        on_workers = {"jobs": jobs, "scheduler": scheduler, "resume": resume, "note": note}
         try:
-            return function(pieces=pieces, **arguments)
+            return function(on_workers=on_workers, **arguments)
         except (KeyboardInterrupt, OutOfTime):
             if resume is not None:
-                note(f"finished pieces are kept in {resume}: the same command goes on from there")
+                note(f"finished jobs are kept in {resume}: the same command goes on from there")
             raise
 
     return wrapped
@@ -207,13 +207,13 @@ def _size(
 
 __all__ = [
     "CommandFunction",
+    "JobsKeywords",
     "ModelKeywords",
-    "PiecesKeywords",
+    "jobs_options",
     "kept_plans",
     "limits",
     "model_options",
     "note",
-    "pieces_options",
     "slack_option",
     "was_given",
 ]

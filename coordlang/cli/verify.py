@@ -20,12 +20,12 @@ from coordlang.cli.files import (
     planning_files,
 )
 from coordlang.cli.shared_options import (
+    JobsKeywords,
     ModelKeywords,
-    PiecesKeywords,
+    jobs_options,
     kept_plans,
     limits,
     model_options,
-    pieces_options,
 )
 from coordlang.cli.terminal import line_width, working
 from planners.notebook import counted
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     help="With --certificate: write the formula that was refuted, for any SAT solver.",
 )
 @click.option("--json", "as_json", is_flag=True, help="One JSON object.")
-@pieces_options
+@jobs_options
 @model_options
 @kept_plans
 @limits
@@ -68,7 +68,7 @@ def command(
     certificate: str | None,
     dimacs: str | None,
     as_json: bool,
-    pieces: PiecesKeywords,
+    on_workers: JobsKeywords,
     model: ModelKeywords,
 ) -> int:
     """Check by definition that LANGUAGE is a coordination language.
@@ -91,7 +91,7 @@ def command(
             tasks=tasks,
             certificate=certificate,
             progress=progress,
-            **pieces,
+            **on_workers,
             **model,
         )
     echo(json.dumps(found.data()) if as_json else _text(found))

@@ -14,9 +14,8 @@ from coordlang.language.partition import Partition
 from coordlang.lifted.features import Feature
 from coordlang.lifted.world import States, World
 from coordlang.tasks.candidates import Candidates
-from coordlang.verification.pieces import verify_candidates
-from planners.pieces.processes import Processes
-from planners.pieces.work import Runner
+from coordlang.verification.candidates import verify_candidates
+from planners.parallel.workers import Workers
 from planners.tables import Ints
 
 Progress = Callable[[str], None]
@@ -45,10 +44,10 @@ class Instance:
         return np.array(columns, np.int64).reshape(len(columns), len(self.states)).T
 
     def holds(
-        self, words: Ints, runner: Runner | None = None, progress: Progress | None = None
+        self, words: Ints, workers: Workers | None = None, progress: Progress | None = None
     ) -> bool:
         """Whether words of the states are a language for the candidate tasks, by definition."""
         names = [f"w{k}" for k in range(int(words.max(initial=0)) + 1)]
         partition = Partition.of_table(names, self.candidates.rows, words)
-        runner, progress = runner or Processes(jobs=1), progress or (lambda _: None)
-        return verify_candidates(partition, self.candidates, runner, progress).holds
+        workers, progress = workers or Workers(), progress or (lambda _: None)
+        return verify_candidates(partition, self.candidates, workers, progress).holds

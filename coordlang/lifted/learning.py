@@ -28,8 +28,7 @@ from coordlang.symmetry.group import SymmetryGroup
 from coordlang.vocabulary.refuter import Refuter
 from planners.errors import Position, ProvedImpossible
 from planners.limits import run_until_stopped
-from planners.pieces.processes import Processes
-from planners.pieces.work import Runner
+from planners.parallel.workers import Workers
 from planners.tables import Bools, Ints
 
 #: What comes first: simple features, then few words over them, or the other way round.  None:
@@ -98,7 +97,7 @@ def learn(
     prefer: Preference | None = None,
     seed: int = 0,
     progress: Progress = lambda _: None,
-    runner: Runner | None = None,
+    workers: Workers | None = None,
 ) -> Learned:
     """The simplest features that suffice for the candidate tasks of all these problems.
 
@@ -114,17 +113,17 @@ def learn(
         If no features up to this ``complexity`` suffice; the error has the states that must be told
         apart.
     """
-    runner = runner or Processes(jobs=1)
+    workers = workers or Workers()
     learner = _Learner(complexity, seed, progress)
     every = [*known, *held_back]
     for own in known:
         learner.take(own)
     learner.begin()
-    found = [_verified(learner, None, every, runner, progress)]
+    found = [_verified(learner, None, every, workers, progress)]
     if prefer is None:
         return found[0]
     stopped = run_until_stopped(
-        lambda: found.append(_verified(learner, prefer, every, runner, progress))
+        lambda: found.append(_verified(learner, prefer, every, workers, progress))
     )
     return replace(found[-1], stopped=stopped)
 
@@ -133,7 +132,7 @@ def _verified(
     learner: _Learner,
     prefer: Preference | None,
     every: Sequence[Instance],
-    runner: Runner,
+    workers: Workers,
     progress: Progress,
 ) -> Learned:
     """Words that are verified on every problem; those that refute some are learned from."""
@@ -145,7 +144,7 @@ def _verified(
                 raise
             learner.begin(landmarks=True)
             continue
-        refuted = _refuted(words, every, runner, progress)
+        refuted = _refuted(words, every, workers, progress)
         if refuted is None:
             return learner.learned(words, every)
         own, of_states = refuted
@@ -155,11 +154,11 @@ def _verified(
 
 
 def _refuted(
-    words: _Words, every: Sequence[Instance], runner: Runner, progress: Progress
+    words: _Words, every: Sequence[Instance], workers: Workers, progress: Progress
 ) -> tuple[Instance, Ints] | None:
     """The first problem that refutes words, and the words of its states; None if there is none."""
     for own, of_states in zip(every, words.of_states, strict=True):
-        if not own.holds(of_states, runner, progress):
+        if not own.holds(of_states, workers, progress):
             return own, of_states
     return None
 

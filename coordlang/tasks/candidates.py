@@ -36,7 +36,7 @@ class Candidates:
     table of states; ``count`` is the number of tasks.  ``states`` is the number of reachable states
     where the whole space was explored, else None. ``skipped`` names tasks that were left out
     because they have no plan.  ``source`` makes the plan spaces of any portion of the goals, where
-    that is done in pieces.
+    that is done as jobs.
     """
 
     kind: Kind

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tasks of problems in pieces: whether each requires coordination, and how often robots fail."""
+"""Tasks of problems as jobs: whether each requires coordination, and how often robots fail."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ from planners.cache.folder import Folder
 from planners.joint.model import JointModel, PlanningTask
 from planners.loading import PlanningInstance
 from planners.notebook import counted
-from planners.pieces.work import Runner, Table, Work, digest, tables
+from planners.parallel.batch import Batch, Table, digest
+from planners.parallel.workers import Workers
 from planners.search.plan_file import json_count
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
@@ -70,8 +71,8 @@ class FewestActions:
         return f"{line}they fail in {percent(self.failure)}."
 
 
-def answers(loaded: PlanningInstance, runner: Runner) -> list[TaskAnswer]:
-    """Search the task of each problem and decide whether it requires coordination, in pieces.
+def answers(loaded: PlanningInstance, workers: Workers) -> list[TaskAnswer]:
+    """Search the task of each problem and decide whether it requires coordination, as jobs.
 
     Raises
     ------
@@ -84,12 +85,12 @@ def answers(loaded: PlanningInstance, runner: Runner) -> list[TaskAnswer]:
     hashes = (loaded.domain.source.sha256, *(p.source.sha256 for p in loaded.problems))
     identity = digest(*hashes, repr(loaded.options))
     shared = (model, tasks, shared_folder())
-    work = Work("coordination", _answer, shared, numbers, identity, [effort for _ in numbers])
-    return [_read_answer(table) for table in tables(runner.run(work))]
+    batch = Batch("coordination", _answer, shared, numbers, identity, [effort for _ in numbers])
+    return [_read_answer(table) for table in workers.tables(batch)]
 
 
 def _answer(shared: tuple[JointModel, Sequence[PlanningTask], Folder | None], number: int) -> Table:
-    """One piece: a task."""
+    """One job: a task."""
     model, tasks, folder = shared
     with keeping_plans(folder):
         space = search(model, tasks[number])

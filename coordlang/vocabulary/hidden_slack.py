@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from coordlang.language.partition import Partition
+from coordlang.required.all_differences import Differences
 from coordlang.required.divergences import (
     Divergences,
     FirstDifferences,
@@ -22,14 +23,13 @@ from coordlang.required.divergences import (
     states_on_plans,
 )
 from coordlang.required.miscoordination import Inseparable
-from coordlang.required.pieces import Differences
 from coordlang.tasks.candidates import Candidates
-from coordlang.verification.pieces import verify_candidates
-from planners.pieces.work import Runner
+from coordlang.verification.candidates import verify_candidates
+from planners.parallel.workers import Workers
 
 
 def hidden_differences(
-    candidates: Candidates, runner: Runner, progress: Callable[[str], None] = lambda _: None
+    candidates: Candidates, workers: Workers, progress: Callable[[str], None] = lambda _: None
 ) -> Differences:
     """Count the tasks that require coordination, and the states on plans, of separable plans.
 
@@ -46,7 +46,7 @@ def hidden_differences(
     apart = Partition.of_states(
         candidates.rows, {state: number for number, state in enumerate(states.tolist())}
     )
-    verdict = verify_candidates(apart, candidates, runner, progress)
+    verdict = verify_candidates(apart, candidates, workers, progress)
     if verdict.witness is not None:
         raise Inseparable(replace(verdict.witness, sentence=None), hides_slack=True)
     progress("looking where coordination is required")

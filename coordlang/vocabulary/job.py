@@ -11,8 +11,7 @@ from coordlang.required.divergences import FirstDifferences
 from coordlang.symmetry.group import Symmetry
 from coordlang.tasks.candidates import Candidates
 from coordlang.vocabulary.counterexamples import Counterexample
-from planners.pieces.processes import Processes
-from planners.pieces.work import Runner
+from planners.parallel.workers import Workers
 from planners.search.plan_space import PlanSpace
 
 #: A partition while it is looked for: state number -> word number.
@@ -48,7 +47,7 @@ class Job:
     check
         Verifies a partition by definition, and raises if it is no language.  An anytime method
         calls it for every better one that it finds: when it is stopped there is no time left.
-    runner
+    workers
         Who does what can be done beside the method's own work.
     """
 
@@ -60,7 +59,7 @@ class Job:
     alpha_only: bool = False
     progress: Callable[[str], None] = lambda _: None
     check: Callable[[Assignment], None] = lambda _: None
-    runner: Runner = field(default_factory=lambda: Processes(jobs=1))
+    workers: Workers = field(default_factory=lambda: Workers())
 
     @property
     def lower_bound(self) -> int:

@@ -156,7 +156,7 @@ class _Search:
                 job.seed,
                 job.progress,
                 self._first_words(),
-                job.runner,
+                job.workers,
             )
             contained = [
                 *tasks_of_one_orbit(candidates, self.known.group),

@@ -22,8 +22,8 @@ from coordlang.vocabulary.failing_tuples import Agreeing, FailingTuples
 from coordlang.vocabulary.job import Evidence
 from coordlang.vocabulary.necessary_clauses import TaskPart
 from planners.joint.model import FullState
-from planners.pieces.processes import Processes
-from planners.pieces.work import Runner, Table, Work, digest, tables
+from planners.parallel.batch import Batch, Table, digest
+from planners.parallel.workers import Workers
 from planners.search.plan_space import PlanSpace
 from planners.tables import Ints
 
@@ -71,7 +71,7 @@ class Refuter:
     Of goals that are images of each other under a symmetry one is walked: a partition is refuted
     by plans of the tasks to an image iff its image under the symmetry is refuted by plans of the
     tasks to the goal itself.  At the beginning plans are collected that refute the partition
-    ``first``, by default a single word, where walks are longest: by ``runner``, in pieces.
+    ``first``, by default a single word, where walks are longest: as jobs of ``workers``.
 
     Attributes
     ----------
@@ -89,14 +89,14 @@ class Refuter:
         seed: int,
         progress: Callable[[str], None] = lambda _: None,
         first: Ints | None = None,
-        runner: Runner | None = None,
+        workers: Workers | None = None,
     ) -> None:
         self.pool = FailingTuples(group, states)
         self.walks = 0
         self._random = np.random.default_rng(seed)
         self._parts = _parts(spaces, self.pool.images, Random(seed))
         word = np.zeros(states, np.int64) if first is None else first
-        work = Work(
+        batch = Batch(
             "plans whose mixture fails",
             _walk_alone,
             (self._parts, word),
@@ -104,9 +104,9 @@ class Refuter:
             digest(word, *(walked.identity for walked in self._parts)),
             [walked.effort for walked in self._parts],
         )
-        with closing(tables((runner or Processes(jobs=1)).run(work))) as pieces:
+        with closing((workers or Workers()).tables(batch)) as tables:
             progress("collecting plans whose mixture fails")
-            for walked, table in zip(self._parts, pieces, strict=True):
+            for walked, table in zip(self._parts, tables, strict=True):
                 self._add(walked, _read(table))
                 progress(f"collecting plans whose mixture fails: {len(self.pool):,}")
 
@@ -165,16 +165,16 @@ class Refuter:
 
 
 def _walk_alone(shared: tuple[Sequence[_Walked], Ints], number: int) -> Table:
-    """One piece: the failing plans of one part under a partition."""
+    """One job: the failing plans of one part under a partition."""
     parts, word = shared
     found = enumerate(parts[number].failing(word))
     return {f"{name} {n}": getattr(table, name) for n, table in found for name in _COLUMNS}
 
 
-def _read(piece: Table) -> list[Counterexamples]:
+def _read(table: Table) -> list[Counterexamples]:
     """What `_walk_alone` has found."""
-    count = len(piece) // len(_COLUMNS)
-    return [Counterexamples(*(piece[f"{name} {n}"] for name in _COLUMNS)) for n in range(count)]
+    count = len(table) // len(_COLUMNS)
+    return [Counterexamples(*(table[f"{name} {n}"] for name in _COLUMNS)) for n in range(count)]
 
 
 def _parts(spaces: Sequence[PlanSpace], images: Sequence[Ints], random: Random) -> list[_Walked]:

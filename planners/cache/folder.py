@@ -10,14 +10,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from planners.errors import BadInput, CoordlangError, note
-from planners.files import read_stored_bytes
-from planners.pieces.kept import as_bytes, from_bytes
-from planners.pieces.work import Table
-from planners.writing import write_atomically
+from planners.errors import CoordlangError, note
+from planners.parallel.batch import Table
+from planners.parallel.store import Damaged, as_bytes, read_table, write_table
 
 #: The version of the entries' form: entries of another one are never looked at, and go in time.
-FORM = 1
+FORM = 2
 #: Bytes that all entries together may take.
 MOST_BYTES = 2**30
 #: An entry may take one part in so many of them.
@@ -67,21 +65,14 @@ class Folder:
     def read(self, key: str) -> Table | None:
         """The table of an entry; None if there is none, or none that is whole."""
         path = self._path(key)
-        if not os.path.lexists(path):
-            return None
         try:
-            data = read_stored_bytes(path, most=self.most_bytes)
-        except BadInput as error:
-            # Another process may have removed it in the meantime.
-            if os.path.lexists(path):
-                self.ignored(key, str(error).partition("\n")[0])
+            table = read_table(path)
+        except Damaged as damage:
+            self.ignored(key, str(damage))
             return None
-        table = from_bytes(data)
-        if table is None:
-            self.ignored(key, f"{path} is damaged")
-            return None
-        with suppress(OSError):  # a folder that is only read
-            os.utime(path)  # it was used now
+        if table is not None:
+            with suppress(OSError):  # a folder that is only read
+                os.utime(path)  # it was used now
         return table
 
     def write(self, key: str, table: Table) -> None:
@@ -92,7 +83,7 @@ class Folder:
         path = self._path(key)
         try:
             path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            write_atomically(path, data)
+            write_table(path, data)
             self._let_go()
         except (OSError, CoordlangError) as error:
             said = error.strerror if isinstance(error, OSError) else str(error).partition("\n")[0]

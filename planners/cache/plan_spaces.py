@@ -10,10 +10,10 @@ import numpy as np
 
 from planners.grounding import GroundAction
 from planners.joint.model import FullState, JointModel, PlanningTask
+from planners.parallel.batch import Table, digest
+from planners.parallel.versions import code_hash
 from planners.pddl.formula_tree import formula_text, label
 from planners.pddl.lifted import And, Formula, Or
-from planners.pieces.versions import code_hash
-from planners.pieces.work import Table, digest
 from planners.search.plan_space import PlanSpace
 from planners.tables import Ints, unique_rows
 

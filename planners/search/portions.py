@@ -18,7 +18,7 @@ from planners.errors import OutOfMemory
 from planners.graphs import parts_of_graph
 from planners.joint.model import FullState, Goal, JointModel
 from planners.limits import memory_left, more_memory
-from planners.pieces.work import digest
+from planners.parallel.batch import digest
 from planners.search.optimal_plans import distances, plan_spaces
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, PieceSizes, Space
@@ -236,7 +236,7 @@ class Estimate:
     goals: int
     nodes: int
     robots: int
-    pieces: int
+    jobs: int
 
     @property
     def bytes(self) -> int:
@@ -251,7 +251,7 @@ class Estimate:
     def __str__(self) -> str:
         return (
             f"{self.goals:,} goals, up to {self.nodes:,} nodes of plans x {self.robots} robots, in "
-            f"{self.pieces:,} pieces"
+            f"{self.jobs:,} jobs"
         )
 
 

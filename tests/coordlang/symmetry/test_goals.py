@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from coordlang.building import build_language
-from coordlang.required import pieces
+from coordlang.required import all_differences
+from coordlang.required.all_differences import Differences, differences
 from coordlang.required.miscoordination import Inseparable, separable
-from coordlang.required.pieces import Differences, differences
 from coordlang.symmetry.goals import SymmetricGoals, symmetric_goals
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from planners.loading import ModelOptions
+from planners.parallel.workers import Workers
 from planners.pddl import parse_problem, read_domain, read_problem
 from planners.pddl.sexpr import Source
-from planners.pieces.processes import Processes
 from planners.search.portions import PORTION
 from tests.support.domains import DOMAINS, all_tasks
 from tests.support.random_models import random_model
@@ -46,9 +46,11 @@ def answer(candidates: Candidates, portion: float, by_symmetry: bool) -> Differe
     """First differences with or without symmetries; None if some plans are inseparable."""
     with pytest.MonkeyPatch.context() as patch:
         for_action = 0 if by_symmetry else 10**9
-        patch.setattr(pieces, "symmetric_goals", lambda c: symmetric_goals(c, 0, for_action))
+        patch.setattr(
+            all_differences, "symmetric_goals", lambda c: symmetric_goals(c, 0, for_action)
+        )
         try:
-            return differences(candidates, Processes(jobs=1), portion=portion)
+            return differences(candidates, Workers(), portion=portion)
         except Inseparable:
             return None
 
@@ -137,7 +139,7 @@ def test_a_language_is_the_same_and_inseparable_plans_are_shown(
     grid = all_tasks("grid", "gw4-3x3")
     without = build_language(grid)
     monkeypatch.setattr(
-        "coordlang.required.pieces.symmetric_goals", lambda c: symmetric_goals(c, 0, 0)
+        "coordlang.required.all_differences.symmetric_goals", lambda c: symmetric_goals(c, 0, 0)
     )
     assert build_language(grid).language.states == without.language.states
     shown = 0

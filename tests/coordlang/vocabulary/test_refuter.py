@@ -15,9 +15,8 @@ from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary.failing_tuples import FailingTuples
 from coordlang.vocabulary.refuter import Refuter
-from planners.pieces.kept import Kept
-from planners.pieces.processes import Processes
-from planners.pieces.work import Runner
+from planners.parallel.store import KeptJobs
+from planners.parallel.workers import Workers
 from planners.tables import Ints
 from tests.support.domains import all_tasks, own_task
 
@@ -94,7 +93,7 @@ def test_what_is_collected_first_may_refute_other_words() -> None:
 
 
 @pytest.mark.parametrize("stem", ["gw2-2x3", "gw4-3x3"])
-def test_first_walks_find_the_same_in_other_processes_and_from_kept_pieces(
+def test_first_walks_find_the_same_in_other_processes_and_from_kept_jobs(
     stem: str, tmp_path: Path
 ) -> None:
     """The same plans in the same order, so the same clauses for the same reasons."""
@@ -102,16 +101,16 @@ def test_first_walks_find_the_same_in_other_processes_and_from_kept_pieces(
     group, states = symmetry_group(candidates), len(candidates.rows)
     halves = np.arange(states) % 2
 
-    def refuter(runner: Runner | None, first: Ints | None = None) -> Refuter:
-        return Refuter(candidates.spaces, group, states, 0, first=first, runner=runner)
+    def refuter(workers: Workers | None, first: Ints | None = None) -> Refuter:
+        return Refuter(candidates.spaces, group, states, 0, first=first, workers=workers)
 
-    kept = Kept(Processes(1), tmp_path, pytest.fail)
+    kept = Workers(kept=KeptJobs.in_folder(tmp_path, pytest.fail))
     here = refuter(None)
-    others = [refuter(runner) for runner in (Processes(2, worth=0), kept, kept)]
-    pieces = len(list(tmp_path.iterdir()))
-    assert pieces == len(here._parts)
+    others = [refuter(workers) for workers in (Workers(2, worth=0), kept, kept)]
+    jobs = len(list(tmp_path.iterdir()))
+    assert jobs == len(here._parts)
     for other in others:
-        assert other.walks == here.walks == pieces
+        assert other.walks == here.walks == jobs
         assert len(other.pool) == len(here.pool) > 20
     violated = [
         [(clause, evidence.example) for clause, evidence in found.violated(halves).items()]
@@ -120,4 +119,4 @@ def test_first_walks_find_the_same_in_other_processes_and_from_kept_pieces(
     assert violated[0]
     assert all(found == violated[0] for found in violated[1:])
     refuter(kept, first=halves)
-    assert len(list(tmp_path.iterdir())) == 2 * pieces, "other words, other pieces"
+    assert len(list(tmp_path.iterdir())) == 2 * jobs, "other words, other jobs"

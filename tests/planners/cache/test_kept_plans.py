@@ -25,11 +25,11 @@ from planners.cache.plan_spaces import as_table, key_of, model_digest, plan_spac
 from planners.errors import BadInput, Note, ProvedImpossible
 from planners.joint.model import Cost, PlanningTask
 from planners.loading import ModelOptions, PlanningInstance, build
+from planners.parallel.batch import Table
+from planners.parallel.store import as_bytes
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
-from planners.pieces.kept import as_bytes
-from planners.pieces.work import Table
 from planners.search import optimal_plans
 from planners.search.plan_space import PlanSpace
 from tests.support.domains import DOMAINS
@@ -259,8 +259,8 @@ def test_the_oldest_entries_go(tmp_path: Path) -> None:
     other.write_bytes(b"x" * size)
     os.utime(other, (-1, -1))
     for name, seconds in ((".k9.killed", 0.0), (".k9.writing", time.time())):
-        (tmp_path / "cache" / "plans-1" / name).write_bytes(b"x")
-        os.utime(tmp_path / "cache" / "plans-1" / name, (seconds, seconds))
+        (tmp_path / "cache" / "plans-2" / name).write_bytes(b"x")
+        os.utime(tmp_path / "cache" / "plans-2" / name, (seconds, seconds))
     assert folder.read("k0") is not None  # and is the newest now
     folder.write("k5", table)
     assert sorted(path.name for path in entries(folder)) == [
@@ -306,8 +306,12 @@ def test_a_folder_that_is_only_read(
 
     with keeping_plans(folder):
         search(world.model, world.tasks[0])
-        for name in ("utime", "unlink", "open", "replace"):
+        opened = os.open
+        for name in ("utime", "unlink", "replace"):
             monkeypatch.setattr(f"planners.cache.folder.os.{name}", refused)
+        monkeypatch.setattr(
+            os, "open", lambda p, f, *m, **k: refused() if f & os.O_CREAT else opened(p, f, *m, **k)
+        )
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             search(world.model, world.tasks[0])
@@ -319,6 +323,21 @@ def test_a_folder_that_is_only_read(
         with pytest.warns(Note, match="damaged"), pytest.warns(Note, match="not kept"):
             search(world.model, world.tasks[0])
     assert len(searches) == 3
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, Path.mkdir])
+def test_what_is_no_file_is_not_waited_for(
+    make: Callable[[Path], None], folder: Folder, searches: list[str]
+) -> None:
+    world = loaded()
+    with keeping_plans(folder):
+        search(world.model, world.tasks[0])
+        (entry,) = entries(folder)
+        entry.unlink()
+        make(entry)
+        with pytest.warns(Note, match="is ignored, and the task is searched again"):
+            search(world.model, world.tasks[0])
+    assert len(searches) == 2
 
 
 def test_many_at_once(tmp_path: Path) -> None:

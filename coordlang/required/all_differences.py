@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Required coordination of many tasks in pieces: by goals.
+"""Required coordination of many tasks, by goals.
 
 Divergences at a node depend on its goal only, so the goals are cut into portions, and each is a
-piece of work (`planners.pieces`).  Of goals that are images of each other under a symmetry one is
+job (`planners.parallel`).  Of goals that are images of each other under a symmetry one is
 looked at (`coordlang.symmetry.goals`).  Few or small ones are one portion, and done here.
 """
 
@@ -30,7 +30,8 @@ from coordlang.required.partings import minimal
 from coordlang.symmetry.goals import SymmetricGoals, symmetric_goals
 from coordlang.tasks.candidates import Candidates
 from planners.limits import reaching
-from planners.pieces.work import Runner, Table, Work, digest, tables
+from planners.parallel.batch import Batch, Table, digest
+from planners.parallel.workers import Workers
 from planners.search.portions import PORTION, Explored, Source, cut
 from planners.tables import Ints
 
@@ -45,11 +46,11 @@ class Differences:
 
 def differences(
     candidates: Candidates,
-    runner: Runner,
+    workers: Workers,
     progress: Callable[[str], None] = lambda _: None,
     portion: float = PORTION,
 ) -> Differences:
-    """Find both, for tasks without inseparable plans, in pieces of about ``portion`` effort.
+    """Find both, for tasks without inseparable plans, in jobs of about ``portion`` effort.
 
     Raises
     ------
@@ -61,7 +62,7 @@ def differences(
     if goals is not None and isinstance(source, Explored):
         progress(f"looking at {len(goals.chosen):,} of {len(source.goals):,} goals, by symmetry")
         some = _Goals(source.only(goals.chosen), goals.spoken_for[goals.chosen])
-        tables_of_some = _tables(some, runner, progress, portion)
+        tables_of_some = _tables(some, workers, progress, portion)
         if not _inseparable(tables_of_some):
             return _spread(_together(tables_of_some), goals)
     if len(cut(source.efforts, portion)) == 1:
@@ -69,7 +70,7 @@ def differences(
         require_separable(candidates.spaces)
         progress("looking where coordination is required")
         return Differences(first_differences(candidates.spaces), states_on_plans(candidates.spaces))
-    found = _tables(_Goals(source, None), runner, progress, portion)
+    found = _tables(_Goals(source, None), workers, progress, portion)
     if _inseparable(found):
         witness = inseparable(source.portion(cut(source.efforts, portion)[len(found) - 1]))
         assert witness is not None
@@ -86,7 +87,7 @@ class _Goals:
 
 
 def _tables(
-    goals: _Goals, runner: Runner, progress: Callable[[str], None], portion: float
+    goals: _Goals, workers: Workers, progress: Callable[[str], None], portion: float
 ) -> list[Table]:
     """What the portions of the goals say, up to the first with inseparable plans."""
     source = goals.source
@@ -95,7 +96,7 @@ def _tables(
         return [_differences(goals, portions[0])]
     efforts = [float(source.efforts[own.start : own.stop].sum()) for own in portions]
     identity = digest(source.identity, goals.spoken_for)
-    work = Work("first differences", _differences, goals, portions, identity, efforts)
+    batch = Batch("first differences", _differences, goals, portions, identity, efforts)
     found: list[Table] = []
 
     def so_far() -> str:
@@ -103,9 +104,9 @@ def _tables(
 
     with (
         reaching(so_far, "fewer candidate tasks"),
-        closing(tables(runner.run(work))) as pieces,
+        closing(workers.tables(batch)) as found_tables,
     ):
-        for table in pieces:
+        for table in found_tables:
             found.append(table)
             if table["inseparable"]:
                 break
@@ -130,7 +131,7 @@ def _spread(found: Differences, goals: SymmetricGoals) -> Differences:
 
 
 def _differences(shared: _Goals, goals: range) -> Table:
-    """One piece: the tasks of some goals."""
+    """One job: the tasks of some goals."""
     space = shared.source.portion(goals)
     if not len(space):  # nothing leads to these goals
         return _table(None, np.zeros((0, 1 + space.robots), np.int64), space.state)
@@ -155,7 +156,7 @@ def _table(found: FirstDifferences | None, rows: Ints, states: Ints) -> Table:
 
 
 def _together(found: Sequence[Table]) -> Differences:
-    """What pieces found as one: sets and mixtures are counted anew in each."""
+    """What jobs found as one: sets and mixtures are counted anew in each."""
     rows = minimal(np.concatenate([table["divergences"] for table in found]))
     figures = np.stack([table["figures"] for table in found]).sum(axis=0)
     requiring, nodes, edges, sets, evaluations = figures.tolist()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Work cut into pieces gives what the work as a whole gives, whoever does it and however it is cut."""
+"""Work cut into jobs gives what the work as a whole gives, whoever does it and however it is cut."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ import pytest
 
 import coordlang
 from coordlang.language.partition import Partition
+from coordlang.required.all_differences import Differences, differences
 from coordlang.required.miscoordination import Inseparable
-from coordlang.required.pieces import Differences, differences
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.tolerance.task_answers import answers
 from coordlang.verification.by_definition import verify
-from coordlang.verification.pieces import verify_candidates
+from coordlang.verification.candidates import verify_candidates
 from planners.errors import BadInput, ProvedImpossible
 from planners.loading import load
-from planners.pieces.kept import Kept
-from planners.pieces.processes import Processes
+from planners.parallel.store import KeptJobs
+from planners.parallel.workers import Workers
 from planners.search.portions import Explored, Searched, cut
 from tests.support.domains import DOMAINS, all_tasks
 from tests.support.random_models import random_model
 
-HERE = Processes(jobs=1)
-#: So small that every goal is a piece, and that processes do them.
-ONE, EAGER = 1.0, Processes(jobs=2, worth=0.0)
+HERE = Workers()
+#: So small that every goal is a job, and that processes do them.
+ONE, EAGER = 1.0, Workers(2, worth=0.0)
 
 
 def random_candidates(seeds: range, robots: int) -> Iterator[Candidates]:
@@ -60,7 +60,7 @@ def words(differences: Differences, seed: int) -> dict[int, int]:
 
 
 @pytest.mark.parametrize(("robots", "number"), [(2, 40), (3, 20)])
-def test_pieces_give_what_the_whole_gives(robots: int, number: int) -> None:
+def test_jobs_give_what_the_whole_gives(robots: int, number: int) -> None:
     answers: Counter[object] = Counter()
     for seed, candidates in enumerate(random_candidates(range(number), robots)):
         whole, parts = found(candidates, 1e9), found(candidates, ONE)
@@ -127,12 +127,12 @@ def test_goals_are_cut_by_their_efforts_alone() -> None:
     assert len(cut(np.zeros(3, np.int64), 1.0)) == 1
 
 
-def test_processes_and_kept_pieces_change_nothing(tmp_path: Path) -> None:
+def test_processes_and_kept_jobs_change_nothing(tmp_path: Path) -> None:
     candidates = all_tasks("grid", "gw1-2x2")
     whole = differences(candidates, HERE, portion=60.0)
-    kept = Kept(EAGER, tmp_path / "kept", pytest.fail)
-    for runner in (EAGER, kept, kept):
-        again = differences(candidates, runner, portion=60.0)
+    kept = replace(EAGER, kept=KeptJobs.in_folder(tmp_path / "kept", pytest.fail))
+    for workers in (EAGER, kept, kept):
+        again = differences(candidates, workers, portion=60.0)
         assert repr(again) == repr(whole)
     partition = Partition.of_states(candidates.rows, words(whole, 0))
     verdict = verify_candidates(partition, candidates, HERE, portion=60.0)
@@ -140,13 +140,13 @@ def test_processes_and_kept_pieces_change_nothing(tmp_path: Path) -> None:
     assert verify_candidates(partition, candidates, kept, portion=60.0) == verdict
 
 
-@pytest.mark.parametrize("runner", [HERE, EAGER])
-def test_problems_are_pieces_of_coordination(runner: Processes, tmp_path: Path) -> None:
+@pytest.mark.parametrize("workers", [HERE, EAGER])
+def test_problems_are_jobs_of_coordination(workers: Workers, tmp_path: Path) -> None:
     domain, corners = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "corners-3x3.pddl"
     near = tmp_path / "near.pddl"
     near.write_text(corners.read_text().replace("(at r1 c2-2) (at r2 c0-0)", "(at r1 c0-1)"))
     files = [corners, near, corners]
-    found = answers(load(domain, files), runner)
+    found = answers(load(domain, files), workers)
     alone = [coordlang.coordination(domain, file)[0] for file in files]
     assert [(a.makespan, a.plans, a.witness) for a in found] == [
         (a.makespan, a.plans, a.witness) for a in alone

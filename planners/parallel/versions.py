@@ -9,7 +9,7 @@ from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
-#: Packages whose versions must be equal where pieces of one work are done.
+#: Packages whose versions must be equal where jobs of one batch are done.
 _PACKAGES = ("numpy", "scipy", "distributed")
 
 
@@ -26,7 +26,7 @@ def code_hash(package: str) -> str:
 
 
 def versions_here(packages: tuple[str, ...]) -> dict[str, str]:
-    """What must be equal in all processes that do pieces of one work.
+    """What must be equal in all processes that do jobs of one batch.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Verification of many tasks in pieces: the goals are cut into portions, each verified by itself.
+"""Verification of many tasks: the goals are cut into portions, each a job.
 
 Every walk of the verifiers is that of one goal, so the verdict is that of all portions together.
 """
@@ -16,14 +16,15 @@ from coordlang.language.partition import Partition
 from coordlang.tasks.candidates import Candidates
 from coordlang.verification.by_definition import Verdict, verify
 from planners.limits import reaching
-from planners.pieces.work import Runner, Table, Work, digest, tables
+from planners.parallel.batch import Batch, Table, digest
+from planners.parallel.workers import Workers
 from planners.search.plan_space import PlanSpace
 from planners.search.portions import PORTION, Source, cut
 
 
 @dataclass(frozen=True, slots=True)
 class _Check:
-    """What all pieces share: words, and where the plans come from."""
+    """What all jobs share: words, and where the plans come from."""
 
     source: Source
     partition: Partition
@@ -38,11 +39,11 @@ class _Check:
 def verify_candidates(
     partition: Partition,
     candidates: Candidates,
-    runner: Runner,
+    workers: Workers,
     progress: Callable[[str], None] = lambda _: None,
     portion: float = PORTION,
 ) -> Verdict:
-    """Check words against the definition, in pieces of about ``portion`` effort.
+    """Check words against the definition, in jobs of about ``portion`` effort.
 
     The witness of a violation is that of the first portion that has one.
     """
@@ -54,7 +55,7 @@ def verify_candidates(
     check = _Check(source, partition)
     words = (partition.words, partition.rows, partition.word, partition.default)
     identity = digest(source.identity, *words)
-    work = Work("verification", _verdict, check, portions, identity, efforts)
+    batch = Batch("verification", _verdict, check, portions, identity, efforts)
     done = nodes = 0
 
     def so_far() -> str:
@@ -62,9 +63,9 @@ def verify_candidates(
 
     with (
         reaching(so_far, "fewer candidate tasks"),
-        closing(tables(runner.run(work))) as pieces,
+        closing(workers.tables(batch)) as tables,
     ):
-        for table in pieces:
+        for table in tables:
             nodes += int(table["nodes"])
             if not table["holds"]:
                 witness = check.verdict(source.portion(portions[done])).witness
@@ -75,6 +76,6 @@ def verify_candidates(
 
 
 def _verdict(check: _Check, goals: range) -> Table:
-    """One piece: the tasks of some goals."""
+    """One job: the tasks of some goals."""
     verdict = check.verdict(check.source.portion(goals))
     return {"holds": np.array(verdict.holds), "nodes": np.array(verdict.nodes)}

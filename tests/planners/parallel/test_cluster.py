@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Jobs on a Dask cluster: equal results, errors, losses, limits, and nothing left behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socketserver
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from planners.errors import BadInput, CoordlangError, OutOfTime, UsageError
+from planners.limits import time_limit
+from planners.parallel import dask_cluster
+from planners.parallel.workers import Workers
+from planners.parallel.workers import workers as opened
+from tests.support import jobs
+from tests.support.cluster import Cluster, needs_distributed, running_cluster
+from tests.support.jobs import batch
+from tests.support.processes import until, workers
+
+pytestmark = needs_distributed
+
+PACKAGES = ("planners", "tests")
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    """A cluster with one worker, for all that does not hurt it."""
+    with running_cluster(tmp_path_factory.mktemp("cluster"), 1) as found:
+        yield found
+
+
+@pytest.fixture
+def connected(shared: Cluster) -> Iterator[Workers]:
+    with opened(scheduler=str(shared.file), packages=PACKAGES) as found:
+        yield found
+
+
+def left_on(found: Workers) -> tuple[int, list[str]]:
+    """How many tasks the scheduler knows, and our plugins on it."""
+
+    def look(dask_scheduler: Any) -> tuple[int, list[str]]:
+        ours = [name for name in dask_scheduler.worker_plugins if name.startswith("coordlang")]
+        return len(dask_scheduler.tasks), ours
+
+    left: tuple[int, list[str]] = client_of(found).run_on_scheduler(look)
+    return left
+
+
+def client_of(found: Workers) -> Any:
+    return found.cluster.args[0]  # type: ignore[union-attr]
+
+
+def test_results_and_errors(connected: Workers) -> None:
+    squares = batch(jobs.squares, 3, [range(low, low + 3) for low in range(0, 12, 3)])
+    found = [table["values"].tolist() for table in connected.tables(squares)]
+    assert found == [[3 * n * n for n in part] for part in squares.jobs]
+    assert list(connected.run(batch(jobs.squares, 3, []))) == []
+    with pytest.raises(BadInput) as caught:
+        list(connected.tables(batch(jobs.fails, None, [1, 0, 1])))
+    assert str(caught.value) == "here:3:4: no good\n  Try 2."
+    with pytest.raises(ZeroDivisionError):
+        list(connected.tables(batch(jobs.fails, None, [0, 1])))
+    until(lambda: left_on(connected) == (0, []))
+
+
+@pytest.mark.parametrize("how", ["interrupt", "time limit"])
+def test_work_that_is_stopped_leaves_nothing(how: str, connected: Workers, tmp_path: Path) -> None:
+    def interrupt() -> None:
+        until(lambda: workers(tmp_path))
+        os.kill(os.getpid(), signal.SIGINT)
+
+    waiting = batch(jobs.waits, str(tmp_path), [0, 1, 2])
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        if how == "interrupt":
+            threading.Thread(target=interrupt).start()
+            with pytest.raises(KeyboardInterrupt):
+                list(connected.tables(waiting))
+        else:
+            with pytest.raises(OutOfTime), time_limit(4):
+                list(connected.tables(waiting))
+    finally:
+        signal.signal(signal.SIGINT, before)
+    (tmp_path / "go").touch()  # what is under way ends by itself
+    until(lambda: left_on(connected) == (0, []))
+    assert len(workers(tmp_path)) == 1  # no other job was begun
+    done = list(connected.tables(batch(jobs.squares, 1, [range(2)])))
+    assert len(done) == 1  # the worker is as good as before
+
+
+def test_other_versions_are_refused(connected: Workers) -> None:
+    expected = connected.cluster.args[2]  # type: ignore[union-attr]
+    expected["numpy"] = "1.0"
+    with pytest.raises(UsageError, match=r"numpy is .* there and 1.0 here") as caught:
+        list(connected.run(batch(jobs.squares, 1, [range(2)])))
+    assert "coordlang[cluster]" in str(caught.value)
+
+
+@pytest.fixture
+def noise() -> Iterator[str]:
+    """The address of a port where somebody else answers."""
+
+    class Handler(socketserver.BaseRequestHandler):
+        def handle(self) -> None:
+            self.request.sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n" * 50)
+
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"tcp://127.0.0.1:{server.server_address[1]}"
+        server.shutdown()
+
+
+def test_there_is_no_cluster(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, noise: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(dask_cluster, "_CONNECTING", 1.0)
+    (tmp_path / "not.json").write_text("nothing")
+    (tmp_path / "nested.json").write_text("[" * 100_000)
+    (tmp_path / "other.json").write_text('{"address": "ucx://127.0.0.1:9"}')
+    os.mkfifo(tmp_path / "pipe")
+    for where in (
+        noise,
+        noise.replace("tcp", "tls"),
+        "tcp://127.0.0.1:9",
+        "127.0.0.1:9",
+        "tcp://127.0.0.1:99999",
+        "ftp://127.0.0.1:9",
+        "",
+        str(tmp_path),
+        *(str(tmp_path / name) for name in ("none.json", "not.json", "nested.json", "other.json")),
+        str(tmp_path / "pipe"),
+    ):
+        with pytest.raises(UsageError, match="scheduler"), opened(scheduler=where):
+            pytest.fail("there is none")
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.slow
+def test_a_worker_is_waited_for_and_said(tmp_path: Path) -> None:
+    notes: list[str] = []
+    with (
+        running_cluster(tmp_path, 0) as cluster,
+        opened(scheduler=str(cluster.file), packages=PACKAGES, note=notes.append) as found,
+    ):
+        threading.Timer(0.5, cluster.add_worker).start()
+        assert len(list(found.run(batch(jobs.squares, 1, [range(2)])))) == 1
+    (note,) = notes
+    assert "no worker has connected" in note
+
+
+@pytest.mark.thorough
+def test_killed_workers_cost_their_jobs_only(tmp_path: Path) -> None:
+    with (
+        running_cluster(tmp_path, 2) as cluster,
+        opened(scheduler=str(cluster.file), packages=PACKAGES) as found,
+    ):
+        until(lambda: len(client_of(found).scheduler_info()["workers"]) == 2)
+        tables: list[dict[str, Any]] = []
+        waiting = found.tables(batch(jobs.waits, str(tmp_path), range(5)))
+        thread = threading.Thread(target=lambda: tables.extend(waiting))
+        thread.start()
+        until(lambda: len(workers(tmp_path)) == 2)
+        cluster.workers[0].kill(signal.SIGKILL)
+        cluster.add_worker()
+        until(lambda: len(workers(tmp_path)) >= 3)
+        (tmp_path / "go").touch()
+        thread.join(60)
+    assert [int(table["values"][0]) for table in tables] == list(range(5))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("begun", [True, False])
+def test_a_scheduler_that_goes_is_an_error(begun: bool, tmp_path: Path) -> None:
+    def kill() -> None:
+        until(lambda: workers(tmp_path) or not begun)
+        cluster.scheduler.kill(signal.SIGKILL)
+
+    with (
+        running_cluster(tmp_path, 1) as cluster,
+        opened(scheduler=str(cluster.file), packages=PACKAGES) as found,
+    ):
+        if begun:
+            threading.Thread(target=kill).start()
+        else:
+            kill()
+        with pytest.raises(CoordlangError, match="has gone"):
+            list(found.run(batch(jobs.waits, str(tmp_path), [0, 1])))
