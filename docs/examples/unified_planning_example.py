@@ -20,8 +20,8 @@ from unified_planning.shortcuts import (
 )
 
 import coordlang
-from coordlang.use.unified import register
-from coordlang.use.unified.translation import translate
+from coordlang.unified import register
+from coordlang.unified.translation import translate
 
 register()
 get_environment().credits_stream = None

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-from coordlang.use.unified.translation import Translated
+from coordlang.unified.translation import Translated
 from planners.joint.model import JointModel
 from planners.pddl.robots import Team
 from planners.search.plan_file import Texts

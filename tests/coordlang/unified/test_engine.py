@@ -27,12 +27,12 @@ from coordlang.building import build_language
 from coordlang.language.sentences import task_sentences
 from coordlang.tasks.candidates import from_problems
 from coordlang.use.sentence.task_language import languages_in_tasks
-from coordlang.use.unified import engine as engine_module
-from coordlang.use.unified import register
-from coordlang.use.unified.names import Names
-from coordlang.use.unified.options import PLAN_KINDS
-from coordlang.use.unified.plans import label
-from coordlang.use.unified.translation import translate
+from coordlang.unified import engine as engine_module
+from coordlang.unified import register
+from coordlang.unified.names import Names
+from coordlang.unified.options import PLAN_KINDS
+from coordlang.unified.plans import label
+from coordlang.unified.translation import translate
 from planners.loading import ModelOptions, load
 from planners.pddl import read_domain
 from planners.pddl.robots import RobotSelection
@@ -886,7 +886,7 @@ def test_nothing_is_printed(capfd: pytest.CaptureFixture[str]) -> None:
 
 def test_unified_planning_is_imported_by_register_only() -> None:
     code = (
-        "import sys, coordlang.use.unified as u; before = 'unified_planning' in sys.modules; u.register();"
+        "import sys, coordlang.unified as u; before = 'unified_planning' in sys.modules; u.register();"
         "print(before, 'unified_planning' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from coordlang.use.unified.names import Names
+from coordlang.unified.names import Names
 from planners.errors import Unsupported, UsageError
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain, Problem

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The engine: unified-planning's oneshot planner, anytime planner and plan validator.
 
-This module imports unified-planning; `coordlang.use.unified.register` makes the factory import it.
+This module imports unified-planning; `coordlang.unified.register` makes the factory import it.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ from coordlang.language.words import Language
 from coordlang.use.sentence.fitting_plans import NoPlanFits
 from coordlang.use.sentence.plan_sentence import NotAPlan, NotOptimal, sentence_of_plan
 from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
-from coordlang.use.unified import NAME
-from coordlang.use.unified.options import PLAN_KINDS, EngineOptions
-from coordlang.use.unified.plans import NoSteps, of_up, to_up
-from coordlang.use.unified.translation import Concurrency, Subactions, Translated
+from coordlang.unified import NAME
+from coordlang.unified.options import PLAN_KINDS, EngineOptions
+from coordlang.unified.plans import NoSteps, of_up, to_up
+from coordlang.unified.translation import Concurrency, Subactions, Translated
 from planners.check.validate import validate
 from planners.errors import (
     BadInput,

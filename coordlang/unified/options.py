@@ -13,7 +13,7 @@ from unified_planning.plans import PlanKind
 from coordlang.language.file import read_language
 from coordlang.language.recorded import options_of
 from coordlang.language.words import Language
-from coordlang.use.unified.translation import Concurrency, Subactions, Translated, translate
+from coordlang.unified.translation import Concurrency, Subactions, Translated, translate
 from planners.errors import BadInput, UsageError
 from planners.loading import ModelOptions
 from planners.pddl.robots import RobotSelection, find_team

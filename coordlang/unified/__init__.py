@@ -18,4 +18,4 @@ def register(environment: Any = None) -> None:
 
     factory = get_environment(environment).factory
     if NAME not in factory.engines:
-        factory.add_engine(NAME, "coordlang.use.unified.engine", "CoordlangEngine")
+        factory.add_engine(NAME, "coordlang.unified.engine", "CoordlangEngine")
