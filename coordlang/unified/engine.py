@@ -8,47 +8,48 @@ from __future__ import annotations
 
 import threading
 import time
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
-from warnings import warn
 
 from unified_planning.engines import (
     AnytimeGuarantee,
     Credits,
     Engine,
-    FailedValidationReason,
     LogLevel,
     LogMessage,
     OptimalityGuarantee,
     PlanGenerationResult,
-    PlanGenerationResultStatus,
     ValidationResult,
-    ValidationResultStatus,
 )
+from unified_planning.engines import FailedValidationReason as Reason
+from unified_planning.engines import PlanGenerationResultStatus as Status
+from unified_planning.engines import ValidationResultStatus as Validity
 from unified_planning.engines.mixins import (
     AnytimePlannerMixin,
     OneshotPlannerMixin,
     PlanValidatorMixin,
 )
-from unified_planning.exceptions import UPUsageError
+from unified_planning.exceptions import UPUnsupportedProblemTypeError, UPUsageError
 from unified_planning.model import ProblemKind
+from unified_planning.model.metrics import MinimizeMakespan
 from unified_planning.model.problem_kind_versioning import LATEST_PROBLEM_KIND_VERSION
 from unified_planning.plans import PlanKind
 
-from coordlang.language.words import Language
+from coordlang.unified import NAME
+from coordlang.unified.options import PLAN_KINDS, EngineOptions, in_parameters
+from coordlang.unified.plans import NoSteps, of_up, to_up
+from coordlang.unified.translation import FEATURES, Translated
 from coordlang.use.sentence.fitting_plans import NoPlanFits
 from coordlang.use.sentence.plan_sentence import NotAPlan, NotOptimal, sentence_of_plan
 from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
-from coordlang.unified import NAME
-from coordlang.unified.options import PLAN_KINDS, EngineOptions
-from coordlang.unified.plans import NoSteps, of_up, to_up
-from coordlang.unified.translation import Concurrency, Subactions, Translated
 from planners.check.validate import validate
 from planners.errors import (
     BadInput,
     CoordlangError,
+    Note,
     OutOfMemory,
     OutOfTime,
     ProvedImpossible,
@@ -63,28 +64,15 @@ from planners.search.plan_file import Texts
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans
 
-_Status = PlanGenerationResultStatus
-_FEATURES = {
-    "problem_class": ("ACTION_BASED", "ACTION_BASED_MULTI_AGENT"),
-    "typing": ("FLAT_TYPING", "HIERARCHICAL_TYPING"),
-    "conditions_kind": (
-        "NEGATIVE_CONDITIONS",
-        "DISJUNCTIVE_CONDITIONS",
-        "EQUALITIES",
-        "EXISTENTIAL_CONDITIONS",
-        "UNIVERSAL_CONDITIONS",
-    ),
-    "effects_kind": (
-        "CONDITIONAL_EFFECTS",
-        "FORALL_EFFECTS",
-        "STATIC_FLUENTS_IN_BOOLEAN_ASSIGNMENTS",
-        "STATIC_FLUENTS_IN_OBJECT_ASSIGNMENTS",
-        "FLUENTS_IN_OBJECT_ASSIGNMENTS",
-        "FLUENTS_IN_BOOLEAN_ASSIGNMENTS",
-    ),
-    "fluents_type": ("OBJECT_FLUENTS",),
-    "multi_agent": ("AGENT_SPECIFIC_PRIVATE_GOAL", "AGENT_SPECIFIC_PUBLIC_GOAL"),
-    "quality_metrics": ("MAKESPAN",),
+#: What ends a search without a plan, and what it means; the first that fits counts.
+_STATUS = {
+    # There may be plans with another sentence, so this is not a proof that there is none.
+    NoPlanFits: Status.UNSOLVABLE_INCOMPLETELY,
+    ProvedImpossible: Status.UNSOLVABLE_PROVEN,
+    Unsupported: Status.UNSUPPORTED_PROBLEM,
+    OutOfTime: Status.TIMEOUT,
+    OutOfMemory: Status.MEMOUT,
+    MemoryError: Status.MEMOUT,
 }
 
 
@@ -94,7 +82,7 @@ class _Solved:
 
     found: Translated
     space: PlanSpace
-    task_language: TaskLanguage | None
+    messages: list[LogMessage]
 
 
 class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanValidatorMixin):  # type: ignore[misc]
@@ -127,35 +115,11 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         a problem is solved.
     """
 
-    def __init__(
-        self,
-        *,
-        robots: Sequence[Any] = (),
-        robot_type: Any = None,
-        unowned: str | None = None,
-        subactions: Subactions | None = None,
-        concurrency: Concurrency | None = None,
-        cost: str | None = None,
-        remember_actions: bool = False,
-        language: Language | str | None = None,
-        sentence: str | Sequence[str] | None = None,
-        plan_kind: Any = None,
-    ) -> None:
+    def __init__(self, **parameters: Any) -> None:
         Engine.__init__(self)
         OneshotPlannerMixin.__init__(self)
         AnytimePlannerMixin.__init__(self)
-        self._options = EngineOptions.of(
-            robots=robots,
-            robot_type=robot_type,
-            unowned=unowned,
-            subactions=subactions,
-            concurrency=concurrency,
-            cost=cost,
-            remember_actions=remember_actions,
-            language=language,
-            sentence=sentence,
-            plan_kind=plan_kind,
-        )
+        self._options = EngineOptions.of(**parameters)
 
     @property
     def name(self) -> str:
@@ -164,15 +128,8 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
 
     @staticmethod
     def supported_kind() -> ProblemKind:
-        """Costs of actions and lengths of plans are no metrics here.
-
-        The makespan always comes first.
-        """
-        kind = ProblemKind(version=LATEST_PROBLEM_KIND_VERSION)
-        for group, features in _FEATURES.items():
-            for feature in features:
-                getattr(kind, f"set_{group}")(feature)
-        return kind
+        """What problems may have; of the metrics the makespan alone, which always comes first."""
+        return ProblemKind(FEATURES | {"MAKESPAN"}, LATEST_PROBLEM_KIND_VERSION)
 
     @staticmethod
     def supports(problem_kind: ProblemKind) -> bool:
@@ -212,8 +169,7 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         solved = self._solved(problem, timeout)
         if isinstance(solved, PlanGenerationResult):
             return solved
-        plans = Plans.of(solved.space)
-        return self._result(self._done(problem), solved, plans, 0, problem)
+        return self._result(_done(problem), solved, Plans.of(solved.space), 0, problem)
 
     def _get_solutions(
         self, problem: Any, timeout: float | None = None, output_stream: Any = None
@@ -228,50 +184,57 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         plans = Plans.of(solved.space)
         for number in range(plans.count):
             if end is not None and time.monotonic() > end:
-                yield self._none(_Status.TIMEOUT, f"{number} of {plans.count} plans in time")
+                yield self._none(Status.TIMEOUT, f"{number} of {plans.count} plans in time")
                 return
-            last = number == plans.count - 1
-            yield self._result(
-                self._done(problem) if last else _Status.INTERMEDIATE,
-                solved,
-                plans,
-                number,
-                problem,
-            )
+            status = _done(problem) if number == plans.count - 1 else Status.INTERMEDIATE
+            yield self._result(status, solved, plans, number, problem)
 
     def _solved(self, problem: Any, timeout: float | None) -> _Solved | PlanGenerationResult:
         """The plans as a graph; or the result that says why there are none."""
         main = threading.current_thread() is threading.main_thread()
         if timeout is not None and not main:
-            warn("coordlang: timeouts of the search hold in the main thread only", stacklevel=4)
+            text = "coordlang: timeouts of the search hold in the main thread only"
+            warnings.warn(text, stacklevel=4)
         try:
             with time_limit(timeout) if main else nullcontext():
                 return self._search(problem)
-        except ProvedImpossible as error:
-            return self._none(_Status.UNSOLVABLE_PROVEN, str(error))
-        except NoPlanFits as error:
-            # There may be other plans, so this is not a proof that there is none.
-            return self._none(_Status.UNSOLVABLE_INCOMPLETELY, str(error))
-        except Unsupported as error:
-            return self._none(_Status.UNSUPPORTED_PROBLEM, str(error))
-        except OutOfTime as error:
-            return self._none(_Status.TIMEOUT, str(error))
-        except (OutOfMemory, MemoryError) as error:
-            return self._none(_Status.MEMOUT, str(error) or "out of memory")
         except (BadInput, UsageError) as error:
-            raise UPUsageError(str(error)) from error
+            raise UPUsageError(in_parameters(error)) from error
+        except (CoordlangError, MemoryError) as error:
+            status = next((s for kind, s in _STATUS.items() if isinstance(error, kind)), None)
+            if status is None:
+                raise
+            return self._none(status, in_parameters(error) or "out of memory")
 
     def _search(self, problem: Any) -> _Solved:
-        found = self._options.translated(problem)
-        if self._options.language is None:
-            loaded = build(found.domain, [found.problem], self._options.model_options(found))
-            return _Solved(found, search(loaded.model, loaded.tasks[0]), None)
-        task_language = self._language_in(found)
-        words = self._options.sentence
+        """The optimal plans, under the sentence if one is given."""
+        with _notes() as messages:
+            found = self._options.translated(problem)
+            self._refuse_metrics(problem)
+            if self._options.language is None:
+                loaded = build(found.domain, [found.problem], self._options.model_options(found))
+                return _Solved(found, search(loaded.model, loaded.tasks[0]), messages)
+            task_language = self._language_in(found)
+        tolerance, words = task_language.tolerance, self._options.sentence
+        if not task_language.covered:
+            text = "the language does not cover this task: it guarantees nothing here"
+            messages.append(_warning(text))
+        if tolerance is not None and tolerance.warning is not None:
+            messages.append(_warning(tolerance.warning))
         if words is None:
-            return _Solved(found, task_language.space, task_language)
+            return _Solved(found, task_language.space, messages)
         fits = task_language.plans_with(task_language.words_of(words))
-        return _Solved(found, fits, task_language)
+        return _Solved(found, fits, messages)
+
+    def _refuse_metrics(self, problem: Any) -> None:
+        """Raise `Unsupported` for a metric that is not ours, unless checks are to be skipped."""
+        metrics = _other_metrics(problem)
+        if metrics and not self.skip_checks:
+            raise Unsupported(
+                f"the quality metric {', '.join(metrics)}",
+                remedy="coordlang minimises the makespan, and nothing else: give "
+                "MinimizeMakespan or no metric. With skip_checks the metric is ignored.",
+            )
 
     def _language_in(self, found: Translated) -> TaskLanguage:
         """The language in this problem.
@@ -292,72 +255,58 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
             self._options.model_options(found),
         )
 
-    def _done(self, problem: Any) -> PlanGenerationResultStatus:
-        """Optimal, unless a metric that is not ours was to be ignored (`skip_checks`)."""
-        metrics = getattr(problem, "quality_metrics", ())
-        ours = all(type(metric).__name__ == "MinimizeMakespan" for metric in metrics)
-        return _Status.SOLVED_OPTIMALLY if ours else _Status.SOLVED_SATISFICING
-
     def _result(
-        self,
-        status: PlanGenerationResultStatus,
-        solved: _Solved,
-        plans: Plans,
-        number: int,
-        problem: Any,
+        self, status: Status, solved: _Solved, plans: Plans, number: int, problem: Any
     ) -> PlanGenerationResult:
-        plan = plans.unrank(number)
-        whole = plans.space.model.is_joint_action or len(plans.space.model.robots) == 1
+        model = plans.space.model
+        whole = model.is_joint_action or len(model.robots) == 1
         default = PlanKind.SEQUENTIAL_PLAN if whole else PlanKind.PARTIAL_ORDER_PLAN
         kind = self._options.plan_kind or default
-        messages = []
-        if solved.task_language is not None and not solved.task_language.covered:
-            text = "the language does not cover this task: it guarantees nothing here"
-            messages.append(LogMessage(LogLevel.WARNING, text))
-        tolerance = solved.task_language.tolerance if solved.task_language is not None else None
-        if tolerance is not None and tolerance.warning is not None:
-            messages.append(LogMessage(LogLevel.WARNING, tolerance.warning))
         makespan, second = plans.space.cost_of(0)
         metrics = {"makespan": str(makespan), "plans": str(plans.count)}
-        if plans.space.model.cost != "makespan":
+        if model.cost != "makespan":
             metrics["second cost"] = str(second)
-        up_plan = to_up(solved.found, plans, plan, kind, problem.environment)
-        return PlanGenerationResult(status, up_plan, self.name, metrics, messages)
+        ignored = [_warning(f"{metric} is ignored") for metric in _other_metrics(problem)]
+        plan = to_up(solved.found, plans, plans.unrank(number), kind, problem.environment)
+        return PlanGenerationResult(status, plan, self.name, metrics, [*solved.messages, *ignored])
 
-    def _none(self, status: PlanGenerationResultStatus, why: str) -> PlanGenerationResult:
-        return PlanGenerationResult(
-            status, None, self.name, log_messages=[LogMessage(LogLevel.INFO, why)]
-        )
+    def _none(self, status: Status, why: str) -> PlanGenerationResult:
+        messages = [LogMessage(LogLevel.INFO, why)]
+        return PlanGenerationResult(status, None, self.name, log_messages=messages)
 
     # Validation.
 
     def _validate(self, problem: Any, plan: Any) -> ValidationResult:
         """By the rules of joint steps (`planners.check.validate`).
 
-        Under a sentence the plan must be optimal and have it, too.
+        Under a sentence the plan must be optimal and have it, too.  A metric does not matter.
         """
         try:
-            found = self._options.translated(problem)
-            loaded = build(found.domain, [found.problem], self._options.model_options(found))
-            steps = of_up(found, loaded.model, loaded.team, plan)
-            texts = [step for step, _ in steps]
-            verdict = validate(found.domain, found.problem, loaded.team, texts)
-            wrong_sentence = self._wrong_sentence(found, texts) if verdict.valid else None
+            with _notes() as messages:
+                found = self._options.translated(problem)
+                loaded = build(found.domain, [found.problem], self._options.model_options(found))
+                steps = of_up(found, loaded.model, loaded.team, plan)
+                texts = [step for step, _ in steps]
+                verdict = validate(found.domain, found.problem, loaded.team, texts)
+                wrong_sentence = self._wrong_sentence(found, texts) if verdict.valid else None
         except NoSteps as error:
-            return self._invalid(str(error), FailedValidationReason.MUTEX_CONFLICT)
+            reason = Reason.INAPPLICABLE_ACTION if error.action else Reason.MUTEX_CONFLICT
+            return self._invalid(str(error), reason, error.action)
+        except Unsupported as error:
+            raise UPUnsupportedProblemTypeError(in_parameters(error)) from error
         except CoordlangError as error:
-            raise UPUsageError(str(error)) from error
+            raise UPUsageError(in_parameters(error)) from error
+        if wrong_sentence is not None:
+            return self._invalid(wrong_sentence, None)
         if verdict.valid:
-            if wrong_sentence is not None:
-                return self._invalid(wrong_sentence, None)
             metrics = {"makespan": str(len(steps))}
-            return ValidationResult(ValidationResultStatus.VALID, self.name, metrics=metrics)
+            return ValidationResult(Validity.VALID, self.name, messages, metrics=metrics)
         assert verdict.step is not None
         if verdict.step == len(steps):
-            return self._invalid(verdict.reason, FailedValidationReason.UNSATISFIED_GOALS)
+            return self._invalid(verdict.reason, Reason.UNSATISFIED_GOALS)
         action = next(iter(steps[verdict.step][1]), None)
-        reason = f"step {verdict.step + 1}: {verdict.reason}"
-        return self._invalid(reason, FailedValidationReason.INAPPLICABLE_ACTION, action)
+        why = f"step {verdict.step + 1}: {verdict.reason}"
+        return self._invalid(why, Reason.INAPPLICABLE_ACTION, action)
 
     def _wrong_sentence(self, found: Translated, plan: Sequence[Texts]) -> str | None:
         """Why a plan has another sentence than the one given, or none; None if all is well."""
@@ -373,28 +322,53 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         try:
             words = sentence_of_plan(task_language, acting)
         except (NotAPlan, NotOptimal) as error:
-            return str(error)
+            return in_parameters(error)
         if words == wanted:
             return None
         return f'the sentence of this plan is "{task_language.text(words)}"'
 
-    def _invalid(
-        self, why: str, reason: FailedValidationReason | None, action: Any = None
-    ) -> ValidationResult:
-        messages = [LogMessage(LogLevel.INFO, why)]
+    def _invalid(self, why: str, reason: Reason | None, action: Any = None) -> ValidationResult:
         return ValidationResult(
-            ValidationResultStatus.INVALID,
+            Validity.INVALID,
             self.name,
-            messages,
+            [LogMessage(LogLevel.INFO, why)],
             reason=reason,
             inapplicable_action=action,
         )
 
 
+@contextmanager
+def _notes() -> Iterator[list[LogMessage]]:
+    """Notes given inside, as messages: users of unified-planning read results."""
+    messages: list[LogMessage] = []
+    with warnings.catch_warnings(record=True) as caught:
+        yield messages
+    for given in caught:
+        if isinstance(given.message, Note):
+            messages.append(_warning(in_parameters(given.message)))
+        else:
+            warnings.warn_explicit(given.message, given.category, given.filename, given.lineno)
+
+
+def _warning(text: str) -> LogMessage:
+    return LogMessage(LogLevel.WARNING, text)
+
+
+def _other_metrics(problem: Any) -> list[str]:
+    """The problem's metrics that are not the makespan."""
+    metrics = getattr(problem, "quality_metrics", ())
+    return [type(m).__name__ for m in metrics if not isinstance(m, MinimizeMakespan)]
+
+
+def _done(problem: Any) -> Status:
+    """Optimal, unless a metric that is not ours was ignored (`skip_checks`)."""
+    return Status.SOLVED_SATISFICING if _other_metrics(problem) else Status.SOLVED_OPTIMALLY
+
+
 def _ignored(**given: Any) -> None:
     for name, value in given.items():
         if value is not None:
-            warn(f"coordlang ignores {name}", stacklevel=5)
+            warnings.warn(f"coordlang ignores {name}", stacklevel=5)
 
 
 def _without(entries: Mapping[str, Any], *keys: str) -> dict[str, Any]:

@@ -7,21 +7,7 @@ import re
 from collections.abc import Hashable
 
 #: What PDDL or its readers take for something of their own.
-_RESERVED = frozenset(
-    [
-        "and",
-        "or",
-        "not",
-        "imply",
-        "forall",
-        "exists",
-        "when",
-        "either",
-        "object",
-        "increase",
-        "total-cost",
-    ]
-)
+_RESERVED = ("and", "or", "not", "imply", "forall", "exists", "when", "either", "object")
 
 
 class Names:
@@ -34,7 +20,7 @@ class Names:
 
     def __init__(self) -> None:
         self._names: dict[Hashable, str] = {}
-        self._taken: set[str] = set(_RESERVED)
+        self._taken = {*_RESERVED, "increase", "total-cost"}
 
     def of(self, thing: Hashable, text: str) -> str:
         """The PDDL name of a thing; ``text`` is what it is called."""
@@ -44,8 +30,7 @@ class Names:
             while name in self._taken:
                 number += 1
                 name = f"{base}__{number}"
-            self._taken.add(name)
-            self._names[thing] = name
+            self.keep(thing, name)
         return self._names[thing]
 
     def keep(self, thing: Hashable, name: str) -> None:

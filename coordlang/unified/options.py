@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The parameters of the engine, checked before anything is solved."""
+"""The parameters of the engine, checked before anything is solved, and errors in their words."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +15,7 @@ from coordlang.language.file import read_language
 from coordlang.language.recorded import options_of
 from coordlang.language.words import Language
 from coordlang.unified.translation import Concurrency, Subactions, Translated, translate
-from planners.errors import BadInput, UsageError
+from planners.errors import BadInput, CoordlangError, UsageError
 from planners.loading import ModelOptions
 from planners.pddl.robots import RobotSelection, find_team
 
@@ -24,11 +25,12 @@ PLAN_KINDS = (
     PlanKind.SEQUENTIAL_PLAN,
     PlanKind.TIME_TRIGGERED_PLAN,
 )
+_OPTION = re.compile(r"(?<![\w-])--([a-z]+(?:-[a-z]+)*)")
 
 
 @dataclass(frozen=True, slots=True)
 class EngineOptions:
-    """The parameters of the engine (`CoordlangEngine`), with names in place of objects."""
+    """The parameters of the engine; `CoordlangEngine` says what they mean."""
 
     robots: tuple[str, ...] = ()
     robot_type: str | None = None
@@ -45,44 +47,43 @@ class EngineOptions:
     def of(
         cls,
         *,
-        robots: Sequence[Any],
-        robot_type: Any,
-        remember_actions: bool,
-        language: Language | str | None,
-        sentence: str | Sequence[str] | None,
-        plan_kind: Any,
+        robots: Iterable[Any] = (),
+        robot_type: Any = None,
+        language: Language | str | None = None,
         **given: Any,
     ) -> EngineOptions:
-        """Check the engine's parameters.
+        """Check the engine's parameters; objects and types may be given by their names.
 
         Raises `UPUsageError` for a value that there is not, or a language that cannot be read.
         """
-        if sentence is not None and language is None:
-            raise UPUsageError("a sentence needs its language")
-        if plan_kind is not None and plan_kind not in PLAN_KINDS:
-            raise UPUsageError(
-                f"{plan_kind}: plans are partial-order, sequential or time-triggered"
-            )
-        if isinstance(robots, str):
-            raise UPUsageError(f"robots must be a sequence of objects or names, not {robots!r}")
-        if robots and robot_type is not None:
-            raise UPUsageError("give robots or robot_type, not both")
-        if not isinstance(remember_actions, bool):
-            raise UPUsageError(f"remember_actions must be True or False, not {remember_actions!r}")
-        options = cls(
-            robots=tuple(_name(robot) for robot in robots),
-            robot_type=None if robot_type is None else _name(robot_type),
-            remember_actions=remember_actions,
-            language=_language(language),
-            sentence=sentence,
-            plan_kind=plan_kind,
-            **given,
-        )
+        for name in given:
+            if name not in cls.__dataclass_fields__:
+                there_are = ", ".join(cls.__dataclass_fields__)
+                raise UPUsageError(f"there is no parameter {name!r}: there are {there_are}")
         try:
-            options._without_language((), None)
-        except UsageError as error:
-            raise UPUsageError(str(error)) from None
+            if isinstance(robots, str) or not isinstance(robots, Iterable):
+                raise UsageError(f"robots must be a sequence of objects or names, not {robots!r}")
+            names = tuple(map(_name, robots))
+            kind = None if robot_type is None else _name(robot_type)
+            options = cls(names, kind, language=_read(language), **given)
+            options._check()
+        except (BadInput, UsageError) as error:
+            raise UPUsageError(in_parameters(error)) from None
         return options
+
+    def _check(self) -> None:
+        """Raise `UsageError` for a value that a parameter does not have."""
+        if self.sentence is not None and self.language is None:
+            raise UsageError("a sentence needs its language")
+        if self.plan_kind is not None and self.plan_kind not in PLAN_KINDS:
+            raise UsageError(
+                f"{self.plan_kind}: plans are partial-order, sequential or time-triggered"
+            )
+        if self.robots and self.robot_type is not None:
+            raise UsageError("give robots or robot_type, not both")
+        if not isinstance(self.remember_actions, bool):
+            raise UsageError(f"remember_actions must be True or False, not {self.remember_actions}")
+        self._without_language((), None)
 
     def translated(self, problem: Any) -> Translated:
         """Return the problem as PDDL; raises what `translate` raises."""
@@ -95,9 +96,7 @@ class EngineOptions:
         """
         names = {thing.name: name for name, thing in found.objects.items()}
         robots = tuple(names.get(robot, robot) for robot in self.robots)
-        kind = (
-            None if self.robot_type is None else found.types.get(self.robot_type, self.robot_type)
-        )
+        kind = self.robot_type and found.types.get(self.robot_type, self.robot_type)
         if self.language is None:
             return self._without_language(robots, kind)
         options = options_of(
@@ -125,25 +124,32 @@ class EngineOptions:
         return ModelOptions(selection, cost, self.remember_actions)  # type: ignore[arg-type]
 
 
+def in_parameters(error: Exception) -> str:
+    """What an error or a note says, in words of the engine's parameters.
+
+    Options of the command line become parameters (``--robot-type`` robot_type); of a remedy that
+    is a command nothing is left.
+    """
+    text = str(error)
+    if isinstance(error, CoordlangError) and "`coordlang " in (error.remedy or ""):
+        text = str(type(error)(error.what, position=error.position))
+    text = text.replace("--time-limit", "timeout")
+    return _OPTION.sub(lambda option: option[1].replace("-", "_"), text)
+
+
 def _name(thing: Any) -> str:
     """The name of an object or a type, which may be given by it."""
-    if isinstance(thing, str):
-        return thing
-    name = getattr(thing, "name", None)
+    name = thing if isinstance(thing, str) else getattr(thing, "name", None)
     if not isinstance(name, str):
-        raise UPUsageError(f"{thing!r} is no object or type and no name of one")
+        raise UsageError(f"{thing!r} is no object or type and no name of one")
     return name
 
 
-def _language(given: Language | str | None) -> Language | None:
-    if given is None:
-        return None
-    try:
-        language = given if isinstance(given, Language) else read_language(given)
-    except BadInput as error:
-        raise UPUsageError(str(error)) from None
-    if language.tolerance is not None and language.tolerance.slack:
-        raise UPUsageError(
+def _read(given: Language | str | None) -> Language | None:
+    """The language, which may be given by the name of its file."""
+    language = given if given is None or isinstance(given, Language) else read_language(given)
+    if language is not None and language.tolerance is not None and language.tolerance.slack:
+        raise UsageError(
             "this language is for plans within slack, and this engine gives optimal plans only"
         )
     return language

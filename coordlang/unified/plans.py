@@ -11,11 +11,21 @@ different joint plans may become equal.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
+import networkx
+from unified_planning.plans import (
+    ActionInstance,
+    PartialOrderPlan,
+    PlanKind,
+    SequentialPlan,
+    TimeTriggeredPlan,
+)
+
 from coordlang.unified.translation import Translated
+from planners.errors import UsageError
 from planners.joint.model import JointModel
 from planners.pddl.robots import Team
 from planners.search.plan_file import Texts
@@ -23,30 +33,51 @@ from planners.search.plans import Plan, Plans
 
 
 class NoSteps(Exception):
-    """A plan that is no sequence of joint steps: one robot does two things at once."""
+    """A plan that is no sequence of joint steps of the problem.
+
+    Because of ``action``, which is none of the problem's; or, where this is None, because a robot
+    does two things at once or the order has a cycle.
+    """
+
+    def __init__(self, why: str, action: Any = None) -> None:
+        super().__init__(why)
+        self.action = action
 
 
 def to_up(found: Translated, plans: Plans, plan: Plan, kind: Any, environment: Any) -> Any:
     """A joint plan as a unified-planning plan of ``kind`` (a `PlanKind`)."""
-    from unified_planning.plans import PartialOrderPlan, PlanKind, SequentialPlan, TimeTriggeredPlan
-
     steps = [[_instance(found, text) for text in step] for step in _actions(plans, plan)]
     if kind == PlanKind.SEQUENTIAL_PLAN:
         return SequentialPlan([action for step in steps for action in step], environment)
     if kind == PlanKind.TIME_TRIGGERED_PLAN:
         timed = [(Fraction(n), action, None) for n, step in enumerate(steps) for action in step]
         return TimeTriggeredPlan(timed, environment)
-    return PartialOrderPlan(_followers([step for step in steps if step]), environment)
-
-
-def _followers(steps: Sequence[list[Any]]) -> dict[Any, list[Any]]:
-    """For each action those of the next step."""
-    after = [*steps[1:], []]
-    return {
-        action: list(following)
-        for step, following in zip(steps, after, strict=False)
+    steps = [step for step in steps if step]
+    followers = {
+        action: list(after)
+        for step, after in zip(steps, [*steps[1:], []], strict=False)
         for action in step
     }
+    return PartialOrderPlan(followers, environment)
+
+
+def _actions(plans: Plans, plan: Plan) -> list[list[str]]:
+    """The ground actions of each step; a shared one once, idling left out."""
+    model, rows = plans.space.model, plans.space.rows
+    steps = []
+    for state, labels in zip(plans.states(plan), plan, strict=False):
+        whole = model.joint_action(rows[state], labels)
+        own = dict.fromkeys(model.texts(labels))
+        steps.append([text for text in own if text is not None] if whole is None else [whole])
+    return steps
+
+
+def _instance(found: Translated, text: str) -> Any:
+    schema, *args = text[1:-1].split()
+    members = found.schemas[schema]
+    agent = None if None in members else args.pop(0)
+    objects = tuple(found.objects[arg] for arg in args)
+    return ActionInstance(members[agent], objects, agent and found.agents[agent])
 
 
 def of_up(
@@ -55,7 +86,7 @@ def of_up(
     """The joint steps of a unified-planning plan: what each robot does, and the actions.
 
     A partial-order plan is read layer by layer, each action as early as its predecessors allow.
-    Raises `NoSteps`.
+    Raises `NoSteps`, and `UsageError` for a plan of another kind.
     """
     result = []
     for actions in _steps(plan):
@@ -72,80 +103,49 @@ def of_up(
     return result
 
 
+def _steps(plan: Any) -> Sequence[Sequence[Any]]:
+    """The actions of a unified-planning plan, step by step."""
+    if isinstance(plan, SequentialPlan):
+        return [[action] for action in plan.actions]
+    if isinstance(plan, TimeTriggeredPlan):
+        steps: dict[Any, list[Any]] = defaultdict(list)
+        for start, action, duration in plan.timed_actions:
+            if duration is not None:
+                raise NoSteps(f"{action} has a duration, and actions here have none", action)
+            steps[start].append(action)
+        return [steps[start] for start in sorted(steps)]
+    if not isinstance(plan, PartialOrderPlan):
+        raise UsageError(
+            f"a {type(plan).__name__} cannot be validated",
+            remedy="Plans are partial-order, sequential or time-triggered.",
+        )
+    order = networkx.DiGraph(plan.get_adjacency_list)
+    if not networkx.is_directed_acyclic_graph(order):
+        raise NoSteps("the order of the plan's actions has a cycle")
+    return list(networkx.topological_generations(order))
+
+
 def label(found: Translated, action: Any) -> str:
     """The ground action that an action instance stands for, as PDDL text.
 
-    Raises `KeyError` for a foreign action.
+    Raises `NoSteps` for an action that is none of the problem's.
     """
-    agent = None
-    if action.agent is not None:
-        agent = next(name for name, a in found.agents.items() if a.name == action.agent.name)
-    schema = next(s for s, members in found.schemas.items() if members.get(agent) == action.action)
-    names = {o.name: name for name, o in found.objects.items()}
-    args = [names[value.object().name] for value in action.actual_parameters]
-    return f"({' '.join((schema, *([agent] if agent else []), *args))})"
-
-
-def _actions(plans: Plans, plan: Plan) -> list[list[str]]:
-    """The ground actions of each step; a shared one once, idling left out."""
-    model, rows = plans.space.model, plans.space.rows
-    steps = []
-    for state, labels in zip(plans.states(plan), plan, strict=False):
-        whole = model.joint_action(rows[state], labels)
-        own = dict.fromkeys(model.texts(labels))
-        steps.append([text for text in own if text is not None] if whole is None else [whole])
-    return steps
-
-
-def _instance(found: Translated, text: str) -> Any:
-    from unified_planning.plans import ActionInstance
-
-    schema, *args = text[1:-1].split()
-    members = found.schemas[schema]
-    if None in members:
-        return ActionInstance(members[None], tuple(found.objects[arg] for arg in args))
-    agent, *rest = args
-    return ActionInstance(
-        members[agent], tuple(found.objects[arg] for arg in rest), found.agents[agent]
+    agent = action.agent and next(
+        (name for name, a in found.agents.items() if a.name == action.agent.name), None
     )
+    schemas = (s for s, members in found.schemas.items() if members.get(agent) == action.action)
+    names = {thing: name for name, thing in found.objects.items()}
+    values = [v.object() if v.is_object_exp() else None for v in action.actual_parameters]
+    words = [next(schemas, None), *([agent] if action.agent else []), *map(names.get, values)]
+    if None in words:
+        raise NoSteps(f"{action} is no action of the problem", action)
+    return f"({' '.join(map(str, words))})"
 
 
-def _steps(plan: Any) -> list[list[Any]]:
-    """The actions of a unified-planning plan, step by step."""
-    from unified_planning.plans import PlanKind
-
-    if plan.kind == PlanKind.SEQUENTIAL_PLAN:
-        return [[action] for action in plan.actions]
-    if plan.kind == PlanKind.TIME_TRIGGERED_PLAN:
-        steps: dict[Any, list[Any]] = defaultdict(list)
-        for start, action, _ in plan.timed_actions:
-            steps[start].append(action)
-        return [steps[start] for start in sorted(steps)]
-    return _layers(plan.get_adjacency_list)
-
-
-def _layers(following: Mapping[Any, Sequence[Any]]) -> list[list[Any]]:
-    """The actions of a partial order, each as early as its predecessors allow."""
-    open_before: dict[Any, int] = dict.fromkeys(following, 0)
-    for actions in following.values():
-        for action in actions:
-            open_before[action] = open_before.get(action, 0) + 1
-    layer = [action for action, count in open_before.items() if not count]
-    layers = []
-    while layer:
-        layers.append(layer)
-        after = []
-        for action in layer:
-            for later in following.get(action, ()):
-                open_before[later] -= 1
-                if not open_before[later]:
-                    after.append(later)
-        layer = after
-    return layers
-
-
-def _parts(model: JointModel, team: Team, found: Translated, text: str) -> list[tuple[int, str]]:
-    """Which robots do what in a ground action."""
+def _parts(
+    model: JointModel, team: Team, found: Translated, text: str
+) -> list[tuple[int, str | None]]:
+    """The robots that take part in a ground action, with their parts."""
     if not model.is_joint_action:
         name, *args = text[1:-1].split()
         schema = next(s for s in found.domain.schemas if s.name == name)
@@ -154,9 +154,4 @@ def _parts(model: JointModel, team: Team, found: Translated, text: str) -> list[
     action = next((action for action in model.actions if action.label == text), None)
     if action is None:  # it can never be applied, so the plan is refused for that
         return [(robot, text) for robot in robots]
-    return _acting((robot, action.part_of(robot)) for robot in robots)
-
-
-def _acting(parts: Iterable[tuple[int, str | None]]) -> list[tuple[int, str]]:
-    """The robots that do not idle, with their parts."""
-    return [(robot, part) for robot, part in parts if part is not None]
+    return [(robot, part) for robot in robots if (part := action.part_of(robot)) is not None]

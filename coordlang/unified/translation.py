@@ -8,14 +8,19 @@ It is then read like any other PDDL.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+from unified_planning.model import InstantaneousAction, OperatorKind, Problem
+from unified_planning.model.multi_agent import MultiAgentProblem
+from unified_planning.model.problem_kind import FEATURES as ALL_FEATURES
 
 from coordlang.unified.names import Names
 from planners.errors import Unsupported, UsageError
 from planners.pddl import parse_domain, parse_problem
-from planners.pddl.lifted import Domain, Problem
+from planners.pddl.lifted import Domain
+from planners.pddl.lifted import Problem as PddlProblem
 from planners.pddl.sexpr import Source
 
 #: Action -> robot -> its part, as in joint-action PDDL: ``{"swap": {"r1": "(move ?a ?b)", "r2":
@@ -29,14 +34,32 @@ Concurrency = Mapping[str, str]
 #: Action schema -> the actions that it stands for, by agent (None where there are no agents).
 Schemas = dict[str, dict[str | None, Any]]
 
-_AGENT = "?agent"
-_COMPILE = (
-    "coordlang reads InstantaneousAction: states of true and false facts, steps without time."
+#: The features of problems that are understood, in unified-planning's words.  What has any other
+#: is refused, and what is no `Problem` or `MultiAgentProblem` itself.
+FEATURES = frozenset(
+    """
+    ACTION_BASED ACTION_BASED_MULTI_AGENT AGENT_SPECIFIC_PRIVATE_GOAL AGENT_SPECIFIC_PUBLIC_GOAL
+    FLAT_TYPING HIERARCHICAL_TYPING OBJECT_FLUENTS
+    NEGATIVE_CONDITIONS DISJUNCTIVE_CONDITIONS EQUALITIES EXISTENTIAL_CONDITIONS
+    UNIVERSAL_CONDITIONS CONDITIONAL_EFFECTS FORALL_EFFECTS
+    STATIC_FLUENTS_IN_BOOLEAN_ASSIGNMENTS FLUENTS_IN_BOOLEAN_ASSIGNMENTS
+    STATIC_FLUENTS_IN_OBJECT_ASSIGNMENTS FLUENTS_IN_OBJECT_ASSIGNMENTS
+    """.split()  # noqa: SIM905
 )
-_BOOLEAN = "coordlang reads Boolean and object fluents, no numbers."
+#: A metric says which plans are good, not what is a plan.
+_METRIC_GROUPS = ("QUALITY_METRICS", "ACTIONS_COST_KIND", "OVERSUBSCRIPTION_KIND")
+_METRICS = {feature for group in _METRIC_GROUPS for feature in ALL_FEATURES[group]}
+
+_AGENT = "?agent"
 #: Kinds of unified-planning's expressions -> their PDDL operators.
-_QUANTIFIERS = {"exists": "exists", "forall": "forall"}
-_CONNECTIVES = {"and": "and", "or": "or", "not": "not", "implies": "imply"}
+_OPERATORS = {
+    OperatorKind.AND: "and",
+    OperatorKind.OR: "or",
+    OperatorKind.NOT: "not",
+    OperatorKind.IMPLIES: "imply",
+    OperatorKind.EXISTS: "exists",
+    OperatorKind.FORALL: "forall",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +72,7 @@ class Translated:
     """
 
     domain: Domain
-    problem: Problem
+    problem: PddlProblem
     schemas: Schemas
     objects: dict[str, Any]
     agents: dict[str, Any]
@@ -74,61 +97,67 @@ def translate(
     ``subactions`` an action is a whole joint step; the formulas of ``concurrency`` are further
     preconditions.
 
-    Raises `Unsupported` for anything else, `BadInput` for a problem without a robot.
+    Raises `Unsupported` for anything else, `UsageError` for subactions or formulas that belong to
+    no action, `BadInput` for a problem without a robot.
     """
-    _check_subactions(problem, subactions or {})
-    _check_concurrency(problem, concurrency or {})
-    writer = _Writer(problem, concurrency or {})
-    domain_text, problem_text, schemas = writer.write(subactions or {})
+    subactions, concurrency = subactions or {}, concurrency or {}
+    _check_problem(problem)
+    _check_parameters(problem, subactions, concurrency)
+    writer = _Writer(problem, concurrency)
+    domain_text, problem_text, schemas = writer.write(subactions)
     name = problem.name or "unnamed"
     domain = parse_domain(Source(f"unified-planning problem {name!r} (domain)", domain_text))
     return Translated(
         domain=domain,
         problem=parse_problem(Source(f"unified-planning problem {name!r}", problem_text), domain),
         schemas=schemas,
-        objects={writer.objects.of(o.name, o.name): o for o in problem.all_objects},
-        agents={writer.objects.of(("agent", a.name), a.name): a for a in writer.agents},
+        objects={writer.object_name(o): o for o in problem.all_objects},
+        agents={writer.agent_name(a): a for a in writer.agents},
         types={t.name: writer.type_name(t) for t in problem.user_types},
     )
 
 
-def _check_subactions(problem: Any, subactions: Subactions) -> None:
-    """Raise `UsageError` for subactions that no action of the problem can have."""
-    agents = getattr(problem, "agents", None)
+def _refused(what: str) -> Unsupported:
+    return Unsupported(
+        what,
+        remedy="coordlang reads Boolean and object fluents over objects, and instantaneous "
+        "actions; docs/unified-planning.md has the list.",
+    )
+
+
+def _check_problem(problem: Any) -> None:
+    """Raise `Unsupported` for a class of problems, or a feature, that is not read."""
+    if type(problem) not in (Problem, MultiAgentProblem):
+        raise _refused(f"a {type(problem).__name__} is not supported")
+    others = problem.kind.features - FEATURES - _METRICS
+    if others:
+        raise _refused(f"not supported: {', '.join(sorted(others))}")
+
+
+def _check_parameters(problem: Any, subactions: Subactions, concurrency: Concurrency) -> None:
+    """Raise `UsageError` for subactions and formulas that no action of the problem can have."""
+    agents = getattr(problem, "agents", ())
     if subactions and agents:
         raise UsageError(
             "subactions are given for a problem with agents: its actions are the agents' own",
             remedy="Leave out subactions.",
         )
-    names = {action.name for action in getattr(problem, "actions", ())}
-    for name in subactions:
-        if name not in names:
-            raise UsageError(
-                f"subactions: the problem has no action {name!r}",
-                remedy=f"Its actions are {', '.join(sorted(names))}.",
-            )
-
-
-def _check_concurrency(problem: Any, concurrency: Concurrency) -> None:
-    """Raise `UsageError` for a formula of an action that no agent has, or that is no text."""
-    agents = getattr(problem, "agents", None)
     if concurrency and not agents:
         raise UsageError(
             "concurrency is given for a problem without agents",
             remedy="Write a MultiAgentProblem: its actions can speak of other agents' actions.",
         )
-    names = {action.name for agent in agents or () for action in agent.actions}
-    for name, formula in concurrency.items():
+    names = sorted({action.name for owner in agents or (problem,) for action in owner.actions})
+    parameter = "concurrency" if agents else "subactions"
+    example = '"(forall (?o - agent) (not (take ?o)))"' if agents else '{"r1": "(move ?a ?b)"}'
+    for name, value in {**subactions, **concurrency}.items():
         if name not in names:
             raise UsageError(
-                f"concurrency: no agent has an action {name!r}",
-                remedy=f"The actions are {', '.join(sorted(names))}.",
+                f"{parameter}: there is no action {name!r}",
+                remedy=f"The actions are {', '.join(names)}.",
             )
-        if not isinstance(formula, str):
-            raise UsageError(
-                f"concurrency: the formula of {name!r} is no text",
-                remedy='Write it as PDDL, as in "(forall (?o - agent) (not (take ?o)))".',
-            )
+        if not isinstance(value, str if agents else Mapping):
+            raise UsageError(f"{parameter}: {value!r} for {name!r}", remedy=f"Write {example}.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,57 +176,38 @@ class _Writer:
         self.types, self.predicates, self.actions, self.objects = Names(), Names(), Names(), Names()
         self.variable_names = Names()
         self.variable_names.keep(None, _AGENT[1:])
-        above = {t.name.lower() == "object" or _has_father(t, "object") for t in problem.user_types}
-        if above == {True}:  # as unified-planning's PDDL reader makes it
-            for t in problem.user_types:
-                if t.name.lower() == "object":
-                    self.types.keep(t.name, "object")
+        roots = {[*t.ancestors][-1].name for t in problem.user_types}
+        if len(roots) == 1 and min(roots).lower() == "object":  # as its PDDL reader makes it
+            self.types.keep(min(roots), "object")
         # Names of the problem come first, so that they are kept where possible.
         for t in problem.user_types:
             self.type_name(t)
         for o in problem.all_objects:
-            self.objects.of(o.name, o.name)
+            self.object_name(o)
         for agent in self.agents:
-            self.objects.of(("agent", agent.name), agent.name)
+            self.agent_name(agent)
         self.declared: dict[str, str] = {}
         self.apart = False
 
     def write(self, subactions: Subactions) -> tuple[str, str, Schemas]:
         """Domain, problem, and what the schemas stand for."""
-        for fluent in self.problem.ma_environment.fluents if self.agents else self.problem.fluents:
+        shared = self.problem.ma_environment if self.agents else self.problem
+        for fluent in filter(_is_read, shared.fluents):
             self.predicate(fluent, None)
         if self.agents:
             actions, schemas = self.agent_actions()
         else:
             actions, schemas = self.plain_actions(subactions)
         facts, goals = self.facts(), self.goals()  # they may declare further predicates
-        # Objects are constants, because actions may name them.
-        domain = [
-            "(define (domain up)",
-            "(:types",
-            *self.type_lines(),
-            ")",
-            "(:constants",
-            *self.object_lines(),
-            ")",
-            "(:predicates",
-            *(f"  {line}" for line in self.declared.values()),
-            ")",
-            *actions,
-            ")",
-            "",
+        sections = [
+            _section("(:types", self.type_lines()),
+            _section("(:constants", self.object_lines()),  # constants, as actions may name them
+            _section("(:predicates", self.declared.values()),
         ]
-        problem = [
-            "(define (problem up-task) (:domain up)",
-            "(:init",
-            *(f"  {fact}" for fact in facts),
-            ")",
-            "(:goal (and",
-            *(f"  {goal}" for goal in goals),
-            ")))",
-            "",
-        ]
-        return "\n".join(domain), "\n".join(problem), schemas
+        domain = "\n".join(["(define (domain up)", *sections, *actions, ")\n"])
+        sections = [_section("(:init", facts), _section("(:goal (and", goals)]
+        problem = "\n".join(["(define (problem up-task) (:domain up)", *sections])
+        return domain, f"{problem}))\n", schemas
 
     def goals(self) -> list[str]:
         """The goals of the problem and of its agents."""
@@ -209,10 +219,9 @@ class _Writer:
     def object_lines(self) -> list[str]:
         """The objects and agents with their types."""
         objects = [
-            f"  {self.objects.of(o.name, o.name)} - {self.type_name(o.type)}"
-            for o in self.problem.all_objects
+            f"{self.object_name(o)} - {self.type_name(o.type)}" for o in self.problem.all_objects
         ]
-        return [*objects, *(f"  {self.agent_name(a)} - {self.own_type(a)}" for a in self.agents)]
+        return [*objects, *(f"{self.agent_name(a)} - {self.own_type(a)}" for a in self.agents)]
 
     def plain_actions(self, subactions: Subactions) -> tuple[list[str], Schemas]:
         """The actions of a problem without agents."""
@@ -249,22 +258,16 @@ class _Writer:
 
     def body(self, action: Any, agent: Any) -> list[str]:
         """Parameters, precondition and effect."""
-        if type(action).__name__ != "InstantaneousAction":
-            raise Unsupported(
-                f"{type(action).__name__} {action.name!r}: only instantaneous actions "
-                f"are supported",
-                remedy=_COMPILE,
-            )
-        if action.simulated_effect is not None:
-            raise Unsupported(
-                f"action {action.name!r} has simulated effects",
-                remedy="Write its effects as add_effect.",
+        if type(action) is not InstantaneousAction or action.simulated_effect is not None:
+            raise _refused(
+                f"{type(action).__name__} {action.name!r} is not instantaneous, or its effects are "
+                "simulated"
             )
         self.values = 0  # agents' equal actions are equal texts
         parameters = " ".join(
             f"{self.parameter(p)} - {self.type_name(p.type)}" for p in action.parameters
         )
-        conditions = [self.text(c, agent, inside=True) for c in action.preconditions]
+        conditions = [self.text(c, agent, True) for c in action.preconditions]
         conditions += [self.concurrency[action.name]] if action.name in self.concurrency else []
         effects = [text for effect in action.effects for text in self.effect(effect, agent)]
         return [
@@ -273,88 +276,52 @@ class _Writer:
             f"  :effect (and {' '.join(effects)}))",
         ]
 
-    def effect(self, effect: Any, agent: Any) -> Iterable[str]:
-        """An assignment; of a truth value that is not constant both cases."""
+    def effect(self, effect: Any, agent: Any) -> Iterator[str]:
+        """An assignment: what it makes true and what false, each under its condition."""
         if not effect.is_assignment():
-            raise Unsupported(
-                f"the effect {effect}: only assignments of truth values and objects are supported",
-                remedy=_BOOLEAN,
-            )
-        condition = effect.condition
-        conditions = [] if condition.is_true() else [self.text(condition, agent, inside=True)]
-        bound: list[_Bound] = []
-        parts = self.parts(effect.fluent, agent, bound, inside=True)
-        fluent, value = effect.fluent.fluent(), effect.value
+            raise _refused(f"the effect {effect} is no assignment")
+        fluent, value, bound = effect.fluent.fluent(), effect.value, list[_Bound]()
+        when = [] if effect.condition.is_true() else [self.text(effect.condition, agent, True)]
+        parts = self.parts(effect.fluent, agent, bound, True)
+        atom = _list(*parts)
         if fluent.type.is_user_type():
-            yield from self.object_effect(effect, parts, conditions, bound, agent)
-            return
-        atom = f"({' '.join(parts)})"
-        cases = [(value, atom), (None, f"(not {atom})")]
-        if value.is_bool_constant():
-            cases = [(True, atom if value.is_true() else f"(not {atom})")]
-        for case, literal in cases:
-            own = list(conditions)
-            if case is not True:
-                holds = self.text(value, agent, inside=True)
-                own.append(holds if case is not None else f"(not {holds})")
-            yield self.effect_text(literal, own, bound, effect.forall)
-
-    def object_effect(
-        self,
-        effect: Any,
-        parts: Sequence[str],
-        conditions: Sequence[str],
-        bound: list[_Bound],
-        agent: Any,
-    ) -> Iterable[str]:
-        """The new value of an object fluent becomes true, every other one false."""
-        value = self.term(effect.value, agent, bound, inside=True)
-        atom, old = f"({' '.join((*parts, value))})", self.fresh()
-        yield self.effect_text(atom, conditions, bound, effect.forall)
-        former = f"({' '.join((*parts, old))})"
-        kind = self.type_name(effect.fluent.fluent().type)
-        others = [*bound, _Bound(f"{old} - {kind}", former)]
-        other = [*conditions, f"(not (= {old} {value}))"]
-        yield self.effect_text(f"(not {former})", other, others, effect.forall)
+            new, old = self.term(value, agent, bound, True), self.fresh()
+            former = _Bound(f"{old} - {self.type_name(fluent.type)}", _list(*parts, old))
+            yield self.effect_text(_list(*parts, new), when, bound, effect)
+            when = [*when, f"(not (= {old} {new}))"]
+            yield self.effect_text(f"(not {former.atom})", when, [*bound, former], effect)
+        elif value.is_bool_constant():
+            literal = atom if value.is_true() else f"(not {atom})"
+            yield self.effect_text(literal, when, bound, effect)
+        else:
+            holds = self.text(value, agent, True)
+            yield self.effect_text(atom, [*when, holds], bound, effect)
+            yield self.effect_text(f"(not {atom})", [*when, f"(not {holds})"], bound, effect)
 
     def effect_text(
-        self,
-        literal: str,
-        conditions: Sequence[str],
-        bound: Sequence[_Bound],
-        variables: Sequence[Any],
+        self, literal: str, conditions: Sequence[str], bound: Sequence[_Bound], effect: Any
     ) -> str:
         """An effect under conditions, for all values of the variables."""
         when = [*(b.atom for b in bound), *conditions]
         text = f"(when (and {' '.join(when)}) {literal})" if when else literal
-        declared = " ".join(filter(None, [self.variables(variables), *(b.declared for b in bound)]))
+        own = self.variables(effect.forall)
+        declared = " ".join(filter(None, [own, *(b.declared for b in bound)]))
         return f"(forall ({declared}) {text})" if declared else text
 
     def facts(self) -> list[str]:
         """The atoms that are true at the start."""
         found = []
-        for fluent, value in self.problem.initial_values.items():
-            if value.is_object_exp():
-                found.append(self.initial(fluent, value))
-            elif not value.is_bool_constant():
-                raise Unsupported(
-                    f"the initial value {fluent} := {value}: only truth values and objects are "
-                    "supported",
-                    remedy=_BOOLEAN,
-                )
-            elif value.is_true():
-                found.append(self.text(fluent, None))
+        for node, value in self.problem.initial_values.items():
+            agent = self.problem.agent(node.agent()) if node.is_dot() else None
+            fluent = node.arg(0) if node.is_dot() else node
+            if value.is_true():
+                found.append(self.text(fluent, agent))
+            elif value.is_object_exp():
+                parts = self.parts(fluent, agent, [], False)
+                found.append(_list(*parts, self.object_name(value.object())))
         return sorted(found)
 
-    def initial(self, fluent: Any, value: Any) -> str:
-        """The atom of an object fluent's value at the start."""
-        agent = self.problem.agent(fluent.agent()) if fluent.is_dot() else None
-        node = fluent.arg(0) if fluent.is_dot() else fluent
-        bound: list[_Bound] = []
-        parts = self.parts(node, agent, bound, inside=False)
-        return f"({' '.join((*parts, self.objects.of(value.object().name, value.object().name)))})"
-
-    def text(self, node: Any, agent: Any, *, inside: bool = False) -> str:
+    def text(self, node: Any, agent: Any, inside: bool = False) -> str:
         """An expression as PDDL.
 
         Own fluents are those of ``agent``, which is a variable ``inside`` its actions.
@@ -363,61 +330,53 @@ class _Writer:
             return "(and)" if node.is_true() else "(or)"
         if node.is_fluent_exp():
             bound: list[_Bound] = []
-            parts = self.parts(node, agent, bound, inside=inside)
-            return _with(f"({' '.join(parts)})", bound)
+            parts = self.parts(node, agent, bound, inside)
+            return _with(_list(*parts), bound)
         if node.is_dot():
             return self.text(node.arg(0), self.problem.agent(node.agent()))
         if node.is_equals():
             bound = []
-            sides = [self.term(arg, agent, bound, inside=inside) for arg in node.args]
-            return _with(f"(= {' '.join(sides)})", bound)
-        parts = [self.text(arg, agent, inside=inside) for arg in node.args]
+            sides = [self.term(arg, agent, bound, inside) for arg in node.args]
+            return _with(_list("=", *sides), bound)
+        parts = [self.text(arg, agent, inside) for arg in node.args]
         if node.is_iff():
             return f"(and (imply {parts[0]} {parts[1]}) (imply {parts[1]} {parts[0]}))"
-        for kind, operator in _QUANTIFIERS.items():
-            if getattr(node, f"is_{kind}")():
-                return f"({operator} ({self.variables(node.variables())}) {parts[0]})"
-        for kind, operator in _CONNECTIVES.items():
-            if getattr(node, f"is_{kind}")():
-                return f"({' '.join((operator, *parts))})"
-        raise Unsupported(
-            f"the expression {node}",
-            remedy="coordlang reads Boolean fluents with and, or, not, implies, "
-            "equality and quantifiers.",
-        )
+        operator = _OPERATORS.get(node.node_type)
+        if operator is None:
+            raise _refused(f"the expression {node}")
+        if node.is_exists() or node.is_forall():
+            parts = [f"({self.variables(node.variables())})", *parts]
+        return _list(operator, *parts)
 
-    def parts(self, node: Any, agent: Any, bound: list[_Bound], *, inside: bool) -> list[str]:
+    def parts(self, node: Any, agent: Any, bound: list[_Bound], inside: bool) -> list[str]:
         """The predicate of a fluent and its arguments, without the value of an object fluent.
 
         What arguments are values of object fluents is added to ``bound``.
         """
         fluent = node.fluent()
         own = agent if agent is not None and fluent in agent.fluents else None
-        args = [self.term(arg, agent, bound, inside=inside) for arg in node.args]
+        args = [self.term(arg, agent, bound, inside) for arg in node.args]
         if own is not None:
             args.insert(0, _AGENT if inside else self.agent_name(own))
         return [self.predicate(fluent, own), *args]
 
-    def term(self, node: Any, agent: Any, bound: list[_Bound], *, inside: bool) -> str:
+    def term(self, node: Any, agent: Any, bound: list[_Bound], inside: bool) -> str:
         """An object or a variable; for an object fluent a new variable, added to ``bound``."""
         if node.is_object_exp():
-            return self.objects.of(node.object().name, node.object().name)
+            return self.object_name(node.object())
         if node.is_parameter_exp():
             return self.parameter(node.parameter())
         if node.is_variable_exp():
             return self.variable(node.variable())
         if node.is_dot():
-            return self.term(node.arg(0), self.problem.agent(node.agent()), bound, inside=False)
+            return self.term(node.arg(0), self.problem.agent(node.agent()), bound, False)
         if node.is_fluent_exp() and node.fluent().type.is_user_type():
-            parts = self.parts(node, agent, bound, inside=inside)
+            parts = self.parts(node, agent, bound, inside)
             value = self.fresh()
             kind = self.type_name(node.fluent().type)
-            bound.append(_Bound(f"{value} - {kind}", f"({' '.join((*parts, value))})"))
+            bound.append(_Bound(f"{value} - {kind}", _list(*parts, value)))
             return value
-        raise Unsupported(
-            f"the term {node}",
-            remedy="Arguments are objects, parameters, variables, and object fluents.",
-        )
+        raise _refused(f"the term {node}")
 
     def fresh(self) -> str:
         """A variable of its own."""
@@ -435,12 +394,8 @@ class _Writer:
 
     def predicate(self, fluent: Any, owner: Any) -> str:
         """The predicate of a fluent; own fluents of agents with one signature share one."""
-        if not fluent.type.is_bool_type() and not fluent.type.is_user_type():
-            raise Unsupported(
-                f"fluent {fluent.name!r} of type {fluent.type}: only Boolean and object fluents "
-                "are supported",
-                remedy=_BOOLEAN,
-            )
+        if not _is_read(fluent):
+            raise _refused(f"fluent {fluent.name!r} of type {fluent.type}")
         types = tuple(self.type_name(p.type) for p in fluent.signature)
         if fluent.type.is_user_type():
             types = (*types, self.type_name(fluent.type))
@@ -448,17 +403,13 @@ class _Writer:
         name = self.predicates.of(key, fluent.name)
         if name not in self.declared:
             whose = [f"?a - {self.agent_type()}"] if owner is not None else []
-            self.declared[name] = (
-                f"({' '.join((name, *whose, *(f'?x{n} - {t}' for n, t in enumerate(types))))})"
-            )
+            args = [f"?x{n} - {t}" for n, t in enumerate(types)]
+            self.declared[name] = _list(name, *whose, *args)
         return name
 
     def type_name(self, kind: Any) -> str:
         if not kind.is_user_type():
-            raise Unsupported(
-                f"parameters of type {kind}: only user types are supported",
-                remedy="Use objects of a user type.",
-            )
+            raise _refused(f"parameters of type {kind}")
         return self.types.of(kind.name, kind.name)
 
     def agent_type(self) -> str:
@@ -466,11 +417,12 @@ class _Writer:
 
     def own_type(self, agent: Any) -> str:
         """A type for one agent alone, if some action is not for all of them."""
-        return (
-            self.agent_type()
-            if not self.apart
-            else self.types.of(("agent", agent.name), f"agent-{agent.name}")
-        )
+        if not self.apart:
+            return self.agent_type()
+        return self.types.of(("agent", agent.name), f"agent-{agent.name}")
+
+    def object_name(self, thing: Any) -> str:
+        return self.objects.of(thing.name, thing.name)
 
     def agent_name(self, agent: Any) -> str:
         return self.objects.of(("agent", agent.name), agent.name)
@@ -483,7 +435,15 @@ class _Writer:
         kinds += [(self.own_type(agent), self.agent_type()) for agent in self.agents if self.apart]
         if self.agents:
             kinds.append((self.agent_type(), "object"))
-        return [f"  {name} - {father}" for name, father in kinds if name != "object"]
+        return [f"{name} - {father}" for name, father in kinds if name != "object"]
+
+
+def _section(begin: str, lines: Iterable[str]) -> str:
+    return "\n".join([begin, *(f"  {line}" for line in lines), ")"])
+
+
+def _list(*words: str) -> str:
+    return f"({' '.join(words)})"
 
 
 def _with(text: str, bound: Sequence[_Bound]) -> str:
@@ -494,5 +454,6 @@ def _with(text: str, bound: Sequence[_Bound]) -> str:
     return f"(exists ({declared}) (and {' '.join(value.atom for value in bound)} {text}))"
 
 
-def _has_father(kind: Any, name: str) -> bool:
-    return any(t.name.lower() == name for t in kind.ancestors)
+def _is_read(fluent: Any) -> bool:
+    """Whether a fluent has a truth value or an object; another one must not be used."""
+    return bool(fluent.type.is_bool_type() or fluent.type.is_user_type())

@@ -573,8 +573,8 @@ def test_concurrency_constraints() -> None:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"lft": "(up ?agent)"}, "no agent has an action 'lft'"),
-        ({"lift": 3}, "is no text"),
+        ({"lft": "(up ?agent)"}, "concurrency: there is no action 'lft'"),
+        ({"lift": 3}, "concurrency: 3 for 'lift'"),
         ({"lift": "(exists (?o - agent) (lft ?o))"}, "lft"),
         ({"lift": "(and (lift ?agent)"}, "never closed|unexpected|expected"),
     ],
