@@ -10,14 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations_with_replacement
 from typing import Any
 
-from unified_planning.model import InstantaneousAction, OperatorKind, Problem
+from unified_planning.model import InstantaneousAction, OperatorKind, Problem, Variable
 from unified_planning.model.multi_agent import MultiAgentProblem
 from unified_planning.model.problem_kind import FEATURES as ALL_FEATURES
 
 from coordlang.unified.names import Names
-from planners.errors import Unsupported, UsageError
+from planners.errors import BadInput, Unsupported, UsageError
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain
 from planners.pddl.lifted import Problem as PddlProblem
@@ -129,6 +130,8 @@ def _check_problem(problem: Any) -> None:
     """Raise `Unsupported` for a class of problems, or a feature, that is not read."""
     if type(problem) not in (Problem, MultiAgentProblem):
         raise _refused(f"a {type(problem).__name__} is not supported")
+    if type(problem) is MultiAgentProblem and not problem.agents:
+        raise BadInput("the problem has no agent", remedy="Add one: problem.add_agent(..).")
     others = problem.kind.features - FEATURES - _METRICS
     if others:
         raise _refused(f"not supported: {', '.join(sorted(others))}")
@@ -267,7 +270,7 @@ class _Writer:
         parameters = " ".join(
             f"{self.parameter(p)} - {self.type_name(p.type)}" for p in action.parameters
         )
-        conditions = [self.text(c, agent, True) for c in action.preconditions]
+        conditions = [self.text(c, agent, True) for c in (*action.preconditions, *_clashes(action))]
         conditions += [self.concurrency[action.name]] if action.name in self.concurrency else []
         effects = [text for effect in action.effects for text in self.effect(effect, agent)]
         return [
@@ -452,6 +455,32 @@ def _with(text: str, bound: Sequence[_Bound]) -> str:
         return text
     declared = " ".join(value.declared for value in bound)
     return f"(exists ({declared}) (and {' '.join(value.atom for value in bound)} {text}))"
+
+
+def _clashes(action: Any) -> Iterator[Any]:
+    """Conditions without which an object fluent gets two values at once.
+
+    To unified-planning such an action is not applicable.  (A truth value that is made true and
+    false at once becomes true, as in PDDL.)
+    """
+    new = action.environment.expression_manager
+    objects = [e for e in action.effects if e.fluent.fluent().type.is_user_type()]
+    for one, two in combinations_with_replacement(objects, 2):
+        if one.fluent.fluent() != two.fluent.fluent():
+            continue
+        others = [Variable(f"{v.name}'", v.type, v.environment) for v in two.forall]
+        renamed = {
+            new.VariableExp(v): new.VariableExp(o) for v, o in zip(two.forall, others, strict=True)
+        }
+        target, value, when = (
+            n.substitute(renamed) for n in (two.fluent, two.value, two.condition)
+        )
+        same = [new.Equals(a, b) for a, b in zip(one.fluent.args, target.args, strict=True)]
+        differ = new.Not(new.Equals(one.value, value))
+        clash = new.And(one.condition, when, *same, differ).simplify()
+        if not clash.is_false():
+            variables = (*one.forall, *others)
+            yield new.Not(new.Exists(clash, *variables) if variables else clash)
 
 
 def _is_read(fluent: Any) -> bool:
