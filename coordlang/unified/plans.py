@@ -28,7 +28,7 @@ from coordlang.unified.translation import Translated
 from planners.errors import UsageError
 from planners.joint.model import JointModel
 from planners.pddl.robots import Team
-from planners.search.plan_file import Texts
+from planners.search.plan_file import Texts, numbered_actions
 from planners.search.plans import Plan, Plans
 
 
@@ -46,7 +46,9 @@ class NoSteps(Exception):
 
 def to_up(found: Translated, plans: Plans, plan: Plan, kind: Any, environment: Any) -> Any:
     """A joint plan as a unified-planning plan of ``kind`` (a `PlanKind`)."""
-    steps = [[_instance(found, text) for text in step] for step in _actions(plans, plan)]
+    steps: list[list[Any]] = [[] for _ in plan]
+    for number, text in numbered_actions(plans, plan):
+        steps[number].append(_instance(found, text))
     if kind == PlanKind.SEQUENTIAL_PLAN:
         return SequentialPlan([action for step in steps for action in step], environment)
     if kind == PlanKind.TIME_TRIGGERED_PLAN:
@@ -59,17 +61,6 @@ def to_up(found: Translated, plans: Plans, plan: Plan, kind: Any, environment: A
         for action in step
     }
     return PartialOrderPlan(followers, environment)
-
-
-def _actions(plans: Plans, plan: Plan) -> list[list[str]]:
-    """The ground actions of each step; a shared one once, idling left out."""
-    model, rows = plans.space.model, plans.space.rows
-    steps = []
-    for state, labels in zip(plans.states(plan), plan, strict=False):
-        whole = model.joint_action(rows[state], labels)
-        own = dict.fromkeys(model.texts(labels))
-        steps.append([text for text in own if text is not None] if whole is None else [whole])
-    return steps
 
 
 def _instance(found: Translated, text: str) -> Any:

@@ -286,30 +286,24 @@ class _Writer:
         fluent, value, bound = effect.fluent.fluent(), effect.value, list[_Bound]()
         when = [] if effect.condition.is_true() else [self.text(effect.condition, agent, True)]
         parts = self.parts(effect.fluent, agent, bound, True)
-        atom = _list(*parts)
+        cases: list[tuple[str, list[str], list[_Bound]]]
         if fluent.type.is_user_type():
             new, old = self.term(value, agent, bound, True), self.fresh()
             former = _Bound(f"{old} - {self.type_name(fluent.type)}", _list(*parts, old))
-            yield self.effect_text(_list(*parts, new), when, bound, effect)
-            when = [*when, f"(not (= {old} {new}))"]
-            yield self.effect_text(f"(not {former.atom})", when, [*bound, former], effect)
+            cases = [(_list(*parts, new), [], bound)]
+            cases += [(f"(not {former.atom})", [f"(not (= {old} {new}))"], [*bound, former])]
         elif value.is_bool_constant():
-            literal = atom if value.is_true() else f"(not {atom})"
-            yield self.effect_text(literal, when, bound, effect)
+            atom = _list(*parts)
+            cases = [(atom if value.is_true() else f"(not {atom})", [], bound)]
         else:
-            holds = self.text(value, agent, True)
-            yield self.effect_text(atom, [*when, holds], bound, effect)
-            yield self.effect_text(f"(not {atom})", [*when, f"(not {holds})"], bound, effect)
-
-    def effect_text(
-        self, literal: str, conditions: Sequence[str], bound: Sequence[_Bound], effect: Any
-    ) -> str:
-        """An effect under conditions, for all values of the variables."""
-        when = [*(b.atom for b in bound), *conditions]
-        text = f"(when (and {' '.join(when)}) {literal})" if when else literal
-        own = self.variables(effect.forall)
-        declared = " ".join(filter(None, [own, *(b.declared for b in bound)]))
-        return f"(forall ({declared}) {text})" if declared else text
+            atom, holds = _list(*parts), self.text(value, agent, True)
+            cases = [(atom, [holds], bound), (f"(not {atom})", [f"(not {holds})"], bound)]
+        for literal, own, variables in cases:
+            conditions = [*(b.atom for b in variables), *when, *own]
+            text = f"(when (and {' '.join(conditions)}) {literal})" if conditions else literal
+            declared = [self.variables(effect.forall), *(b.declared for b in variables)]
+            quantified = " ".join(filter(None, declared))
+            yield f"(forall ({quantified}) {text})" if quantified else text
 
     def facts(self) -> list[str]:
         """The atoms that are true at the start."""
@@ -476,9 +470,9 @@ def _clashes(action: Any) -> Iterator[Any]:
             n.substitute(renamed) for n in (two.fluent, two.value, two.condition)
         )
         same = [new.Equals(a, b) for a, b in zip(one.fluent.args, target.args, strict=True)]
-        differ = new.Not(new.Equals(one.value, value))
-        clash = new.And(one.condition, when, *same, differ).simplify()
-        if not clash.is_false():
+        values = new.And(*same, new.Not(new.Equals(one.value, value)))
+        if not values.simplify().is_false():
+            clash = new.And(one.condition, when, values)
             variables = (*one.forall, *others)
             yield new.Not(new.Exists(clash, *variables) if variables else clash)
 

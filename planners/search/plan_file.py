@@ -111,7 +111,7 @@ def to_ipc(plans: Plans, plan: Plan) -> str:
     plan = plans.without_rest(plan)
     lines = [
         text if plans.space.model.is_joint_action else f"{number}: {text}"
-        for number, text in _lines(plans, plan)
+        for number, text in numbered_actions(plans, plan)
     ]
     return "\n".join([*lines, f"; makespan = {len(plan)}"]) + "\n"
 
@@ -123,11 +123,11 @@ def to_plansys2(plans: Plans, plan: Plan) -> str:
     Found" are skipped by its readers.
     """
     plan = plans.without_rest(plan)
-    lines = [f"{number}.000: {text}  [1.000]" for number, text in _lines(plans, plan)]
+    lines = [f"{number}.000: {text}  [1.000]" for number, text in numbered_actions(plans, plan)]
     return "\n".join([";;;; Solution Found", *lines]) + "\n"
 
 
-def _lines(plans: Plans, plan: Plan) -> Iterator[tuple[int, str]]:
+def numbered_actions(plans: Plans, plan: Plan) -> Iterator[tuple[int, str]]:
     """The actions of a plan, each with its joint step: joint actions, or robots' subactions."""
     model, rows = plans.space.model, plans.space.rows
     for number, (state, labels) in enumerate(zip(plans.states(plan), plan, strict=False)):

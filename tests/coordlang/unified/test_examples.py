@@ -202,13 +202,13 @@ def test_what_is_solved_is_what_others_say(name: str) -> None:
     with up.OneshotPlanner(name="coordlang", params=params) as planner:
         result = planner.solve(problem)
     assert result.status == Status.SOLVED_OPTIMALLY
-    with up.PlanValidator(name="sequential_plan_validator") as theirs:
-        with up.PlanValidator(name="coordlang", params=params) as ours:
-            plan = result.plan.convert_to(PlanKind.SEQUENTIAL_PLAN, problem)
-            for found in (plan, *example.valid_plans, *example.invalid_plans):
-                verdict = theirs.validate(other, central.plan(found) if central else found)
-                assert ours.validate(problem, found).status == verdict.status
-                assert found is not plan or verdict.status == Validity.VALID
+    plan = result.plan.convert_to(PlanKind.SEQUENTIAL_PLAN, problem)
+    theirs = up.PlanValidator(name="sequential_plan_validator")
+    ours = up.PlanValidator(name="coordlang", params=params)
+    for found in (plan, *example.valid_plans, *example.invalid_plans):
+        verdict = theirs.validate(other, central.plan(found) if central else found)
+        assert ours.validate(problem, found).status == verdict.status
+        assert found is not plan or verdict.status == Validity.VALID
     assert int(result.metrics["makespan"]) == len(plan.actions) == shortest(other)
 
 
