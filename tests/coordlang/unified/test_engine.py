@@ -316,7 +316,9 @@ def test_agents_of_different_kinds() -> None:
 def random_problem(seed: int) -> Any:
     """One robot in places that point at places, with random formulas and effects: conditional,
     universal, copying.  Object fluents are nested, compared, and assigned several times by one
-    action, which is not applicable if the values differ.
+    action, which is not applicable if the values differ.  (Two assignments without a condition
+    that are different as written are never applicable to the library, even where the values are
+    equal, so all but one speak of ``dark``, which the action a0 may change.)
     """
     random = Random(seed)
     robot, place = up.UserType("robot"), up.UserType("place")
@@ -364,8 +366,11 @@ def random_problem(seed: int) -> Any:
         if random.random() < 0.6:
             action.add_precondition(formula(x, y))
         for _ in range(random.randrange(1, 4)):
-            condition = formula(x, y) if random.random() < 0.6 else up.TRUE()
-            every = up.Or(seen(v), up.Not(up.Equals(v, value(x, y, 1))))
+            now = random.choice([dark(), up.Not(dark())])
+            condition = up.And(formula(x, y), now)
+            if not action.effects and random.random() < 0.5:
+                condition = up.TRUE()
+            every = up.And(up.Or(seen(v), up.Not(up.Equals(v, value(x, y, 1)))), now)
             given = random.choice(
                 [
                     (at(x), value(x, y), condition),
@@ -379,6 +384,8 @@ def random_problem(seed: int) -> Any:
             )
             with suppress(UPConflictingEffectsException):  # the library refuses to model it
                 action.add_effect(*given)
+        if not number:
+            action.add_effect(dark, up.Iff(dark, seen(y)))
         problem.add_action(action)
     problem.add_goal(up.Equals(at(r), random.choice(places)))
     problem.add_goal(seen(random.choice(places)))
@@ -415,7 +422,7 @@ def shortest(problem: Any) -> tuple[int, int] | None:
     return None
 
 
-@pytest.mark.parametrize("seeds", [20, pytest.param(200, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("seeds", [10, pytest.param(100, marks=pytest.mark.thorough)])
 def test_formulas_and_effects_mean_what_they_mean_to_the_library(seeds: int) -> None:
     answers = Counter[str]()
     for seed in range(seeds):
