@@ -363,9 +363,9 @@ def random_problem(seed: int) -> Any:
     for number in range(3):
         action = up.InstantaneousAction(f"a{number}", x=robot, y=place)
         x, y, v = action.x, action.y, up.Variable("v", place)
-        if random.random() < 0.6:
+        if random.random() < 0.3:
             action.add_precondition(formula(x, y))
-        for _ in range(random.randrange(1, 4)):
+        for _ in range(random.randrange(2, 5)):
             now = random.choice([dark(), up.Not(dark())])
             condition = up.And(formula(x, y), now)
             if not action.effects and random.random() < 0.5:
@@ -422,10 +422,16 @@ def shortest(problem: Any) -> tuple[int, int] | None:
     return None
 
 
-@pytest.mark.parametrize("seeds", [10, pytest.param(100, marks=pytest.mark.thorough)])
-def test_formulas_and_effects_mean_what_they_mean_to_the_library(seeds: int) -> None:
+#: Seeds with quick answers of each kind.
+SOME = (0, 1, 6, 7, 10, 11, 12, 13, 14, 15, 16, 17, 18, 26, 27)
+
+
+@pytest.mark.parametrize(
+    "seeds", [SOME, pytest.param(range(100), marks=pytest.mark.thorough)], ids=len
+)
+def test_formulas_and_effects_mean_what_they_mean_to_the_library(seeds: Any) -> None:
     answers = Counter[str]()
-    for seed in range(seeds):
+    for seed in seeds:
         problem = random_problem(seed)
         assert problem.kind <= CoordlangEngine.supported_kind()
         expected = shortest(problem)
@@ -718,7 +724,7 @@ def test_another_metric_is_refused_or_without_checks_ignored_and_nothing_promise
         assert "MinimizeActionCosts" in str(result.log_messages)
         engine = CoordlangEngine()
         engine.skip_checks = True
-        *_, last = [engine.solve(problem), *engine.get_solutions(problem)]
+        *_, last = engine.get_solutions(problem)
         assert last.status == Status.SOLVED_SATISFICING
         assert "MinimizeActionCosts is ignored" in str(last.log_messages)
         assert verdict(problem, plan).status == Validity.VALID, (

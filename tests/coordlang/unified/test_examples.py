@@ -175,7 +175,7 @@ REMOVED = {
 
 def shortest(problem: Any) -> int:
     """The length of a shortest plan, by Fast Downward."""
-    back = []
+    back: list[Any] = []
     for feature, kind in REMOVED.items():
         if feature in problem.kind.features:
             with up.Compiler(problem_kind=problem.kind, compilation_kind=kind) as compiler:
