@@ -84,11 +84,11 @@ def verdict(problem: Any, plan: Any, **params: Any) -> Any:
         return validator.validate(problem, plan)
 
 
-def crossing(cells: int = 4) -> Any:
+def crossing(cells: int = 4, kind: str = "Robot") -> Any:
     """Two robots on a star of cells (the T-map with four) trade places, one cell each; entering
     asks for a free cell.
     """
-    cell, robot = up.UserType("Cell"), up.UserType("Robot")
+    cell, robot = up.UserType("Cell"), up.UserType(kind)
     at = up.Fluent("At", up.BoolType(), r=robot, c=cell)
     near, free = (
         up.Fluent("near", up.BoolType(), a=cell, b=cell),
@@ -802,19 +802,14 @@ def test_who_the_robots_are() -> None:
 
 
 def test_a_note_is_a_message_in_words_of_the_engine() -> None:
-    problem = crossing()
-    vehicle = up.UserType("Vehicle")
-    renamed = up.Problem("vehicles")
-    seen = renamed.add_fluent("seen", up.BoolType(), v=vehicle, default_initial_value=False)
-    look = up.InstantaneousAction("look", v=vehicle)
-    look.add_effect(seen(look.v), True)
-    renamed.add_action(look)
-    renamed.add_goal(seen(renamed.add_object("v1", vehicle)))
-    renamed.add_object("elsewhere", up.UserType("Place"))
-    (message,) = solve(renamed).log_messages
-    assert "robots are taken to be v1" in str(message)
+    problem = crossing(kind="Vehicle")  # and one action takes nothing but a vehicle
+    look = up.InstantaneousAction("look", r=problem.user_type("Vehicle"))
+    look.add_effect(problem.add_fluent("seen", default_initial_value=False), True)
+    problem.add_action(look)
+    (message,) = solve(problem).log_messages
+    assert "robots are taken to be r1, r2" in str(message)
     assert "Say robot_type vehicle if that is so" in str(message)
-    assert solve(problem).log_messages == []
+    assert solve(crossing()).log_messages == []
 
 
 def test_invalid_plans() -> None:
