@@ -135,8 +135,8 @@ def map_of(scenario: Path) -> Path:
 
 def load(name: str, cost: str) -> PlanningInstance:
     """The joint model of a row."""
-    from planners.loading import ModelOptions
     from planners.loading import load as load_files
+    from planners.model_options import ModelOptions
 
     if name.startswith("corners"):
         size, robots = name.split()[1:3]

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Literal
+from typing import Literal, cast
 
 from coordlang.certificate import Certificate, certify
 from coordlang.explanation.simple import simple
@@ -28,9 +28,12 @@ from coordlang.vocabulary.minimal import refuting_clauses
 from planners.errors import UsageError
 from planners.limits import little_time_after, run_until_stopped, start_clock, time_left
 from planners.messages import echoed
+from planners.options import option
 from planners.parallel.workers import Workers
 from planners.search.portions import require_room
 
+#: How words are found: a key of `coordlang.vocabulary.METHODS`.
+Method = Literal["greedy", "separating", "minimal", "exhaustive"]
 #: What the language should be like, of those with the fewest words, by the value of ``--prefer``.
 BuildPreference = Literal["flexible", "simple"]
 PREFERENCES: Mapping[BuildPreference, Callable[[Job, Outcome], Outcome]] = {
@@ -62,32 +65,26 @@ class Built:
 
 
 @dataclass(frozen=True, slots=True)
-class BuildOptions:
-    """How a language is built.
+class MethodOptions:
+    """How the words of a language are found.
 
-    Attributes
-    ----------
-    method
-        The way to a partition, a key of `coordlang.vocabulary.METHODS`.
-    seed
-        Seed of all random choices.
-    alpha_only
-        For the method "separating": separate plans where they part, never where they meet.
-    prefer
-        Of the languages with as many words as the method finds, "flexible": one whose sentences
-        leave many plans open; "simple": one whose words have short formulas.  For the exact
-        methods, "minimal" and "exhaustive".
-
-    Raises
-    ------
-    UsageError
-        For a value that there is not, or one that the method does not support.
+    Raises `UsageError` for a value that there is not, or one that the method does not support.
     """
 
-    method: str = "greedy"
-    seed: int = 0
-    alpha_only: bool = False
-    prefer: BuildPreference | None = None
+    method: Method = option(
+        "greedy",
+        "greedy: fast.  separating: fewest words that part plans where they differ first or last.  "
+        "minimal: fewest words at all, with proof.  exhaustive: brute force.",
+    )
+    seed: int = option(0, "Seed of all random choices.", least=0)
+    alpha_only: bool = option(
+        False, "separating: part plans where they differ first, never where last."
+    )
+    prefer: BuildPreference | None = option(
+        None,
+        "Of the languages with the fewest words (--method minimal or exhaustive) one whose ..  "
+        "flexible: sentences leave many plans open.  simple: words have short formulas.",
+    )
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
@@ -135,7 +132,7 @@ def build_language(
     candidates
         The tasks that it must serve.
     method, seed, alpha_only, prefer
-        See `BuildOptions`.
+        See `MethodOptions`.
     reserve
         Share of a time limit's rest that a search, once there is a language, leaves for
         `certificate_of`.
@@ -155,7 +152,7 @@ def build_language(
     UsageError
         The options contradict each other.
     """
-    options = BuildOptions(method, seed, alpha_only, prefer)
+    options = MethodOptions(cast(Method, method), seed, alpha_only, prefer)
     require_solvable(candidates)
     workers = workers or Workers()
     clock = Clock()
@@ -224,7 +221,7 @@ def _with_incumbent(job: Job) -> Job:
 
 
 def _outcome(
-    job: Job, options: BuildOptions, verified: Sequence[_Verified], clock: Clock
+    job: Job, options: MethodOptions, verified: Sequence[_Verified], clock: Clock
 ) -> Outcome:
     """What the method finds; if it is stopped early, the last partition that was verified."""
     found: list[Outcome] = []

@@ -94,7 +94,7 @@ def inspect(loaded: PlanningInstance) -> Inspection:
         idle=_idle(model),
         left_out=tuple(sorted(idling)),
         shared=_counted(a.schema for a in model.actions if len(a.owners) > 1 and not a.parts),
-        unowned=loaded.options.robots.unowned,
+        unowned=loaded.options.unowned,
         step_formulas=_counted(a.schema for a in model.actions if _speaks_of_others(a)),
         formulas=_formulas(model),
         without_effects=tuple(sorted({a.schema for a in model.actions if not a.effects})),

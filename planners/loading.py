@@ -4,9 +4,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import get_args
 
 from planners.errors import BadInput, Position, UsageError
 from planners.grounding import (
@@ -18,71 +17,18 @@ from planners.grounding import (
 )
 from planners.grounding.networks import apply_network
 from planners.joint.assembly import SLACK_LEFT, assemble
-from planners.joint.model import Cost, JointModel, PlanningTask, show
+from planners.joint.model import JointModel, PlanningTask, show
 from planners.limits import reaching
 from planners.messages import echoed
+from planners.model_options import ModelOptions
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Atom, Domain, Problem
 from planners.pddl.robots import (
-    RobotSelection,
     Team,
-    Unowned,
     find_team,
     static_atoms,
     without_idle_environment,
 )
-
-#: The most slack that is taken: plans of so many joint steps fill any memory.
-MOST_SLACK = 1_000_000
-
-
-@dataclass(frozen=True, slots=True)
-class ModelOptions:
-    """How the files are to be understood; all of it is recorded in a language file.
-
-    Attributes
-    ----------
-    robots
-        Which objects are robots, and who owns actions that name none.
-    cost
-        What optimal means.
-    remember_actions
-        Whether a state also holds each robot's last subaction.
-    slack
-        Joint steps that plans may take more than the least makespan.
-    sees_slack
-        Whether states on plans say how many of these are left.
-
-    Raises
-    ------
-    UsageError
-        For a value that there is not.
-    """
-
-    robots: RobotSelection = field(default_factory=RobotSelection)
-    cost: Cost = "makespan"
-    remember_actions: bool = False
-    slack: int = 0
-    sees_slack: bool = False
-
-    def __post_init__(self) -> None:
-        if isinstance(self.slack, bool) or not isinstance(self.slack, int) or self.slack < 0:
-            raise UsageError(
-                f"--slack {echoed(str(self.slack))}: expected a number of joint steps, 0 or more",
-                remedy="Say --slack 1.",
-            )
-        if self.slack > MOST_SLACK:
-            raise UsageError(
-                f"--slack {echoed(str(self.slack))}: more than {MOST_SLACK:,} joint steps",
-                remedy="Say --slack 1.",
-            )
-        if self.sees_slack and not self.slack:
-            raise UsageError(
-                "--words-see-slack belongs to --slack, and there is none",
-                remedy="Add --slack 1, or leave out --words-see-slack.",
-            )
-        _require_one_of("cost", self.cost, get_args(Cost))
-        _require_one_of("unowned", self.robots.unowned, get_args(Unowned))
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +72,7 @@ def build(
             "'last'",
             remedy="Rename the predicate.",
         )
-    if options.sees_slack and SLACK_LEFT in domain.predicates:
+    if options.words_see_slack and SLACK_LEFT in domain.predicates:
         raise UsageError(
             f"--words-see-slack writes facts ({SLACK_LEFT} N), but this domain has a predicate "
             f"{SLACK_LEFT!r}",
@@ -135,7 +81,7 @@ def build(
     first = problems[0]
     for other in problems[1:]:
         _check_same_world(domain, first, other)
-    team = find_team(domain, first, options.robots)
+    team = find_team(domain, first, options)
     starts = [*(problem.init for problem in problems), *inits]
     extra = {atom for start in starts for atom in start}
     with_costs = options.cost == "makespan+cost"
@@ -155,7 +101,7 @@ def build(
             remember_actions=options.remember_actions,
             idling_costs=idling_costs(domain, first, team, costs=with_costs),
             slack=options.slack,
-            sees_slack=options.sees_slack,
+            words_see_slack=options.words_see_slack,
         )
         never = impossible_actions(domain, first, team, actions, extra)
         model = replace(model, impossible=never)
@@ -169,14 +115,6 @@ def task_of(model: JointModel, domain: Domain, problem: Problem) -> PlanningTask
     return PlanningTask(
         problem.name, model.state(problem.init), goal, Position(problem.source.name)
     )
-
-
-def _require_one_of(option: str, value: str, values: Sequence[str]) -> None:
-    if value not in values:
-        raise UsageError(
-            f"{echoed(value)} is no value of the option {option}",
-            remedy=f"It is {' or '.join(values)}.",
-        )
 
 
 def _check_same_world(domain: Domain, first: Problem, other: Problem) -> None:

@@ -16,7 +16,7 @@ from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_
 from coordlang.tasks.listed import ListedTask
 from coordlang.tasks.task_file import read_task_file
 from coordlang.tolerating import WordLimit, build_few_words
-from planners.loading import ModelOptions
+from planners.model_options import ModelOptions
 from planners.pddl import read_domain, read_problem
 
 
@@ -120,7 +120,7 @@ def language_for(
     OutOfTime, OutOfMemory
         If a limit ended the method early: what it then has depends on the machine.
     """
-    options = ModelOptions(slack=1, sees_slack=True) if method == "slack" else None
+    options = ModelOptions(slack=1, words_see_slack=True) if method == "slack" else None
     candidates = world.candidates(listed, options)
     if method in ("few", "silence"):
         words = WordLimit({"few": 2, "silence": 1}[method])

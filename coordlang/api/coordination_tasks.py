@@ -3,17 +3,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Unpack
+from typing import Any
 
-from coordlang.api.inputs import DomainSource, File, ProblemSource, read_planning
+from coordlang.api.inputs import DomainSource, ProblemSource, read_planning
 from coordlang.api.layout import WIDTH
-from coordlang.api.options import GivenOptions, ModelKeywords
+from coordlang.api.options import Jobs, Source
 from coordlang.api.presenting import Presented
 from coordlang.api.witness import witness_data, witness_text
 from coordlang.api.workers import opened_workers
+from coordlang.commands.keywords import with_options
 from coordlang.language.tolerance import percent
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.tolerance.failure import mean
@@ -21,6 +22,7 @@ from coordlang.tolerance.failures import Failures, estimate_data, estimate_text
 from coordlang.tolerance.sampled import FailureEstimate
 from coordlang.tolerance.task_answers import FewestActions, answers
 from planners.notebook import counted, html_table
+from planners.options import group, option
 from planners.search.plan_file import json_count
 
 
@@ -180,35 +182,31 @@ class Coordination(Presented):
         return html_table(head, rows)
 
 
+@dataclass(frozen=True, slots=True)
+class CoordinationOptions:
+    """What `coordination` can be asked for."""
+
+    as_json: bool = option(False, "One JSON object.", names=("--json",), only="cli")
+    source: Source = group(Source)
+    work: Jobs = group(Jobs)
+
+
+@with_options(CoordinationOptions)
 def coordination(
-    domain: DomainSource | None = None,
-    *problems: ProblemSource,
-    factored: File | None = None,
-    jobs: int | None = None,
-    scheduler: File | None = None,
-    resume: File | None = None,
-    note: Callable[[str], None] | None = None,
-    **model: Unpack[ModelKeywords],
+    domain: DomainSource | None = None, *problems: ProblemSource, options: CoordinationOptions
 ) -> Coordination:
     """Decide which tasks require coordination, and show how robots then miscoordinate.
 
     A task requires coordination (RC) if some mixture of its optimal plans is no optimal plan.
-
-    Parameters
-    ----------
-    domain, problems, factored, **model
-        As in `load`.
-    jobs, scheduler, resume, note
-        As in `build`; a problem is a piece of the work.
 
     Raises
     ------
     ProvedImpossible
         For a task without a plan.
     """
-    files = read_planning(domain, problems, factored, GivenOptions.of(**model))
+    files = read_planning(domain, problems, options.source)
     loaded = files.instance()
-    with opened_workers(jobs, scheduler, resume, note) as workers:
+    with opened_workers(options.work) as workers:
         found = answers(loaded, workers)
     tasks = tuple(
         TaskCoordination(

@@ -5,13 +5,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Unpack
+from typing import Any
 
-from coordlang.api.inputs import DomainSource, File, ProblemSource, read_instance
-from coordlang.api.options import GivenOptions, ModelKeywords
+from coordlang.api.inputs import DomainSource, ProblemSource, read_instance
+from coordlang.api.options import Source
 from coordlang.api.presenting import Presented
+from coordlang.commands.keywords import with_options
 from planners.classical.fast_downward import optimal_cost
 from planners.errors import ProvedImpossible
+from planners.options import group, option
 from planners.search.optimal_plans import search
 
 
@@ -51,26 +53,29 @@ class CrossCheck(Presented):
         return {"agree": self.agree, "cost": self.cost, "fast_downward": self.fast_downward}
 
 
+@dataclass(frozen=True, slots=True)
+class CheckOptions:
+    """What `check` can be asked for."""
+
+    as_json: bool = option(False, "One JSON object.", names=("--json",), only="cli")
+    source: Source = group(Source)
+
+
+@with_options(CheckOptions)
 def check(
     domain: DomainSource | None = None,
     problem: ProblemSource | None = None,
     *,
-    factored: File | None = None,
-    **model: Unpack[ModelKeywords],
+    options: CheckOptions,
 ) -> CrossCheck:
     """Compare our optimal cost with Fast Downward's.
-
-    Parameters
-    ----------
-    domain, problem, factored, **model
-        As in `load`.
 
     Raises
     ------
     CoordlangError
         If Fast Downward gives no answer.
     """
-    loaded = read_instance(domain, problem, factored, GivenOptions.of(**model))
+    loaded = read_instance(domain, problem, options.source)
     task = loaded.tasks[0]
     try:
         ours: tuple[int, int] | None = search(loaded.model.without_slack, task).cost_of(0)

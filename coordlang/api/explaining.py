@@ -6,14 +6,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Unpack
+from typing import Any
 
 from coordlang.api.grounding import coordinates_of
-from coordlang.api.inputs import DomainSource, File, ProblemSource, read_planning
+from coordlang.api.inputs import DomainSource, ProblemSource, read_planning
 from coordlang.api.language_inputs import LanguageSource, language_for
-from coordlang.api.options import GivenOptions, ModelKeywords
+from coordlang.api.options import Source
 from coordlang.api.presenting import Presented
 from coordlang.api.speaking import SentenceSource
+from coordlang.commands.keywords import with_options
 from coordlang.explanation.cover import Cover
 from coordlang.explanation.demands import SentenceDemands, sentence_demands
 from coordlang.explanation.descriptions import WordDescriptions, describe_words
@@ -33,6 +34,7 @@ from coordlang.tasks.candidates import describe
 from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
 from planners.errors import UsageError
 from planners.notebook import counted, html_table
+from planners.options import group, option
 from planners.search.plan_file import json_count
 from planners.search.plans import Plans
 
@@ -249,29 +251,31 @@ class Explanation(Presented):
         return "\n".join(lines)
 
 
+@dataclass(frozen=True, slots=True)
+class ExplainOptions:
+    """What `explain` can be asked for."""
+
+    task: bool = option(False, "Also show what the sentences of PROBLEM's task ask of each robot.")
+    sentence: SentenceSource | None = option(None, "With --task: this sentence only.", "S")
+    formula_per_word: bool = option(
+        False, "Describe every word by a formula of its own, also where less would do."
+    )
+    source: Source = group(Source)
+
+    def __post_init__(self) -> None:
+        if self.sentence is not None and not self.task:
+            raise UsageError("--sentence: only with --task", remedy="Add --task.")
+
+
+@with_options(ExplainOptions)
 def explain(
     language: LanguageSource,
     domain: DomainSource | None = None,
     problem: ProblemSource | None = None,
     *,
-    factored: File | None = None,
-    task: bool = False,
-    sentence: SentenceSource | None = None,
-    formula_per_word: bool = False,
-    **model: Unpack[ModelKeywords],
+    options: ExplainOptions,
 ) -> Explanation:
     """Explain a language: each word as a short formula, and the sentences of a task.
-
-    Parameters
-    ----------
-    language, domain, problem, factored, **model
-        As in `verify`, with one problem.
-    task
-        Whether it is found out what the sentences of the problem's task ask of each robot.
-    sentence
-        With ``task``: this sentence only.
-    formula_per_word
-        Whether every word is described by a formula of its own, also where less would do.
 
     Raises
     ------
@@ -280,21 +284,21 @@ def explain(
     NoPlanFits
         If no optimal plan has the sentence.
     """
-    if sentence is not None and not task:
-        raise UsageError("--sentence: only with --task", remedy="Add --task.")
-    files = read_planning(domain, [problem], factored, GivenOptions.of(**model), most=1)
+    files = read_planning(domain, [problem], options.source, most=1)
     read, position = language_for(language, files)
     first = files.problems[0]
     used = language_in_task(read, files.domain, first, files.options_of(read), position)
-    only = None if sentence is None else used.words_of(sentence)
+    only = None if options.sentence is None else used.words_of(options.sentence)
     if only is not None:
         used.plans_with(only)
     mapped = mapped_states(used.language, used.model)
     covers = all_covers(mapped)
-    descriptions = describe_words(mapped, covers, formula_per_word)
+    descriptions = describe_words(mapped, covers, options.formula_per_word)
     points = coordinates_of(None, first)
     lifted = lifted_words(read, files.domain, first, used.model, points, position)
-    return Explanation(WordsExplained(used, mapped, covers, descriptions, lifted), only, task)
+    return Explanation(
+        WordsExplained(used, mapped, covers, descriptions, lifted), only, options.task
+    )
 
 
 def _sentence_data(sentence: TaskSentence) -> dict[str, Any]:

@@ -6,22 +6,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import fspath
-from typing import Any, Literal, Unpack, overload
+from typing import Any, Literal
 
 from coordlang.api.inputs import DomainSource, File, ProblemSource
 from coordlang.api.language_inputs import LanguageSource, read_task_language
 from coordlang.api.optimal_plans import PlanSteps
-from coordlang.api.options import (
-    READERS,
-    TARGETS,
-    GivenOptions,
-    ModelKeywords,
-    Reader,
-    Target,
-    require_one_of,
-)
+from coordlang.api.options import Source
 from coordlang.api.presenting import Presented
 from coordlang.api.speaking import SentencePlans, SentenceSource, given_sentence
+from coordlang.commands.keywords import with_options
 from coordlang.language.tolerance import Tolerance, tolerance_data
 from coordlang.use.choices.choices import choices as choices_under
 from coordlang.use.export.behaviour_tree import behaviour_trees
@@ -31,11 +24,17 @@ from coordlang.use.sentence.open_plans import OpenPlans
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import BadInput, Position, Refuted
 from planners.joint.model import JointModel
+from planners.options import group, option
 from planners.search.plan_file import json_count, only_one_plan
 from planners.writing import write_texts
 
 #: Beyond this many joint actions robots choose one after another in the exported PDDL.
 MAX_ACTIONS = 2000
+
+
+Target = Literal["pddl", "ltlf", "bt"]
+#: Planners whose PDDL differs: what Fast Downward and K* read, or STRIPS alone.
+Reader = Literal["fd", "kstar", "pyperplan"]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -218,80 +217,48 @@ class ExportedTrees(Presented):
         }
 
 
-@overload
+@dataclass(frozen=True, slots=True)
+class ExportOptions:
+    """What `export` can be asked for."""
+
+    to: Target = option(
+        "pddl",
+        "pddl: a planning problem.  ltlf: a temporal formula over plans.  bt: each robot's "
+        "choices as a behaviour tree.",
+    )
+    max_actions: int = option(
+        MAX_ACTIONS,
+        "Beyond N joint actions robots choose one after another in the PDDL.",
+        "N",
+        least=0,
+    )
+    for_planner: Reader = option(
+        "fd",
+        "Who reads the PDDL: fd (Fast Downward) and kstar the same, pyperplan STRIPS only.",
+        names=("--for",),
+    )
+    source: Source = group(Source)
+
+
+@with_options(ExportOptions)
 def export(
     language: LanguageSource,
     domain: DomainSource | None = None,
     problem: ProblemSource | None = None,
     sentence: SentenceSource | None = None,
     *,
-    factored: File | None = None,
-    to: Literal["pddl"] = "pddl",
-    max_actions: int = MAX_ACTIONS,
-    for_planner: Reader = "fd",
-    **model: Unpack[ModelKeywords],
-) -> ExportedTask: ...
-
-
-@overload
-def export(
-    language: LanguageSource,
-    domain: DomainSource | None = None,
-    problem: ProblemSource | None = None,
-    sentence: SentenceSource | None = None,
-    *,
-    factored: File | None = None,
-    to: Literal["ltlf"],
-    max_actions: int = MAX_ACTIONS,
-    for_planner: Reader = "fd",
-    **model: Unpack[ModelKeywords],
-) -> ExportedFormula: ...
-
-
-@overload
-def export(
-    language: LanguageSource,
-    domain: DomainSource | None = None,
-    problem: ProblemSource | None = None,
-    sentence: SentenceSource | None = None,
-    *,
-    factored: File | None = None,
-    to: Literal["bt"],
-    max_actions: int = MAX_ACTIONS,
-    for_planner: Reader = "fd",
-    **model: Unpack[ModelKeywords],
-) -> ExportedTrees: ...
-
-
-def export(
-    language: LanguageSource,
-    domain: DomainSource | None = None,
-    problem: ProblemSource | None = None,
-    sentence: SentenceSource | None = None,
-    *,
-    factored: File | None = None,
-    to: Target = "pddl",
-    max_actions: int = MAX_ACTIONS,
-    for_planner: Reader = "fd",
-    **model: Unpack[ModelKeywords],
-) -> ExportedTask | ExportedFormula | ExportedTrees:
+    options: ExportOptions,
+) -> Any:
     """Write a task under a sentence for other programs.
 
-    Parameters
-    ----------
-    language, domain, problem, factored, **model
-        As in `verify`, with one problem.
-    sentence
-        ``"w1 w0"`` or ``("w1", "w0")``.
-    to
-        ``"pddl"``: a planning problem whose optimal plans are exactly the plans that fit.
-        ``"ltlf"``: a temporal formula over plans.  ``"bt"``: each robot's choices as a behaviour
-        tree.
-    max_actions
-        Beyond this many joint actions robots choose one after another in the PDDL.
-    for_planner
-        Who reads the PDDL: ``"fd"`` (Fast Downward) and ``"kstar"`` read the same, ``"pyperplan"``
-        needs STRIPS without negative conditions and costs.
+    Returns
+    -------
+    ExportedTask
+        A planning problem whose optimal plans are exactly the plans that fit.
+    ExportedFormula
+        With ``to="ltlf"``: a temporal formula over plans.
+    ExportedTrees
+        With ``to="bt"``: each robot's choices as a behaviour tree.
 
     Raises
     ------
@@ -300,14 +267,13 @@ def export(
     NoPlanFits
         If no optimal plan has the sentence.
     """
-    require_one_of("--to", to, TARGETS)
-    require_one_of("--for", for_planner, READERS)
     said = given_sentence(sentence)
-    used = read_task_language(language, domain, problem, factored, GivenOptions.of(**model))
+    used = read_task_language(language, domain, problem, options.source)
     words = used.words_of(said)
-    if to == "pddl":
-        return ExportedTask(OpenPlans.of(used, words), _pddl(used, words, max_actions, for_planner))
-    if to == "bt":
+    if options.to == "pddl":
+        pddl = _pddl(used, words, options.max_actions, options.for_planner)
+        return ExportedTask(OpenPlans.of(used, words), pddl)
+    if options.to == "bt":
         return _trees(used, words)
     found: SentenceFormula = export_ltlf(used, words)
     return ExportedFormula(

@@ -4,15 +4,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
-from coordlang.api.options import GivenOptions
+from coordlang.api.options import Source
 from coordlang.tasks.listed import ListedTask
 from coordlang.tasks.task_file import TASKS, read_task_file, tasks_from_data
 from planners.errors import Position, UsageError
-from planners.loading import ModelOptions, PlanningInstance, build
+from planners.loading import PlanningInstance, build
+from planners.model_options import ModelOptions
 from planners.pddl import read_domain, read_problem
 from planners.pddl.factored import read_factored
 from planners.pddl.lifted import Domain, Problem
@@ -36,17 +37,17 @@ class PlanningInput:
 
     domain: Domain
     problems: list[Problem]
-    given: GivenOptions
-    is_loaded: bool = False
+    source: Source
 
     def options_of(self, language: Language) -> ModelOptions:
         """Return the options that a language records; `UsageError` where these contradict them."""
-        given = replace(self.given, robot_type=None) if self.is_loaded else self.given
-        return given.for_language(language)
+        from coordlang.language.recorded import options_of
+
+        return options_of(language, self.source.model, self.source.given - {"factored"})
 
     def instance(self) -> PlanningInstance:
         """Return the joint model and the tasks of the problems."""
-        loaded = build(self.domain, self.problems, self.given.options())
+        loaded = build(self.domain, self.problems, self.source.model)
         note_doubled(self.domain, self.problems, loaded.model)
         return loaded
 
@@ -71,19 +72,19 @@ class PlanningInput:
 def read_planning(
     domain: DomainSource | None,
     problems: Sequence[ProblemSource | None],
-    factored: File | None,
-    given: GivenOptions,
+    source: Source,
     *,
     most: int | None = None,
 ) -> PlanningInput:
-    """Read domain and problems, or the files of ``factored`` in their place.
+    """Read domain and problems, or the files of ``source.factored`` in their place.
 
     Parameters
     ----------
     domain, problems
         Paths or parsed objects; None is not given.
-    factored
-        A folder of ``domain-ROBOT.pddl`` and ``problem-ROBOT.pddl`` files.
+    source
+        The model options, and in place of the files a folder of ``domain-ROBOT.pddl`` and
+        ``problem-ROBOT.pddl`` files.
     most
         The greatest number of problems; None: any number.
 
@@ -93,10 +94,10 @@ def read_planning(
         For too few or too many of them.
     """
     found = [problem for problem in problems if problem is not None]
-    if factored is not None:
-        return _from_factored(factored, [domain, *found], given)
+    if source.factored is not None:
+        return _from_factored(source, [domain, *found])
     if isinstance(domain, PlanningInstance):
-        return _from_instance(domain, found, given, most)
+        return _from_instance(domain, found, source, most)
     if domain is None or not found or (most is not None and len(found) > most):
         wanted = "a problem" if most == 1 else "problems"
         raise UsageError(
@@ -104,19 +105,16 @@ def read_planning(
             remedy="Give both as files or parsed objects, or factored=DIR.",
         )
     lifted = domain if isinstance(domain, Domain) else read_domain(fspath(domain))
-    return PlanningInput(lifted, [_problem(p, lifted) for p in found], given)
+    return PlanningInput(lifted, [_problem(p, lifted) for p in found], source)
 
 
 def read_instance(
-    domain: DomainSource | None,
-    problem: ProblemSource | None,
-    factored: File | None,
-    given: GivenOptions,
+    domain: DomainSource | None, problem: ProblemSource | None, source: Source
 ) -> PlanningInstance:
     """Read the joint model and the task of one problem."""
-    if isinstance(domain, PlanningInstance) and given == GivenOptions() and problem is None:
+    if isinstance(domain, PlanningInstance) and source == Source() and problem is None:
         return domain
-    return read_planning(domain, [problem], factored, given, most=1).instance()
+    return read_planning(domain, [problem], source, most=1).instance()
 
 
 def read_tasks(tasks: TasksSource) -> tuple[tuple[ListedTask, ...], Position]:
@@ -136,19 +134,20 @@ def read_tasks(tasks: TasksSource) -> tuple[tuple[ListedTask, ...], Position]:
     return tasks_from_data(data, position), position
 
 
-def _from_factored(factored: File, others: Sequence[object], given: GivenOptions) -> PlanningInput:
+def _from_factored(source: Source, others: Sequence[object]) -> PlanningInput:
     """Read a folder of factored files, which stands in the place of all ``others``."""
     if any(other is not None for other in others):
         raise UsageError("--factored names all files", remedy="Leave out domain and problem.")
-    domain, problem = read_factored(fspath(factored))
-    return PlanningInput(domain, [problem], given)
+    assert source.factored is not None
+    domain, problem = read_factored(fspath(source.factored))
+    return PlanningInput(domain, [problem], source)
 
 
 def _from_instance(
-    loaded: PlanningInstance, problems: list[ProblemSource], given: GivenOptions, most: int | None
+    loaded: PlanningInstance, problems: list[ProblemSource], source: Source, most: int | None
 ) -> PlanningInput:
     """Return the files of an instance, and the options that it was loaded with."""
-    if given != GivenOptions():
+    if source.given:
         raise UsageError(
             "the model options of a loaded domain are fixed",
             remedy="Give them to coordlang.load.",
@@ -159,16 +158,10 @@ def _from_instance(
             f"expected one problem, and {len(read)} are loaded",
             remedy="Give the problem that is meant as the second argument.",
         )
-    options = loaded.options
-    chosen = options.robots
-    kept = GivenOptions(
-        chosen.names,
-        chosen.type,
-        chosen.unowned,
-        options.cost,
-        options.remember_actions,
-    )
-    return PlanningInput(loaded.domain, read, kept, is_loaded=True)
+    # A language must have been built with the same options; its robots may be named there alone.
+    fixed = {"cost", "unowned", "remember_actions", "slack", "words_see_slack"}
+    given = fixed | ({"robots"} if loaded.options.names else set())
+    return PlanningInput(loaded.domain, read, Source(None, loaded.options, frozenset(given)))
 
 
 def _problem(problem: ProblemSource, domain: Domain) -> Problem:

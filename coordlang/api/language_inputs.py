@@ -15,7 +15,7 @@ from coordlang.api.inputs import (
     TasksSource,
     read_planning,
 )
-from coordlang.api.options import GivenOptions
+from coordlang.api.options import Source
 from coordlang.coordinates import Point
 from coordlang.language.file import language_from_bytes
 from coordlang.language.words import Language
@@ -95,10 +95,9 @@ def read_task_language(
     language: LanguageSource,
     domain: DomainSource | None,
     problem: ProblemSource | None,
-    factored: File | None,
-    given: GivenOptions,
+    source: Source,
 ) -> TaskLanguage:
     """Read a language and put it into the task of a problem."""
-    files = read_planning(domain, [problem], factored, given, most=1)
+    files = read_planning(domain, [problem], source, most=1)
     read, position = language_for(language, files)
     return language_in_task(read, files.domain, files.problems[0], files.options_of(read), position)

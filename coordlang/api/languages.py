@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from os import PathLike, fspath
 from time import perf_counter
-from typing import Any, Unpack
+from typing import Any, Literal
 
 import coordlang
 from coordlang.api.inputs import (
@@ -20,23 +20,15 @@ from coordlang.api.inputs import (
     read_planning,
 )
 from coordlang.api.language_inputs import LanguageSource, language_for, read_language_source
-from coordlang.api.options import (
-    UNSOLVABLE,
-    BuildPreference,
-    GivenOptions,
-    Method,
-    ModelKeywords,
-    Unsolvable,
-    require_one_of,
-    require_seed,
-)
+from coordlang.api.options import Jobs, Source
 from coordlang.api.presenting import Presented
 from coordlang.api.repair import repair_data
 from coordlang.api.witness import witness_data
 from coordlang.api.workers import opened_workers, say_size
-from coordlang.building import BuildOptions, Built, build_language, certificate_of
+from coordlang.building import Built, MethodOptions, build_language, certificate_of
 from coordlang.certificate import Certificate, Checked, read_certificate
 from coordlang.certificate import check as check_certificate
+from coordlang.commands.keywords import with_options
 from coordlang.language.file import read_language
 from coordlang.language.provenance import Guarantee
 from coordlang.language.recorded import (
@@ -57,7 +49,8 @@ from coordlang.tolerating import WordLimit, build_few_words
 from coordlang.verification.candidates import verify_candidates
 from coordlang.vocabulary.fewest_failures import FewWords
 from planners.errors import ProvedImpossible, UsageError
-from planners.loading import ModelOptions
+from planners.model_options import ModelOptions
+from planners.options import group, option
 
 #: Called with what is being done, now and then.
 Progress = Callable[[str], None]
@@ -88,7 +81,7 @@ class BuiltLanguage(Presented):
     """
 
     language: Language
-    options: BuildOptions
+    options: MethodOptions
     candidates: Candidates
     built: Built
     seconds: Mapping[str, float]
@@ -170,67 +163,75 @@ class BuiltLanguage(Presented):
         }
 
 
+@dataclass(frozen=True, slots=True)
+class BuildOptions:
+    """What `build` can be asked for: a method, or a number of words, or a language to repair."""
+
+    tasks: TasksSource | None = option(
+        None,
+        "Candidate tasks: every pair of reachable states, or a task file (default: the problems' "
+        "own).",
+        "all|FILE",
+    )
+    way: MethodOptions = group(MethodOptions)
+    words: int | None = option(
+        None,
+        "At most K words, in place of a method: those under which robots that choose by themselves "
+        "fail least often.  1: silence.",
+        "K",
+        least=1,
+    )
+    worst: bool = option(
+        False, "With --words: minimise how often they fail in the worst task, not on average."
+    )
+    start: LanguageSource | None = option(
+        None,
+        "Repair this language in place of building one: as few states as possible change their "
+        "word.",
+        "LANGUAGE",
+    )
+    unsolvable: Literal["fail", "skip"] = option(
+        "fail",
+        "What to do about candidate tasks without plans: stop (exit 11), or name and leave them "
+        "out.",
+    )
+    reserve: float = option(
+        0.0,
+        "The share of a time limit's rest that a search, once there is a language, leaves for its "
+        "certificate.",
+        only="python",
+    )
+    progress: Progress | None = option(
+        None, "Called with a line of text when a phase begins.", only="python"
+    )
+    work: Jobs = group(Jobs)
+    source: Source = group(Source)
+
+    def __post_init__(self) -> None:
+        if self.words is None and self.worst:
+            raise UsageError("--worst belongs to --words", remedy="Add --words K.")
+        has_method = self.way != MethodOptions(seed=self.way.seed)
+        if self.words is not None and (has_method or self.start is not None):
+            raise UsageError(
+                "--words finds the words in its own way",
+                remedy="Leave out --method, --alpha-only, --prefer and --start.",
+            )
+        if self.start is not None and has_method:
+            raise UsageError(
+                "--start changes the words of a language, and no method makes new ones",
+                remedy="Leave out --method, --alpha-only and --prefer, or --start.",
+            )
+
+
+@with_options(BuildOptions)
 def build(
-    domain: DomainSource | None = None,
-    *problems: ProblemSource,
-    factored: File | None = None,
-    tasks: TasksSource | None = None,
-    method: Method = "greedy",
-    alpha_only: bool = False,
-    prefer: BuildPreference | None = None,
-    words: int | None = None,
-    worst: bool = False,
-    start: LanguageSource | None = None,
-    unsolvable: Unsolvable = "fail",
-    seed: int = 0,
-    reserve: float = 0.0,
-    progress: Progress | None = None,
-    jobs: int | None = None,
-    scheduler: File | None = None,
-    resume: File | None = None,
-    note: Progress | None = None,
-    **model: Unpack[ModelKeywords],
+    domain: DomainSource | None = None, *problems: ProblemSource, options: BuildOptions
 ) -> BuiltLanguage:
     """Build a coordination language for candidate tasks, and verify it by definition.
 
-    Parameters
-    ----------
-    domain, problems, factored, **model
-        As in `load`.
-    tasks
-        The candidate tasks: ``"all"`` (every ordered pair of different reachable states), a task
-        file, or its tasks as objects; None: the problems' own.
-    method
-        ``"greedy"``, ``"separating"``, ``"minimal"`` or ``"exhaustive"`` (docs/concepts.md).
-    alpha_only
-        With ``"separating"``: part plans where they differ first, never where they differ last.
-    prefer
-        What the language should be like, of those with the fewest words, with ``"minimal"`` or
-        ``"exhaustive"``.  ``"flexible"``: its sentences leave many plans open; ``"simple"``: its
-        words have short formulas.
-    words
-        The most words, in place of a method: those under which robots that choose by themselves
-        fail least often (docs/concepts.md, what communication is worth).  1 is silence.  Where
-        they fail, the result is no coordination language, and says so (``failures``).
-    worst
-        With ``words``: minimise how often robots fail in the worst task, not over all tasks.
-    start
-        A language to repair in place of building one: as few states as possible change their word.
-        It then also serves the tasks that this language records, unless the map has changed.
-    unsolvable
-        ``"fail"`` or ``"skip"``: what to do about candidate tasks without plans.
-    seed
-        Of the methods' random choices: same input, same seed, same language.
-    reserve
-        With `time_limit` around: the share of the time left that a search, once there is a
-        language, leaves for `BuiltLanguage.certificate`; 0.25 is a quarter.
-    progress
-        Called with a line of text when a phase begins.
-    jobs, scheduler, resume, note
-        Who does the jobs of large work (docs/cli.md, cores and machines): how many processes, by
-        default one for each core; a running Dask cluster; a folder that keeps finished jobs.
-        ``note`` is called with what a person should read, by default a warning.  The language
-        does not depend on them.
+    Where ``words`` are too few for one, the result is none, and says so (``failures``).  A language
+    to repair (``start``) also serves the tasks that it records, unless the map has changed.  The
+    language does not depend on ``jobs``, ``scheduler`` and ``resume``.
 
     Raises
     ------
@@ -242,30 +243,27 @@ def build(
         If a limit was hit before there was any verified language; later the language so far is
         returned, with ``stopped`` set.
     """
-    options = BuildOptions(method, seed, alpha_only, prefer)
-    limit = _word_limit(words, worst, options, start)
-    require_one_of("--unsolvable", unsolvable, UNSOLVABLE)
-    require_seed(seed)
+    way, seed, start = options.way, options.way.seed, options.start
     begin = perf_counter()
-    files = read_planning(domain, problems, factored, GivenOptions.of(**model))
+    files = read_planning(domain, problems, options.source)
     if start is None:
-        candidates = _candidates(files, tasks, unsolvable, files.given.options())
+        candidates = _candidates(files, options, files.source.model)
     else:
-        _require_no_method(options)
-        old, candidates, contained = _to_repair(start, files, tasks, unsolvable)
+        old, candidates, contained = _to_repair(start, files, options)
     seconds = {"space": perf_counter() - begin}
-    say_size(candidates, note or progress)
+    say_size(candidates, options.work.note or options.progress)
     fewest = requiring(candidates.spaces) if candidates.kind != "all" else None
     repaired = few = None
-    with opened_workers(jobs, scheduler, resume, note) as workers:
-        say = progress or _silent
-        if limit is not None:
+    with opened_workers(options.work) as workers:
+        say = options.progress or _silent
+        if options.words is not None:
+            limit = WordLimit(options.words, options.worst)
             built, few = build_few_words(
                 candidates, limit, seed=seed, progress=say, workers=workers
             )
         elif start is None:
             built = build_language(
-                candidates, **asdict(options), reserve=reserve, progress=say, workers=workers
+                candidates, **asdict(way), reserve=options.reserve, progress=say, workers=workers
             )
         else:
             built, repaired = repair_language(
@@ -275,14 +273,14 @@ def build(
     producer = {
         "program": "coordlang",
         "version": coordlang.__version__,
-        "arguments": _arguments(tasks, {**asdict(options), "words": words, "worst": worst}, start),
+        "arguments": _arguments(options),
         "seed": seed,
         "solver": f"python-sat {version('python-sat')}",
         "seconds": {name: round(value, 3) for name, value in seconds.items()},
     }
     provenance = replace(built.language.provenance, producer=producer)
     language = replace(built.language, provenance=provenance)
-    return BuiltLanguage(language, options, candidates, built, seconds, repaired, few, fewest)
+    return BuiltLanguage(language, way, candidates, built, seconds, repaired, few, fewest)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -360,38 +358,34 @@ class Verification(Presented):
         return found
 
 
+@dataclass(frozen=True, slots=True)
+class VerifyOptions:
+    """What `verify` can be asked for."""
+
+    tasks: TasksSource | None = option(
+        None, "Check these tasks (default: those that the language file records).", "all|FILE"
+    )
+    certificate: File | Certificate | None = option(
+        None, "Also check why fewer words do not suffice (a file of build --certificate).", "FILE"
+    )
+    progress: Progress | None = option(
+        None, "Called with a line of text when a phase begins.", only="python"
+    )
+    work: Jobs = group(Jobs)
+    source: Source = group(Source)
+
+
+@with_options(VerifyOptions)
 def verify(
     language: LanguageSource,
     domain: DomainSource | None = None,
     *problems: ProblemSource,
-    factored: File | None = None,
-    tasks: TasksSource | None = None,
-    certificate: File | Certificate | None = None,
-    progress: Progress | None = None,
-    jobs: int | None = None,
-    scheduler: File | None = None,
-    resume: File | None = None,
-    note: Progress | None = None,
-    **model: Unpack[ModelKeywords],
+    options: VerifyOptions,
 ) -> Verification:
     """Check by definition that a language is a coordination language.
 
-    All plans of one sentence then mix freely.
-
-    Parameters
-    ----------
-    language
-        A language file or a language; or a lifted one, for ``tasks`` or the problems' own.
-    domain, problems, factored, **model
-        As in `load`; they must be those that the language was built for.
-    tasks
-        As in `build`; None: the tasks that the language records.
-    certificate
-        Why fewer words do not suffice: a file of ``coordlang build --certificate``, checked too.
-    progress
-        Called with a line of text when a phase begins.
-    jobs, scheduler, resume, note
-        As in `build`.
+    All plans of one sentence then mix freely.  A lifted language is checked for ``tasks``, or the
+    problems' own.
 
     Raises
     ------
@@ -402,28 +396,29 @@ def verify(
     Refuted
         If a reason of the certificate is none.
     """
-    proof = _certificate(certificate)
-    files = read_planning(domain, problems, factored, GivenOptions.of(**model))
+    tasks, progress = options.tasks, options.progress or _silent
+    proof = _certificate(options.certificate)
+    files = read_planning(domain, problems, options.source)
     read, position = language_for(language, files, tasks, is_verified=False)
     check_source(read, files.domain, files.problems, position)
-    options = files.options_of(read)
+    model = files.options_of(read)
     if tasks is None:
-        candidates = recorded_candidates(read, files.domain, files.problems, options, position)
+        candidates = recorded_candidates(read, files.domain, files.problems, model, position)
     else:
-        candidates = files.candidates(tasks, options)
+        candidates = files.candidates(tasks, model)
     require_solvable(candidates)
     partition = read.partition(candidates.model)
-    say_size(candidates, note or progress)
-    with opened_workers(jobs, scheduler, resume, note) as workers:
-        verdict = verify_candidates(partition, candidates, workers, progress or _silent)
+    say_size(candidates, options.work.note or options.progress)
+    with opened_workers(options.work) as workers:
+        verdict = verify_candidates(partition, candidates, workers, progress)
         found = NONE
         if not verdict.holds:
-            (progress or _silent)("counting how often robots fail")
+            progress("counting how often robots fail")
             found = failures_under(partition, candidates, is_claimed=_claims_failures(read))
     _require_counted(found, read)
     checked = None
     if proof and verdict.holds:
-        checked = check_certificate(proof, candidates, progress or _silent)
+        checked = check_certificate(proof, candidates, progress)
         if checked.lower_bound > len(read.words):
             raise AssertionError(
                 f"a language of {len(read.words)} words is verified, and a certificate that "
@@ -465,64 +460,36 @@ def _certificate(certificate: File | Certificate | None) -> Certificate | None:
     return certificate
 
 
-def _candidates(
-    files: PlanningInput, tasks: TasksSource | None, unsolvable: Unsolvable, options: ModelOptions
-) -> Candidates:
+def _candidates(files: PlanningInput, options: BuildOptions, model: ModelOptions) -> Candidates:
     try:
-        return files.candidates(tasks, options, skip_unsolvable=unsolvable == "skip")
+        return files.candidates(options.tasks, model, skip_unsolvable=options.unsolvable == "skip")
     except ProvedImpossible as error:
-        if unsolvable == "fail":
+        if options.unsolvable == "fail":
             advice = (error.remedy, "--unsolvable skip leaves out such tasks.")
             error.remedy = "\n  ".join(filter(None, advice))
         raise
 
 
-def _word_limit(
-    words: int | None, worst: bool, options: BuildOptions, start: LanguageSource | None
-) -> WordLimit | None:
-    """Return how many words there may be, None where a method or a repair decides."""
-    if words is None:
-        if worst:
-            raise UsageError("--worst belongs to --words", remedy="Add --words K.")
-        return None
-    if options != BuildOptions(seed=options.seed) or start is not None:
-        raise UsageError(
-            "--words finds the words in its own way",
-            remedy="Leave out --method, --alpha-only, --prefer and --start.",
-        )
-    return WordLimit(words, worst)
-
-
-def _require_no_method(options: BuildOptions) -> None:
-    """Raise `UsageError` for options of a method, where a language is repaired."""
-    if options != BuildOptions(seed=options.seed):
-        raise UsageError(
-            "--start changes the words of a language, and no method makes new ones",
-            remedy="Leave out --method, --alpha-only and --prefer, or --start.",
-        )
-
-
 def _to_repair(
-    start: LanguageSource, files: PlanningInput, tasks: TasksSource | None, unsolvable: Unsolvable
+    start: LanguageSource, files: PlanningInput, options: BuildOptions
 ) -> tuple[Language, Candidates, bool]:
     """Return the language, the tasks that it is to serve, and whether its own are among them."""
     language, position = read_language_source(start)
     check_domain(language, files.domain, position)
-    if files.given.slack or (language.tolerance is not None and language.tolerance.slack):
+    if files.source.model.slack or (language.tolerance is not None and language.tolerance.slack):
         raise UsageError(
             "--start does not go with --slack: a language for plans within slack is built anew",
             remedy="Leave out --start.",
         )
-    candidates = _candidates(files, tasks, unsolvable, files.options_of(language))
+    candidates = _candidates(files, options, files.options_of(language))
     return language, *with_recorded(language, candidates, position)
 
 
-def _arguments(
-    tasks: TasksSource | None, options: Mapping[str, Any], start: LanguageSource | None
-) -> list[str]:
+def _arguments(options: BuildOptions) -> list[str]:
     """Return the keywords of a call as a language file records them."""
-    given = {name: value for name, value in options.items() if value}
-    files = {"tasks": tasks, "start": start}
+    named = {**asdict(options.way), "words": options.words, "worst": options.worst}
+    given = {name: value for name, value in named.items() if value}
+    files = {"tasks": options.tasks, "start": options.start}
     given |= {k: fspath(file) for k, file in files.items() if isinstance(file, str | PathLike)}
     return [f"{name}={value}" for name, value in sorted(given.items())]
 

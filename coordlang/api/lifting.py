@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import fspath
-from typing import Any, Literal, Unpack
+from typing import Any, Literal
 
 import coordlang
 from coordlang.api.grounding import (
@@ -18,9 +18,10 @@ from coordlang.api.grounding import (
 )
 from coordlang.api.inputs import DomainSource, File, ProblemSource, TasksSource, read_planning
 from coordlang.api.languages import Progress
-from coordlang.api.options import GivenOptions, ModelKeywords, require_one_of, require_seed
+from coordlang.api.options import Jobs, Source
 from coordlang.api.presenting import Presented
 from coordlang.api.workers import opened_workers
+from coordlang.commands.keywords import with_options
 from coordlang.language.provenance import Guarantee, provenance_of, world_sha256
 from coordlang.language.words import Language
 from coordlang.lifted.file import write_lifted
@@ -31,6 +32,7 @@ from coordlang.lifted.wording import english, formula
 from coordlang.tasks.candidates import require_solvable
 from planners.errors import BadInput, Position, ProvedImpossible, Refuted, UsageError
 from planners.loading import PlanningInstance
+from planners.options import group, option
 
 #: What a lifted language should have few of first, features or words.
 LiftPreference = Literal["features", "words"]
@@ -84,86 +86,81 @@ class Lifted(Presented):
         }
 
 
+@dataclass(frozen=True, slots=True)
+class LiftOptions:
+    """What `lift` can be asked for."""
+
+    tasks: Literal["all"] | None = option(
+        None, "Every pair of reachable states of each problem (default: the problems' own tasks)."
+    )
+    check: Sequence[ProblemSource] = option(
+        (), "Also verify in this problem, and learn from it if it refutes.", "PROBLEM"
+    )
+    complexity: int = option(8, "Leave out features that are more complex.", "N", least=1)
+    prefer: LiftPreference | None = option(
+        None,
+        "features: the simplest features, then few words.  words: few words, then simple "
+        "features.  Default: the simplest features, and a word for each class of states.",
+    )
+    coordinates: CoordinatesSource | None = option(
+        None, "Where places lie (default: coordinates.json beside the problem, else names).", "FILE"
+    )
+    seed: int = option(0, "Seed of all random choices.", least=0)
+    progress: Progress | None = option(
+        None, "Called with a line of text now and then.", only="python"
+    )
+    jobs: int | None = option(
+        None, "Processes that verify (default: one for each core).", "N", least=1
+    )
+    source: Source = group(Source)
+
+    def __post_init__(self) -> None:
+        if self.source.model.slack:
+            raise UsageError(
+                "--slack: words over features are learned from optimal plans",
+                remedy="Build a language of this problem: `coordlang build --slack`.",
+            )
+        if self.source.factored is not None and self.check:
+            raise UsageError(
+                "--check and --factored: a folder of factored files holds one problem",
+                remedy="Leave out --check, or make a file of each folder: "
+                "`coordlang inspect --write`.",
+            )
+
+
+@with_options(LiftOptions)
 def lift(
-    domain: DomainSource | None = None,
-    *problems: ProblemSource,
-    factored: File | None = None,
-    tasks: Literal["all"] | None = None,
-    check: Sequence[ProblemSource] = (),
-    complexity: int = 8,
-    prefer: LiftPreference | None = None,
-    coordinates: CoordinatesSource | None = None,
-    seed: int = 0,
-    progress: Progress | None = None,
-    jobs: int | None = None,
-    **model: Unpack[ModelKeywords],
+    domain: DomainSource | None = None, *problems: ProblemSource, options: LiftOptions
 ) -> Lifted:
     """Learn words as functions of features, for all these problems at once.
 
-    Parameters
-    ----------
-    domain, problems, factored, **model
-        As in `load`; the problems need not have the same objects, but the same robots.
-    tasks
-        ``"all"``: every ordered pair of different reachable states of each problem; None: the
-        problems' own.
-    check
-        Further problems, to verify what was learned; those that refute it are learned from.
-    complexity
-        Features that are more complex are left out.
-    prefer
-        ``"features"``: the simplest features, then few words, where classes of states with equal
-        features may share one.  ``"words"``: few words, then simple features.  None: the simplest
-        features, and a word for each class, which other problems refute less often.
-    coordinates
-        Where places lie, as in `report`; by default those of a file ``coordinates.json`` beside a
-        problem, else what their names say.
-    seed
-        Of random choices: same input, same seed, same language.
-    progress
-        Called with a line of text now and then.
-    jobs
-        How many processes verify; by default one for each core.
+    The problems need not have the same objects, but the same robots.
 
     Raises
     ------
     ProvedImpossible
         If no features up to this complexity suffice.
     """
-    require_one_of("--prefer", prefer, ("features", "words"))
-    require_seed(seed)
-    if complexity < 1:
-        raise UsageError(f"--complexity {complexity}: expected 1 or more", remedy="Say 8.")
-    given = GivenOptions.of(**model)
-    if given.slack:
-        raise UsageError(
-            "--slack: words over features are learned from optimal plans",
-            remedy="Build a language of this problem: `coordlang build --slack`.",
-        )
-    if factored is not None and check:
-        raise UsageError(
-            "--check and --factored: a folder of factored files holds one problem",
-            remedy="Leave out --check, or make a file of each folder: `coordlang inspect --write`.",
-        )
+    check, seed = options.check, options.seed
     if isinstance(domain, PlanningInstance):
         problems = problems or domain.problems
     every = [
-        _instance(domain, problem, factored, tasks, given, coordinates, progress)
-        for problem in ([*problems, *check] if factored is None else [None, *check])
+        _instance(domain, problem, options)
+        for problem in ([*problems, *check] if options.source.factored is None else [None])
     ]
     if not every:
         raise UsageError("there is no problem to learn from", remedy="Name one or more.")
     known = len(every) - len(check)
     for other in every[1:]:
         _require_alike(every[0], other)
-    with opened_workers(jobs, None, None, None) as workers:
+    with opened_workers(Jobs(options.jobs)) as workers:
         learned = learn(
             every[:known],
             every[known:],
-            complexity=complexity,
-            prefer=prefer,
+            complexity=options.complexity,
+            prefer=options.prefer,
             seed=seed,
-            progress=progress or _silent,
+            progress=options.progress or _silent,
             workers=workers,
         )
     words = learned.words
@@ -177,42 +174,43 @@ def lift(
         first.model.robots,
         provenance.domain,
         {key: provenance.model[key] for key in keys},
-        bool(first.loaded.options.robots.names or first.loaded.options.robots.type),
+        bool(first.loaded.options.names or first.loaded.options.robot_type),
         tuple(_verified(own, sizes) for own, sizes in zip(every, learned.sizes, strict=True)),
         {"program": "coordlang", "version": coordlang.__version__, "seed": seed},
     )
     return Lifted(language, learned)
 
 
+@dataclass(frozen=True, slots=True)
+class GroundOptions:
+    """What `ground` can be asked for."""
+
+    tasks: TasksSource | None = option("all", "The candidate tasks, as of build.", "all|FILE")
+    verified: bool = option(True, "Whether it is verified here.", only="python")
+    coordinates: CoordinatesSource | None = option(
+        None, "Where places lie (default: coordinates.json beside the problem, else names).", "FILE"
+    )
+    progress: Progress | None = option(
+        None, "Called with a line of text now and then.", only="python"
+    )
+    jobs: int | None = option(
+        None, "Processes that verify (default: one for each core).", "N", least=1
+    )
+    source: Source = group(Source)
+
+
+@with_options(GroundOptions)
 def ground(
     lifted: LiftedSource,
     domain: DomainSource | None = None,
     problem: ProblemSource | None = None,
     *,
-    factored: File | None = None,
-    tasks: TasksSource | None = "all",
-    verified: bool = True,
-    coordinates: CoordinatesSource | None = None,
-    progress: Progress | None = None,
-    jobs: int | None = None,
-    **model: Unpack[ModelKeywords],
+    options: GroundOptions,
 ) -> Language:
-    """The language of one problem, an ordinary one, from a lifted language.
+    """The language of one problem, an ordinary one, from a lifted language of its domain.
 
-    Parameters
-    ----------
-    lifted
-        A lifted file or language.
-    domain, problem, factored, **model
-        As in `load`: the domain must be that of the lifted language.
-    tasks
-        The candidate tasks, as in `build`.
-    verified
-        Whether it is verified here: its method is then "lifted; verified here".  If not, or if the
-        memory does not suffice, the language covers no task, and its method says on which problems
-        the words were verified.
-    coordinates
-        As in `lift`.
+    If it is not verified here, or if the memory does not suffice, the language covers no task, and
+    its method says on which problems the words were verified.
 
     Raises
     ------
@@ -222,17 +220,17 @@ def ground(
         If the lifted language belongs to another domain or other robots.
     """
     own, position = read_lifted_source(lifted)
-    files = read_planning(domain, [problem], factored, GivenOptions.of(**model), most=1)
-    with opened_workers(jobs, None, None, None) as workers:
+    files = read_planning(domain, [problem], options.source, most=1)
+    with opened_workers(Jobs(options.jobs)) as workers:
         found = ground_in(
             own,
             files,
             position,
-            tasks=tasks,
-            is_verified=verified,
-            points=coordinates_of(coordinates, files.problems[0]),
+            tasks=options.tasks,
+            is_verified=options.verified,
+            points=coordinates_of(options.coordinates, files.problems[0]),
             workers=workers,
-            progress=progress or _silent,
+            progress=options.progress or _silent,
         )
     if found.known == "refuted":
         known = ", ".join(v.problem for v in own.verified)
@@ -247,22 +245,15 @@ def ground(
 
 
 def _instance(
-    domain: DomainSource | None,
-    problem: ProblemSource | None,
-    factored: File | None,
-    tasks: Literal["all"] | None,
-    given: GivenOptions,
-    coordinates: CoordinatesSource | None,
-    progress: Progress | None,
+    domain: DomainSource | None, problem: ProblemSource | None, options: LiftOptions
 ) -> Instance:
-    """A problem; with ``factored`` that of a folder, where none is given."""
-    folder = factored if problem is None else None
-    files = read_planning(domain if folder is None else None, [problem], folder, given, most=1)
-    if progress is not None:
-        progress(f"finding all optimal plans of {files.problems[0].name}")
-    points = coordinates_of(coordinates, files.problems[0])
+    """A problem; that of a factored folder where none is given."""
+    files = read_planning(domain, [problem], options.source, most=1)
+    if options.progress is not None:
+        options.progress(f"finding all optimal plans of {files.problems[0].name}")
+    points = coordinates_of(options.coordinates, files.problems[0])
     try:
-        candidates = files.candidates(tasks, files.given.options())
+        candidates = files.candidates(options.tasks, files.source.model)
         require_solvable(candidates)
     except ProvedImpossible as error:
         error.position = error.position or Position(files.problems[0].source.name)

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from os import fspath
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any, Literal
 
 from coordlang.api.inputs import (
     DomainSource,
@@ -17,12 +17,13 @@ from coordlang.api.inputs import (
 )
 from coordlang.api.layout import WIDTH, wrapped
 from coordlang.api.optimal_plans import OptimalPlans
-from coordlang.api.options import GivenOptions, ModelKeywords, require_one_of
+from coordlang.api.options import Listing, Source
 from coordlang.api.presenting import Presented
+from coordlang.commands.keywords import with_options
 from planners.cache import search
 from planners.loading import PlanningInstance
 from planners.notebook import counted, html_table
-from planners.search.guides import GUIDES
+from planners.options import group, option
 from planners.search.optimal_plans import search as bounded_search
 from planners.search.plans import Plans
 
@@ -33,25 +34,15 @@ if TYPE_CHECKING:  # what inspects is not loaded where plans are counted
 _WIDEST_NAME = 30
 
 
+@with_options(Source)
 def load(
-    domain: DomainSource | None = None,
-    *problems: ProblemSource,
-    factored: File | None = None,
-    **model: Unpack[ModelKeywords],
+    domain: DomainSource | None = None, *problems: ProblemSource, options: Source
 ) -> PlanningInstance:
     """Read a domain and problems, and build their joint model.
 
     The result stands for the domain and its problems in every other function, which then read and
-    ground nothing again where they can help it.
-
-    Parameters
-    ----------
-    domain, problems
-        PDDL files or parsed objects; problems of one model have the same objects and static facts.
-    factored
-        A folder of factored MA-PDDL files in their place.
-    **model
-        ``robots``, ``robot_type``, ``unowned``, ``cost``, ``remember_actions`` (docs/cli.md).
+    ground nothing again where they can help it.  Problems of one model have the same objects and
+    static facts.
 
     Raises
     ------
@@ -60,7 +51,7 @@ def load(
     UsageError
         For options that contradict each other or the files.
     """
-    return read_planning(domain, problems, factored, GivenOptions.of(**model)).instance()
+    return read_planning(domain, problems, options).instance()
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,76 +155,83 @@ class Inspected(Presented):
         return ", none of them possible in one state near the start" if found.interfering else ""
 
 
+@dataclass(frozen=True, slots=True)
+class InspectOptions:
+    """What `inspect` can be asked for."""
+
+    states: bool = option(False, "Also count the reachable joint states and steps.")
+    write: File | None = option(
+        None,
+        "Also write what was read as domain.pddl and problem.pddl in this folder; of factored "
+        "files, one domain and one problem.",
+        "DIR",
+    )
+    as_json: bool = option(False, "One JSON object.", names=("--json",), only="cli")
+    source: Source = group(Source)
+
+
+@with_options(InspectOptions)
 def inspect(
     domain: DomainSource | None = None,
     problem: ProblemSource | None = None,
     *,
-    factored: File | None = None,
-    states: bool = False,
-    write: File | None = None,
-    **model: Unpack[ModelKeywords],
+    options: InspectOptions,
 ) -> Inspected:
-    """Show what was understood of a domain and problem.
-
-    Parameters
-    ----------
-    domain, problem, factored, **model
-        As in `load`.
-    states
-        Whether the reachable joint states and steps are counted as well.
-    write
-        A folder for what was read, as ``domain.pddl`` and ``problem.pddl``: of factored files, one
-        domain and one problem in place of them all.
-    """
+    """Show what was understood of a domain and problem."""
     from planners.inspection import inspect as inspect_instance
     from planners.pddl.pddl_text import domain_text, problem_text
     from planners.search.reachable import count as count_reachable
     from planners.writing import write_texts
 
-    loaded = read_instance(domain, problem, factored, GivenOptions.of(**model))
+    loaded = read_instance(domain, problem, options.source)
     size = None
-    if states:
+    if options.states:
         size = ReachableSize(*count_reachable(loaded.model, loaded.tasks[0].init[None, :]))
     found = Inspected(inspect_instance(loaded), size)
-    if write is not None:
+    if options.write is not None:
         problem_pddl = problem_text(loaded.problems[0], loaded.domain)
         texts = {"domain.pddl": domain_text(loaded.domain), "problem.pddl": problem_pddl}
-        write_texts(fspath(write), texts)
+        write_texts(fspath(options.write), texts)
     return found
 
 
+@dataclass(frozen=True, slots=True)
+class PlansOptions:
+    """What `plans` can be asked for."""
+
+    listing: Listing = group(Listing)
+    form: Literal["ipc", "json"] = option(
+        "ipc", "How plans are written.", names=("--format",), only="cli"
+    )
+    heuristic: Literal["auto", "blind", "projections", "relaxed"] = option(
+        "auto", "What the search is bounded by; the plans are the same."
+    )
+    as_json: bool = option(False, "Short for --format json.", names=("--json",), only="cli")
+    source: Source = group(Source)
+
+
+@with_options(PlansOptions)
 def plans(
     domain: DomainSource | None = None,
     problem: ProblemSource | None = None,
     *,
-    factored: File | None = None,
-    heuristic: str = "auto",
-    **model: Unpack[ModelKeywords],
+    options: PlansOptions,
 ) -> OptimalPlans:
     """Find all optimal plans of a task.
 
-    Parameters
-    ----------
-    domain, problem, factored, **model
-        As in `load`.
-    heuristic
-        What the search is bounded by (`planners.search.guides.GUIDES`); the plans are the same.
-        With another one than ``auto`` plans that are kept are not used.
+    With another heuristic than ``auto`` plans that are kept are not used.
 
     Raises
     ------
     ProvedImpossible
         If there is no plan.
-    UsageError
-        If there is no such heuristic.
     OutOfMemory
         Before the reachable part of the joint model uses up the memory.
     """
-    require_one_of("--heuristic", heuristic, GUIDES)
-    loaded = read_instance(domain, problem, factored, GivenOptions.of(**model))
-    if heuristic == "auto":
+    loaded = read_instance(domain, problem, options.source)
+    if options.heuristic == "auto":
         return OptimalPlans(Plans.of(search(loaded.model, loaded.tasks[0])))
-    space = bounded_search(loaded.model, loaded.tasks[0], heuristic=heuristic)
+    space = bounded_search(loaded.model, loaded.tasks[0], heuristic=options.heuristic)
     return OptimalPlans(Plans.of(space))
 
 

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import prod
 from os import fspath
-from typing import Any, Unpack
+from typing import Any
 
 from coordlang.api.inputs import DomainSource, File, ProblemSource
 from coordlang.api.language_inputs import LanguageSource, read_task_language
-from coordlang.api.options import GivenOptions, ModelKeywords, names_in
+from coordlang.api.options import Source
 from coordlang.api.presenting import Presented
 from coordlang.api.speaking import SentenceSource, given_sentence
+from coordlang.commands.keywords import with_options
 from coordlang.language.tolerance import Tolerance
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.tolerance.failure import TooManyToCount, failure_of_sentence
@@ -24,7 +25,9 @@ from coordlang.use.choices.dot import to_dot
 from coordlang.use.choices.file import monitor, to_bytes, to_data
 from coordlang.use.choices.monitor import Monitor
 from planners.errors import UsageError
+from planners.model_options import names_in
 from planners.notebook import html_table
+from planners.options import group, option
 from planners.search.plans import Plans
 from planners.writing import write_atomically
 
@@ -150,29 +153,27 @@ class RobotsChoices(Presented):
         return html_table(("robot", "subplans"), rows, f'under "{self.sentence}"')
 
 
+@dataclass(frozen=True, slots=True)
+class ChoicesOptions:
+    """What `choices` can be asked for."""
+
+    robot: str | Sequence[str] = option((), "Whose choices; may be repeated (default: all).", "R")
+    check: bool = option(
+        False, "Walk every combination of all robots' choices: is each an optimal plan?"
+    )
+    source: Source = group(Source)
+
+
+@with_options(ChoicesOptions)
 def choices(
     language: LanguageSource,
     domain: DomainSource | None = None,
     problem: ProblemSource | None = None,
     sentence: SentenceSource | None = None,
     *,
-    factored: File | None = None,
-    robot: str | Sequence[str] = (),
-    check: bool = False,
-    **model: Unpack[ModelKeywords],
+    options: ChoicesOptions,
 ) -> RobotsChoices:
     """Find the subplans that each robot may follow under a sentence, whatever the others choose.
-
-    Parameters
-    ----------
-    language, domain, problem, factored, **model
-        As in `verify`, with one problem.
-    sentence
-        ``"w1 w0"`` or ``("w1", "w0")``.
-    robot
-        Whose choices are shown and saved; none named: all robots'.
-    check
-        Whether every combination of all robots' choices is walked, however many there are.
 
     Raises
     ------
@@ -184,18 +185,17 @@ def choices(
         If the automata, or with ``check`` the combinations, do not fit into the memory.
     """
     said = given_sentence(sentence)
-    used = read_task_language(language, domain, problem, factored, GivenOptions.of(**model))
-    chosen = _numbers(used.model.robots, robot) or tuple(range(len(used.model.robots)))
-    found = choices_under(used, used.words_of(said), most=None if check else MOST)
+    used = read_task_language(language, domain, problem, options.source)
+    chosen = _numbers(used.model.robots, options.robot) or tuple(range(len(used.model.robots)))
+    found = choices_under(used, used.words_of(said), most=None if options.check else MOST)
     return RobotsChoices(found, chosen)
 
 
 def _numbers(known: tuple[str, ...], whose: str | Sequence[str]) -> tuple[int, ...]:
-    names = [whose] if isinstance(whose, str) else names_in("--robot", whose)
-    for name in names:
-        if name.lower() not in known:
+    for name in (names := names_in("--robot", whose)):
+        if name not in known:
             raise UsageError(
                 f"--robot {name}: there is no such robot",
                 remedy=f"The robots are {', '.join(known)}.",
             )
-    return tuple(dict.fromkeys(known.index(name.lower()) for name in names))
+    return tuple(dict.fromkeys(known.index(name) for name in names))

@@ -8,16 +8,17 @@ from dataclasses import dataclass
 from functools import cached_property
 from os import fspath
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any, Literal
 
 import msgspec
 
 from coordlang.api.grounding import CoordinatesSource, coordinates_of
 from coordlang.api.inputs import DomainSource, File, ProblemSource, read_planning
 from coordlang.api.language_inputs import LanguageSource, language_for
-from coordlang.api.options import GivenOptions, ModelKeywords, require_seed
+from coordlang.api.options import Source
 from coordlang.api.presenting import Presented
 from coordlang.api.speaking import SentenceSource
+from coordlang.commands.keywords import with_options
 from coordlang.language.tolerance import Tolerance
 from coordlang.use.sentence.best_sentence import best_sentence
 from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
@@ -31,6 +32,7 @@ from coordlang.use.simulation.team import Agreement, Mission, mission
 from planners.errors import UsageError
 from planners.limits import run_until_stopped
 from planners.messages import echoed
+from planners.options import group, option
 from planners.writing import write_atomically
 
 #: Called with the number of runs done, and of all.
@@ -119,63 +121,55 @@ def written(record: SimulationRecord, path: str, seed: int | None = None) -> byt
     return recorded(record, found[0], kind)
 
 
+@dataclass(frozen=True, slots=True)
+class SimulateOptions:
+    """What `simulate` can be asked for."""
+
+    sentence: SentenceSource | None = option(
+        None, "The sentence that is agreed on (default: that which leaves most plans open).", "S"
+    )
+    without: bool = option(False, "No sentence: each robot follows an optimal plan of its own.")
+    plan: bool = option(False, "No sentence: all robots follow one plan.")
+    runs: int = option(1, "How many runs.", "N", least=1)
+    seed: int = option(0, "Seed of the first run; the next ones follow.", least=0)
+    step: Literal["clock", "barrier", "word"] = option("clock", "How robots keep step.")
+    cell: float = option(1.0, "Metres for one unit of coordinates.", "METRES")
+    radius: float | None = option(
+        None, "The radius of robots (default: a fifth of --cell).", "METRES"
+    )
+    noise: float = option(
+        0.1, "What wheels do, as a share of what they are told: the standard deviation.", "SHARE"
+    )
+    lidar: bool = option(
+        True, "Whether robots stop before what they see straight ahead.", only="python"
+    )
+    human: str | None = option(
+        None, "A human whom only lidars see: a place, random or walking.", "PLACE"
+    )
+    visit: Sequence[str] = option(
+        (), "What a robot comes to want on the way: ROBOT:STEP:PLACE.", "WISH"
+    )
+    coordinates: CoordinatesSource | None = option(
+        None, "Where places lie (default: coordinates.json beside the problem, else names).", "FILE"
+    )
+    progress: RunProgress | None = option(
+        None, "Called with the number of runs done, and of all.", only="python"
+    )
+    source: Source = group(Source)
+
+
+@with_options(SimulateOptions)
 def simulate(
     language: LanguageSource,
     domain: DomainSource | None = None,
     problem: ProblemSource | None = None,
     *,
-    sentence: SentenceSource | None = None,
-    without: bool = False,
-    plan: bool = False,
-    runs: int = 1,
-    seed: int = 0,
-    step: str = "clock",
-    cell: float = 1.0,
-    radius: float | None = None,
-    noise: float = 0.1,
-    lidar: bool = True,
-    human: str | None = None,
-    visit: Sequence[str] = (),
-    coordinates: CoordinatesSource | None = None,
-    factored: File | None = None,
-    progress: RunProgress | None = None,
-    **model: Unpack[ModelKeywords],
+    options: SimulateOptions,
 ) -> Simulated:
     """Let simulated robots with wheels do a task, each by its own logic.
 
     Every robot knows the task, the language, the sentence, and so its own choices, and draws one of
     its own subplans.
-
-    Parameters
-    ----------
-    language, domain, problem, factored, **model
-        As in `verify`, with one problem.
-    sentence
-        ``"w1 w0"`` or ``("w1", "w0")``; by default that which leaves most plans open.
-    without, plan
-        In place of a sentence: each robot follows an optimal plan of its own; or all follow one.
-    runs, seed
-        How many runs; they have the seeds ``seed``, ``seed + 1``, ..
-    step
-        How robots keep step: ``"clock"``, ``"barrier"`` (before each step) or ``"word"`` (a barrier
-        before each word).
-    cell, radius
-        Metres for one unit of coordinates, and the robots' radius in metres (a fifth of ``cell``).
-    noise
-        The standard deviation of what wheels do, as a share of what they are told.
-    lidar
-        Whether robots stop before what they see straight ahead.
-    human
-        A human whom only lidars see: a place, ``"random"`` (a place drawn for each run), or
-        ``"walking"``.
-    visit
-        What robots come to want on the way, each ``"ROBOT:STEP:PLACE"``: a robot that has done so
-        many steps visits the place if its choices allow it.
-    coordinates
-        Where places lie, as in `report`; by default those of a file ``coordinates.json`` beside the
-        problem, else what names such as ``c2-3`` say.
-    progress
-        Called with the number of runs done, and of all.
 
     Raises
     ------
@@ -186,33 +180,31 @@ def simulate(
     NoPlanFits
         If no optimal plan has the sentence.
     """
+    cell, runs = options.cell, options.runs
     settings = Settings(
-        step,
+        options.step,
         cell,
-        cell / 5 if radius is None else radius,
-        noise=noise,
-        lidar=lidar,
-        human=human,
+        cell / 5 if options.radius is None else options.radius,
+        noise=options.noise,
+        lidar=options.lidar,
+        human=options.human,
     )
-    agreement = _agreement(sentence, without, plan)
-    require_seed(seed)
-    if runs < 1:
-        raise UsageError(f"--runs {runs}: expected 1 or more", remedy="Say 1.")
+    agreement = _agreement(options.sentence, options.without, options.plan)
     require_simulator()
-    files = read_planning(domain, [problem], factored, GivenOptions.of(**model), most=1)
-    known = coordinates_of(coordinates, files.problems[0])
+    files = read_planning(domain, [problem], options.source, most=1)
+    known = coordinates_of(options.coordinates, files.problems[0])
     read, position = language_for(language, files, coordinates=known)
     used = language_in_task(read, files.domain, files.problems[0], files.options_of(read), position)
-    prepared = _prepared(used, agreement, sentence)
+    prepared = _prepared(used, agreement, options.sentence)
     floor = floor_of(prepared.world, known, cell)
-    wishes = [_wish(prepared, text) for text in visit]
+    wishes = [_wish(prepared, text) for text in options.visit]
     done: list[RunRecord] = []
 
     def work() -> None:
-        for finished in runs_of(prepared, floor, settings, runs, seed, wishes):
+        for finished in runs_of(prepared, floor, settings, runs, options.seed, wishes):
             done.append(finished)
-            if progress is not None:
-                progress(len(done), runs)
+            if options.progress is not None:
+                options.progress(len(done), runs)
 
     stopped = run_until_stopped(work)
     if stopped is not None and not done:

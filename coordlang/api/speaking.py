@@ -6,19 +6,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike, fspath
-from typing import Any, Unpack
+from typing import Any, Literal
 
 from coordlang.api.inputs import DomainSource, File, ProblemSource
 from coordlang.api.language_inputs import LanguageSource, read_task_language
 from coordlang.api.optimal_plans import OptimalPlans, PlanSteps
-from coordlang.api.options import (
-    HEURISTICS,
-    GivenOptions,
-    HeuristicName,
-    ModelKeywords,
-    require_one_of,
-)
+from coordlang.api.options import Listing, Source
 from coordlang.api.presenting import Presented
+from coordlang.commands.keywords import with_options
 from coordlang.language.tolerance import Tolerance, tolerance_data
 from coordlang.use.sentence.best_sentence import BestSentence, best_sentence
 from coordlang.use.sentence.drawing import cut_note, to_dot
@@ -29,8 +24,10 @@ from coordlang.use.sentence.plan_sentence import read_plan_file, sentence_of_pla
 from coordlang.use.sentence.preferences import Preference, read_preference
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import CoordlangError, UsageError
+from planners.options import group, option
 from planners.search.plan_file import Texts, json_count
 
+HeuristicName = Literal["relaxed", "manhattan", "blind"]
 #: A sentence: ``"w1 w0"`` or ``("w1", "w0")``.
 SentenceSource = str | Sequence[str]
 #: A plan file, or the steps of one plan, each with one text or None for every robot.
@@ -84,23 +81,26 @@ def given_sentence(sentence: SentenceSource | None) -> SentenceSource:
     return sentence
 
 
+@dataclass(frozen=True, slots=True)
+class SayOptions:
+    """What `say` can be asked for."""
+
+    as_json: bool = option(False, "One JSON object.", names=("--json",), only="cli")
+    source: Source = group(Source)
+
+
+@with_options(SayOptions)
 def say(
     language: LanguageSource,
     domain: DomainSource | None = None,
     problem: ProblemSource | None = None,
     plan: PlanSource | None = None,
     *,
-    factored: File | None = None,
-    **model: Unpack[ModelKeywords],
+    options: SayOptions,
 ) -> Said:
     """Say optimal plans: the sentence of a plan is the sequence of words that it passes through.
 
-    Parameters
-    ----------
-    language, domain, problem, factored, **model
-        As in `verify`, with one problem.
-    plan
-        A plan file (which may hold several plans), or the steps of one plan.
+    ``plan`` is a plan file (which may hold several plans), or the steps of one plan.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def say(
     """
     if plan is None:
         raise UsageError("expected a plan", remedy="Give a plan file or the steps of one plan.")
-    used = read_task_language(language, domain, problem, factored, GivenOptions.of(**model))
+    used = read_task_language(language, domain, problem, options.source)
     plans = _plans(plan, used)
     sentences = []
     for number, steps in enumerate(plans, 1):
@@ -167,23 +167,43 @@ class SentencePlans(OptimalPlans):
         return {"sentence": self.sentence, **super().facts(), "covered": self.covered}
 
 
+@dataclass(frozen=True, slots=True)
+class UnderstandOptions:
+    """What `understand` can be asked for."""
+
+    listing: Listing = group(Listing)
+    form: Literal["ipc", "json", "dot"] = option(
+        "ipc", "How plans are written; dot draws them.", names=("--format",), only="cli"
+    )
+    nodes: int | None = option(
+        None,
+        "Cut the DAG to about N nodes (default: 200 for dot; json: not cut).",
+        "N",
+        least=1,
+        only="cli",
+    )
+    output: str | None = option(
+        None,
+        "Write to this file instead of stdout.",
+        "FILE",
+        names=("-o", "--output"),
+        only="cli",
+        is_output=True,
+    )
+    as_json: bool = option(False, "Short for --format json.", names=("--json",), only="cli")
+    source: Source = group(Source)
+
+
+@with_options(UnderstandOptions)
 def understand(
     language: LanguageSource,
     domain: DomainSource | None = None,
     problem: ProblemSource | None = None,
     sentence: SentenceSource | None = None,
     *,
-    factored: File | None = None,
-    **model: Unpack[ModelKeywords],
+    options: UnderstandOptions,
 ) -> SentencePlans:
     """Understand a sentence: the optimal plans of the task that have it.
-
-    Parameters
-    ----------
-    language, domain, problem, factored, **model
-        As in `verify`, with one problem.
-    sentence
-        ``"w1 w0"`` or ``("w1", "w0")``.
 
     Raises
     ------
@@ -193,7 +213,7 @@ def understand(
         For a word that the language does not have, or one said twice in a row.
     """
     words = given_sentence(sentence)
-    used = read_task_language(language, domain, problem, factored, GivenOptions.of(**model))
+    used = read_task_language(language, domain, problem, options.source)
     return SentencePlans(OpenPlans.of(used, used.words_of(words)))
 
 
@@ -293,57 +313,60 @@ class PlanUnderSentence(Presented):
         return data
 
 
+@dataclass(frozen=True, slots=True)
+class PlanOptions:
+    """What `plan` can be asked for."""
+
+    prefer: str | Sequence[str] = option(
+        (),
+        "In place of SENTENCE: the best one by shortest, most-plans, first:ROBOT or avoid:(ATOM); "
+        "of several, a later one decides among equals.",
+        "PREFERENCE",
+    )
+    heuristic: HeuristicName = option("relaxed", "The lower bound of A*.")
+    form: Literal["ipc", "json", "plansys2"] = option(
+        "ipc", "How the plan is written.", names=("--format",), only="cli"
+    )
+    as_json: bool = option(False, "Short for --format json.", names=("--json",), only="cli")
+    source: Source = group(Source)
+
+
+@with_options(PlanOptions)
 def plan(
     language: LanguageSource,
     domain: DomainSource | None = None,
     problem: ProblemSource | None = None,
     sentence: SentenceSource | None = None,
     *,
-    factored: File | None = None,
-    prefer: str | Sequence[str] = (),
-    heuristic: HeuristicName = "relaxed",
-    **model: Unpack[ModelKeywords],
+    options: PlanOptions,
 ) -> PlanUnderSentence:
     """Find one optimal plan that has a sentence, by A* that prunes what does not fit.
-
-    Parameters
-    ----------
-    language, domain, problem, factored, **model
-        As in `verify`, with one problem.
-    sentence
-        ``"w1 w0"`` or ``("w1", "w0")``; None with ``prefer``.
-    prefer
-        In place of the sentence: the best sentence by ``"shortest"``, ``"most-plans"``,
-        ``"first:ROBOT"`` or ``"avoid:(ATOM) .."``; of several, a later one decides among equals.
-    heuristic
-        The lower bound of A*: ``"relaxed"``, ``"manhattan"`` or ``"blind"``.
 
     Raises
     ------
     NoPlanFits
         If no optimal plan has the sentence.
     UsageError
-        For an unknown preference or heuristic, and for both or neither of sentence and ``prefer``.
+        For an unknown preference, and for both or neither of sentence and ``prefer``.
     """
-    require_one_of("--heuristic", heuristic, HEURISTICS)
-    preferences = [prefer] if isinstance(prefer, str) else list(prefer)
+    preferences = [options.prefer] if isinstance(options.prefer, str) else list(options.prefer)
     if (sentence is None) == (not preferences):
         raise UsageError(
             "expected a SENTENCE or --prefer, one of the two",
             remedy="--prefer shortest finds the sentence with the fewest words.",
         )
-    used = read_task_language(language, domain, problem, factored, GivenOptions.of(**model))
+    used = read_task_language(language, domain, problem, options.source)
     read = [read_preference(used, text) for text in preferences]
     best = best_sentence(used, read) if read else None
     words = best.words if best else used.words_of(sentence or ())
     expanded = ExpandedStates(used.model, used.partition)
-    found = plan_under_sentence(used, words, heuristic, expanded)
-    without = plan_under_sentence(used, None, heuristic, expanded)
+    found = plan_under_sentence(used, words, options.heuristic, expanded)
+    without = plan_under_sentence(used, None, options.heuristic, expanded)
     return PlanUnderSentence(
         used.text(words),
         tuple(used.model.texts(step) for step in found.plan),
         used.covered,
-        heuristic,
+        options.heuristic,
         found,
         without,
         tuple(_fulfilled(read, best)) if best else (),

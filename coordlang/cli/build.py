@@ -13,14 +13,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import coordlang
-from coordlang.api.options import (
-    BUILD_PREFERENCES,
-    METHODS,
-    UNSOLVABLE,
-    BuildPreference,
-    Method,
-    Unsolvable,
-)
 from coordlang.cli.echo import echo
 from coordlang.cli.exit_codes import UNPROVED, code_of_interrupt
 from coordlang.cli.failure import why_stopped
@@ -57,7 +49,7 @@ _FOR_CERTIFICATE = 0.25
 )
 @click.option(
     "--method",
-    type=click.Choice(METHODS),
+    type=click.Choice(["greedy", "separating", "minimal", "exhaustive"]),
     default="greedy",
     show_default=True,
     help="greedy: fast.  separating: fewest words that part plans where they differ first or "
@@ -70,7 +62,7 @@ _FOR_CERTIFICATE = 0.25
 )
 @click.option(
     "--prefer",
-    type=click.Choice(BUILD_PREFERENCES),
+    type=click.Choice(["flexible", "simple"]),
     help="Of the languages with the fewest words (--method minimal or exhaustive) one whose .. "
     "flexible: sentences leave many plans open.  simple: words have short formulas.",
 )
@@ -101,7 +93,7 @@ _FOR_CERTIFICATE = 0.25
 )
 @click.option(
     "--unsolvable",
-    type=click.Choice(UNSOLVABLE),
+    type=click.Choice(["fail", "skip"]),
     default="fail",
     show_default=True,
     help="What to do about candidate tasks without plans: stop (exit 11), "
@@ -130,14 +122,14 @@ _FOR_CERTIFICATE = 0.25
 def command(
     pddl: PlanningFiles,
     tasks: str | None,
-    method: Method,
+    method: str,
     alpha_only: bool,
-    prefer: BuildPreference | None,
+    prefer: str | None,
     words: int | None,
     worst: bool,
     start: str | None,
     certificate: str | None,
-    unsolvable: Unsolvable,
+    unsolvable: str,
     output: str,
     seed: int,
     as_json: bool,

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import click
 
 import coordlang
-from coordlang.api.options import READERS, TARGETS, Reader, Target
 from coordlang.cli.echo import echo
 from coordlang.cli.files import (
     FILE,
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
 @click.option(
     "--to",
     "target",
-    type=click.Choice(TARGETS),
+    type=click.Choice(["pddl", "ltlf", "bt"]),
     default="pddl",
     show_default=True,
     help="pddl: a planning problem.  ltlf: a temporal formula over plans.  bt: each robot's "
@@ -59,7 +58,7 @@ if TYPE_CHECKING:
 @click.option(
     "--for",
     "reader",
-    type=click.Choice(READERS),
+    type=click.Choice(["fd", "kstar", "pyperplan"]),
     default="fd",
     show_default=True,
     help="Who reads the PDDL: fd (Fast Downward) and kstar the same, pyperplan STRIPS only.",
@@ -78,10 +77,10 @@ def command(
     language: str,
     pddl: PlanningFiles,
     sentence: str,
-    target: Target,
+    target: str,
     output: str | None,
     max_actions: int,
-    reader: Reader,
+    reader: str,
     translate_plan: str | None,
     as_json: bool,
     model: ModelKeywords,
@@ -131,7 +130,7 @@ def command(
     return covered_code(exported.covered, exported.tolerance)
 
 
-def _check_not_pddl(target: Target, translate_plan: str | None) -> None:
+def _check_not_pddl(target: str, translate_plan: str | None) -> None:
     """Refuse what has an effect on PDDL only."""
     if translate_plan is not None:
         raise click.UsageError(

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import click
 
 import coordlang
-from coordlang.api.options import HEURISTICS, HeuristicName
 from coordlang.cli.echo import echo
 from coordlang.cli.files import PlanningFiles, language_argument, planning_files
 from coordlang.cli.listing import form_of
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--heuristic",
-    type=click.Choice(HEURISTICS),
+    type=click.Choice(["relaxed", "manhattan", "blind"]),
     default="relaxed",
     show_default=True,
     help="The lower bound of A*.",
@@ -55,7 +54,7 @@ def command(
     pddl: PlanningFiles,
     sentence: str | None,
     prefer: tuple[str, ...],
-    heuristic: HeuristicName,
+    heuristic: str,
     form: str,
     as_json: bool,
     model: ModelKeywords,

@@ -83,17 +83,22 @@ def command(
     """
     from coordlang.api.inputs import read_planning
     from coordlang.api.language_inputs import language_for
-    from coordlang.api.options import GivenOptions
+    from coordlang.api.options import Source
     from coordlang.language.recorded import check_source
     from coordlang.report.page import make_report
     from coordlang.report.planviz import planviz
+    from planners.options import record_from
     from planners.writing import write_atomically
 
     places = coordinates if coordinates is not None else str(_beside(pddl))
     inputs = [language, *pddl.paths, places, *([run_file] if run_file else [])]
     beside = _planviz_paths(output) if with_planviz else []
     check_outputs([("-o", output), *(("--planviz", path) for path in beside)], inputs)
-    files = read_planning(pddl.domain, pddl.problems, pddl.factored, GivenOptions.of(**model))
+    files = read_planning(
+        pddl.domain,
+        pddl.problems,
+        record_from(Source, {**model, "factored": pddl.factored}, "report"),
+    )
     known = _coordinates(coordinates, pddl)
     read, position = language_for(language, files, coordinates=known)
     check_source(read, files.domain, files.problems, position)

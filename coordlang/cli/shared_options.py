@@ -8,15 +8,19 @@ import math
 import os
 import re
 from collections.abc import Callable
+from typing import Any, get_args
 
 import click
 
-from coordlang.api.options import COSTS, UNOWNED, JobsKeywords, ModelKeywords
 from coordlang.cli.echo import echo
 from planners.errors import OutOfTime
+from planners.model_options import Cost, Unowned
 
 #: A command's function; it returns the exit code, None for 0.
 CommandFunction = Callable[..., int | None]
+#: Keywords of a function: how the PDDL files are understood, and who does the work.
+ModelKeywords = dict[str, Any]
+JobsKeywords = dict[str, Any]
 
 
 def limits(function: CommandFunction) -> CommandFunction:
@@ -62,10 +66,12 @@ def model_options(function: CommandFunction) -> CommandFunction:
         "--robot-type", metavar="TYPE", help="The type (or unary predicate) of the robots."
     )
     @click.option(
-        "--unowned", type=click.Choice(UNOWNED), help="Who owns actions that name no robot."
+        "--unowned",
+        type=click.Choice(get_args(Unowned)),
+        help="Who owns actions that name no robot.",
     )
     @click.option(
-        "--cost", type=click.Choice(COSTS), help="What optimal means (default: makespan)."
+        "--cost", type=click.Choice(get_args(Cost)), help="What optimal means (default: makespan)."
     )
     @click.option(
         "--remember-actions", is_flag=True, help="Add each robot's last subaction to the state."

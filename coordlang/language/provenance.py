@@ -90,14 +90,14 @@ def provenance_of(
             "name": loaded.domain.name,
             "sha256": domain_sha256(loaded.domain),
             "fluents": key_predicates(
-                loaded.domain, loaded.options.remember_actions, loaded.options.sees_slack
+                loaded.domain, loaded.options.remember_actions, loaded.options.words_see_slack
             ),
         },
         model={
             "cost": loaded.options.cost,
-            "unowned": loaded.options.robots.unowned,
+            "unowned": loaded.options.unowned,
             "remember_actions": loaded.options.remember_actions,
-            **({"words_see_slack": True} if loaded.options.sees_slack else {}),
+            **({"words_see_slack": True} if loaded.options.words_see_slack else {}),
             "problem_sha256": loaded.problems[0].source.sha256,
             "world_sha256": world_sha256(loaded.domain, loaded.problems[0]),
         },

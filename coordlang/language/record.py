@@ -11,9 +11,7 @@ from msgspec import UNSET, Meta, UnsetType
 from coordlang.tasks.candidates import Kind
 from coordlang.tasks.listed import ListedTask
 from planners.files import FileFormat
-from planners.joint.model import Cost
-from planners.loading import MOST_SLACK
-from planners.pddl.robots import Unowned
+from planners.model_options import MOST_SLACK, Cost, Unowned
 
 # What JSON Schema can say and the reader checks with messages of its own.
 _SOME = {"minItems": 1, "uniqueItems": True}

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -19,69 +19,62 @@ from coordlang.tasks.candidates import (
 )
 from coordlang.tasks.listed import ListedTask
 from planners.errors import BadInput, Position, UsageError
-from planners.loading import ModelOptions
 from planners.messages import echoed
+from planners.model_options import ModelOptions
 from planners.pddl.lifted import Domain, Problem
-from planners.pddl.robots import ENVIRONMENT, RobotSelection
+from planners.pddl.robots import ENVIRONMENT
 from planners.tables import find_rows
 
 
 def options_of(
     language: Language,
-    *,
-    robots: Sequence[str] = (),
-    unowned: str | None = None,
-    cost: str | None = None,
-    remember_actions: bool | None = None,
-    slack: int | None = None,
-    sees_slack: bool | None = None,
+    model: ModelOptions | None = None,
+    given: Collection[str] = (),
 ) -> ModelOptions:
-    """How the language's model is built.
+    """How the language's model is built: as its file records it.
 
-    Raises `UsageError` for a flag that contradicts the file.
+    ``given`` names the fields of ``model`` that the user gave.  Raises `UsageError` for one that
+    contradicts the file.
     """
-    model: Mapping[str, Any] = language.provenance.model
-    recorded = {
-        "--cost": model.get("cost", "makespan"),
-        "--unowned": model.get("unowned", "error"),
-        "--remember-actions": model.get("remember_actions", False),
-        "--slack": (language.tolerance.slack if language.tolerance else None) or 0,
-        "--words-see-slack": model.get("words_see_slack", False),
-    }
-    given = {
-        "--cost": cost,
-        "--unowned": unowned,
-        "--remember-actions": remember_actions or None,
-        "--slack": slack,
-        "--words-see-slack": sees_slack or None,
-    }
-    for flag, value in given.items():
-        if value is not None and value != recorded[flag]:
-            raise _contradiction(flag, value, recorded[flag])
-    own = tuple(language.provenance.robots or robots)
-    if recorded["--unowned"] == "environment":
-        own = tuple(robot for robot in own if robot != ENVIRONMENT)
-    if robots and set(robots) != set(own):
+    entries: Mapping[str, Any] = language.provenance.model
+    robots = language.provenance.robots or (model.names if model else ())
+    if entries.get("unowned") == "environment":
+        robots = tuple(robot for robot in robots if robot != ENVIRONMENT)
+    recorded = ModelOptions(
+        robots,
+        unowned=entries.get("unowned", "error"),
+        cost=entries.get("cost", "makespan"),
+        remember_actions=entries.get("remember_actions", False),
+        slack=(language.tolerance.slack if language.tolerance else None) or 0,
+        words_see_slack=entries.get("words_see_slack", False),
+        recorded=bool(language.provenance.robots),
+    )
+    for name in given if model else ():
+        _require_same(name, getattr(model, name), getattr(recorded, name))
+    return recorded
+
+
+def _require_same(name: str, given: Any, recorded: Any) -> None:
+    """Raise `UsageError` for a model option that contradicts the language file."""
+    flag = f"--{name.replace('_', '-')}"
+    if name == "robot_type":
         raise UsageError(
-            f"--robots contradicts the language file: its robots are {', '.join(own)}",
-            remedy="Leave out --robots.",
+            "--robot-type: a language file names its robots already",
+            remedy="Leave out --robot-type.",
         )
-    return ModelOptions(
-        RobotSelection(own, None, recorded["--unowned"], recorded=bool(language.provenance.robots)),
-        recorded["--cost"],
-        recorded["--remember-actions"],
-        recorded["--slack"],
-        recorded["--words-see-slack"],
-    )
-
-
-def _contradiction(flag: str, given: str | int, recorded: str | int) -> UsageError:
-    option = flag if given is True else f"{flag} {given}"
-    built = f"without {flag}" if recorded is False else f"with {flag} {recorded}"
-    return UsageError(
-        f"{option} contradicts the language file, which was built {built}",
-        remedy=f"Leave out {flag}.",
-    )
+    if name == "robots":
+        if set(given) != set(recorded):
+            raise UsageError(
+                f"--robots contradicts the language file: its robots are {', '.join(recorded)}",
+                remedy="Leave out --robots.",
+            )
+    elif given != recorded:
+        option = flag if given is True else f"{flag} {given}"
+        built = f"without {flag}" if recorded is False else f"with {flag} {recorded}"
+        raise UsageError(
+            f"{option} contradicts the language file, which was built {built}",
+            remedy=f"Leave out {flag}.",
+        )
 
 
 def check_source(

@@ -23,7 +23,7 @@ from coordlang.report.task import task_part
 from coordlang.use.sentence.task_language import TaskLanguage
 from coordlang.use.simulation.record import SimulationRecord
 from planners.errors import OutOfMemory, Position
-from planners.loading import ModelOptions
+from planners.model_options import ModelOptions
 from planners.pddl.lifted import Domain, Problem
 
 #: What a page has at most, in bytes.

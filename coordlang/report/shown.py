@@ -18,7 +18,7 @@ from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
 from planners.cache import search
 from planners.errors import OutOfMemory, Position, ProvedImpossible, UsageError
 from planners.joint.model import PlanningTask
-from planners.loading import ModelOptions
+from planners.model_options import ModelOptions
 from planners.pddl.lifted import Domain, Problem
 
 #: Tasks looked at for each one shown, so that enough of them require coordination.

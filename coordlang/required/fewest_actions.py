@@ -15,7 +15,8 @@ import numpy as np
 from coordlang.required.choices import Choices
 from coordlang.required.label_sets import LabelSets
 from planners.joint.composition import cost_of
-from planners.joint.model import Cost, JointModel
+from planners.joint.model import JointModel
+from planners.model_options import Cost
 from planners.search.plan_space import PlanSpace
 from planners.tables import Ints
 

@@ -16,7 +16,8 @@ from coordlang.tasks.shared_search import SharedSearch
 from planners.cache import search, search_each
 from planners.errors import BadInput, Position, ProvedImpossible, note
 from planners.joint.model import NO_FACT, FullState, Goal, JointModel, PlanningTask
-from planners.loading import ModelOptions, PlanningInstance, build
+from planners.loading import PlanningInstance, build
+from planners.model_options import ModelOptions
 from planners.pddl.lifted import Domain, Problem
 from planners.search.optimal_plans import joined, plan_spaces, solvable
 from planners.search.plan_space import PlanSpace

@@ -13,7 +13,8 @@ from planners.errors import BadInput, Position
 from planners.grounding import ground_goal
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask, show
 from planners.joint.states import split_atoms
-from planners.loading import ModelOptions, PlanningInstance, build
+from planners.loading import PlanningInstance, build
+from planners.model_options import ModelOptions
 from planners.pddl.formula_tree import conjuncts, formula_text
 from planners.pddl.formulas import read_formula
 from planners.pddl.lifted import And, Atom, Domain, Formula, Problem

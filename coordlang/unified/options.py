@@ -16,8 +16,9 @@ from coordlang.language.recorded import options_of
 from coordlang.language.words import Language
 from coordlang.unified.translation import Concurrency, Subactions, Translated, translate
 from planners.errors import BadInput, CoordlangError, UsageError
-from planners.loading import ModelOptions
-from planners.pddl.robots import RobotSelection, find_team
+from planners.model_options import ModelOptions
+from planners.options import record_from
+from planners.pddl.robots import find_team
 
 #: The kinds of plans that the engine returns and validates.
 PLAN_KINDS = (
@@ -99,19 +100,16 @@ class EngineOptions:
         kind = self.robot_type and found.types.get(self.robot_type, self.robot_type)
         if self.language is None:
             return self._without_language(robots, kind)
-        options = options_of(
-            self.language,
-            robots=robots,
-            unowned=self.unowned,
-            cost=self.cost,
-            remember_actions=self.remember_actions or None,
-        )
+        said: dict[str, object] = {"robots": robots, "unowned": self.unowned, "cost": self.cost}
+        said |= {"remember_actions": self.remember_actions}
+        given = {name: value for name, value in said.items() if value}
+        options = options_of(self.language, record_from(ModelOptions, given, "Coordlang"), given)
         if kind is not None:
-            team = find_team(found.domain, found.problem, RobotSelection((), kind))
-            if set(team.robots) != set(options.robots.names):
+            team = find_team(found.domain, found.problem, ModelOptions(robot_type=kind))
+            if set(team.robots) != set(options.names):
                 raise UsageError(
                     f"robot_type {kind} contradicts the language: "
-                    f"its robots are {', '.join(options.robots.names)}",
+                    f"its robots are {', '.join(options.names)}",
                     remedy="Leave out robot_type.",
                 )
         return options
@@ -119,9 +117,8 @@ class EngineOptions:
     def _without_language(self, robots: tuple[str, ...], kind: str | None) -> ModelOptions:
         unowned = "error" if self.unowned is None else self.unowned
         cost = "makespan" if self.cost is None else self.cost
-        # `ModelOptions` and its parts refuse values that there are not.
-        selection = RobotSelection(robots, kind, unowned)  # type: ignore[arg-type]
-        return ModelOptions(selection, cost, self.remember_actions)  # type: ignore[arg-type]
+        # `ModelOptions` refuses values that there are not.
+        return ModelOptions(robots, kind, unowned, cost, self.remember_actions)  # type: ignore[arg-type]
 
 
 def in_parameters(error: Exception) -> str:

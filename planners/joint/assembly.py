@@ -10,8 +10,9 @@ from planners.joint.composition import ComposingStepper
 from planners.joint.conditions import Evaluator
 from planners.joint.facts import FactTable
 from planners.joint.joint_actions import JointActionStepper
-from planners.joint.model import IDLE, Cost, JointModel, Stepper
+from planners.joint.model import IDLE, JointModel, Stepper
 from planners.joint.states import StateCodec
+from planners.model_options import Cost
 from planners.pddl.lifted import Atom, Domain, Problem, StepAtom
 from planners.pddl.robots import Team, fluent_predicates, natural, static_atoms
 
@@ -33,7 +34,7 @@ def assemble(
     remember_actions: bool,
     idling_costs: Sequence[int],
     slack: int = 0,
-    sees_slack: bool = False,
+    words_see_slack: bool = False,
 ) -> JointModel:
     """The joint model of a team's ground actions.
 
@@ -47,13 +48,13 @@ def assemble(
         For each robot what idling adds to the second cost.
     slack
         Joint steps that plans may take more than the least makespan.
-    sees_slack
+    words_see_slack
         Whether states on plans say how many of these are left.
     """
     robots = team.robots
     subactions = [[a for a in actions if robot in a.owners] for robot in range(len(robots))]
     labels = _labels_of_parts(actions, robots) if domain.is_joint_action else _labels(subactions)
-    left = [Atom(SLACK_LEFT, (str(k),)) for k in range(slack + 1)] if sees_slack else []
+    left = [Atom(SLACK_LEFT, (str(k),)) for k in range(slack + 1)] if words_see_slack else []
     facts = FactTable.of({*_facts(domain, actions, starts), *left})
     codec = StateCodec(facts, robots, labels if remember_actions else None)
     evaluator = Evaluator(codec.facts, {} if domain.is_joint_action else _step_atoms(subactions))

@@ -11,9 +11,10 @@ from planners.errors import BadInput, Position
 from planners.grounding import GroundAction, GroundEffect
 from planners.joint.composition import cost_of
 from planners.joint.conditions import Evaluator
-from planners.joint.model import Cost, Options, Steps
+from planners.joint.model import Options, Steps
 from planners.joint.operators import Operators
 from planners.joint.states import StateCodec
+from planners.model_options import Cost
 from planners.tables import Ints, Rows
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -18,11 +18,10 @@ from planners.errors import Position
 from planners.grounding import GroundAction, Impossible
 from planners.joint.conditions import Evaluator, Labels
 from planners.joint.states import StateCodec
+from planners.model_options import Cost
 from planners.pddl.formula_tree import label
 from planners.pddl.lifted import Atom, Formula, StepAtom
 from planners.tables import Bools, Ints, Rows
-
-Cost = Literal["makespan", "makespan+actions", "makespan+cost"]
 
 #: The text of label 0.
 IDLE = "idle"

@@ -7,13 +7,11 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Literal
 
 from planners.errors import BadInput, UsageError, note
 from planners.messages import echoed
+from planners.model_options import ModelOptions, Unowned
 from planners.pddl.lifted import And, Atom, Domain, Problem, Schema
-
-Unowned = Literal["error", "environment", "shared"]
 
 #: The name of the extra robot that owns actions without a robot, under ``--unowned environment``.
 ENVIRONMENT = "environment"
@@ -34,19 +32,6 @@ def natural(name: str) -> tuple[tuple[int, int, str], ...]:
         (1, len(p.lstrip("0")), f"{p.lstrip('0')} {p}") if p[:1] in _DIGITS else (0, 0, p)
         for p in parts
     )
-
-
-@dataclass(frozen=True, slots=True)
-class RobotSelection:
-    """What the user said about robots (``--robots``, ``--robot-type``, ``--unowned``).
-
-    ``recorded``: a language file said it, not the user.
-    """
-
-    names: tuple[str, ...] = ()
-    type: str | None = None
-    unowned: Unowned = "error"
-    recorded: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +74,7 @@ def objects_of(domain: Domain, problem: Problem, types: Sequence[str]) -> tuple[
     return tuple(sorted(found, key=natural))
 
 
-def find_team(domain: Domain, problem: Problem, choice: RobotSelection) -> Team:
+def find_team(domain: Domain, problem: Problem, choice: ModelOptions) -> Team:
     """The robots: from subaction comments, ``:agent``, the user's choice, or by detection.
 
     Raises
@@ -119,7 +104,7 @@ def find_team(domain: Domain, problem: Problem, choice: RobotSelection) -> Team:
     return Team(robots, by, choice.unowned)
 
 
-def _found(domain: Domain, problem: Problem, choice: RobotSelection) -> tuple[tuple[str, ...], str]:
+def _found(domain: Domain, problem: Problem, choice: ModelOptions) -> tuple[tuple[str, ...], str]:
     """The robots' names, and how they were found."""
     declared = _declared(domain, problem)
     if declared is not None:
@@ -136,19 +121,19 @@ def _found(domain: Domain, problem: Problem, choice: RobotSelection) -> tuple[tu
                     )
                 raise UsageError(f"--robots: there is no object {echoed(name)}", remedy=objects)
         return tuple(sorted(set(choice.names), key=natural)), "--robots"
-    if choice.type:
-        robots = _of_kind(domain, problem, choice.type)
+    if choice.robot_type:
+        robots = _of_kind(domain, problem, choice.robot_type)
         if not robots:
             raise UsageError(
-                f"--robot-type: nothing has type or predicate {echoed(choice.type)}",
+                f"--robot-type: nothing has type or predicate {echoed(choice.robot_type)}",
                 remedy=f"Candidates: {', '.join(_kinds(domain, problem)) or 'none'}.",
             )
-        return robots, f"--robot-type {choice.type}"
+        return robots, f"--robot-type {choice.robot_type}"
     return _detect(domain, problem)
 
 
 def _require_agreement(
-    domain: Domain, problem: Problem, choice: RobotSelection, robots: tuple[str, ...], by: str
+    domain: Domain, problem: Problem, choice: ModelOptions, robots: tuple[str, ...], by: str
 ) -> None:
     """Raise `UsageError` for robots that are not the domain's, `BadInput` if a file names them."""
     contradicting = None
@@ -158,8 +143,8 @@ def _require_agreement(
             position=problem.source.section(":objects"),
             remedy=f"The robots are {', '.join(robots)} (by {by}).",
         )
-    if choice.type and set(_of_kind(domain, problem, choice.type)) != set(robots):
-        contradicting = f"--robot-type {choice.type}"
+    if choice.robot_type and set(_of_kind(domain, problem, choice.robot_type)) != set(robots):
+        contradicting = f"--robot-type {choice.robot_type}"
     elif choice.names and set(choice.names) != set(robots):
         contradicting = f"--robots {','.join(choice.names)}"
     if contradicting:

@@ -7,10 +7,9 @@ from typing import Any
 
 import pytest
 
-from coordlang.building import BuildOptions, build_language
+from coordlang.building import MethodOptions, build_language
 from planners.errors import UsageError
-from planners.loading import ModelOptions
-from planners.pddl.robots import RobotSelection
+from planners.model_options import ModelOptions
 from tests.support.domains import all_tasks
 
 
@@ -26,17 +25,17 @@ from tests.support.domains import all_tasks
 )
 def test_bad_build_options(options: dict[str, Any], said: str) -> None:
     with pytest.raises(UsageError) as raised:
-        BuildOptions(**options)
+        MethodOptions(**options)
     assert raised.match(f"(?s){said}")
     with pytest.raises(UsageError):
         build_language(all_tasks("three-cells"), **options)
 
 
 def test_good_build_options() -> None:
-    BuildOptions("separating", alpha_only=True)
-    BuildOptions("minimal", prefer="simple")
-    assert BuildOptions("exhaustive", prefer="flexible").is_exact
-    assert not BuildOptions().is_exact
+    MethodOptions("separating", alpha_only=True)
+    MethodOptions("minimal", prefer="simple")
+    assert MethodOptions("exhaustive", prefer="flexible").is_exact
+    assert not MethodOptions().is_exact
 
 
 def test_bad_model_options() -> None:
@@ -44,4 +43,4 @@ def test_bad_model_options() -> None:
     with pytest.raises(UsageError, match=r"(?s)'bogus'.*makespan\+actions"):
         ModelOptions(cost=bogus)
     with pytest.raises(UsageError, match=r"(?s)'bogus'.*environment"):
-        ModelOptions(RobotSelection((), None, bogus))
+        ModelOptions(unowned=bogus)

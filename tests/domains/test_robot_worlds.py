@@ -17,9 +17,9 @@ from coordlang.building import build_language
 from coordlang.required.miscoordination import Inseparable, miscoordination
 from coordlang.verification.by_definition import verify
 from planners.classical.fast_downward import optimal_cost
-from planners.joint.model import Cost
 from planners.limits import time_limit
-from planners.loading import ModelOptions, PlanningInstance, load
+from planners.loading import PlanningInstance, load
+from planners.model_options import Cost, ModelOptions
 from planners.pddl.robots import static_atoms
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans

@@ -10,12 +10,12 @@ import pytest
 
 from planners.inspection import inspect
 from planners.joint.composition import ComposingStepper
-from planners.loading import ModelOptions, PlanningInstance, build, load
+from planners.loading import PlanningInstance, build, load
+from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.formula_tree import formula_text
 from planners.pddl.formulas import read_formula
 from planners.pddl.names import Names
-from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source, parse
 from planners.search.reachable import explore
 from tests.support.domains import DOMAINS
@@ -126,7 +126,7 @@ def test_the_example_can_happen_in_random_models() -> None:
     shown = hidden = 0
     for seed in range(60):
         text = random_model(seed, ("agent", "plain")[seed % 2])
-        loaded = made(text.domain, text.problem, ModelOptions(RobotSelection(unowned=text.unowned)))
+        loaded = made(text.domain, text.problem, ModelOptions(unowned=text.unowned))
         found = inspect(loaded)
         if found.example is None:
             hidden += found.interfering > 0

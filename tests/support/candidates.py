@@ -13,7 +13,7 @@ from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_
 from coordlang.tasks.listed import ListedTask
 from planners.errors import ProvedImpossible
 from planners.joint.states import split_atoms
-from planners.loading import ModelOptions
+from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
 from planners.search.plan_space import PlanSpace

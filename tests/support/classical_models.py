@@ -12,11 +12,10 @@ import pytest
 
 from planners.classical import selection
 from planners.classical.immediate import Immediate
-from planners.joint.model import Cost
-from planners.loading import ModelOptions, PlanningInstance, build
+from planners.loading import PlanningInstance, build
+from planners.model_options import Cost, ModelOptions, Unowned
 from planners.pddl.domain import parse_domain
 from planners.pddl.problem import parse_problem
-from planners.pddl.robots import RobotSelection, Unowned
 from planners.pddl.sexpr import Source
 from planners.tables import Rows
 
@@ -222,7 +221,7 @@ def read(
 ) -> PlanningInstance:
     domain = parse_domain(Source("domain.pddl", domain_text))
     problem = parse_problem(Source("problem.pddl", problem_text), domain)
-    return build(domain, [problem], ModelOptions(RobotSelection(unowned=unowned), cost))
+    return build(domain, [problem], ModelOptions(unowned=unowned, cost=cost))
 
 
 def random_state(loaded: PlanningInstance, seed: int) -> Rows:

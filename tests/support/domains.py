@@ -9,7 +9,8 @@ from functools import cache
 from pathlib import Path
 
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
-from planners.loading import ModelOptions, PlanningInstance, load
+from planners.loading import PlanningInstance, load
+from planners.model_options import ModelOptions
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Domain, Problem
 from planners.search.optimal_plans import search

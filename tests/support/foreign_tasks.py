@@ -16,11 +16,10 @@ from coordlang.required.divergences import required_nodes
 from coordlang.tasks.candidates import Candidates, from_listed
 from coordlang.tasks.patterns import varied_tasks
 from planners.limits import time_limit
-from planners.loading import ModelOptions
 from planners.loading import build as build_model
+from planners.model_options import ModelOptions
 from planners.pddl import read_domain, read_problem
 from planners.pddl.factored import read_factored
-from planners.pddl.robots import RobotSelection
 from planners.search.plans import Plans
 from tests.support.domains import SHARED
 
@@ -245,7 +244,7 @@ def load(row: Row, cost: str, *, remember_actions: bool = False) -> Any:
     """The joint model of a row."""
 
     words = dict(zip(row.options[::2], row.options[1::2], strict=True))
-    choice = RobotSelection(
+    choice = ModelOptions(
         tuple(words["--robots"].split(",")) if "--robots" in words else (),
         words.get("--robot-type"),
         words.get("--unowned", "error"),  # type: ignore[arg-type]

@@ -11,10 +11,10 @@ import pytest
 
 from planners.check.validate import State, validate
 from planners.errors import BadInput, ProvedImpossible
-from planners.loading import ModelOptions, PlanningInstance, build, task_of
+from planners.loading import PlanningInstance, build, task_of
+from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import And, Formula, Not, Problem
-from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plans import Plans
@@ -30,7 +30,7 @@ _MOST_PLANS = 300
 def built(text: RandomModel, cost: str = "makespan") -> PlanningInstance:
     domain = parse_domain(Source("domain", text.domain))
     problem = parse_problem(Source("problem", text.problem), domain)
-    options = ModelOptions(robots=RobotSelection(unowned=text.unowned), cost=cost)  # type: ignore[arg-type]
+    options = ModelOptions(unowned=text.unowned, cost=cost)  # type: ignore[arg-type]
     return build(domain, [problem], options)
 
 

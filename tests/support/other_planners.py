@@ -23,7 +23,7 @@ from coordlang.use.sentence.task_language import TaskLanguage, languages_in_task
 from planners.classical.fast_downward import total_cost
 from planners.errors import CoordlangError, OutOfMemory
 from planners.limits import time_limit
-from planners.loading import ModelOptions
+from planners.model_options import ModelOptions
 from planners.pddl import read_domain, read_problem
 from planners.search.plans import Plans
 from tests.support.domains import DOMAINS

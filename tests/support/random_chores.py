@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from random import Random
 
-from planners.loading import ModelOptions
+from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.sexpr import Source

@@ -7,10 +7,9 @@ from dataclasses import replace
 from random import Random
 
 from planners.errors import BadInput
-from planners.joint.model import Cost
-from planners.loading import ModelOptions, PlanningInstance, build
+from planners.loading import PlanningInstance, build
+from planners.model_options import Cost, ModelOptions
 from planners.pddl import parse_domain, parse_problem
-from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
 from planners.search.reachable import Space, explore
 from tests.support.random_models import random_model
@@ -27,9 +26,7 @@ def random_instance(seed: int, cost: Cost | None = None) -> PlanningInstance | N
             text = random_pddl(seed, random.choice(["agent", "plain", "joint"]))
             domain = parse_domain(Source("domain", text.domain))
             problem = parse_problem(Source("problem", text.problem), domain)
-            options = ModelOptions(
-                RobotSelection(unowned=text.unowned), remember_actions=random.random() < 0.3
-            )
+            options = ModelOptions(unowned=text.unowned, remember_actions=random.random() < 0.3)
         return build(domain, [problem], replace(options, cost=cost or options.cost))
     except BadInput:
         return None

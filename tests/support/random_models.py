@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from random import Random
 
-from planners.joint.model import Cost
-from planners.loading import ModelOptions
+from planners.model_options import Cost, ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.sexpr import Source

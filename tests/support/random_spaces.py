@@ -13,9 +13,8 @@ import pytest
 from coordlang.required.miscoordination import inseparable
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from planners.errors import BadInput, ProvedImpossible
-from planners.loading import ModelOptions
+from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
-from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
 from planners.search.plan_space import PlanSpace
 from tests.support.random_models import random_model
@@ -40,8 +39,7 @@ def candidates_of_kinds(seed: int) -> Candidates:
     text = random_pddl(seed, random.choice(["agent", "plain", "joint"]))
     domain = parse_domain(Source("domain", text.domain))
     problem = parse_problem(Source("problem", text.problem), domain)
-    selection = RobotSelection(unowned=text.unowned)
-    options = ModelOptions(selection, remember_actions=random.random() < 0.3)
+    options = ModelOptions(unowned=text.unowned, remember_actions=random.random() < 0.3)
     make = from_problems if random.random() < 0.3 else all_pairs
     return make(domain, [problem], options)
 

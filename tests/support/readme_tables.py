@@ -9,7 +9,7 @@ from pathlib import Path
 
 from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
 from coordlang.tasks.task_file import read_task_file
-from planners.loading import ModelOptions
+from planners.model_options import ModelOptions
 from planners.pddl import read_domain, read_problem
 from tests.support.domains import DOMAINS
 

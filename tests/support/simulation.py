@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from functools import cache
 
-from coordlang.api.options import Method
 from coordlang.building import build_language
 from coordlang.use.sentence.best_sentence import best_sentence
 from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
@@ -18,7 +17,7 @@ from tests.support.domains import own_task, read
 
 
 @cache
-def language_of_task(folder: str, stem: str = "problem", method: Method = "greedy") -> TaskLanguage:
+def language_of_task(folder: str, stem: str = "problem", method: str = "greedy") -> TaskLanguage:
     """A language of a shipped problem's own task, in that task."""
     built = build_language(own_task(folder, stem), method)
     return language_in_task(built.language, *read(folder, stem))
@@ -29,7 +28,7 @@ def mission_of(
     folder: str,
     stem: str = "problem",
     agreement: Agreement = "sentence",
-    method: Method = "greedy",
+    method: str = "greedy",
 ) -> Mission:
     """A mission in a shipped problem; a sentence is the one that leaves most plans open."""
     used = language_of_task(folder, stem, method)

@@ -16,7 +16,8 @@ from coordlang.tasks.candidates import Candidates, from_listed, from_problems
 from coordlang.tasks.listed import ListedTask
 from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 from planners.errors import ProvedImpossible
-from planners.loading import ModelOptions, build
+from planners.loading import build
+from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.sexpr import Source

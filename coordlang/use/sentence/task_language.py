@@ -19,8 +19,8 @@ from coordlang.use.sentence.fitting_plans import plans_with_sentence
 from planners.cache import search
 from planners.errors import BadInput, Position
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask
-from planners.loading import ModelOptions
 from planners.messages import echoed
+from planners.model_options import ModelOptions
 from planners.pddl.formula_tree import conjuncts
 from planners.pddl.lifted import Domain, Problem
 from planners.search.plan_space import PlanSpace

@@ -37,7 +37,7 @@ from coordlang.vocabulary.minimal import refuting_clauses
 from coordlang.vocabulary.problems_by_size import SolverBudget
 from planners.errors import BadInput, OutOfTime, ProvedImpossible, Refuted
 from planners.limits import time_left
-from planners.loading import ModelOptions
+from planners.model_options import ModelOptions
 from planners.pddl import read_domain, read_problem
 from tests.support.candidates import states_of
 from tests.support.command import Command

@@ -17,7 +17,8 @@ import coordlang as door
 from planners.check.validate import validate
 from planners.errors import UsageError
 from planners.loading import load
-from planners.pddl.robots import RobotSelection, find_team
+from planners.model_options import ModelOptions
+from planners.pddl.robots import find_team
 from planners.search.plan_file import read_plans
 from tests.support.command import Command, own_process
 from tests.support.domains import DOMAINS, ROOT
@@ -48,7 +49,7 @@ def test_every_printed_plan_is_valid(
         path.write_text(text)
         plans += read_plans(path, loaded.model)
     assert len(plans) == len(set(plans)) == 18
-    team = find_team(loaded.domain, loaded.problems[0], RobotSelection())
+    team = find_team(loaded.domain, loaded.problems[0], ModelOptions())
     for plan in plans:
         verdict = validate(loaded.domain, loaded.problems[0], team, plan)
         assert verdict.valid, verdict.reason

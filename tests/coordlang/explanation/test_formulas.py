@@ -22,7 +22,7 @@ from coordlang.language.words import Language
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from planners.errors import ProvedImpossible
 from planners.joint.model import show
-from planners.loading import ModelOptions
+from planners.model_options import ModelOptions
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Atom
 from planners.search.reachable import explore

@@ -179,7 +179,7 @@ def test_features_that_are_too_weak() -> None:
 @pytest.mark.parametrize("wrong", [{"prefer": "nothing"}, {"complexity": 0}, {"seed": -1}])
 def test_wrong_options(wrong: dict[str, object]) -> None:
     with pytest.raises(UsageError):
-        coordlang.lift(GRID, OPEN, jobs=1, **wrong)  # type: ignore[arg-type]
+        coordlang.lift(GRID, OPEN, jobs=1, **wrong)
 
 
 def test_a_problem_without_static_relations(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from coordlang.language.words import Language
 from coordlang.report.page import Report, make_report
 from coordlang.tasks.candidates import all_pairs, from_listed, from_problems
 from coordlang.tasks.task_file import read_task_file
-from planners.loading import ModelOptions
+from planners.model_options import ModelOptions
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Domain, Problem
 from tests.support.domains import DOMAINS

@@ -13,7 +13,8 @@ import pytest
 
 from coordlang.required.fewest_actions import fewest_actions, requiring
 from planners.errors import ProvedImpossible
-from planners.loading import ModelOptions, PlanningInstance, build
+from planners.loading import PlanningInstance, build
+from planners.model_options import ModelOptions
 from planners.pddl import parse_problem, read_domain
 from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import search

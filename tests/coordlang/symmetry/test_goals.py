@@ -15,7 +15,7 @@ from coordlang.required.all_differences import Differences, differences
 from coordlang.required.miscoordination import Inseparable, separable
 from coordlang.symmetry.goals import SymmetricGoals, symmetric_goals
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
-from planners.loading import ModelOptions
+from planners.model_options import ModelOptions
 from planners.parallel.workers import Workers
 from planners.pddl import parse_problem, read_domain, read_problem
 from planners.pddl.sexpr import Source

@@ -18,10 +18,9 @@ from coordlang.tasks.reached import explored_if_small, surely_unreachable
 from planners.cache import searching
 from planners.errors import BadInput, Note, ProvedImpossible
 from planners.joint.model import JointModel, PlanningTask
-from planners.loading import ModelOptions
+from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem, read_domain, read_problem
 from planners.pddl.lifted import Domain, Problem
-from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
 from planners.search import optimal_plans
 from planners.search.plan_space import PlanSpace
@@ -108,7 +107,7 @@ def test_random_tasks_have_the_same_plans(
         listed = some_tasks(world.model, world.tasks[0].init, 4)
         for remember, cost in ((False, "makespan"), (True, "makespan+actions")):
             options = ModelOptions(
-                RobotSelection(unowned=text.unowned),
+                unowned=text.unowned,
                 cost=cost,  # type: ignore[arg-type]
                 remember_actions=remember,
             )

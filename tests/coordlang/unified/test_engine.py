@@ -51,9 +51,9 @@ from coordlang.unified.options import PLAN_KINDS
 from coordlang.unified.plans import label
 from coordlang.unified.translation import translate
 from coordlang.use.sentence.task_language import languages_in_tasks
-from planners.loading import ModelOptions, load
+from planners.loading import load
+from planners.model_options import ModelOptions
 from planners.pddl import read_domain
-from planners.pddl.robots import RobotSelection
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from tests.support.command import Command
@@ -161,8 +161,8 @@ def test_the_plans_are_those_of_the_pddl_files(
     folder: str, name: str, robots: dict[str, Any]
 ) -> None:
     path = DOMAINS / folder
-    choice = RobotSelection(tuple(robots.get("robots", ())))
-    loaded = load(path / "domain.pddl", [path / f"{name}.pddl"], ModelOptions(choice))
+    choice = ModelOptions(tuple(robots.get("robots", ())))
+    loaded = load(path / "domain.pddl", [path / f"{name}.pddl"], choice)
     space = search(loaded.model, loaded.tasks[0])
     problem = read(folder, name)
     found = translate(problem)

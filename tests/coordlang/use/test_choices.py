@@ -243,7 +243,7 @@ def shipped(folder: str, name: str) -> Iterator[TaskLanguage]:
         try:
             language = build_language(candidates).language
         except Inseparable:
-            from planners.loading import ModelOptions
+            from planners.model_options import ModelOptions
 
             candidates = from_problems(domain, [problem], ModelOptions(remember_actions=True))
             language = build_language(candidates).language

@@ -23,7 +23,7 @@ import pytest
 
 from coordlang.api.language_inputs import read_task_language
 from coordlang.api.languages import build
-from coordlang.api.options import GivenOptions
+from coordlang.api.options import Source
 from coordlang.building import build_language
 from coordlang.explanation.cover import Conjunction
 from coordlang.language.sentences import sentence
@@ -566,7 +566,7 @@ def within_slack(folder: str, slack: int, **given: Any) -> TaskLanguage:
     """Three words for the plans within slack of a shipped problem; they may be inseparable."""
     domain, problem = (DOMAINS / folder / f"{name}.pddl" for name in ("domain", "problem"))
     built = build(domain, problem, slack=slack, words=3, seed=1, **given)
-    return read_task_language(built.language, domain, problem, None, GivenOptions.of())
+    return read_task_language(built.language, domain, problem, Source())
 
 
 def every_plan(task: ClassicalTask) -> Iterator[tuple[int, ...]]:

@@ -248,7 +248,7 @@ def test_a_function_gives_words_too() -> None:
 @pytest.mark.parametrize("words", [0, -1, 2.5, "2", True])
 def test_what_is_no_number_of_words_is_refused(words: object) -> None:
     with pytest.raises(library.UsageError, match="a language has a word at least, not"):
-        library.build(*SQUARE, words=words)  # type: ignore[arg-type]
+        library.build(*SQUARE, words=words)
 
 
 def test_the_search_ends_as_soon_as_nothing_fails_and_then_nothing_is_missing() -> None:

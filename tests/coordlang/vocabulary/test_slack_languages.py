@@ -18,7 +18,7 @@ from coordlang.required.miscoordination import Inseparable
 from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.verification.by_definition import verify
 from planners.errors import BadInput, ProvedImpossible, Refuted, UsageError
-from planners.loading import ModelOptions
+from planners.model_options import ModelOptions
 from planners.pddl import read_domain, read_problem
 from planners.search.plans import counts
 from tests.support.domains import DOMAINS
@@ -40,7 +40,7 @@ def small_tasks(seeds: range, robots: int) -> Iterator[Candidates]:
     """Random candidate tasks with slack 1 whose plans can be listed, seen and hidden."""
     for seed in seeds:
         domain, problem, options = random_model(seed, robots)
-        options = replace(options, slack=1, sees_slack=seed % 2 == 0)
+        options = replace(options, slack=1, words_see_slack=seed % 2 == 0)
         try:
             found = from_problems(domain, [problem], options)
         except (ProvedImpossible, BadInput, UsageError):
@@ -110,7 +110,7 @@ def test_more_tasks() -> None:
 @pytest.mark.parametrize("method", ["greedy", "minimal"])
 def test_all_methods_where_states_say_what_is_left(method: str) -> None:
     built = build_language(
-        shipped("three-cells", "problem", slack=1, sees_slack=True, every=True), method
+        shipped("three-cells", "problem", slack=1, words_see_slack=True, every=True), method
     )
     assert built.verdict.holds
     assert built.language.guarantee.size == 6
@@ -183,7 +183,7 @@ def test_a_language_within_slack_is_one_within_less() -> None:
 
 
 def test_lower_bounds_are_certified() -> None:
-    found = shipped("three-cells", "problem", slack=1, sees_slack=True, every=True)
+    found = shipped("three-cells", "problem", slack=1, words_see_slack=True, every=True)
     built = build_language(found, "minimal")
     checked = check(certificate_of(built), found)
     assert checked.lower_bound == built.language.guarantee.size == 6
@@ -197,4 +197,4 @@ def test_states_repeat_on_plans_and_nodes_do_not() -> None:
     (space,) = found.spaces
     assert len(np.unique(space.state)) < len(space)
     assert found.model.hides_slack
-    assert not shipped("grid", "corners-3x3", slack=2, sees_slack=True).model.hides_slack
+    assert not shipped("grid", "corners-3x3", slack=2, words_see_slack=True).model.hides_slack

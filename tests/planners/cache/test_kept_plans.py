@@ -23,12 +23,12 @@ from planners.cache import keeping_plans, search, searching, shared_folder
 from planners.cache.folder import Folder, default_folder
 from planners.cache.plan_spaces import as_table, key_of, model_digest, plan_space
 from planners.errors import BadInput, Note, ProvedImpossible
-from planners.joint.model import Cost, PlanningTask
-from planners.loading import ModelOptions, PlanningInstance, build
+from planners.joint.model import PlanningTask
+from planners.loading import PlanningInstance, build
+from planners.model_options import Cost, ModelOptions
 from planners.parallel.batch import Table
 from planners.parallel.store import as_bytes
 from planners.pddl import parse_domain, parse_problem
-from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
 from planners.search import optimal_plans
 from planners.search.plan_space import PlanSpace
@@ -109,8 +109,8 @@ def test_random_models_come_back_as_they_were(folder: Folder, searches: list[str
     for seed in range(30):
         text = random_model(seed, KINDS[seed % 3])
         for cost in get_args(Cost):
-            robots = RobotSelection(unowned=text.unowned)
-            world = loaded(text.domain, text.problem, ModelOptions(robots=robots, cost=cost))
+            options = ModelOptions(unowned=text.unowned, cost=cost)
+            world = loaded(text.domain, text.problem, options)
             with keeping_plans(folder):
                 try:
                     found = search(world.model, world.tasks[0])

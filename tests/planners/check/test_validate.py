@@ -16,9 +16,10 @@ import planners.check.validate
 from planners.check.rules import Rules
 from planners.check.validate import Labels, Verdict, validate
 from planners.errors import BadInput
+from planners.model_options import ModelOptions, Unowned
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import And, Atom, Domain, Not, Problem
-from planners.pddl.robots import RobotSelection, Team, Unowned, find_team
+from planners.pddl.robots import Team, find_team
 from planners.pddl.sexpr import Source
 
 World = tuple[Domain, Problem, Team]
@@ -28,7 +29,7 @@ def world(domain: str, problem: str, unowned: Unowned = "error") -> World:
     """``domain`` and ``problem`` are the sections behind the names."""
     read = parse_domain(Source("domain", f"(define (domain d) {domain})"))
     task = parse_problem(Source("problem", f"(define (problem p) (:domain d) {problem})"), read)
-    return read, task, find_team(read, task, RobotSelection(unowned=unowned))
+    return read, task, find_team(read, task, ModelOptions(unowned=unowned))
 
 
 def one_step(setting: World, *labels: str | None) -> str | None:

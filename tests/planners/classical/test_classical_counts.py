@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from planners.classical import compile_classical
 from planners.errors import BadInput, ProvedImpossible
-from planners.joint.model import Cost, JointModel, PlanningTask
+from planners.joint.model import JointModel, PlanningTask
 from planners.loading import PlanningInstance
+from planners.model_options import Cost
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from planners.search.reachable import explore

@@ -11,6 +11,7 @@ import tempfile
 import threading
 import time
 from contextlib import suppress
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -21,11 +22,10 @@ from planners import classical as plain_module
 from planners.classical import fast_downward
 from planners.classical.fast_downward import FastDownwardFailed, optimal_cost
 from planners.errors import OutOfMemory, OutOfTime, ProvedImpossible
-from planners.joint.model import Cost
 from planners.limits import time_limit
-from planners.loading import ModelOptions, PlanningInstance, build, load
+from planners.loading import PlanningInstance, build, load
+from planners.model_options import Cost, ModelOptions
 from planners.pddl import parse_domain, parse_problem
-from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import search
 from tests.support.domains import ROOT, SHARED
@@ -321,20 +321,20 @@ def test_importing_is_cheap() -> None:
     )
 
 
-ROWS: list[tuple[str, str, str, RobotSelection, int]] = [
-    ("boxpushing", "domain", "p2_3_2_1_1_0", RobotSelection(), 6),
-    ("workshop", "workshop_dom_cal", "workshop2_1_2_2_2", RobotSelection(), 5),
-    ("grippers", "domain", "n2-r3-o3-s2", RobotSelection(), 7),
-    ("transport", "p11.DOMAIN", "p11", RobotSelection(type="vehicle"), 7),
-    ("driverlog", "domain", "pfile1", RobotSelection(), 6),
-    ("driverlog", "domain_constrained", "pfile1", RobotSelection(), 6),
-    ("taxi", "domain", "p01", RobotSelection(), 10),
-    ("depot", "domain", "pfile1", RobotSelection(), 5),
-    ("depot", "domain_constrained", "pfile1", RobotSelection(), 5),
-    ("mapf", "mapf-domain", "mapf-problem2", RobotSelection(), 2),
-    ("storage", "domain", "p05", RobotSelection(type="hoist"), 6),
-    ("blocks-arms", "original_domain", "original_problem_3", RobotSelection(), 5),
-    ("gripper", "domain", "prob01", RobotSelection(type="gripper", unowned="environment"), 7),
+ROWS: list[tuple[str, str, str, ModelOptions, int]] = [
+    ("boxpushing", "domain", "p2_3_2_1_1_0", ModelOptions(), 6),
+    ("workshop", "workshop_dom_cal", "workshop2_1_2_2_2", ModelOptions(), 5),
+    ("grippers", "domain", "n2-r3-o3-s2", ModelOptions(), 7),
+    ("transport", "p11.DOMAIN", "p11", ModelOptions(robot_type="vehicle"), 7),
+    ("driverlog", "domain", "pfile1", ModelOptions(), 6),
+    ("driverlog", "domain_constrained", "pfile1", ModelOptions(), 6),
+    ("taxi", "domain", "p01", ModelOptions(), 10),
+    ("depot", "domain", "pfile1", ModelOptions(), 5),
+    ("depot", "domain_constrained", "pfile1", ModelOptions(), 5),
+    ("mapf", "mapf-domain", "mapf-problem2", ModelOptions(), 2),
+    ("storage", "domain", "p05", ModelOptions(robot_type="hoist"), 6),
+    ("blocks-arms", "original_domain", "original_problem_3", ModelOptions(), 5),
+    ("gripper", "domain", "prob01", ModelOptions(robot_type="gripper", unowned="environment"), 7),
 ]
 
 
@@ -347,13 +347,13 @@ def test_foreign_models(
     folder: str,
     domain: str,
     problem: str,
-    robots: RobotSelection,
+    robots: ModelOptions,
     makespan: int,
     limit: int,
     cost: Cost,
 ) -> None:
     files = FOREIGN / folder
-    loaded = load(files / f"{domain}.pddl", [files / f"{problem}.pddl"], ModelOptions(robots, cost))
+    loaded = load(files / f"{domain}.pddl", [files / f"{problem}.pddl"], replace(robots, cost=cost))
     answer = optimal_cost(loaded.model, loaded.tasks[0], limit=limit)
     assert answer.cost == search(loaded.model, loaded.tasks[0]).cost_of(0)
     assert answer.cost is not None

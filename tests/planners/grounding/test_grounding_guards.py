@@ -17,9 +17,10 @@ from planners.grounding.bindings import Bindings
 from planners.grounding.instantiate import _Grounder
 from planners.grounding.interned import Interned
 from planners.loading import build
+from planners.model_options import ModelOptions, Unowned
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import FALSE, And, Formula, StepAtom
-from planners.pddl.robots import RobotSelection, Unowned, find_team
+from planners.pddl.robots import find_team
 from planners.pddl.sexpr import Source
 from tests.support.naive_grounding import NaiveGrounding, without_impossible
 from tests.support.random_pddl import random_model
@@ -67,7 +68,7 @@ CONDITIONS = [
 def grounded(domain: str, problem: str, unowned: Unowned = "error") -> tuple[GroundAction, ...]:
     lifted = parse_domain(Source("d", domain))
     read = parse_problem(Source("p", problem), lifted)
-    return ground_actions(lifted, read, find_team(lifted, read, RobotSelection(unowned=unowned)))
+    return ground_actions(lifted, read, find_team(lifted, read, ModelOptions(unowned=unowned)))
 
 
 def both(
@@ -76,7 +77,7 @@ def both(
     """The ground actions, and the same ones with preconditions and effects by definition."""
     lifted = parse_domain(Source("d", domain))
     read = parse_problem(Source("p", problem), lifted)
-    team = find_team(lifted, read, RobotSelection(unowned=unowned))
+    team = find_team(lifted, read, ModelOptions(unowned=unowned))
     twin = NaiveGrounding(lifted, read, team)
     schemas = {schema.name: schema for schema in lifted.schemas}
     fast = ground_actions(lifted, read, team)

@@ -13,7 +13,8 @@ from planners.classical import compile_classical
 from planners.classical.selectors import clashes
 from planners.errors import ProvedImpossible
 from planners.joint.interference import conflict, footprint
-from planners.loading import ModelOptions, PlanningInstance, build
+from planners.loading import PlanningInstance, build
+from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import StepAtom
 from planners.pddl.sexpr import Source

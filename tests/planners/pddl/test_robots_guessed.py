@@ -10,8 +10,9 @@ import pytest
 
 from planners.errors import BadInput, Note
 from planners.loading import PlanningInstance, build
+from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
-from planners.pddl.robots import RobotSelection, find_team
+from planners.pddl.robots import find_team
 from planners.pddl.sexpr import Source
 from tests.support.command import Command
 
@@ -128,7 +129,7 @@ def team(domain_text: str, objects: str) -> tuple[str, ...]:
     lifted = parse_domain(Source("domain.pddl", domain_text))
     text = f"(define (problem p) (:domain d) (:objects {objects}) (:goal (and)))"
     problem = parse_problem(Source("problem.pddl", text), lifted)
-    return find_team(lifted, problem, RobotSelection()).robots
+    return find_team(lifted, problem, ModelOptions()).robots
 
 
 @pytest.mark.parametrize(

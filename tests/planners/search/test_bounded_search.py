@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from planners.errors import BadInput, ProvedImpossible
-from planners.joint.model import Cost, FullState, JointModel, PlanningTask
-from planners.loading import ModelOptions, PlanningInstance, build, load
+from planners.joint.model import FullState, JointModel, PlanningTask
+from planners.loading import PlanningInstance, build, load
+from planners.model_options import Cost, ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Atom
-from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
 from planners.search import exact_bound, layers
 from planners.search.guides import GUIDES
@@ -58,7 +58,7 @@ def instances(seeds: range, robots: int | None) -> Iterator[PlanningInstance]:
                 text = random_pddl(seed, random.choice(["agent", "plain", "joint"]))
                 domain = parse_domain(Source("domain", text.domain))
                 problem = parse_problem(Source("problem", text.problem), domain)
-                options = replace(options, robots=RobotSelection(unowned=text.unowned))
+                options = replace(options, unowned=text.unowned)
             yield build(domain, [problem], options)
         except BadInput:
             continue

@@ -18,10 +18,10 @@ from planners.check.validate import Moment, State, validate
 from planners.classical import compile_classical
 from planners.errors import BadInput
 from planners.joint.model import show
-from planners.loading import ModelOptions, PlanningInstance, build, task_of
+from planners.loading import PlanningInstance, build, task_of
+from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import And, Formula, Not
-from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
 from planners.search.guides import GUIDES
 from planners.search.optimal_plans import plan_spaces, search
@@ -66,9 +66,7 @@ def priced(seed: int, kind: Kind) -> tuple[PlanningInstance, Price]:
     problem = parse_problem(
         Source("p", text.problem.replace("(:init", f"(:init {known}", 1)), domain
     )
-    loaded = build(
-        domain, [problem], ModelOptions(RobotSelection(unowned=text.unowned), "makespan+cost")
-    )
+    loaded = build(domain, [problem], ModelOptions(unowned=text.unowned, cost="makespan+cost"))
 
     def price(label: str) -> int:
         name, *args = label.strip("()").split()
@@ -213,7 +211,7 @@ def test_what_belonged_to_an_environment_that_is_not_there_costs_nobody() -> Non
     problem = """(define (problem p) (:domain d) (:objects r1 r2 - robot a b - place)
       (:init (at r1 a) (at r2 a)) (:goal (at r1 b)))"""
     read = parse_domain(Source("d", domain))
-    options = ModelOptions(RobotSelection(("r1", "r2"), unowned="environment"), "makespan+cost")
+    options = ModelOptions(("r1", "r2"), unowned="environment", cost="makespan+cost")
     loaded = build(read, [parse_problem(Source("p", problem), read)], options)
     assert loaded.model.robots == ("r1", "r2")
     assert search(loaded.model, loaded.tasks[0]).cost_of(0) == (1, 3)

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from planners.errors import BadInput, ProvedImpossible
-from planners.joint.model import Cost, JointModel, PlanningTask
+from planners.joint.model import JointModel, PlanningTask
 from planners.loading import PlanningInstance
+from planners.model_options import Cost
 from planners.search import exact_bound as exact_bounds
 from planners.search.cheapest import label_costs, least_cost
 from planners.search.exact_bound import ExactBound, exact_bound

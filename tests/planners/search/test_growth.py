@@ -9,9 +9,9 @@ import pytest
 from coordlang.api.feasibility import feasibility
 from planners.errors import BadInput, ProvedImpossible
 from planners.joint.model import JointModel
-from planners.loading import ModelOptions, PlanningInstance, build, load
+from planners.loading import PlanningInstance, build, load
+from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
-from planners.pddl.robots import RobotSelection
 from planners.pddl.sexpr import Source
 from planners.search.growth import first_layers
 from planners.search.optimal_plans import search
@@ -59,7 +59,7 @@ def test_layers_bounds_and_choices_are_those_of_the_whole_search(style: str) -> 
         text = random_model(seed, style)  # type: ignore[arg-type]
         lifted = parse_domain(Source("d.pddl", text.domain))
         problem = parse_problem(Source("p.pddl", text.problem), lifted)
-        options = ModelOptions(RobotSelection(unowned=text.unowned))
+        options = ModelOptions(unowned=text.unowned)
         loaded = build(lifted, [problem], options)
         model, task = loaded.model, loaded.tasks[0]
         try:

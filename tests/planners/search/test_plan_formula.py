@@ -8,8 +8,8 @@ from random import Random
 import pytest
 
 from planners.errors import ProvedImpossible
-from planners.joint.model import Cost
-from planners.loading import ModelOptions, PlanningInstance, build, load
+from planners.loading import PlanningInstance, build, load
+from planners.model_options import Cost, ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import search

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from planners.errors import BadInput, ProvedImpossible, UsageError
 from planners.joint.model import JointModel, PlanningTask
-from planners.loading import ModelOptions, PlanningInstance, build, load
+from planners.loading import PlanningInstance, build, load
+from planners.model_options import ModelOptions
 from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
@@ -46,7 +47,7 @@ def nodes_are_states_and_steps_left(space: PlanSpace) -> bool:
 def random_task(seed: int, robots: int, slack: int) -> tuple[JointModel, PlanningTask] | None:
     domain, problem, options = random_model(seed, robots)
     sees, remembers = seed % 2 == 0, seed % 3 == 0
-    options = replace(options, slack=slack, sees_slack=sees, remember_actions=remembers)
+    options = replace(options, slack=slack, words_see_slack=sees, remember_actions=remembers)
     try:
         found = build(domain, [problem], options)
     except BadInput:
@@ -123,7 +124,7 @@ def compare_counts(folder: str, stem: str, makespan: int, counts: tuple[int, ...
 
 def test_one_pass_over_an_explored_space_finds_what_searches_find() -> None:
     for sees in (False, True):
-        found = loaded("three-cells", "problem", 2, sees_slack=sees)
+        found = loaded("three-cells", "problem", 2, words_see_slack=sees)
         model, task = found.model, found.tasks[0]
         space = explore(model, task.init[None, :])
         (every,) = plan_spaces(space, [(task.goal, None)])
@@ -153,7 +154,7 @@ def test_states_say_what_is_left_only_if_asked() -> None:
     blind = loaded("three-cells", "problem", 1)
     space = search(blind.model, blind.tasks[0])
     assert len(np.unique(space.state)) < len(space)
-    seeing = loaded("three-cells", "problem", 1, sees_slack=True)
+    seeing = loaded("three-cells", "problem", 1, words_see_slack=True)
     seen = search(seeing.model, seeing.tasks[0])
     assert len(np.unique(seen.state)) == len(seen) == len(space)
     keys = {seen.model.codec.key(seen.rows[state]) for state in seen.state}
@@ -188,7 +189,7 @@ def test_what_is_no_slack_is_refused(slack: object) -> None:
 
 def test_seeing_slack_needs_some() -> None:
     with pytest.raises(UsageError, match="belongs to --slack"):
-        ModelOptions(sees_slack=True)
+        ModelOptions(words_see_slack=True)
 
 
 BEEPING = """(define (domain beeping) (:types robot) (:predicates (on ?r - robot))

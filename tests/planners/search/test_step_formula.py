@@ -9,7 +9,8 @@ from planners.grounding import GroundAction
 from planners.joint.composition import ComposingStepper
 from planners.joint.conditions import speaks_of_step
 from planners.joint.model import JointModel
-from planners.loading import ModelOptions, build
+from planners.loading import build
+from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
 from planners.sat import sat_solver

@@ -11,7 +11,8 @@ import pytest
 
 from planners.errors import BadInput
 from planners.joint.model import JointModel
-from planners.loading import ModelOptions, PlanningInstance, build
+from planners.loading import PlanningInstance, build
+from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
 from planners.search.cheapest import label_costs

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Options of the command line alone: limits, and plans that are kept."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+
+import click
+
+from planners.options import option
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What bounds the work of a command."""
+
+    time_limit: float | None = option(None, "Stop after this long (exit 23).", "SECONDS")
+    memory_limit: str | None = option(
+        None,
+        "Stop before using more, e.g. 4G (exit 22); none: no limit.  Default: 80 % of what is "
+        "free.",
+        "SIZE",
+    )
+    debug: bool = option(False, "Show tracebacks.")
+
+    @property
+    def bytes(self) -> int | None:
+        """The most memory, None for no limit; `click.BadParameter` for what is no size."""
+        from planners.limits import default_memory_limit
+
+        if self.memory_limit is None:
+            return default_memory_limit()
+        text = self.memory_limit.strip().lower()
+        if text == "none":
+            return None
+        match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([kmgt]?)i?b?", text)
+        if not match:
+            raise click.BadParameter(
+                "expected a size such as 500M or 4G, or none", param_hint="'--memory-limit'"
+            )
+        return int(float(match[1]) * 1024 ** " kmgt".index(match[2] or " "))
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """Whether plans that were found before are read from the user's cache."""
+
+    no_cache: bool = option(False, "Search anew: read no plans that were found before.")
+
+
+@contextmanager
+def limited(limits: Limits, kept: Kept) -> Iterator[None]:
+    """Run a block under limits, with plans kept unless the user says otherwise."""
+    from planners.limits import limited_memory, require_libraries, require_memory, time_limit
+
+    if limits.time_limit is not None and math.isnan(limits.time_limit):
+        raise click.UsageError("--time-limit: expected a number of seconds")
+    most = limits.bytes
+    require_libraries()
+    if limits.memory_limit is not None and most is not None:
+        require_memory(most)
+    with ExitStack() as stack:
+        stack.enter_context(limited_memory(most))
+        stack.enter_context(time_limit(limits.time_limit))
+        if not kept.no_cache:
+            from planners.cache import keeping_plans
+            from planners.cache.folder import Folder, default_folder
+
+            place = default_folder()
+            stack.enter_context(keeping_plans(None if place is None else Folder(place)))
+        yield

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One record of options: keywords, command line, contradictions, what was given."""
+
+from __future__ import annotations
+
+import inspect
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from coordlang.api.options import Source
+from coordlang.commands.command import arguments_by_name, command
+from coordlang.commands.keywords import with_options
+from planners.errors import UsageError
+from planners.options import group, option
+
+
+@dataclass(frozen=True, slots=True)
+class Greeting:
+    """What is said."""
+
+    tone: Literal["warm", "cold"] = option("warm", "How it sounds.")
+    times: int = option(1, "How often.", "N", least=1)
+    names: tuple[str, ...] = option((), "Whom.", "NAME", names=("--name",))
+    shout: bool = option(False, "In capitals.")
+    as_json: bool = option(False, "JSON.", names=("--json",), only="cli")
+    progress: Any = option(None, "Called now and then.", only="python")
+    source: Source = group(Source)
+
+    def __post_init__(self) -> None:
+        if self.shout and self.tone == "cold":
+            raise UsageError("--shout contradicts --tone cold")
+
+
+@with_options(Greeting)
+def greet(
+    domain: str | None = None, problem: str | None = None, *, options: Greeting
+) -> tuple[str | None, str | None, Greeting]:
+    """Greet."""
+    return domain, problem, options
+
+
+def show(result: tuple[str, str, Greeting], options: Greeting) -> int:
+    domain, problem, greeting = result
+    assert greeting is options
+    model = greeting.source.model
+    click.echo(f"{domain} {problem} {greeting.tone} {greeting.times} {greeting.names}")
+    click.echo(f"{model.cost} {model.robots} {sorted(greeting.source.given)}")
+    return 3 if greeting.shout else 0
+
+
+cli = command(greet, Greeting, "DOMAIN PROBLEM", show, doing="greeting", help="Greet.")
+
+
+def run(*arguments: str) -> tuple[int, str]:
+    done = CliRunner().invoke(cli, [*arguments], standalone_mode=False)
+    if done.exception is not None:
+        raise done.exception
+    return done.return_value, done.stdout
+
+
+def test_keywords_become_the_record() -> None:
+    _, _, options = greet("d", "p", tone="cold", times=2, cost="makespan+actions", robots="R1,r2")
+    assert (options.tone, options.times) == ("cold", 2)
+    assert options.source.model.cost == "makespan+actions"
+    assert options.source.model.names == ("r1", "r2")
+    assert options.source.given == {"cost", "robots"}
+
+
+def test_what_is_not_given_is_the_default_and_not_among_the_given() -> None:
+    _, _, options = greet(domain="d", problem="p", tone=None, remember_actions=False)
+    assert options == Greeting()
+
+
+def test_an_unknown_keyword_is_refused_with_one_that_is_alike() -> None:
+    with pytest.raises(TypeError, match=r"greet\(\) got an .* 'tome'; did you mean 'tone'\?"):
+        greet("d", "p", tome="cold")
+
+
+@pytest.mark.parametrize(
+    ("keywords", "message"),
+    [
+        ({"tone": "hot"}, "--tone hot: there is no such value"),
+        ({"times": 0}, "--times 0: expected 1 or more"),
+        ({"times": True}, "--times True: expected 1"),
+        ({"shout": 1}, "--shout is given or not: 1 is neither"),
+        ({"shout": True, "tone": "cold"}, "--shout contradicts --tone cold"),
+        ({"robots": "r1", "robot_type": "robot"}, "both say who the robots are"),
+    ],
+)
+def test_values_that_there_are_not(keywords: dict[str, Any], message: str) -> None:
+    with pytest.raises(UsageError, match=message):
+        greet("d", "p", **keywords)
+
+
+def test_the_command_line_makes_the_same_record() -> None:
+    code, text = run("d", "p", "--name", "a", "--name", "b", "--cost", "makespan", "--times", "2")
+    assert (code, text) == (0, "d p warm 2 ('a', 'b')\nmakespan () ['cost']\n")
+    assert run("d", "p", "--shout")[0] == 3
+
+
+def test_factored_stands_for_domain_and_problem() -> None:
+    assert run("--factored", "folder")[1].startswith("None None warm")
+    with pytest.raises(click.UsageError, match="expected DOMAIN PROBLEM, or --factored DIR"):
+        run("d", "--factored", "folder")
+
+
+@pytest.mark.parametrize("arguments", [("d",), ("d", "p", "q"), ()])
+def test_too_few_and_too_many_arguments(arguments: tuple[str, ...]) -> None:
+    with pytest.raises(click.UsageError, match="expected DOMAIN PROBLEM"):
+        run(*arguments)
+
+
+def test_arguments_by_name() -> None:
+    read = arguments_by_name("LANGUAGE DOMAIN PROBLEMS...", ("l", "d", "p", "q"), is_factored=False)
+    assert read == {"language": "l", "domain": "d", "problems": ("p", "q")}
+    read = arguments_by_name("LANGUAGE DOMAIN PROBLEM [SENTENCE]", ("l", "w1"), is_factored=True)
+    assert read == {"language": "l", "sentence": "w1"}
+
+
+def test_the_signature_names_what_python_takes() -> None:
+    names = [*inspect.signature(greet).parameters]
+    assert names[:4] == ["domain", "problem", "tone", "times"]
+    assert "as_json" not in names
+    assert {"factored", "cost", "slack", "progress"} <= {*names}
+
+
+def test_help_shows_kinds_and_defaults() -> None:
+    text = CliRunner().invoke(cli, ["--help"]).output
+    assert "--tone [warm|cold]" in text
+    assert "[default: warm]" in text
+    assert "--time-limit SECONDS" in text
+    assert "--progress" not in text
