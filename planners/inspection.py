@@ -21,8 +21,7 @@ from planners.pddl.lifted import (
     Domain,
     StepAtom,
 )
-from planners.search.growth import Growth, first_layers
-from planners.search.outlook import Outlook, outlook
+from planners.search.search_estimate import SearchEstimate, estimate
 from planners.tables import Rows
 
 #: States in which an example of interference is looked for.
@@ -40,7 +39,7 @@ class Inspection:
     counts pairs of subactions of different robots that cannot share a step; the ``example`` is one
     that meets in a reachable state, None if no state near the start has one.  ``start`` counts the
     fluents that are true at first, ``never`` are the predicates that no state can make true.
-    ``growth`` says how large a search would be without bounds, ``outlook`` what it is bounded by.
+    ``estimate`` says how large a search for plans will be.
     """
 
     domain: str
@@ -67,18 +66,17 @@ class Inspection:
     never: tuple[str, ...]
     facts: int
     goal: str
-    growth: Growth
-    outlook: Outlook
+    estimate: SearchEstimate
 
 
 def inspect(loaded: PlanningInstance) -> Inspection:
     """Inspect a loaded domain and its first problem.
 
     O(pairs of subactions) for the interference count; the work in states is bounded
-    (`planners.search.growth`).
+    (`planners.search.search_estimate`).
     """
     model, domain = loaded.model, loaded.domain
-    growth, layers = first_layers(model, loaded.tasks[0])
+    found, layers = estimate(model, loaded.tasks[0])
     start = model.codec.true_facts(loaded.tasks[0].init)
     idling = idling_schemas(domain)
     acting = {action.schema for action in model.actions}
@@ -107,8 +105,7 @@ def inspect(loaded: PlanningInstance) -> Inspection:
         never=_never_true(domain, model),
         facts=len(model.codec.facts),
         goal=formula_text(loaded.problems[0].goal),
-        growth=growth,
-        outlook=outlook(model, loaded.tasks[0], layers),
+        estimate=found,
     )
 
 

@@ -24,6 +24,7 @@ from planners.cache import search
 from planners.loading import PlanningInstance
 from planners.notebook import counted, html_table
 from planners.options import group, option
+from planners.search.heuristics import SearchHeuristic
 from planners.search.optimal_plans import search as bounded_search
 from planners.search.plans import Plans
 
@@ -128,7 +129,7 @@ class Inspected(Presented):
             ("statics", _counts(found.statics) or "none"),
             ("never true", ", ".join(found.never) or "none"),
             ("goal", found.goal),
-            *feasibility(found.growth, found.outlook),
+            *feasibility(found.estimate),
         ]
         if self.reachable:
             states = counted(self.reachable.states, "joint state")
@@ -203,7 +204,7 @@ class PlansOptions:
     form: Literal["ipc", "json"] = option(
         "ipc", "How plans are written.", names=("--format",), only="cli"
     )
-    heuristic: Literal["auto", "blind", "projections", "relaxed"] = option(
+    heuristic: SearchHeuristic = option(
         "auto", "What the search is bounded by; the plans are the same."
     )
     as_json: bool = option(False, "Short for --format json.", names=("--json",), only="cli")

@@ -25,9 +25,9 @@ from coordlang.use.sentence.preferences import Preference, read_preference
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.errors import CoordlangError, UsageError
 from planners.options import group, option
+from planners.search.heuristics import HeuristicName
 from planners.search.plan_file import Texts, json_count
 
-HeuristicName = Literal["relaxed", "manhattan", "blind"]
 #: A sentence: ``"w1 w0"`` or ``("w1", "w0")``.
 SentenceSource = str | Sequence[str]
 #: A plan file, or the steps of one plan, each with one text or None for every robot.

@@ -15,6 +15,7 @@ from coordlang.cli.listing import form_of
 from coordlang.cli.shared_options import ModelKeywords, kept_plans, limits, model_options
 from coordlang.cli.terminal import covered_code, working
 from planners.notebook import counted
+from planners.search.heuristics import HEURISTICS
 
 if TYPE_CHECKING:
     from coordlang.api.speaking import Fulfilled
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--heuristic",
-    type=click.Choice(["relaxed", "manhattan", "blind"]),
+    type=click.Choice(tuple(HEURISTICS)),
     default="relaxed",
     show_default=True,
     help="The lower bound of A*.",

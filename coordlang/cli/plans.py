@@ -19,6 +19,7 @@ from coordlang.cli.shared_options import (
     slack_option,
 )
 from coordlang.cli.terminal import note_single_robot, working
+from planners.search.heuristics import CHOICES
 
 
 @click.command(name="plans")
@@ -28,7 +29,7 @@ from coordlang.cli.terminal import note_single_robot, working
 )
 @click.option(
     "--heuristic",
-    type=click.Choice(["auto", "blind", "projections", "relaxed"]),
+    type=click.Choice(CHOICES),
     default="auto",
     show_default=True,
     help="What the search is bounded by; the plans are the same.",

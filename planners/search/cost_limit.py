@@ -7,11 +7,9 @@ step into a state is left out if its way costs more than the limit together with
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
-from planners.search.bounds import FAR
+from planners.search.goals import FAR, Values
 from planners.tables import Bools, Ints, Numbers, Rows
 
 
@@ -21,7 +19,7 @@ class CostLimit:
     ``left`` says for a table of states a lower bound on the second cost component of their plans.
     """
 
-    def __init__(self, left: Callable[[Rows], Ints]) -> None:
+    def __init__(self, left: Values) -> None:
         self._bound = left
         #: Ways cost at most so much; the least cost of one that was left out.
         self.most = self.beyond = FAR

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from planners.errors import ProvedImpossible
 from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, PlanningTask, Steps
-from planners.search.bounds import FAR
 from planners.search.cost_limit import CostLimit
 from planners.search.exact_bound import ExactBound, exact_bound
-from planners.search.guide import Guide
+from planners.search.goals import FAR
+from planners.search.heuristics import Heuristic
 from planners.search.packed_steps import PackedSteps
 from planners.search.reachable import PieceSizes
 from planners.search.state_table import Packing, StateTable
@@ -90,7 +90,7 @@ class Layers:
 
     model: JointModel
     table: StateTable
-    guide: Guide
+    heuristic: Heuristic
     states: list[Ints] = field(default_factory=list)
     edges: list[Edges | None] = field(default_factory=list)
     makespan: int = 0
@@ -118,11 +118,11 @@ class BoundedSearch:
         self,
         model: JointModel,
         task: PlanningTask,
-        guide: Guide,
+        heuristic: Heuristic,
         variables: Sequence[StateVariable],
         pieces: PieceSizes,
     ) -> None:
-        self._model, self._task, self._guide, self._pieces = model, task, guide, pieces
+        self._model, self._task, self._heuristic, self._pieces = model, task, heuristic, pieces
         self._variables = variables
         packing = Packing(model.codec, variables)
         self.table = StateTable(packing)
@@ -134,17 +134,19 @@ class BoundedSearch:
         self._ways = _Ways(len(model.robots))
         self._exact: ExactBound | None = None
         #: How many times the probe may be composed, after what was composed before; 0: no limit.
-        self._share = int(guide.exact)
+        self._share = int(heuristic.exact)
         self._before = 0
-        self._costs = CostLimit(guide.cost_left) if guide.cost_left and guide.bound else None
-        self.layers = Layers(model, self.table, guide)
+        self._costs = (
+            CostLimit(heuristic.cost_left) if heuristic.cost_left and heuristic.value else None
+        )
+        self.layers = Layers(model, self.table, heuristic)
         self.bound = 0
         self.rounds = 0
 
     def run(self) -> Layers:
         """Search, in as many rounds as it takes."""
         start = self._numbers(self._task.init[None, :])
-        following = int(self._h[start[0]]) if self._guide.bound else FAR - 1
+        following = int(self._h[start[0]]) if self._heuristic.value else FAR - 1
         if self._costs is not None and following < FAR and self._cheap(self._costs, start):
             return self.layers
         work = 0
@@ -190,7 +192,7 @@ class BoundedSearch:
             if found in (_MET, _GROWN) or costs.beyond >= FAR:
                 break
             most = costs.beyond
-        self._share, self._before = int(self._guide.exact), self.layers.composed
+        self._share, self._before = int(self._heuristic.exact), self.layers.composed
         if found != _MET:
             self._costs = None
         return found == _MET
@@ -203,7 +205,7 @@ class BoundedSearch:
         depth = len(self.layers.states) - 1
         if self._model.cost == "makespan" and at_least:
             left = at_least - depth
-            if mostly_lead(self._model, self._task.goal, self._guide, self._last(), left, most):
+            if mostly_lead(self._model, self._task.goal, self._heuristic, self._last(), left, most):
                 return at_least
         self._exact = exact_bound(
             self._model,
@@ -327,8 +329,8 @@ class BoundedSearch:
                 raise _GrownError
             if self._exact is not None:
                 options = self._exact.only(depth - 1, rows, options)
-            if self._guide.in_time is not None:
-                options, low = self._guide.in_time(rows, options, self.bound - depth)
+            if self._heuristic.in_time is not None:
+                options, low = self._heuristic.in_time(rows, options, self.bound - depth)
             return options
 
         start, size = 0, _FIRST_PROBED if self._share else _FIRST
@@ -373,7 +375,7 @@ class BoundedSearch:
             more = np.full(max(grown, len(self._h)), _NEVER, np.int32)
             self._h = np.concatenate((self._h, more))
             self._depth = np.concatenate((self._depth, more))
-        self._h[new] = self._guide.bound(rows) if self._guide.bound else 0
+        self._h[new] = self._heuristic.value(rows) if self._heuristic.value else 0
         if self._costs is not None:
             self._costs.enter(new, rows)
 

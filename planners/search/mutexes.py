@@ -19,9 +19,9 @@ from planners.errors import OutOfMemory
 from planners.graphs import csgraph
 from planners.grounding import GroundAction
 from planners.joint.composition import ComposingStepper
-from planners.joint.conditions import split_condition
 from planners.joint.model import JointModel
-from planners.pddl.lifted import TRUE, Formula
+from planners.pddl.lifted import TRUE
+from planners.search.goals import positive_facts
 from planners.tables import Bools, Ints, Rows
 
 if TYPE_CHECKING:
@@ -124,17 +124,16 @@ def _ways_of(
     certain = [effect for effect in known if effect.condition == TRUE]
     added = {index[effect.atom] for effect in certain if effect.adds}
     lost = sorted({index[effect.atom] for effect in certain if not effect.adds} - added)
-    needed = _positive(model, action.precondition)
+    needed = positive_facts(model, action.precondition)
     if added:
         yield sorted(needed), sorted(added), lost
     for effect in known:
         if effect.adds and effect.condition != TRUE:
-            yield sorted(needed | _positive(model, effect.condition)), [index[effect.atom]], lost
-
-
-def _positive(model: JointModel, formula: Formula) -> set[int]:
-    literals, _ = split_condition(formula, model.evaluator)
-    return {fact for fact, positive in literals if positive}
+            yield (
+                sorted(needed | positive_facts(model, effect.condition)),
+                [index[effect.atom]],
+                lost,
+            )
 
 
 def _together(model: JointModel, ways: _Ways) -> Bools:

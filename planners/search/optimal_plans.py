@@ -18,7 +18,7 @@ from planners.errors import ProvedImpossible
 from planners.joint.model import Goal, JointModel, PlanningTask
 from planners.limits import reaching
 from planners.search.exact_bound import SMALLER
-from planners.search.guides import guide_for
+from planners.search.heuristics import search_heuristic
 from planners.search.layers import BoundedSearch, Edges, Layers
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, PieceSizes, Space
@@ -61,8 +61,8 @@ def search(
 ) -> PlanSpace:
     """All optimal plans of one task, expanding only states that may be on one.
 
-    Forward in layers, bounded by ``heuristic`` (`planners.search.guides`), then back along optimal
-    edges.  With slack the least makespan is found first, and then what is within the bound.
+    Forward in layers, bounded by ``heuristic`` (`planners.search.heuristics`), then back along
+    optimal edges.  With slack the least makespan is found first, and then what is within the bound.
 
     Raises
     ------
@@ -94,8 +94,8 @@ def search_with_effort(
     """The plans as `search` finds them, and the work that it took."""
     with reaching(lambda: f"looking for bounds of {task.name}", SMALLER):
         variables = state_variables(model, task.init)
-        guide = guide_for(heuristic, model, task, variables)
-    forward = BoundedSearch(model, task, guide, variables, pieces)
+        chosen = search_heuristic(heuristic, model, task, variables)
+    forward = BoundedSearch(model, task, chosen, variables, pieces)
     with (
         closing(forward),
         reaching(forward.so_far, SMALLER, lambda: forward.layers.composed, "joint steps"),
@@ -103,7 +103,7 @@ def search_with_effort(
         layers = forward.run()
         found = _backward(model, task, layers, forward)
     table = layers.table
-    name = f"{guide.name} + SAT" if forward.asked_solver else guide.name
+    name = f"{chosen.name} + SAT" if forward.asked_solver else chosen.name
     return found, SearchEffort(name, forward.rounds, len(table), table.bytes, layers.composed)
 
 

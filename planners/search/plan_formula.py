@@ -12,7 +12,6 @@ from contextlib import closing, suppress
 
 import numpy as np
 
-from planners.joint.composition import ComposingStepper
 from planners.joint.model import FullState, Goal, JointModel
 from planners.search.fixed_plans import FixedPlans
 from planners.search.mutexes import Pair
@@ -143,11 +142,6 @@ class PlanFormula(Questions):
     def labels_chosen(self, steps: int) -> Plan:
         """The robots' labels in the plan that the last answer found, from its first step on."""
         return self.chosen(self._first(steps), self._sizes)
-
-
-def may_be_exact(model: JointModel) -> bool:
-    """Whether a model may have a plan formula: its joint steps are composed."""
-    return isinstance(model.stepper, ComposingStepper)
 
 
 def _goal_clauses(model: JointModel, goal: Goal) -> Iterator[Literals]:

@@ -19,8 +19,7 @@ import numpy as np
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import Goal, JointModel, Options
 from planners.joint.states import TrueFacts
-from planners.search.bounds import FAR
-from planners.search.goals import goal_facts
+from planners.search.goals import FAR, goal_facts
 from planners.search.state_variables import StateVariable
 from planners.tables import Ints, Rows
 

@@ -20,8 +20,8 @@ from planners.errors import UsageError
 from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, PlanningTask, Steps
 from planners.limits import reaching
-from planners.search.bounds import FAR
-from planners.search.guides import guide_for
+from planners.search.goals import FAR
+from planners.search.heuristics import search_heuristic
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, PieceSizes, Space, blocks, joined_steps
 from planners.search.state_variables import state_variables
@@ -37,7 +37,7 @@ def explore_within(
     Breadth first, so that the steps to it are the least: every state of such a plan is kept.  The
     joint steps are those between states that are kept.
     """
-    guide = guide_for("auto", model, task, state_variables(model, task.init))
+    heuristic = search_heuristic("auto", model, task, state_variables(model, task.init))
     layer = seen = task.init[None, :]
     sources: list[Rows] = []
     found: list[Steps] = []
@@ -47,9 +47,9 @@ def explore_within(
         return f"{len(seen):,} states within {depth} of {steps} steps of {task.name}"
 
     def only(rows: Rows, options: Options) -> Options:
-        if guide.in_time is None:
+        if heuristic.in_time is None:
             return options
-        return guide.in_time(rows, options, steps - depth)[0]
+        return heuristic.in_time(rows, options, steps - depth)[0]
 
     with reaching(so_far, "less slack", lambda: sum(map(len, found)), "joint steps"):
         while len(layer) and depth < steps:
@@ -61,8 +61,8 @@ def explore_within(
                 fresh.append(unique_rows(piece.result)[0])
             new, _ = unique_rows(np.concatenate(fresh))
             layer = new[find_rows(seen, new) < 0]
-            if guide.bound is not None:
-                bound = guide.bound(layer)
+            if heuristic.value is not None:
+                bound = heuristic.value(layer)
                 layer = layer[(bound < FAR) & (depth + bound <= steps)]
             seen, _ = unique_rows(np.concatenate((seen, layer)))
         # Goal states that are met in the last layer rest there, as do others.

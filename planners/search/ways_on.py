@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from planners.joint.model import Goal, JointModel, Options
-from planners.search.guide import Guide
+from planners.search.heuristics import Heuristic
 from planners.tables import Bools, Ints, Rows
 
 #: States from which ways are tried, the ways that are followed from each, and the share of them
@@ -19,7 +19,7 @@ _SAMPLE, _WAYS, _MOST = 50, 4, 0.5
 
 
 def mostly_lead(
-    model: JointModel, goal: Goal, guide: Guide, rows: Rows, left: int, most: int
+    model: JointModel, goal: Goal, heuristic: Heuristic, rows: Rows, left: int, most: int
 ) -> bool:
     """Whether more than half of some states have a way to the goal in ``left`` joint steps.
 
@@ -28,12 +28,12 @@ def mostly_lead(
 
     Parameters
     ----------
-    guide
+    heuristic
         By its bounds ways that are too long are left out.
     rows
         The states, of which some are asked for, evenly.
     """
-    assert guide.bound is not None
+    assert heuristic.value is not None
     rows = rows[:: -(-len(rows) // _SAMPLE)]
     begin, composed = np.arange(len(rows)), 0
     leads = np.zeros(len(rows), np.bool_)
@@ -41,12 +41,12 @@ def mostly_lead(
         left -= 1
 
         def only(states: Rows, options: Options, left: int = left) -> Options:
-            return guide.in_time(states, options, left)[0] if guide.in_time else options
+            return heuristic.in_time(states, options, left)[0] if heuristic.in_time else options
 
         steps = model.successors(rows, only)
         composed += len(steps)
         begin = begin[steps.source]
-        bounds = guide.bound(steps.result)
+        bounds = heuristic.value(steps.result)
         followed = _best(begin, bounds, bounds <= left)
         begin, rows = begin[followed], steps.result[followed]
         leads[begin[model.holds(goal, rows)]] = True

@@ -15,7 +15,8 @@ from coordlang.use.sentence.plan_sentence import sentence_of_plan
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.joint.model import Goal, JointModel
 from planners.joint.states import bits
-from planners.search.bounds import FAR, Heuristic, heuristic
+from planners.search.goals import FAR, Values
+from planners.search.heuristics import heuristic
 from planners.search.plans import Plan
 from planners.search.slack import rests
 from planners.tables import Rows
@@ -115,7 +116,7 @@ def plan_under_sentence(
     words
         The word numbers of the sentence; any optimal plan for None.
     name
-        The heuristic (`planners.search.bounds.HEURISTICS`).  Of plans within slack the earliest is
+        The heuristic (`planners.search.heuristics.HEURISTICS`).  Of plans within slack the earliest is
         read off the plan space, without a search.
     states
         What earlier searches with the same language and model have expanded.
@@ -133,7 +134,7 @@ def plan_under_sentence(
     states = states or ExpandedStates(task_language.model, task_language.partition)
     goal = space.goals[space.goal[task_language.start]]
     init = space.rows[space.state[task_language.start]]
-    bound = heuristic(name, task_language.model, goal)
+    bound = heuristic(name, task_language.model, goal, init)
     found = a_star(states, init, goal, bound, words, count_words=count_words)
     if found is None or found.cost != space.cost_of(task_language.task):
         task_language.plans_with(words or ())  # raises: says where the sentence first breaks
@@ -172,7 +173,7 @@ def a_star(
     states: ExpandedStates,
     init: Rows,
     goal: Goal,
-    bound: Heuristic,
+    bound: Values,
     words: Sequence[int] | None = None,
     *,
     count_words: bool = True,
@@ -315,7 +316,7 @@ class _Heights:
 
     states: ExpandedStates
     goal: Goal
-    bound: Heuristic
+    bound: Values
     height: dict[int, int] = field(default_factory=dict)
     is_goal: dict[int, bool] = field(default_factory=dict)
 

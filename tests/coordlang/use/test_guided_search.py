@@ -18,7 +18,7 @@ from coordlang.use.sentence.guided_search import ExpandedStates, a_star, plan_un
 from coordlang.use.sentence.task_language import TaskLanguage
 from planners.check.validate import validate
 from planners.errors import UsageError
-from planners.search.bounds import heuristic
+from planners.search.heuristics import heuristic
 from planners.search.plan_file import read_plans, texts
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
@@ -60,8 +60,10 @@ def check(candidates: Candidates, task_language: TaskLanguage, names: tuple[str,
 @pytest.mark.parametrize("name", SHIPPED)
 def test_shipped_domains(name: str) -> None:
     candidates, task_language = shipped(name)
+    space = task_language.space
+    init = space.rows[space.state[task_language.start]]
     try:
-        heuristic("manhattan", task_language.model, task_language.space.goals[0])
+        heuristic("manhattan", task_language.model, space.goals[0], init)
         names = ["blind", "relaxed", "manhattan"]
     except UsageError:
         names = ["blind", "relaxed"]
@@ -110,7 +112,7 @@ def test_a_sentence_of_longer_plans_only_is_no_sentence() -> None:
     sentences = [task_language.words_of(words) for words in by_sentence(task_language)]
     terrain = ExpandedStates(task_language.model, task_language.partition)
     goal, init = space.goals[0], space.rows[space.state[task_language.start]]
-    bound = heuristic("relaxed", task_language.model, goal)
+    bound = heuristic("relaxed", task_language.model, goal, init)
     found = {}
     for words in chain.from_iterable(product(range(3), repeat=length) for length in range(1, 6)):
         if words not in sentences and all(a != b for a, b in pairwise(words)):

@@ -20,7 +20,7 @@ from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Atom
 from planners.pddl.sexpr import Source
 from planners.search import exact_bound, layers
-from planners.search.guides import GUIDES
+from planners.search.heuristics import CHOICES
 from planners.search.optimal_plans import search, search_with_effort
 from planners.search.plan_space import PlanSpace
 from planners.search.projections import Projections
@@ -89,7 +89,7 @@ def compared(models: Iterable[PlanningInstance]) -> Counter[str]:
             twin = expected(loaded.model, task)
         except BadInput:  # joint actions that no robot can tell apart, somewhere
             continue
-        for heuristic in GUIDES:
+        for heuristic in CHOICES:
             pieces = PIECE_SIZES[number % len(PIECE_SIZES)]
             if twin is None:
                 with pytest.raises(ProvedImpossible):

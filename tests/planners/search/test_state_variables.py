@@ -13,11 +13,11 @@ import pytest
 from planners.joint.states import TrueFacts
 from planners.loading import PlanningInstance, load
 from planners.search import state_table
-from planners.search.bounds import FAR, relaxed
-from planners.search.goals import goal_facts
+from planners.search.goals import FAR, goal_facts
 from planners.search.optimal_plans import distances
 from planners.search.projections import Projections
 from planners.search.reachable import Space, explore
+from planners.search.relaxed import relaxed
 from planners.search.state_table import Packing, StateTable
 from planners.search.state_variables import StateVariable, state_variables
 from tests.support.domains import DOMAINS

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from planners.search.exact_bound import exact_bound
-from planners.search.guides import guide_for
+from planners.search.heuristics import search_heuristic
 from planners.search.optimal_plans import distances, search_with_effort
 from planners.search.plans import counts
 from planners.search.reachable import PieceSizes
@@ -30,17 +30,17 @@ def test_ways_are_found_only_where_they_are() -> None:
             continue
         model, task = loaded.model, loaded.tasks[0]
         far = distances(space, model.holds(task.goal, space.rows)[None, :])[0]
-        guide = guide_for("relaxed", model, task, state_variables(model, task.init))
+        heuristic = search_heuristic("relaxed", model, task, state_variables(model, task.init))
         for left in (1, 2, 3):
             open_ = space.rows[far != 0]  # a search ends where it meets a goal state
             leads = ((far > 0) & (far <= left))[far != 0]
             for some in (slice(None), leads):
                 if len(open_[some]):
                     asked = leads[some][:: -(-len(leads[some]) // 50)]
-                    mostly = mostly_lead(model, task.goal, guide, open_[some], left, 10**6)
+                    mostly = mostly_lead(model, task.goal, heuristic, open_[some], left, 10**6)
                     assert not mostly or asked.mean() > 0.5
                     found += mostly
-            assert not len(open_) or not mostly_lead(model, task.goal, guide, open_, left, -1)
+            assert not len(open_) or not mostly_lead(model, task.goal, heuristic, open_, left, -1)
     assert found > 30
 
 

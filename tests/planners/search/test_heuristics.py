@@ -11,16 +11,18 @@ import pytest
 from planners.errors import UsageError
 from planners.joint.model import Goal, JointModel
 from planners.loading import PlanningInstance, build, load
-from planners.search.bounds import FAR, HEURISTICS, heuristic
+from planners.search.goals import FAR
+from planners.search.heuristics import HEURISTICS, heuristic
 from planners.search.reachable import Space, explore
+from planners.tables import Rows
 from tests.support.domains import DOMAINS
 from tests.support.random_models import random_model
 
 
-def check(name: str, model: JointModel, goal: Goal, space: Space) -> Counter[int]:
+def check(name: str, model: JointModel, goal: Goal, init: Rows, space: Space) -> Counter[int]:
     """How far below the true distance the bounds are."""
     true = distances(space, model.holds(goal, space.rows).tolist())
-    bound = heuristic(name, model, goal)(space.rows)
+    bound = heuristic(name, model, goal, init)(space.rows)
     assert (bound[true >= 0] <= true[true >= 0]).all()
     assert ((bound == 0) == (true == 0)).all()
     source = np.repeat(np.arange(len(space)), np.diff(space.first))
@@ -47,11 +49,12 @@ def distances(space: Space, goals: list[bool]) -> np.ndarray:
     return np.array([found.get(state, -1) for state in range(len(space))])
 
 
-def of(loaded: PlanningInstance) -> tuple[JointModel, Goal, Space]:
-    return loaded.model, loaded.tasks[0].goal, explore(loaded.model, loaded.tasks[0].init[None, :])
+def of(loaded: PlanningInstance) -> tuple[JointModel, Goal, Rows, Space]:
+    task = loaded.tasks[0]
+    return loaded.model, task.goal, task.init, explore(loaded.model, task.init[None, :])
 
 
-@pytest.mark.parametrize("name", ["blind", "relaxed"])
+@pytest.mark.parametrize("name", ["blind", "projections", "relaxed"])
 def test_random_models(name: str) -> None:
     seen: Counter[int] = Counter()
 
@@ -97,7 +100,7 @@ def test_shipped_domains(problem: str) -> None:
 
 def test_manhattan_is_the_distance_on_the_map() -> None:
     loaded = load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "corners-4x4.pddl"])
-    bound = heuristic("manhattan", loaded.model, loaded.tasks[0].goal)
+    bound = heuristic("manhattan", loaded.model, loaded.tasks[0].goal, loaded.tasks[0].init)
     assert bound(loaded.tasks[0].init[None, :]).tolist() == [6]
     row = loaded.model.codec.parse_key("(at r1 c3-3) (at r2 c1-0)")
     assert bound(row[None, :]).tolist() == [1]
@@ -124,12 +127,12 @@ def test_manhattan_is_admissible_where_robots_jump() -> None:
     ]:
         domain = parse_domain(Source("d", JUMPS.format(more=more)))
         loaded = build(domain, [parse_problem(Source("p", AROUND), domain)])
-        model, goal, space = of(loaded)
+        model, goal, init, space = of(loaded)
         if expected is None:
             with pytest.raises(UsageError, match="Manhattan"):
-                heuristic("manhattan", model, goal)
+                heuristic("manhattan", model, goal, init)
             continue
-        check("manhattan", model, goal, space)
-        assert heuristic("manhattan", model, goal)(loaded.tasks[0].init[None, :]).tolist() == [
-            expected
-        ]
+        check("manhattan", model, goal, init, space)
+        assert heuristic("manhattan", model, goal, init)(
+            loaded.tasks[0].init[None, :]
+        ).tolist() == [expected]

@@ -13,10 +13,9 @@ from planners.loading import PlanningInstance, build, load
 from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
-from planners.search.growth import first_layers
 from planners.search.optimal_plans import search
-from planners.search.outlook import outlook
 from planners.search.reachable import explore
+from planners.search.search_estimate import estimate
 from planners.tables import Rows, find_rows, unique_rows
 from tests.support.domains import DOMAINS
 from tests.support.random_pddl import random_model
@@ -63,29 +62,33 @@ def test_layers_bounds_and_choices_are_those_of_the_whole_search(style: str) -> 
         loaded = build(lifted, [problem], options)
         model, task = loaded.model, loaded.tasks[0]
         try:
-            growth, layers = first_layers(model, task, MANY, MANY)
+            found, layers = estimate(model, task, MANY, MANY)
         except BadInput:  # two joint actions of the same parts that do different things
             continue
-        assert growth.next_steps is None
-        assert list(growth.layers) == naive_layers(model, task.init) == list(map(len, layers))
+        assert found.next_steps is None
+        assert (
+            list(found.layers)
+            == naive_layers(model, task.init)
+            == [len(rows) for rows in layers if len(rows)]
+        )
         space = explore(model, task.init[None, :])
-        assert growth.states == len(space)
+        assert found.states == len(space)
         assert model.stepper.most_steps(space.rows) >= len(space.labels)
         start = model.successors(task.init[None, :]).labels
         for own, robot in zip(start.T, model.robots, strict=True):
-            assert growth.choices[robot] >= len(np.unique(own))
+            assert found.choices[robot] >= len(np.unique(own))
         try:
             makespan = search(model, task).layer.max()
         except ProvedImpossible:
             unsolved += 1
-            assert growth.solvable is False
+            assert found.solvable is False
             continue
         solved += 1
-        assert growth.solvable
-        assert growth.makespan == makespan == growth.at_least
-        short, _ = first_layers(model, task, 0, 0)
-        assert short.at_least is not None
-        assert short.at_least <= makespan
+        assert found.solvable
+        assert found.makespan == makespan == found.hmax
+        short, _ = estimate(model, task, 0, 0)
+        assert short.hmax is not None
+        assert short.hmax <= makespan
     assert solved >= 5
     assert unsolved >= 1
 
@@ -93,20 +96,20 @@ def test_layers_bounds_and_choices_are_those_of_the_whole_search(style: str) -> 
 def test_no_layer_is_begun_that_exceeds_the_work() -> None:
     """Twelve robots, 2^12 joint steps at the start: nothing of it is composed."""
     loaded = walking(12, 20, "(at r0 p19)")
-    growth, layers = first_layers(loaded.model, loaded.tasks[0], steps=4_000)
-    assert growth.layers == (1,)
-    assert growth.next_steps == 2**12
-    assert growth.choices == {f"r{k}": 2 for k in range(12)}
-    assert growth.at_least == 19
+    found, layers = estimate(loaded.model, loaded.tasks[0], steps=4_000)
+    assert found.layers == (1,)
+    assert found.next_steps == 2**12
+    assert found.choices == {f"r{k}": 2 for k in range(12)}
+    assert found.hmax == 19
     assert len(layers) == 1
-    growth, _ = first_layers(loaded.model, loaded.tasks[0], steps=5_000)
-    assert growth.layers == (1, 2**12 - 1)
+    found, _ = estimate(loaded.model, loaded.tasks[0], steps=5_000)
+    assert found.layers == (1, 2**12 - 1)
 
 
 def said(robots: int, places: int, goal: str) -> dict[str, str]:
     loaded = walking(robots, places, goal)
-    growth, layers = first_layers(loaded.model, loaded.tasks[0])
-    return dict(feasibility(growth, outlook(loaded.model, loaded.tasks[0], layers)))
+    found, _ = estimate(loaded.model, loaded.tasks[0])
+    return dict(feasibility(found))
 
 
 def test_what_is_said() -> None:
@@ -148,7 +151,7 @@ def test_what_is_said() -> None:
 
 def test_the_estimate_of_a_grid_is_not_far_off() -> None:
     loaded = load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "corners-8x8.pddl"])
-    growth, _ = first_layers(loaded.model, loaded.tasks[0], states=500)
-    whole, _ = first_layers(loaded.model, loaded.tasks[0], MANY, MANY)
-    assert growth.expected is not None
-    assert whole.states / 10 < growth.expected < whole.states * 100
+    found, _ = estimate(loaded.model, loaded.tasks[0], states=500)
+    whole, _ = estimate(loaded.model, loaded.tasks[0], MANY, MANY)
+    assert found.expected is not None
+    assert whole.states / 10 < found.expected < whole.states * 100

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An estimate of the search for a task: its first layers, looked at with bounded work."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planners.joint.model import JointModel, PlanningTask
+from planners.search.goals import FAR, Values
+from planners.search.heuristics import search_heuristic
+from planners.search.layers import probe_size
+from planners.search.reachable import PIECES
+from planners.search.relaxed import relaxed
+from planners.search.state_variables import state_variables
+from planners.tables import Rows, find_rows, unique_rows
+
+#: Joint steps composed for all layers together, at most.
+_STEPS = 100_000
+#: States of all layers beyond which no further layer is looked at.
+_STATES = 10_000
+#: States of all layers of which it is asked whether they are within the bound.
+_BOUNDED = 2_000
+#: States of a layer of which the joint steps are counted; those of the others are estimated.
+_COUNTED = 1_000
+
+
+@dataclass(frozen=True, slots=True)
+class SearchEstimate:
+    """The first layers of a task, and how the search for its plans would begin.
+
+    Attributes
+    ----------
+    labels
+        By robot, how many labels (idling included) it has in all.
+    choices
+        By robot, how many of them are possible at the start.
+    layers
+        States by their distance from the start, in joint steps; all of each layer.
+    next_steps
+        The joint steps out of the last layer, where they are too many to be looked at: products of
+        the robots' own choices, in a layer of many states estimated from a part of them.  None if
+        every reachable state is in ``layers``.
+    makespan
+        The least makespan where a layer has a goal state, else None.
+    hmax
+        A lower bound on the makespan, the least one where it is known; None if there is no plan.
+    heuristic
+        What `planners.search.heuristics` chooses.
+    at_least
+        Its lower bound on the makespan; None if it proves that there is no plan.
+    within
+        How many states of each of the first layers are within this bound.
+    solver_after
+        Joint steps within this bound, after which a SAT solver would be asked for the optimal cost;
+        None if never.
+    """
+
+    labels: dict[str, int]
+    choices: dict[str, int]
+    layers: tuple[int, ...]
+    next_steps: int | None
+    makespan: int | None
+    hmax: int | None
+    heuristic: str
+    at_least: int | None
+    within: tuple[int, ...]
+    solver_after: int | None
+
+    @property
+    def states(self) -> int:
+        """How many states were seen."""
+        return sum(self.layers)
+
+    @property
+    def solvable(self) -> bool | None:
+        """Whether the task has a plan; None if neither is known."""
+        if self.makespan is not None:
+            return True
+        return False if self.hmax is None or self.next_steps is None else None
+
+    @property
+    def factor(self) -> float | None:
+        """By how much the last layer is larger than the one before; None where that says little.
+
+        It says little of the first layer, which any choice of any robot leads to.
+        """
+        return self.layers[-1] / self.layers[-2] if len(self.layers) > 2 else None
+
+    @property
+    def expected(self) -> float | None:
+        """States within ``hmax`` joint steps, if layers go on growing by ``factor``.
+
+        None where ``factor`` is None or the task has no plan; infinite beyond all floats.
+        """
+        if self.factor is None or self.hmax is None:
+            return None
+        further = range(1, max(1, self.hmax - len(self.layers) + 1) + 1)
+        try:
+            return self.states + sum(self.layers[-1] * self.factor**n for n in further)
+        except OverflowError:
+            return float("inf")
+
+
+def estimate(
+    model: JointModel, task: PlanningTask, steps: int = _STEPS, states: int = _STATES
+) -> tuple[SearchEstimate, list[Rows]]:
+    """Search breadth first until ``steps`` joint steps or ``states`` states would be exceeded.
+
+    Returns what was found, and the layers.  A layer is expanded only if the product of the robots'
+    own choices in its states is within what is left of ``steps``: work is bounded before it is
+    done.
+    """
+    start = task.init[None, :]
+    layers = _layers(model, start, steps, states)
+    reached = [depth for depth, rows in enumerate(layers) if model.holds(task.goal, rows).any()]
+    makespan = reached[0] if reached else None
+    hmax = int(relaxed(model, task.goal)(start)[0]) if makespan is None else makespan
+    heuristic = search_heuristic("auto", model, task, state_variables(model, task.init))
+    bound = 0 if heuristic.value is None else int(heuristic.value(start)[0])
+    found = SearchEstimate(
+        labels={robot: len(own) for robot, own in zip(model.robots, model.labels, strict=True)},
+        choices={
+            robot: len(labels)
+            for robot, (_, labels) in zip(
+                model.robots, model.stepper.choices(model.codec.facts_part(start)), strict=True
+            )
+        },
+        layers=tuple(len(rows) for rows in layers if len(rows)),
+        next_steps=_most_steps(model, layers[-1]) if len(layers[-1]) else None,
+        makespan=makespan,
+        hmax=hmax if hmax < FAR else None,
+        heuristic=heuristic.name,
+        at_least=bound if bound < FAR else None,
+        within=tuple(_within(heuristic.value, layers, bound)) if heuristic.value else (),
+        solver_after=probe_size(model, bound, PIECES) if heuristic.exact else None,
+    )
+    return found, layers
+
+
+def _layers(model: JointModel, start: Rows, steps: int, states: int) -> list[Rows]:
+    """The states of each layer; the last one is empty if no others can be reached."""
+    layer = seen = start
+    layers = [layer]
+    while len(layer):
+        most = _most_steps(model, layer)
+        if most > steps or len(seen) > states:
+            break
+        steps -= most
+        new, _ = unique_rows(model.successors(layer).result)
+        layer = new[find_rows(seen, new) < 0]
+        seen, _ = unique_rows(np.concatenate((seen, layer)))
+        layers.append(layer)
+    return layers
+
+
+def _within(value: Values, layers: Sequence[Rows], bound: int) -> Iterator[int]:
+    """The states of each layer that are within a bound, of `_BOUNDED` states in all."""
+    left = _BOUNDED
+    for depth, rows in enumerate(layers):
+        left -= len(rows)
+        if left < 0 or bound >= FAR or not len(rows):
+            return
+        count = int((value(rows) + depth <= bound).sum())
+        yield count
+        if not count:
+            return
+
+
+def _most_steps(model: JointModel, rows: Rows) -> int:
+    """Joint steps out of these states, counted without composing them; of many, estimated."""
+    counted = rows[:: -(-len(rows) // _COUNTED)]
+    most = model.stepper.most_steps(model.codec.facts_part(counted))
+    return most * len(rows) // len(counted)
