@@ -20,9 +20,8 @@ import numpy as np
 
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import JointModel, PlanningTask
-from planners.search.fixed_plans import FixedPlans
 from planners.search.goals import goal_facts
-from planners.search.questions import Literals, OutOfEffort, Plan
+from planners.search.questions import FixedPlans, Literals, OutOfEffort, Plan
 from planners.tables import Ints
 
 #: Conflicts for the try by cores.

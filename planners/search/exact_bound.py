@@ -22,18 +22,13 @@ from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, PlanningTask
 from planners.limits import reaching
 from planners.search.cheapest import cheapest
-from planners.search.fixed_plans import FixedPlans
 from planners.search.mutexes import mutexes
-from planners.search.plan_formula import PlanFormula
-from planners.search.questions import Literals, OutOfEffort, Plan
+from planners.search.plan_formula import PlanFormula, TooManyClauses
+from planners.search.questions import FixedPlans, Literals, OutOfEffort, Plan
 from planners.search.reachable import PieceSizes
 from planners.search.state_variables import StateVariable
-from planners.search.step_formula import TooManyClauses
 from planners.tables import Bools, Ints, Rows
 
-#: States that are asked for to see whether exact bounds pay, and the share on optimal plans above
-#: which they do not.
-_SAMPLE, _MOST = 50, 0.5
 #: Ways that were asked for last, of which so many may pass that no more are asked for.
 _RECENT = 200
 #: What a makespan that is refuted at once costs for each of its steps, in conflicts; the clauses of
@@ -95,15 +90,11 @@ def exact_bound(
     variables: Sequence[StateVariable],
     at_least: int,
     pieces: PieceSizes,
-    some: tuple[Rows, int],
 ) -> ExactBound | None:
-    """The bound of a task; None where it is not found with the effort that is spent, or not needed.
+    """The bound of a task; None where it is not found with the effort that is spent.
 
     ``at_least`` is a lower bound on the makespan; ``pieces`` say how many conflicts of the solver
-    are spent.  Of a task without plan none is found.  ``some`` are states that a search met within
-    the bound ``at_least``, and how many steps they are from the start: if the bound is the
-    makespan, costs do not count, and optimal plans pass through most of them, the search does as
-    well alone.
+    are spent.  Of a task without plan none is found.
     """
     try:
         pairs = partial(mutexes, model, task.init)
@@ -113,9 +104,6 @@ def exact_bound(
     try:
         with closing(formula), reaching(formula.so_far, SMALLER):
             plan = _shortest(formula, task, at_least)
-            only_time = model.cost == "makespan"
-            if only_time and len(plan) == at_least and _mostly_pass(formula, plan, some):
-                return None
             plans = formula.fixed(task.init, len(plan))
     except OutOfEffort:
         return None
@@ -125,14 +113,6 @@ def exact_bound(
     except BaseException:
         plans.close()
         raise
-
-
-def _mostly_pass(formula: PlanFormula, plan: Plan, some: tuple[Rows, int]) -> bool:
-    """Whether optimal plans pass through most of some states."""
-    rows, depth = some
-    sample = rows[:: -(-len(rows) // _SAMPLE)]
-    passing = sum(formula.solvable(row, len(plan) - depth) for row in sample)
-    return passing > _MOST * len(sample)
 
 
 def _bound(

@@ -17,9 +17,10 @@ import numpy as np
 from planners.errors import ProvedImpossible
 from planners.joint.model import Goal, JointModel, PlanningTask
 from planners.limits import reaching
+from planners.search.bounded_search import BoundedSearch
 from planners.search.exact_bound import SMALLER
 from planners.search.heuristics import search_heuristic
-from planners.search.layers import BoundedSearch, Edges, Layers
+from planners.search.layers import Edges, Layers
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, PieceSizes, Space
 from planners.search.slack import explore_within, require_rest, seeing, seen_rows

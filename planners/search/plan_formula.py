@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Plans of a given number of joint steps as a propositional formula, for a SAT solver.
 
-Steps (`planners.search.step_formula`) are counted from the goal, so that one formula answers for
+Planning as satisfiability (Kautz and Selman 1992) with the joint steps of this model: every robot
+has exactly one label in a step, labels that may not share a step exclude each other, a fact changes
+only where an effect changes it.  Steps are counted from the goal, so that one formula answers for
 every state how many steps lead from it to the goal.
 """
 
@@ -9,16 +11,242 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, suppress
+from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
+from planners.grounding import GroundAction
+from planners.joint.composition import ComposingStepper
+from planners.joint.interference import Choices
 from planners.joint.model import FullState, Goal, JointModel
-from planners.search.fixed_plans import FixedPlans
+from planners.joint.step_clauses import Clause, clauses
+from planners.pddl.formula_tree import Leaf, negated
+from planners.pddl.lifted import TRUE, Formula
+from planners.search.dominated_labels import dominated_pairs
 from planners.search.mutexes import Pair
-from planners.search.questions import Literals, OutOfEffort, Plan, Questions
+from planners.search.questions import FixedPlans, Literals, OutOfEffort, Plan, Questions
 from planners.search.state_variables import StateVariable
-from planners.search.step_formula import clauses_of, step_formula
 from planners.tables import Ints, Rows
+
+
+class TooManyClauses(Exception):
+    """A condition of the model has too many clauses to be part of a formula."""
+
+
+@dataclass(frozen=True, slots=True)
+class StepFormula:
+    """The clauses of one step, over the variables of its state and the facts of the next one.
+
+    Variable k (from 1) of a step is fact k - 1, then come labels, robot by robot, then helping
+    variables; ``size`` is how many there are.  ``size + k`` is variable k of the next state.
+    """
+
+    size: int
+    first_label: tuple[int, ...]
+    clauses: tuple[tuple[int, ...], ...]
+
+
+def step_formula(
+    model: JointModel, variables: Sequence[StateVariable], pairs: Callable[[], Sequence[Pair]]
+) -> StepFormula:
+    """The clauses of a step whose state has one value of each variable, and none of the pairs.
+
+    These are asked for when all conditions are written.  Where costs count, the next step is such
+    that both may be part of a cheapest plan, as far as pairs of labels say.
+
+    Raises `TooManyClauses`.
+    """
+    return _Builder(model).build(variables, pairs)
+
+
+def clauses_of(model: JointModel, formula: Formula, robot: int, label: int) -> list[Clause]:
+    """The clauses of a condition; raises `TooManyClauses`."""
+    found = clauses(formula, model.evaluator, robot, label)
+    if found is None:
+        raise TooManyClauses
+    return found
+
+
+class _Builder:
+    def __init__(self, model: JointModel) -> None:
+        stepper = model.stepper
+        assert isinstance(stepper, ComposingStepper)
+        self._model, self._stepper = model, stepper
+        self._facts = len(model.codec.facts)
+        counts = [len(own) for own in model.labels]
+        self.first_label = tuple(
+            self._facts + 1 + sum(counts[:robot]) for robot in range(len(counts))
+        )
+        self._size = self._facts + sum(counts)
+        self.clauses: list[tuple[int, ...]] = []
+        #: Per fact the literals that make it true in the next state, and false.
+        self._adders: list[Literals] = [[] for _ in range(self._facts)]
+        self._deleters: list[Literals] = [[] for _ in range(self._facts)]
+        self._choices = [Choices(own) for own in stepper.labelled]
+        self._touched: dict[tuple[int, str], dict[Leaf, Ints]] = {}
+        #: Per robot and some of its labels, as bytes, the variable that they imply.
+        self._implied: dict[tuple[int, bytes], int] = {}
+
+    def build(
+        self, variables: Sequence[StateVariable], pairs: Callable[[], Sequence[Pair]]
+    ) -> StepFormula:
+        for variable in variables:
+            self._exactly_one([fact + 1 for fact in variable.facts])
+        for robot, own in enumerate(self._stepper.labelled):
+            self._one_label(robot, len(own))
+            for label, action in enumerate(own):
+                if action is not None:
+                    self._action(robot, label, action)
+        for i, j in combinations(range(len(self._model.robots)), 2):
+            self._apart(i, j)
+        known = {fact: number for number, own in enumerate(variables) for fact in own.facts}
+        for one, other in pairs():
+            if one == other:
+                self.clauses.append((-(one + 1),))
+            elif one not in known or known[one] != known.get(other):
+                self.clauses.append((-(one + 1), -(other + 1)))
+        following = [*self._facts_follow(), *self._not_dominated(variables)]
+        # Variables of the next state come after all of this step's.
+        shifted = [
+            tuple(self._next(lit) if is_next else lit for lit, is_next in clause)
+            for clause in following
+        ]
+        return StepFormula(self._size, self.first_label, (*self.clauses, *shifted))
+
+    def _next(self, literal: int) -> int:
+        return literal + self._size if literal > 0 else literal - self._size
+
+    def _fresh(self) -> int:
+        self._size += 1
+        return self._size
+
+    def _label(self, robot: int, label: int) -> int:
+        return self.first_label[robot] + label
+
+    def _one_label(self, robot: int, count: int) -> None:
+        self._exactly_one([self._label(robot, label) for label in range(count)])
+
+    def _exactly_one(self, variables: Literals) -> None:
+        """Of some variables; at most one, by a chain: "one of those up to here"."""
+        self.clauses.append(tuple(variables))
+        before = variables[0]
+        for variable in variables[1:]:
+            self.clauses.append((-before, -variable))
+            so_far = self._fresh()
+            self.clauses += [(-before, so_far), (-variable, so_far)]
+            before = so_far
+
+    def _literal(self, literal: tuple[int, ...]) -> int:
+        number = literal[0] + 1 if len(literal) == 2 else self._label(literal[0], literal[1])
+        return number if literal[-1] else -number
+
+    def _action(self, robot: int, label: int, action: GroundAction) -> None:
+        chosen = self._label(robot, label)
+        for clause in clauses_of(self._model, action.precondition, robot, label):
+            self.clauses.append((-chosen, *map(self._literal, sorted(clause))))
+        index = self._model.codec.facts.index
+        for effect in action.effects:
+            if effect.atom not in index:
+                continue
+            fires = chosen
+            if effect.condition != TRUE:
+                fires = self._fires(robot, label, effect.condition)
+            (self._adders if effect.adds else self._deleters)[index[effect.atom]].append(fires)
+
+    def _fires(self, robot: int, label: int, condition: Formula) -> int:
+        """A variable for: the label is chosen, and the condition of an effect holds."""
+        chosen, fires = self._label(robot, label), self._fresh()
+        self.clauses.append((-fires, chosen))
+        for clause in clauses_of(self._model, condition, robot, label):
+            self.clauses.append((-fires, *map(self._literal, sorted(clause))))
+        for clause in clauses_of(self._model, negated(condition), robot, label):
+            self.clauses.append((fires, -chosen, *map(self._literal, sorted(clause))))
+        return fires
+
+    def _apart(self, i: int, j: int) -> None:
+        """Labels that may not share a step: first fact by fact, as far as facts say why.
+
+        Of the others those that exclude the same ones are one class.
+        """
+        apart = ~self._stepper.tables[i, j]
+        left = apart.copy()
+        for mine, theirs in self._meeting(i, j):
+            block = np.ix_(mine, theirs)
+            if np.count_nonzero(left[block]) > 1 and apart[block].all():
+                self.clauses.append((-self._one_of(i, mine), -self._one_of(j, theirs)))
+                left[block] = False
+        rows, row_class = np.unique(left, axis=0, return_inverse=True)
+        columns, column_class = np.unique(rows, axis=1, return_inverse=True)
+        for one, other in np.argwhere(columns).tolist():
+            mine = np.flatnonzero(row_class.reshape(-1) == one)
+            theirs = np.flatnonzero(column_class.reshape(-1) == other)
+            self.clauses.append((-self._one_of(i, mine), -self._one_of(j, theirs)))
+
+    def _meeting(self, i: int, j: int) -> Iterator[tuple[Ints, Ints]]:
+        """Labels of two robots of which one makes a fact what the other needs it not to be."""
+        for one, other in (("deletes", "keeps"), ("adds", "requires_false")):
+            for first, second in ((one, other), (other, one)):
+                rows, columns = self._touching(i, first), self._touching(j, second)
+                for fact in rows:
+                    if fact in columns:
+                        yield rows[fact], columns[fact]
+
+    def _touching(self, robot: int, field: str) -> dict[Leaf, Ints]:
+        """Per fact the labels in whose footprint it is; "keeps": needed to be true, or added."""
+        if (robot, field) not in self._touched:
+            choices = self._choices[robot]
+            fields = ("requires_true", "adds") if field == "keeps" else (field,)
+            found: dict[Leaf, set[int]] = {}
+            for labels in map(choices.labels, fields):
+                for fact, own in labels.items():
+                    found.setdefault(fact, set()).update(own)
+            self._touched[robot, field] = {
+                fact: np.array(sorted(found[fact])) for fact in sorted(found, key=str)
+            }
+        return self._touched[robot, field]
+
+    def _one_of(self, robot: int, labels: Ints) -> int:
+        """A variable that is implied by each of a robot's labels."""
+        if len(labels) == 1:
+            return self._label(robot, int(labels[0]))
+        key = (robot, labels.tobytes())
+        if key not in self._implied:
+            self._implied[key] = self._fresh()
+            self.clauses += [
+                (-self._label(robot, label), self._implied[key]) for label in labels.tolist()
+            ]
+        return self._implied[key]
+
+    def _not_dominated(
+        self, variables: Sequence[StateVariable]
+    ) -> Iterator[tuple[tuple[int, bool], ...]]:
+        """Labels that no cheapest plan has one after the other; with the same second ones at once.
+
+        A plan that has them costs more than another one of as many steps.
+        """
+        for robot, pairs in enumerate(dominated_pairs(self._model, variables)):
+            rows, row_class = np.unique(pairs, axis=0, return_inverse=True)
+            for number in np.flatnonzero(rows.any(axis=1)).tolist():
+                first = np.flatnonzero(row_class.reshape(-1) == number)
+                second = np.flatnonzero(rows[number])
+                yield (
+                    (-self._one_of(robot, first), False),
+                    (-self._one_of(robot, second), True),
+                )
+
+    def _facts_follow(self) -> list[tuple[tuple[int, bool], ...]]:
+        """What is true in the next state; added facts are, whatever deletes them, too."""
+        found: list[tuple[tuple[int, bool], ...]] = []
+        for fact in range(self._facts):
+            now, adders, deleters = fact + 1, self._adders[fact], self._deleters[fact]
+            adding = tuple((adder, False) for adder in adders)
+            found += [((-adder, False), (now, True)) for adder in adders]
+            found += [((-deleter, False), *adding, (-now, True)) for deleter in deleters]
+            found.append(((-now, True), (now, False), *adding))
+            found.append(((now, True), (-now, False), *((d, False) for d in deleters)))
+        return found
+
 
 #: Conflicts for a question, after which it is asked of a solver of its own.
 _SOON = 1_000

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from planners.joint.model import JointModel, PlanningTask
+from planners.search.bounded_search import probe_size
 from planners.search.goals import FAR, Values
 from planners.search.heuristics import search_heuristic
-from planners.search.layers import probe_size
 from planners.search.reachable import PIECES
 from planners.search.relaxed import relaxed
 from planners.search.state_variables import state_variables

@@ -116,8 +116,8 @@ def plan_under_sentence(
     words
         The word numbers of the sentence; any optimal plan for None.
     name
-        The heuristic (`planners.search.heuristics.HEURISTICS`).  Of plans within slack the earliest is
-        read off the plan space, without a search.
+        The heuristic (`planners.search.heuristics.HEURISTICS`).  Of plans within slack the earliest
+        is read off the plan space, without a search.
     states
         What earlier searches with the same language and model have expanded.
     count_words

@@ -19,7 +19,7 @@ from planners.model_options import Cost, ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Atom
 from planners.pddl.sexpr import Source
-from planners.search import exact_bound, layers
+from planners.search import exact_bound, optimal_states
 from planners.search.heuristics import CHOICES
 from planners.search.optimal_plans import search, search_with_effort
 from planners.search.plan_space import PlanSpace
@@ -118,9 +118,9 @@ def test_bounds_lose_no_optimal_plan_where_a_third_robot_decides() -> None:
 def test_states_that_are_not_asked_for_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """As if most states passed wherever one does: the others are searched, and lead nowhere."""
     monkeypatch.setattr(exact_bound, "_RECENT", 1)
-    monkeypatch.setattr(layers, "_NEARLY_ALL", 0)
-    monkeypatch.setattr(layers, "_SAMPLE", 1)
-    monkeypatch.setattr(layers, "_MOSTLY", 1)
+    monkeypatch.setattr(optimal_states, "_NEARLY_ALL", 0)
+    monkeypatch.setattr(optimal_states, "_SAMPLE", 1)
+    monkeypatch.setattr(optimal_states, "_MOSTLY", 1)
     asked = 0
     for loaded in instances(range(30), 2):
         task = loaded.tasks[0]

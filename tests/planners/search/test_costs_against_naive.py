@@ -23,12 +23,12 @@ from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import And, Formula, Not
 from planners.pddl.sexpr import Source
+from planners.search.dominated_labels import dominated_pairs
 from planners.search.heuristics import CHOICES
 from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plans import Plans
 from planners.search.reachable import explore
 from planners.search.state_variables import state_variables
-from planners.search.wasteful import wasteful_pairs
 from tests.support.naive_classical import optimal_plans
 from tests.support.naive_joint_steps import TooLarge, Twin
 from tests.support.random_pddl import Kind, random_model
@@ -198,7 +198,7 @@ def test_idling_costs_what_the_cheapest_action_that_is_idling_costs(
         found = optimal_plans(plain)
         assert found.cost is not None
         assert (plain.cost(found.cost), found.count()) == ((2, cost), count)
-    pairs = wasteful_pairs(model, state_variables(model, task.init))
+    pairs = dominated_pairs(model, state_variables(model, task.init))
     assert [bool(own.any()) for own in pairs] == [saves, False]
 
 

@@ -17,14 +17,13 @@ from planners.loading import PlanningInstance
 from planners.model_options import Cost
 from planners.search import exact_bound as exact_bounds
 from planners.search.cheapest import label_costs, least_cost
+from planners.search.dominated_labels import dominated_pairs
 from planners.search.exact_bound import ExactBound, exact_bound
 from planners.search.mutexes import mutexes
-from planners.search.plan_formula import PlanFormula
+from planners.search.plan_formula import PlanFormula, TooManyClauses
 from planners.search.questions import OutOfEffort
 from planners.search.reachable import PIECES
 from planners.search.state_variables import state_variables
-from planners.search.step_formula import TooManyClauses
-from planners.search.wasteful import wasteful_pairs
 from planners.tables import Rows
 from tests.support import blind_search
 from tests.support.random_instances import random_instance
@@ -59,9 +58,8 @@ def plans(model: JointModel, task: PlanningTask) -> list[Labels] | None:
 
 
 def bound_of(model: JointModel, task: PlanningTask) -> ExactBound | None:
-    start = (task.init[None, :], 0)
     variables = state_variables(model, task.init)
-    return exact_bound(model, task, variables, 0, PIECES, start)
+    return exact_bound(model, task, variables, 0, PIECES)
 
 
 def beginnings(model: JointModel, task: PlanningTask, depth: int) -> np.ndarray:
@@ -176,7 +174,7 @@ def cheapest_compared(seeds: range) -> Counter[str]:
             fixed = formula.fixed(task.init, steps)
         with closing(fixed):
             cheap = least_cost(fixed, model, task)
-            wasteful = wasteful_pairs(model, variables)
+            dominated = dominated_pairs(model, variables)
             for plan, cost in zip(every, costs, strict=True):
                 chosen = [
                     fixed.label(k, robot, label)
@@ -186,7 +184,7 @@ def cheapest_compared(seeds: range) -> Counter[str]:
                 saves = any(
                     own[one[robot], two[robot]]
                     for one, two in pairwise(plan)
-                    for robot, own in enumerate(wasteful)
+                    for robot, own in enumerate(dominated)
                 )
                 assert fixed.holds(chosen) == (not saves)
                 assert fixed.holds([*chosen, *cheap]) == (cost == min(costs))

@@ -14,7 +14,7 @@ from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
 from planners.sat import sat_solver
-from planners.search.step_formula import TooManyClauses, step_formula
+from planners.search.plan_formula import TooManyClauses, step_formula
 from tests.support.random_instances import random_instance
 
 

@@ -23,7 +23,7 @@ from planners.search.state_variables import StateVariable
 from planners.tables import Bools, Ints
 
 
-def wasteful_pairs(model: JointModel, variables: Sequence[StateVariable]) -> list[Bools]:
+def dominated_pairs(model: JointModel, variables: Sequence[StateVariable]) -> list[Bools]:
     """Per robot (labels, labels): no cheapest plan has the first and in the next step the second.
 
     There is a third label, or idling, that costs less with idling than both, leads to the same

@@ -11,10 +11,10 @@ import pytest
 from planners.search.exact_bound import exact_bound
 from planners.search.heuristics import search_heuristic
 from planners.search.optimal_plans import distances, search_with_effort
+from planners.search.optimal_states import mostly_lead
 from planners.search.plans import counts
 from planners.search.reachable import PieceSizes
 from planners.search.state_variables import state_variables
-from planners.search.ways_on import mostly_lead
 from tests.support.domains import world_of
 from tests.support.random_instances import explored, random_instance
 
@@ -53,10 +53,10 @@ def test_on_open_grids_no_solver_is_asked(monkeypatch: pytest.MonkeyPatch) -> No
         asked.append(1)
         return exact_bound(*args)
 
-    monkeypatch.setattr("planners.search.layers.exact_bound", noting)
+    monkeypatch.setattr("planners.search.bounded_search.exact_bound", noting)
     plans, effort = search_with_effort(model, task, PieceSizes(probe=400))
     assert (counts(plans)[int(plans.starts[0])], effort.rounds, asked) == (8_383_608, 2, [])
-    monkeypatch.setattr("planners.search.layers.mostly_lead", lambda *_: False)
+    monkeypatch.setattr("planners.search.bounded_search.mostly_lead", lambda *_: False)
     again, _ = search_with_effort(model, task, PieceSizes(probe=400))
     assert asked == [1]
     assert np.array_equal(again.labels, plans.labels)

@@ -16,8 +16,8 @@ from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
 from planners.search.cheapest import label_costs
+from planners.search.dominated_labels import dominated_pairs
 from planners.search.state_variables import state_variables
-from planners.search.wasteful import wasteful_pairs
 from planners.tables import Rows, unique_rows
 from tests.support.random_instances import random_instance
 
@@ -118,7 +118,7 @@ def wrong_pairs(loaded: PlanningInstance) -> tuple[list[str], Counter[str]]:
     Every two joint steps in a row that a robot has such a pair in are looked at.
     """
     model, task = loaded.model, loaded.tasks[0]
-    pairs = wasteful_pairs(model, state_variables(model, task.init))
+    pairs = dominated_pairs(model, state_variables(model, task.init))
     costs = label_costs(model)
     wrong: list[str] = []
     met = Counter({"pairs": sum(int(own.sum()) for own in pairs)})
@@ -178,20 +178,20 @@ def checked(seeds: range) -> Counter[str]:
     return met
 
 
-def test_instead_of_a_wasteful_pair_something_cheaper_leads_to_the_same_state() -> None:
+def test_instead_of_a_dominated_pair_something_cheaper_leads_to_the_same_state() -> None:
     met = checked(range(12))
     assert met["pairs"] > 200
     assert met["steps"] > 500
 
 
 @pytest.mark.slow
-def test_instead_of_a_wasteful_pair_something_cheaper_leads_there_in_many_models() -> None:
+def test_instead_of_a_dominated_pair_something_cheaper_leads_there_in_many_models() -> None:
     met = checked(range(1_000, 1_400))
     print(dict(met))
     assert met["steps"] > 10_000
 
 
-def test_to_drive_on_without_a_stop_and_to_turn_back_are_wasteful() -> None:
+def test_to_drive_on_without_a_stop_and_to_turn_back_are_dominated() -> None:
     text = """(define (domain drive) (:types robot place)
       (:predicates (at ?r - robot ?p - place) (way ?p ?q - place) (seen ?p - place)
         (lucky ?r - robot) (glad ?r - robot))
@@ -210,7 +210,7 @@ def test_to_drive_on_without_a_stop_and_to_turn_back_are_wasteful() -> None:
     options = ModelOptions(cost="makespan+actions")
     loaded = build(domain, [parse_problem(Source("problem", problem), domain)], options)
     model = loaded.model
-    found = wasteful_pairs(model, state_variables(model, loaded.tasks[0].init))
+    found = dominated_pairs(model, state_variables(model, loaded.tasks[0].init))
     for robot, own in enumerate(found):
         name, labels = model.robots[robot], model.labels[robot]
         pairs = {(labels[one], labels[two]) for one, two in np.argwhere(own).tolist()}
@@ -221,5 +221,5 @@ def test_to_drive_on_without_a_stop_and_to_turn_back_are_wasteful() -> None:
             for one, two in (("ab", "ba"), ("ba", "ab"), ("ab", "bc"), ("ba", "ac"))
         }
     shortest = build(domain, [parse_problem(Source("problem", problem), domain)], ModelOptions())
-    none = wasteful_pairs(shortest.model, ())
+    none = dominated_pairs(shortest.model, ())
     assert not any(own.any() for own in none)

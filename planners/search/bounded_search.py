@@ -1,0 +1,322 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bounded search forward: the states that a task's optimal plans may pass through, in layers.
+
+A state ``g`` joint steps from the start is kept if ``g + h <= B``, where ``h`` is a consistent
+lower bound on the joint steps left, for B from ``h(I)`` upwards until a goal state is met.  Then
+all optimal plans are in the layers (Proposition 16 of docs/concepts.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planners.errors import ProvedImpossible
+from planners.joint.model import JointModel, Options, PlanningTask, Steps
+from planners.search.cost_limit import CostLimit
+from planners.search.exact_bound import exact_bound
+from planners.search.goals import FAR
+from planners.search.heuristics import Heuristic
+from planners.search.layers import Edges, Layers, joined_edges
+from planners.search.optimal_states import OptimalStates, mostly_lead
+from planners.search.packed_steps import PackedSteps
+from planners.search.reachable import PieceSizes
+from planners.search.state_table import Packing, StateTable
+from planners.search.state_variables import StateVariable
+from planners.search.unreachable import searched
+from planners.tables import Ints, Rows
+
+_NEVER = np.iinfo(np.int32).max
+#: In place of the layer of a state: no optimal plan passes through it.
+_LEFT_OUT = -1
+#: States expanded first; from the joint steps that they have the next numbers of states follow.
+_FIRST, _FIRST_PROBED = 500, 8
+#: Labels in all steps for which the solver's formula takes as long as the steps that are tried
+#: before it is asked; steps that are counted where nothing bounds them.
+_FORMULA, _STEPS = 50_000, 20
+#: Combinations of labels, for each joint step that is tried without exact bounds, that are not even
+#: composed.
+_TOO_MANY = 10
+#: As many times more joint steps may be composed to see that no solver needs to be asked.
+_TRIED = 4
+#: How a round ended: the goal was met, or more joint steps were composed than are tried without
+#: exact bounds.
+_MET, _GROWN = -1, -2
+#: As many times more joint steps are composed where plans of the least cost that may suffice are
+#: looked for, or of not much more: mostly only they are met.
+_CHEAP = 5
+#: Limits of the cost that are tried.
+_LIMITS = 10
+#: Bytes of the states that joint steps lead to, composed at a time.
+_BYTES = 1 << 28
+
+
+def probe_size(model: JointModel, bound: int, pieces: PieceSizes) -> int:
+    """Joint steps after which a solver is asked, within a bound on the makespan.
+
+    They are more where the formula for that is large.
+    """
+    size = sum(map(len, model.labels)) * (bound if bound < FAR - 1 else _STEPS)
+    return pieces.probe * (1 + size // _FORMULA)
+
+
+class _GrownError(Exception):
+    """More joint steps than are composed without exact bounds."""
+
+
+class BoundedSearch:
+    """Layers of states within a bound that grows until the goal is met."""
+
+    def __init__(
+        self,
+        model: JointModel,
+        task: PlanningTask,
+        heuristic: Heuristic,
+        variables: Sequence[StateVariable],
+        pieces: PieceSizes,
+    ) -> None:
+        self._model, self._task, self._heuristic, self._pieces = model, task, heuristic, pieces
+        self._variables = variables
+        packing = Packing(model.codec, variables)
+        self.table = StateTable(packing)
+        self._packed = PackedSteps.of(model, packing, variables)
+        #: Per state the lower bound, and the layer that it was met in, in this round.
+        self._h: NDArray[np.int32] = np.zeros(0, np.int32)
+        self._depth: NDArray[np.int32] = np.zeros(0, np.int32)
+        #: What a solver says of the states, once it was asked.
+        self._optimal: OptimalStates | None = None
+        #: How many times the probe may be composed, after what was composed before; 0: no limit.
+        self._share = int(heuristic.exact)
+        self._before = 0
+        self._costs = (
+            CostLimit(heuristic.cost_left) if heuristic.cost_left and heuristic.value else None
+        )
+        self.layers = Layers(model, self.table)
+        self.bound = 0
+        self.rounds = 0
+
+    def run(self) -> Layers:
+        """Search, in as many rounds as it takes."""
+        start = self._numbers(self._task.init[None, :])
+        following = int(self._h[start[0]]) if self._heuristic.value else FAR - 1
+        if self._costs is not None and following < FAR and self._cheap(self._costs, start):
+            return self.layers
+        work = 0
+        slow = 1
+        while following < FAR:
+            self.bound, before = following, work
+            self.rounds += 1
+            done = self.layers.composed
+            following = self._round(start)
+            work = self.layers.composed - done
+            if following == _MET:
+                return self.layers
+            if following == _GROWN:
+                following = self._bounded_exactly()
+                continue
+            # Rounds that hardly grow are left out: more than needed is searched then, never less.
+            slow = 2 * slow if work < 1.5 * before else 1
+            following += slow - 1
+        seen = np.flatnonzero(self._depth[: len(self.table)] < _NEVER)
+        raise ProvedImpossible(
+            f"task {self._task.name}: the goal cannot be reached",
+            position=self._task.position,
+            remedy=searched(
+                self._model, self._task.goal, self.table.rows(seen), len(self.table) - len(seen)
+            ),
+        )
+
+    def _cheap(self, costs: CostLimit, start: Ints) -> bool:
+        """Whether the least makespan that may suffice does, at the least cost or not much more.
+
+        Every cost is tried from the least one that may suffice: where the goal is met, nothing is
+        shorter, and of the plans of that length none is cheaper.
+        """
+        self.bound, most = int(self._h[start[0]]), None
+        self._share = _CHEAP
+        found = FAR
+        for _ in range(_LIMITS):
+            costs.begin(start, most)
+            if not costs.most:
+                break  # nothing is known of costs
+            self.rounds += 1
+            found = self._round(start)
+            if found in (_MET, _GROWN) or costs.beyond >= FAR:
+                break
+            most = costs.beyond
+        self._share, self._before = int(self._heuristic.exact), self.layers.composed
+        if found != _MET:
+            self._costs = None
+        return found == _MET
+
+    def _bounded_exactly(self) -> int:
+        """Ask the solver for the optimal cost, if it may pay; what the next round is bounded by."""
+        most = _TRIED * self._probe
+        self._share = 0
+        at_least = self.bound if self.bound < FAR - 1 else 0
+        if self._model.cost == "makespan" and at_least:
+            left = at_least - (len(self.layers.states) - 1)
+            if mostly_lead(self._model, self._task.goal, self._heuristic, self._last(), left, most):
+                return at_least
+        exact = exact_bound(self._model, self._task, self._variables, at_least, self._pieces)
+        if exact is None:
+            return self.bound
+        self._optimal = OptimalStates(exact, len(self._model.robots))
+        return exact.makespan
+
+    def _round(self, start: Ints) -> int:
+        """Search within the bound; the least bound that was too large, `_MET` or `_GROWN`."""
+        self._depth[: len(self.table)] = _NEVER
+        self._depth[start] = 0
+        layers = self.layers
+        layers.states, layers.edges = [start], []
+        kept = 0
+        beyond = FAR
+        while not self._model.holds(self._task.goal, self._last()).any():
+            depth = len(layers.states)
+            try:
+                edges, low = self._expand(layers.states[-1], depth)
+            except _GrownError:
+                return _GROWN
+            beyond = min(beyond, low)
+            if self._optimal is not None:
+                left_out = self._optimal.left_out(edges, depth, len(self.table))
+                if len(left_out):
+                    self._depth[left_out] = _LEFT_OUT
+                    edges = edges.only(self._depth[edges.target] == depth)
+            new = np.flatnonzero(self._depth[: len(self.table)] == depth)
+            if not len(new):
+                return beyond
+            kept += len(edges.source)
+            layers.edges.append(edges if kept <= self._pieces.kept else None)
+            layers.states.append(new)
+        layers.makespan = len(layers.states) - 1
+        return _MET
+
+    @property
+    def _probe(self) -> int:
+        """Joint steps that may be composed, where they are limited."""
+        return self._share * probe_size(self._model, self.bound, self._pieces)
+
+    @property
+    def asked_solver(self) -> bool:
+        """Whether exact bounds were found."""
+        return self._optimal is not None
+
+    def close(self) -> None:
+        """Give the solver back."""
+        if self._optimal is not None:
+            self._optimal.exact.plans.close()
+
+    def edges_into(self, depth: int) -> Edges:
+        """The joint steps into a layer of the last round, composed again, however many they are."""
+        self._share = 0
+        return self._expand(self.layers.states[depth - 1], depth)[0]
+
+    def so_far(self) -> str:
+        """How far it got, for messages."""
+        states = self.layers.states
+        if not states:
+            return "no state"
+        within = f" with a bound of {self.bound}" if self.bound < FAR - 1 else ""
+        return (
+            f"{sum(map(len, states)):,} states within {len(states) - 1} steps of the initial state "
+            f"of {self._task.name}{within}, {len(states[-1]):,} of them new in the last step"
+        )
+
+    def _last(self) -> Rows:
+        return self.table.rows(self.layers.states[-1])
+
+    def _expand(self, states: Ints, depth: int) -> tuple[Edges, int]:
+        """The joint steps from a layer into the next, and the least bound that was too large."""
+        parts: list[Edges] = []
+        beyond = FAR
+        for numbers, steps, low in self._steps(states, depth):
+            target = self._reached(steps)
+            h = self._h[target]
+            late = h > self.bound - depth
+            beyond = min(beyond, low + depth, int(h[late].min(initial=FAR)) + depth)
+            source = numbers[steps.source]
+            if self._costs is not None:
+                late |= ~self._costs.within(source, target, steps.cost)
+            into = target[~late]
+            self._depth[into] = np.minimum(self._depth[into], depth)
+            edges = Edges(source, target, steps.labels, steps.cost)
+            edges = edges.only(~late & (self._depth[target] == depth))
+            parts.append(edges.compact())
+            if self._costs is not None:
+                self._costs.pay(edges.source, edges.target, edges.cost)
+        return joined_edges(parts, self._model), beyond
+
+    def _steps(self, states: Ints, depth: int) -> Iterator[tuple[Ints, Steps, int]]:
+        """Joint steps into a layer, in pieces, without choices that leave too few steps.
+
+        With the states of each piece, and the least number of steps that such a choice needs.
+        """
+        low = FAR
+
+        def only(rows: Rows, options: Options) -> Options:
+            nonlocal low
+            if self._share and _combinations(options) > _TOO_MANY * self._probe:
+                raise _GrownError
+            if self._optimal is not None:
+                options = self._optimal.exact.only(depth - 1, rows, options)
+            if self._heuristic.in_time is not None:
+                options, low = self._heuristic.in_time(rows, options, self.bound - depth)
+            return options
+
+        start, size = 0, _FIRST_PROBED if self._share else _FIRST
+        most = max(1, min(self._pieces.steps, _BYTES // (8 * self._model.codec.width)))
+        if self._share:
+            most = min(most, self._probe)
+        while start < len(states):
+            if self._share and self.layers.composed - self._before > self._probe:
+                raise _GrownError
+            numbers = states[start : start + size]
+            rows = self.table.rows(numbers)
+            if self._packed is None:
+                steps = self._model.successors(rows, only)
+            else:
+                steps = self._packed.successors(rows, self.table.packed(numbers), only)
+            self.layers.composed += len(steps)
+            if self._share and len(steps) > self._probe:
+                raise _GrownError  # bounds of so many states take long
+            yield numbers, steps, low
+            start += size
+            size = max(1, min(self._pieces.states, int(most * size / max(1, len(steps)))))
+
+    def _reached(self, steps: Steps) -> Ints:
+        """The numbers of the states that joint steps lead to."""
+        if self._packed is None:
+            return self._numbers(steps.result)
+        numbers, fresh = self.table.add_packed(steps.result)
+        new = numbers[fresh]
+        self._enter(new, self.table.rows(new))
+        return numbers
+
+    def _numbers(self, rows: Rows) -> Ints:
+        """The numbers of states, with bounds for those that are new."""
+        numbers, fresh = self.table.add(rows)
+        self._enter(numbers[fresh], rows[fresh])
+        return numbers
+
+    def _enter(self, new: Ints, rows: Rows) -> None:
+        """Bound states that are new."""
+        grown = len(self.table) - len(self._h)
+        if grown > 0:
+            more = np.full(max(grown, len(self._h)), _NEVER, np.int32)
+            self._h = np.concatenate((self._h, more))
+            self._depth = np.concatenate((self._depth, more))
+        self._h[new] = self._heuristic.value(rows) if self._heuristic.value else 0
+        if self._costs is not None:
+            self._costs.enter(new, rows)
+
+
+def _combinations(options: Options) -> float:
+    """How many joint labels the robots' own choices have, in all states."""
+    counts = np.ones(len(options[0][0]) - 1)
+    for first, _ in options:
+        counts *= np.diff(first)
+    return float(counts.sum())
