@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The least second cost component of plans with the least makespan, by a SAT solver.
 
-By *cores* from below where actions cost 0 or 1, else by a counter from above.  The cost is assumed
-to be 0: no action that costs something is done at all.  The solver answers with a core, some of
-these assumptions that cannot hold together: one of those actions is needed.  Each core raises the
-lower bound by one, and from then on one of its actions may be done, and for more there are new
-assumptions (core-guided MaxSAT, OLL; Andres, Kaufmann, Matheis and Schaub 2012).  The first plan
-that is found is a cheapest one.  Cores are small where goals have little to do with each other, and
-a bound on the sum of all costs says nothing for long.
+A lower-bound search by *cores* where actions cost 0 or 1, else an upper-bound search by a counter.
+In the first the cost is assumed to be 0: no action that costs something is done at all.  The solver
+answers with a core, some of these assumptions that cannot hold together: one of those actions is
+needed.  Each core raises the lower bound by one, and from then on one of its actions may be done,
+and for more there are new assumptions (core-guided MaxSAT, OLL; Andres, Kaufmann, Matheis and
+Schaub 2012).  The first plan that is found is a cheapest one.  Cores are small where goals have
+little to do with each other, and a bound on the sum of all costs says nothing for long.
 """
 
 from __future__ import annotations
