@@ -190,8 +190,7 @@ def build_language(
     outcome = _outcome(job, options, verified, clock)
     best = next(known for known in verified if known.assignment is outcome.partition)
     clock.note("verify")
-    size = len(best.partition.words)
-    guarantee = Guarantee(method, size, outcome.lower_bound, size == outcome.lower_bound)
+    guarantee = Guarantee.of(method, len(best.partition.words), outcome.lower_bound)
     provenance = provenance_of(candidates, guarantee, {"program": "coordlang"})
     return Built(
         language=Language.of(best.partition, candidates.model, provenance),

@@ -78,7 +78,6 @@ def repair_language(
     candidates: Candidates,
     start: Language,
     *,
-    contained: bool = False,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
     workers: Workers | None = None,
@@ -94,9 +93,6 @@ def repair_language(
         The tasks that it must serve.
     start
         The language; states that the tasks' problem cannot have are left out.
-    contained
-        Whether all tasks that it was built for are among the candidate tasks.  Then its lower bound
-        on the number of words holds for these, too.
     seed
         Recorded.
     progress
@@ -121,10 +117,9 @@ def repair_language(
     verdict = verify_candidates(old.partition, candidates, workers, progress)
     clock.note("verify")
     job = Job(candidates, states, found.first, seed=seed)
-    before = start.guarantee if contained else replace(start.guarantee, lower_bound=1)
     if verdict.holds:
         kept = Repaired(None, new_states=new_states, gone=old.gone)
-        return _built(old.partition, job, before, verdict, clock), kept
+        return _built(old.partition, job, verdict, clock), kept
     verified: list[tuple[Assignment, Partition, Verdict]] = []
 
     def check(assignment: Assignment) -> None:
@@ -147,24 +142,19 @@ def repair_language(
         new_states,
         old.gone,
     )
-    return _built(partition, job, before, after, clock, result), repaired
+    return _built(partition, job, after, clock, result), repaired
 
 
 def _built(
     partition: Partition,
     job: Job,
-    before: Guarantee,
     verdict: Verdict,
     clock: Clock,
     result: Repair | None = None,
 ) -> Built:
-    """The language of a partition, with the bound of the language ``before``."""
-    candidates, size = job.candidates, len(partition.words)
-    bound = job.lower_bound
-    if before.lower_bound <= size:  # what a file claims may be wrong
-        bound = max(bound, before.lower_bound)
-    method = METHOD if result else before.method
-    guarantee = Guarantee(method, size, bound, size == bound)
+    """The language of a partition; what its old file claims of fewer words is not believed."""
+    candidates = job.candidates
+    guarantee = Guarantee.of(METHOD, len(partition.words), job.lower_bound)
     provenance = provenance_of(candidates, guarantee, {"program": "coordlang"})
     return Built(
         language=Language.of(partition, candidates.model, provenance),

@@ -126,10 +126,8 @@ def build_few_words(
         if not verdict.holds:
             raise AssertionError(f"no robot fails, but these words do: {verdict.witness}")
     clock.note("verify")
-    size = len(partition.words)
     is_interrupted = isinstance(found.stopped, KeyboardInterrupt)
-    is_least = verdict.holds and size == job.lower_bound
-    guarantee = Guarantee(METHOD, size, job.lower_bound, is_least, verdict.holds)
+    guarantee = Guarantee.of(METHOD, len(partition.words), job.lower_bound, verdict.holds)
     failures = Failures(found.failures.mean, found.failures.worst)
     provenance = provenance_of(candidates, guarantee, {"program": "coordlang"})
     if not verdict.holds:

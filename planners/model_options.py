@@ -66,6 +66,23 @@ class ModelOptions:
         """The robots that are named; none where they are to be found."""
         return cast(tuple[str, ...], self.robots)
 
+    def data(self) -> dict[str, str | int]:
+        """The cost, and the other options that say what a plan or a state is, where one is used."""
+        options: dict[str, str | int] = {
+            "remember-actions": self.remember_actions,
+            "slack": self.slack,
+            "words-see-slack": self.words_see_slack,
+        }
+        if self.unowned != "error":
+            options["unowned"] = self.unowned
+        return {"cost": self.cost, **{name: value for name, value in options.items() if value}}
+
+    def __str__(self) -> str:
+        """These options as text: ``cost makespan, remember-actions``."""
+        return ", ".join(
+            name if value is True else f"{name} {value}" for name, value in self.data().items()
+        )
+
     def _check_slack(self) -> None:
         if isinstance(self.slack, bool) or not isinstance(self.slack, int) or self.slack < 0:
             raise UsageError(

@@ -48,7 +48,7 @@ from coordlang.tolerance.failures import NONE, Failures, failures_under
 from coordlang.tolerating import WordLimit, build_few_words
 from coordlang.verification.candidates import verify_candidates
 from coordlang.vocabulary.fewest_failures import FewWords
-from planners.errors import ProvedImpossible, UsageError
+from planners.errors import ProvedImpossible, Refuted, UsageError
 from planners.model_options import ModelOptions
 from planners.options import group, option
 
@@ -117,9 +117,15 @@ class BuiltLanguage(Presented):
     def certificate(self) -> Certificate:
         """Return why fewer words than the proved lower bound do not suffice, for others to check.
 
-        Also where the search was ``stopped``; as long as that takes.
+        It is checked here, too.  Also where the search was ``stopped``; as long as that takes.
+        Raises `AssertionError` for one that does not prove the bound: a solver has erred.
         """
-        return certificate_of(self.built)
+        proof = certificate_of(self.built)
+        try:
+            check_certificate(proof, self.candidates)
+        except Refuted as error:
+            raise AssertionError(f"the lower bound is not proved: {error.what}") from None
+        return proof
 
     def data(self) -> dict[str, Any]:
         """Return the figures of the making as JSON data."""
@@ -249,7 +255,7 @@ def build(
     if start is None:
         candidates = _candidates(files, options, files.source.model)
     else:
-        old, candidates, contained = _to_repair(start, files, options)
+        old, candidates = _to_repair(start, files, options)
     seconds = {"space": perf_counter() - begin}
     say_size(candidates, options.work.note or options.progress)
     fewest = requiring(candidates.spaces) if candidates.kind != "all" else None
@@ -267,7 +273,7 @@ def build(
             )
         else:
             built, repaired = repair_language(
-                candidates, old, contained=contained, seed=seed, progress=say, workers=workers
+                candidates, old, seed=seed, progress=say, workers=workers
             )
     seconds |= built.seconds
     producer = {
@@ -292,6 +298,7 @@ class Verification(Presented):
 
     ``witness`` has plans of one sentence that miscoordinate, or is None.  ``certificate`` is the
     checked one, where one was given, and ``claimed`` the lower bound that the language file claims.
+    ``options`` are those of the model, which the file chooses.
     """
 
     holds: bool
@@ -301,6 +308,7 @@ class Verification(Presented):
     witness: Miscoordination | None
     certificate: Checked | None
     claimed: int
+    options: ModelOptions
     failures: Failures = NONE
     tolerance: Tolerance | None = None
 
@@ -315,6 +323,16 @@ class Verification(Presented):
             return False
         return _at_most(found.failure_mean, claimed.failure_mean) and _at_most(
             found.failure_worst, claimed.failure_worst
+        )
+
+    @property
+    def unchecked(self) -> str | None:
+        """What the language file claims and nothing proved, None if there is nothing."""
+        if self.claimed == 1 or self.certificate:
+            return None
+        return (
+            f"not checked: the file claims that at least {self.claimed:,} words are needed, "
+            "which a certificate would prove"
         )
 
     @property
@@ -339,6 +357,8 @@ class Verification(Presented):
             "tasks": self.tasks,
             "words": self.words,
             "nodes": self.nodes,
+            "model": self.options.data(),
+            "unchecked": self.unchecked,
             "miscoordination": witness_data(self.witness),
             "lower_bound": self.lower_bound,
             "reasons": self.certificate.reasons if self.certificate else None,
@@ -432,6 +452,7 @@ def verify(
         verdict.witness,
         checked,
         read.guarantee.lower_bound,
+        model,
         found,
         read.tolerance,
     )
@@ -472,8 +493,8 @@ def _candidates(files: PlanningInput, options: BuildOptions, model: ModelOptions
 
 def _to_repair(
     start: LanguageSource, files: PlanningInput, options: BuildOptions
-) -> tuple[Language, Candidates, bool]:
-    """Return the language, the tasks that it is to serve, and whether its own are among them."""
+) -> tuple[Language, Candidates]:
+    """Return the language and the tasks that it is to serve."""
     language, position = read_language_source(start)
     check_domain(language, files.domain, position)
     if files.source.model.slack or (language.tolerance is not None and language.tolerance.slack):
@@ -482,7 +503,7 @@ def _to_repair(
             remedy="Leave out --start.",
         )
     candidates = _candidates(files, options, files.options_of(language))
-    return language, *with_recorded(language, candidates, position)
+    return language, with_recorded(language, candidates, position)
 
 
 def _arguments(options: BuildOptions) -> list[str]:

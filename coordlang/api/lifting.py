@@ -165,7 +165,7 @@ def lift(
         )
     words = learned.words
     first = every[0].candidates
-    provenance = provenance_of(first, Guarantee("lifted", len(words), 1, len(words) == 1), {})
+    provenance = provenance_of(first, Guarantee.of("lifted", len(words), 1), {})
     keys = ("cost", "unowned", "remember_actions")
     language = LiftedLanguage(
         learned.features,

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike, fspath
 from typing import Any, Literal
@@ -28,8 +28,8 @@ from planners.options import group, option
 from planners.search.heuristics import HeuristicName
 from planners.search.plan_file import Texts, json_count
 
-#: A sentence: ``"w1 w0"`` or ``("w1", "w0")``.
-SentenceSource = str | Sequence[str]
+#: A sentence: ``"w1 w0"``, its words ``("w1", "w0")``, or one of `explain`.
+SentenceSource = str | Iterable[str]
 #: A plan file, or the steps of one plan, each with one text or None for every robot.
 PlanSource = File | Sequence[Texts]
 

@@ -33,6 +33,7 @@ from planners.notebook import counted
 
 if TYPE_CHECKING:
     from coordlang.api.languages import BuiltLanguage
+    from coordlang.certificate import Certificate
 
 #: Share of the time that a search leaves for its certificate.
 _FOR_CERTIFICATE = 0.25
@@ -171,12 +172,12 @@ def command(
         **on_workers,
         **model,
     )
+    proof, unproved = _certificate(built, end) if certificate else (None, None)
     stop_clock()  # the work is done; from here on it is saved
-    stopped = _save(built, output, certificate)
-    version = file_version(output)
+    stopped = _save(built, output, certificate) or unproved
     try:
-        if certificate and stopped is None:
-            stopped = _certify(built, output, version, certificate, end)
+        if certificate and proof is not None and stopped is None:
+            _write_certificate(built, proof, output, certificate)
         figures = built.data()
         if as_json and output != "-":
             echo(json.dumps(figures))
@@ -232,54 +233,52 @@ def _save(built: BuiltLanguage, output: str, certificate: str | None) -> BaseExc
     return None
 
 
-def _certify(
-    built: BuiltLanguage, output: str, version: tuple[int, ...] | None, path: str, end: float
-) -> BaseException | None:
-    """Write the certificate, until the time ``end``; the error that ended it early, or None.
+def _certificate(
+    built: BuiltLanguage, end: float
+) -> tuple[Certificate | None, BaseException | None]:
+    """Return the certificate, checked, or the error that ended it early, until the time ``end``.
 
-    ``version`` is that of the language file as it was written: a certificate belongs to no other.
-
-    Of a search that was stopped it proves the lower bound that was reached; not after an interrupt,
-    which asks for an end.
+    Nothing is written before: a language whose certificate is refused is none.  Of a search that
+    was stopped it proves the lower bound that was reached; not after an interrupt, which asks for
+    an end.
     """
-    from coordlang.certificate import write_certificate
-    from planners.limits import run_until_stopped, start_clock, stop_clock
-    from planners.writing import file_version, is_device
+    from planners.limits import run_until_stopped, start_clock
 
     if isinstance(built.stopped, KeyboardInterrupt):
-        return None
+        return None, built.stopped
+    proofs: list[Certificate] = []
 
-    def write() -> None:
+    def prove() -> None:
         start_clock(end - monotonic())
-        with working("writing why fewer words do not suffice"):
-            proof = built.certificate()
-        stop_clock()
-        if file_version(output) != version and not is_device(output):
-            raise coordlang.UsageError(
-                f"{output} has been replaced meanwhile: no certificate is written beside it",
-                remedy="Let two commands write to different files.",
-            )
-        write_certificate(proof, path)
+        with working("proving and checking why fewer words do not suffice"):
+            proofs.append(built.certificate())
 
-    try:
-        stopped = run_until_stopped(write)
-    except coordlang.UsageError as error:
-        if file_version(output) == version:
-            error.reached = _written(built, output)
-        raise
-    if stopped is not None and not isinstance(stopped, KeyboardInterrupt):
+    stopped = run_until_stopped(prove)
+    if stopped is None:
+        return proofs[0], None
+    if not isinstance(stopped, KeyboardInterrupt):
         echo(
             "coordlang: no certificate is written: there was no time or memory left for it",
             err=True,
         )
-    elif stopped is None and not built.guarantee.proved_minimal:
+    return None, stopped
+
+
+def _write_certificate(built: BuiltLanguage, proof: Certificate, output: str, path: str) -> None:
+    from coordlang.certificate import write_certificate
+
+    try:
+        write_certificate(proof, path)
+    except coordlang.UsageError as error:
+        error.reached = _written(built, output)
+        raise
+    if not built.guarantee.proved_minimal:
         echo(
             "coordlang: the certificate proves a lower bound of "
             f"{counted(built.guarantee.lower_bound, 'word')}, not that {built.guarantee.size:,} "
             "are the fewest",
             err=True,
         )
-    return stopped
 
 
 def _exit_code(

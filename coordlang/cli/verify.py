@@ -95,6 +95,8 @@ def command(
             **model,
         )
     echo(json.dumps(found.data()) if as_json else _text(found))
+    if found.unchecked and not as_json:
+        echo(found.unchecked)
     if not found.holds:
         return 0 if found.is_tolerated else REFUTED
     if found.certificate is not None:
@@ -105,7 +107,8 @@ def command(
 def _text(found: Verification) -> str:
     from coordlang.api.witness import witness_text
 
-    words, tasks = counted(found.words, "word"), counted(found.tasks, "task")
+    words = counted(found.words, "word")
+    tasks = f"{counted(found.tasks, 'task')}, {found.options}"
     fail = f"robots that choose by themselves {found.failures.text()}"
     if found.is_tolerated:
         return (
@@ -114,7 +117,7 @@ def _text(found: Verification) -> str:
         )
     if found.witness:
         sentence = " ".join(found.witness.sentence or ())
-        head = f'refuted: plans with the sentence "{sentence} .." miscoordinate'
+        head = f'refuted ({found.options}): plans with the sentence "{sentence} .." miscoordinate'
         if found.tolerance is not None and found.tolerance.may_fail:
             fail += f".\nThe file claims less: {found.tolerance.warning}"
         return f"{head}\n{witness_text(found.witness, line_width())}\n\nOn the whole {fail}."

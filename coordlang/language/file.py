@@ -31,8 +31,8 @@ from planners.writing import write_compressed
 _BUILD_AGAIN = "Copy the file again, or build the language again: `coordlang build`."
 
 
-def to_bytes(language: Language) -> bytes:
-    """The text of a language file: the same language gives the same bytes."""
+def to_data(language: Language) -> dict[str, Any]:
+    """The JSON data of a language file."""
     provenance = language.provenance
     data = {
         "format": LANGUAGE.format,
@@ -51,7 +51,12 @@ def to_bytes(language: Language) -> bytes:
         data["lifted"] = dict(provenance.lifted)
     if provenance.tolerance is not None:
         data["tolerance"] = provenance.tolerance.data()
-    return msgspec.json.format(msgspec.json.encode(data), indent=1) + b"\n"
+    return data
+
+
+def to_bytes(language: Language) -> bytes:
+    """The text of a language file: the same language gives the same bytes."""
+    return msgspec.json.format(msgspec.json.encode(to_data(language)), indent=1) + b"\n"
 
 
 def write_language(

@@ -22,7 +22,7 @@ from planners.pddl.sexpr import JoinedSource, Source
 
 @dataclass(frozen=True, slots=True)
 class Guarantee:
-    """What is known of a language's number of words.
+    """What is known of a language's number of words; of one that was read, what its file claims.
 
     Attributes
     ----------
@@ -43,6 +43,26 @@ class Guarantee:
     lower_bound: int
     proved_minimal: bool
     coordination_language: bool = True
+
+    @classmethod
+    def of(cls, method: str, size: int, lower_bound: int, holds: bool = True) -> Guarantee:
+        """The guarantee of words that were just made; ``holds`` if they are a verified language.
+
+        Raises `AssertionError` for a bound above the size of a verified language.
+        """
+        if holds and lower_bound > size:
+            raise AssertionError(
+                f"a language of {size} words is verified, and a search has found that "
+                f"{lower_bound} are needed: one of the two is wrong"
+            )
+        return cls(method, size, lower_bound, holds and size == lower_bound, holds)
+
+    @property
+    def claim(self) -> str:
+        """The bound as it is told where nobody has checked it."""
+        if self.lower_bound == 1:
+            return "nothing is claimed of fewer words"
+        return f"the file claims at least {self.lower_bound} words; not checked here"
 
 
 @dataclass(frozen=True, slots=True)

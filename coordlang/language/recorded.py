@@ -7,7 +7,6 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Any
 
-from coordlang.language.keys import read_keys
 from coordlang.language.provenance import domain_sha256, states_sha256, world_sha256
 from coordlang.language.words import Language
 from coordlang.tasks.candidates import (
@@ -23,7 +22,6 @@ from planners.messages import echoed
 from planners.model_options import ModelOptions
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.robots import ENVIRONMENT
-from planners.tables import find_rows
 
 
 def options_of(
@@ -181,13 +179,11 @@ def _require_same_states(language: Language, candidates: Candidates) -> None:
         )
 
 
-def with_recorded(
-    language: Language, candidates: Candidates, position: Position
-) -> tuple[Candidates, bool]:
-    """Candidate tasks together with those that a language records, and whether these are contained.
+def with_recorded(language: Language, candidates: Candidates, position: Position) -> Candidates:
+    """Candidate tasks together with those that a language records.
 
     On another map, where problems have other objects or static facts, the recorded tasks do not
-    count.  Among all pairs of states no recorded tasks are added, and then they are not contained.
+    count.  Among all pairs of states no recorded tasks are added.
 
     Raises
     ------
@@ -196,20 +192,19 @@ def with_recorded(
     """
     domain, problems = candidates.loaded.domain, list(candidates.loaded.problems)
     if not all(_is_of_world(language, domain, problem) for problem in problems):
-        return candidates, False
+        return candidates
     if language.provenance.tasks["kind"] == "all":
         _require_all_pairs(language, candidates, position)
-        rows, _ = read_keys(candidates.model.codec, language.states)
-        return candidates, bool((find_rows(candidates.rows, rows) >= 0).all())
+        return candidates
     recorded = recorded_list(language)
     more = [task for task in recorded if task not in candidates.listed]
     if candidates.kind == "all" or not more:
-        return candidates, bool(recorded) and not more
+        return candidates
     listed = [*recorded, *(task for task in candidates.listed if task not in recorded)]
     kinds = {candidates.kind, language.provenance.tasks["kind"]}
     make = from_recorded if kinds == {"problems"} else from_listed
     together = make(domain, problems, listed, candidates.loaded.options, position)
-    return replace(together, skipped=candidates.skipped), True
+    return replace(together, skipped=candidates.skipped)
 
 
 def _require_all_pairs(language: Language, candidates: Candidates, position: Position) -> None:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import compress
 
@@ -38,13 +38,17 @@ def sentence(words: Iterable[int]) -> Sentence:
 class TaskSentence:
     """One sentence of a task.
 
-    ``plans`` is the exact number of optimal plans with it; ``choices[step][robot]`` the texts of
-    what the robot may do in that step (None: idle), over all plans with the sentence.
+    Iterating gives its words, which `understand` takes.  ``plans`` is the exact number of optimal
+    plans with it; ``choices[step][robot]`` the texts of what the robot may do in that step (None:
+    idle), over all plans with the sentence.
     """
 
     words: tuple[str, ...]
     plans: int
     choices: tuple[tuple[tuple[str | None, ...], ...], ...]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.words)
 
 
 def task_sentences(space: PlanSpace, task: int, partition: Partition) -> list[TaskSentence]:

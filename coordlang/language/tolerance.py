@@ -44,8 +44,8 @@ class Tolerance:
         if self.failure_mean is None or self.failure_worst is None:
             return _UNKNOWN if self.fails_unknown else None
         return (
-            "this is no coordination language: robots that choose by themselves under its "
-            f"sentences fail in {percent(self.failure_mean)} of all runs, and in "
+            "this is no coordination language: its file says that robots that choose by themselves "
+            f"under its sentences fail in {percent(self.failure_mean)} of all runs, and in "
             f"{percent(self.failure_worst)} in the worst task"
         )
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from os import PathLike, fspath
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -61,7 +61,7 @@ class Language:
 
     @property
     def guarantee(self) -> Guarantee:
-        """What is known of the number of words; nothing is, where nothing is claimed."""
+        """What is known, or claimed by a file, of the number of words."""
         size = len(self.words)
         return self.provenance.guarantee or Guarantee("unknown", size, 1, size == 1)
 
@@ -83,6 +83,12 @@ class Language:
         """How many of the listed states each word holds."""
         counts = Counter(self.states.values())
         return {word: counts[word] for word in self.words}
+
+    def data(self) -> dict[str, Any]:
+        """Return the JSON data of the language's file (docs/formats.md)."""
+        from coordlang.language.file import to_data  # the file format builds on this module
+
+        return to_data(self)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write a language file (gzip for ``.gz``); the file is complete or not there at all.
@@ -108,9 +114,8 @@ class Language:
             (word, f"{sizes[word]:,}{' and every other state' * (word == self.default)}")
             for word in self.words
         ]
-        bound = "proved minimal" if g.proved_minimal else f"at least {g.lower_bound} are needed"
         return html_table(
-            ("word", "states"), rows, f"{counted(len(rows), 'word')} ({g.method}, {bound})"
+            ("word", "states"), rows, f"{counted(len(rows), 'word')} ({g.method}; {g.claim})"
         )
 
     def partition(self, model: JointModel) -> Partition:

@@ -10,16 +10,13 @@ from typing import Any, Literal
 from coordlang.language.provenance import Guarantee, Provenance, provenance_of
 from coordlang.language.words import Language
 from coordlang.lifted.file import written_values
-from coordlang.lifted.language import LiftedLanguage, Verified
+from coordlang.lifted.language import LiftedLanguage
 from coordlang.lifted.world import States
 from coordlang.tasks.candidates import Candidates
 from planners.errors import BadInput, Position
 
 #: Whether the words were verified in the problem, refuted there, or neither.
 Known = Literal["verified", "refuted", "unknown"]
-
-#: Problems that a guarantee names.
-_NAMED = 6
 
 
 def described(lifted: LiftedLanguage) -> Language:
@@ -38,15 +35,6 @@ def require_robots(lifted: LiftedLanguage, robots: Sequence[str], position: Posi
             position=position,
             remedy="Use a problem with these robots, or name them with --robots.",
         )
-
-
-def guarantee_text(known: Known, verified: Sequence[Verified]) -> str:
-    """What is known of a grounded language, and never more than that."""
-    if known != "unknown":
-        return f"lifted; {known} here"
-    names = list(dict.fromkeys(one.problem for one in verified))
-    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-    return f"lifted; verified on {', '.join(names[:_NAMED]) or 'no problem'}{more}"
 
 
 def grounded(
@@ -75,8 +63,8 @@ def grounded(
     """
     partition = lifted.partition(states, every_word=every_word)
     size = len(partition.words)
-    method = guarantee_text(known, lifted.verified)
-    provenance = provenance_of(candidates, Guarantee(method, size, 1, size == 1), producer)
+    method = "lifted; not verified here" if known == "unknown" else f"lifted; {known} here"
+    provenance = provenance_of(candidates, Guarantee.of(method, size, 1), producer)
     origin = {
         "features": [str(feature) for feature in lifted.features],
         "values": written_values(lifted.values),

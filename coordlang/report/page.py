@@ -190,11 +190,7 @@ def _figures(language: Language) -> list[tuple[str, str, str]]:
     g, tolerance = language.guarantee, language.tolerance
     kind = {"all": "all pairs of states", "problems": "of the problems", "file": "of a task file"}
     return [
-        (
-            "Words",
-            _number(g.size),
-            "proved minimal" if g.proved_minimal else f"at least {g.lower_bound} needed",
-        ),
+        ("Words", _number(g.size), g.claim),
         (
             "Tasks",
             _number(int(language.provenance.tasks.get("count", 0))),
@@ -203,7 +199,13 @@ def _figures(language: Language) -> list[tuple[str, str, str]]:
         ("States", _number(len(language.states)), "on optimal plans of these tasks"),
         ("Method", g.method, ""),
         *(
-            [("Failures", percent(tolerance.failure_mean), "on average over the tasks")]
+            [
+                (
+                    "Failures",
+                    percent(tolerance.failure_mean),
+                    "on average over the tasks, its file says",
+                )
+            ]
             if tolerance is not None and tolerance.failure_mean is not None
             else []
         ),

@@ -252,7 +252,7 @@ def test_a_false_bound_is_not_carried_over() -> None:
     candidates = all_tasks("three-cells")
     false = replace(found, provenance=replace(found.provenance, guarantee=guarantee))
     for start, bound in ((false, 2), (found, 2)):
-        built, _ = repair_language(candidates, start, contained=True)
+        built, _ = repair_language(candidates, start)
         assert built.language.guarantee.lower_bound == bound
         assert built.verdict.holds
 

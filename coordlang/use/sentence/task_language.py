@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -16,8 +16,9 @@ from coordlang.language.words import Language
 from coordlang.tasks.candidates import Candidates, describe
 from coordlang.tasks.listed import ListedTask, model_of_listed
 from coordlang.use.sentence.fitting_plans import plans_with_sentence
+from coordlang.verification.pieces import verify_spaces
 from planners.cache import search
-from planners.errors import BadInput, Position
+from planners.errors import BadInput, OutOfMemory, Position, note
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask
 from planners.messages import echoed
 from planners.model_options import ModelOptions
@@ -57,8 +58,10 @@ class TaskLanguage:
     word
         The word number of every plan-space node.
     covered
-        Whether it is one of the candidate tasks that the language was built for.  For any other
-        task nothing is guaranteed.
+        Whether it is one of the language's candidate tasks and nothing worse happens in it than
+        the language says.  For any other task nothing is guaranteed.
+    holds
+        Whether the plans of each sentence mix freely in the task: verified here.
     declared
         The names of domain and problem; None where there is only a model.
     """
@@ -70,6 +73,7 @@ class TaskLanguage:
     word: Ints
     covered: bool
     declared: Declared | None = None
+    holds: bool = True
 
     @property
     def start(self) -> int:
@@ -78,8 +82,8 @@ class TaskLanguage:
 
     @property
     def guaranteed(self) -> bool:
-        """Whether the language guarantees that the plans of a sentence mix freely in this task."""
-        return self.covered and not (self.language and self.language.may_fail)
+        """Whether the plans of a sentence mix freely in this task, one of the language's."""
+        return self.covered and self.holds
 
     @property
     def tolerance(self) -> Tolerance | None:
@@ -91,7 +95,7 @@ class TaskLanguage:
         """The joint model of the task."""
         return self.space.model
 
-    def words_of(self, text: str | Sequence[str]) -> tuple[int, ...]:
+    def words_of(self, text: str | Iterable[str]) -> tuple[int, ...]:
         """Word numbers of a sentence, ``"w2 w0"`` or ``("w2", "w0")``.
 
         Raises `BadInput` for an empty sentence, a word that the language does not have, or equal
@@ -160,9 +164,23 @@ def language_in_task(
     space = search(loaded.model, loaded.tasks[0])
     partition = language.partition(loaded.model)
     covered = _covers(language, space, recorded)
+    holds = covered and _holds(partition, space)
+    covered &= holds or language.may_fail
     word = partition.word_of(space.rows)[space.state]
     declared = Declared(domain.predicates, problem.objects)
-    return TaskLanguage(language, partition, space, 0, word, covered, declared)
+    return TaskLanguage(language, partition, space, 0, word, covered, declared, holds)
+
+
+def _holds(partition: Partition, space: PlanSpace) -> bool:
+    """Whether words are a coordination language in a plan space, by definition.
+
+    False, with a note, where the verification does not fit into the memory.
+    """
+    try:
+        return verify_spaces(partition, [space]).holds
+    except OutOfMemory as error:
+        note(f"what the language promises is not verified here: {error.what}")
+        return False
 
 
 def languages_in_tasks(language: Language, candidates: Candidates) -> Iterator[TaskLanguage]:
