@@ -51,15 +51,6 @@ def is_device(path: str | Path) -> bool:
     return os.path.exists(path) and not os.path.isfile(path)
 
 
-def file_version(path: str | Path) -> tuple[int, ...] | None:
-    """What changes whenever a file is replaced or written; None where there is no file."""
-    try:
-        found = os.stat(path)
-    except FileNotFoundError:
-        return None
-    return found.st_dev, found.st_ino, found.st_mtime_ns, found.st_size
-
-
 def remove_file(path: str | Path | None) -> None:
     """Remove a file; nothing for None, for what is missing, and for a device or a pipe."""
     if path is not None and os.path.isfile(path):

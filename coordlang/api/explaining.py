@@ -115,11 +115,10 @@ class WordsExplained(Presented):
     def head(self) -> str:
         """What the language is, in a line."""
         language = self.used.language
-        g = language.guarantee
         number = language.provenance.tasks["count"]
         tasks = counted(number, "task") if number else "no recorded task"
         words, robots = counted(len(language.words), "word"), ", ".join(self.used.model.robots)
-        line = f"{words} ({g.method}; {g.claim}) for {tasks} of {robots}."
+        line = f"{words} for {tasks} of {robots}; {language.guarantee.claim}."
         tolerance = language.tolerance
         if tolerance is not None and tolerance.warning is not None:
             line += f"\n{tolerance.warning[0].upper()}{tolerance.warning[1:]}."

@@ -328,7 +328,7 @@ class Verification(Presented):
     @property
     def unchecked(self) -> str | None:
         """What the language file claims and nothing proved, None if there is nothing."""
-        if self.claimed == 1 or self.certificate:
+        if self.claimed == 1 or self.certificate or not self.holds:
             return None
         return (
             f"not checked: the file claims that at least {self.claimed:,} words are needed, "

@@ -146,7 +146,6 @@ def command(
     hit).
     """
     from planners.limits import stop_clock, time_left
-    from planners.writing import file_version
 
     if words is not None and (certificate or was_given("method")):
         raise click.UsageError(

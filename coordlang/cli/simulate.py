@@ -168,6 +168,9 @@ def command(
             )
     _write(found, outputs, shown)
     echo(to_bytes(found.record).decode() if as_json else _summary(found.counts), nl=not as_json)
+    if replay is not None:
+        echo("coordlang: note: this is what the record says; nothing of it is checked", err=True)
+        return 0
     return _exit_code(found, options["runs"])
 
 

@@ -117,10 +117,11 @@ def _text(found: Verification) -> str:
         )
     if found.witness:
         sentence = " ".join(found.witness.sentence or ())
-        head = f'refuted ({found.options}): plans with the sentence "{sentence} .." miscoordinate'
+        head = f'refuted: plans with the sentence "{sentence} .." miscoordinate'
         if found.tolerance is not None and found.tolerance.may_fail:
             fail += f".\nThe file claims less: {found.tolerance.warning}"
-        return f"{head}\n{witness_text(found.witness, line_width())}\n\nOn the whole {fail}."
+        text = witness_text(found.witness, line_width())
+        return f"{head}\n{text}\n\nOn the whole ({found.options}) {fail}."
     slack = found.tolerance.slack if found.tolerance else None
     plans = f"plans within slack {slack}" if slack else "optimal plans"
     mixing = f"all {plans} of one sentence mix freely"

@@ -14,6 +14,7 @@ from coordlang.tasks.candidates import Candidates
 from coordlang.tasks.task_file import task_data
 from planners.joint.assembly import SLACK_LEFT
 from planners.joint.model import show
+from planners.notebook import counted
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.pddl_text import domain_text
 from planners.pddl.robots import fluent_predicates, static_atoms
@@ -59,10 +60,11 @@ class Guarantee:
 
     @property
     def claim(self) -> str:
-        """The bound as it is told where nobody has checked it."""
-        if self.lower_bound == 1:
-            return "nothing is claimed of fewer words"
-        return f"the file claims at least {self.lower_bound} words; not checked here"
+        """The bound and the method as they are told where nobody has checked them."""
+        return (
+            f"the file claims at least {counted(self.lower_bound, 'word')} ({self.method}); "
+            "not checked here"
+        )
 
 
 @dataclass(frozen=True, slots=True)

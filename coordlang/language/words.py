@@ -109,13 +109,13 @@ class Language:
 
     def _repr_html_(self) -> str:
         """A table for notebooks: the words with their numbers of states."""
-        g, sizes = self.guarantee, self.sizes()
+        sizes = self.sizes()
         rows = [
             (word, f"{sizes[word]:,}{' and every other state' * (word == self.default)}")
             for word in self.words
         ]
         return html_table(
-            ("word", "states"), rows, f"{counted(len(rows), 'word')} ({g.method}; {g.claim})"
+            ("word", "states"), rows, f"{counted(len(rows), 'word')} ({self.guarantee.claim})"
         )
 
     def partition(self, model: JointModel) -> Partition:

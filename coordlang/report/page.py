@@ -197,7 +197,6 @@ def _figures(language: Language) -> list[tuple[str, str, str]]:
             kind.get(str(language.provenance.tasks.get("kind")), ""),
         ),
         ("States", _number(len(language.states)), "on optimal plans of these tasks"),
-        ("Method", g.method, ""),
         *(
             [
                 (

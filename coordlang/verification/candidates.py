@@ -6,7 +6,7 @@ Every walk of the verifiers is that of one goal, so the verdict is that of all p
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 

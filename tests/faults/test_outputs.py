@@ -354,7 +354,7 @@ def test_a_file_that_goes_while_it_is_asked_for_denies_nothing(
     assert path.read_bytes() == b"new"
 
 
-def test_no_certificate_is_written_beside_a_language_of_others(
+def test_a_language_and_its_certificate_are_written_together(
     coordlang: Command, here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Another command writes to the same file while this one works out its certificate."""
@@ -367,11 +367,9 @@ def test_no_certificate_is_written_beside_a_language_of_others(
         return own(built)
 
     monkeypatch.setattr(BuiltLanguage, "certificate", meanwhile)
-    outcome = coordlang(*BUILD, "-o", "l.json", "--certificate", "c.json")
-    assert outcome.code == 2
-    assert "l.json has been replaced meanwhile: no certificate is written" in outcome.err
-    assert [path.name for path in here.iterdir()] == ["l.json"]
-    assert Path("l.json").read_bytes() == b"a language of others"
+    assert coordlang(*BUILD, "-o", "l.json", "--certificate", "c.json").code == 0
+    verified = coordlang("verify", "l.json", *CELLS, "--certificate", "c.json")
+    assert verified.code == 0, verified.err
 
 
 @pytest.mark.parametrize("mode", [0o600, 0o640, 0o666, 0o755])

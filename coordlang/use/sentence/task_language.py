@@ -16,7 +16,7 @@ from coordlang.language.words import Language
 from coordlang.tasks.candidates import Candidates, describe
 from coordlang.tasks.listed import ListedTask, model_of_listed
 from coordlang.use.sentence.fitting_plans import plans_with_sentence
-from coordlang.verification.pieces import verify_spaces
+from coordlang.verification.by_definition import verify
 from planners.cache import search
 from planners.errors import BadInput, OutOfMemory, Position, note
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask
@@ -177,7 +177,7 @@ def _holds(partition: Partition, space: PlanSpace) -> bool:
     False, with a note, where the verification does not fit into the memory.
     """
     try:
-        return verify_spaces(partition, [space]).holds
+        return verify(partition, [space]).holds
     except OutOfMemory as error:
         note(f"what the language promises is not verified here: {error.what}")
         return False

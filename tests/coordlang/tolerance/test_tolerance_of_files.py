@@ -166,7 +166,7 @@ def test_choices_under_wrong_words_within_slack_are_refuted(
     path.write_text(json.dumps(data))
     found = coordlang("choices", path, *SQUARE, "w0")
     assert found.code == 1
-    assert "the file holds no coordination language" in found.err
+    assert "the language does not cover it" in found.err
 
 
 def test_choices_under_words_that_are_too_few_are_not_guaranteed(

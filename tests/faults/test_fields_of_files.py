@@ -1,0 +1,367 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every field of every kind of file, edited: a verdict is true of the edited file, or refused.
+
+What is true is found by listing plans and mixing them (`tests.support.naive`).
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import coordlang as library
+from coordlang.certificate import write_certificate
+from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
+from coordlang.tasks.listed import ListedTask
+from coordlang.use.choices.monitor import Monitor, MonitorError
+from planners.model_options import ModelOptions
+from tests.support import naive
+from tests.support.command import Command, Outcome
+from tests.support.domains import DOMAINS, read
+from tests.support.edited_fields import edits
+from tests.support.naive_failures import failure
+
+CELLS = "three-cells"
+#: How a language is made: the options of `build`, and of `verify`'s files.
+LANGUAGES: dict[str, tuple[str, ...]] = {
+    "all pairs": ("--tasks", "all", "--method", "minimal"),
+    "own task": (),
+    "silence": ("--words", "1"),
+    "slack": ("--slack", "1", "--words-see-slack", "--method", "minimal"),
+    "fewest actions": ("--cost", "makespan+actions", "--remember-actions"),
+}
+_MOST = 3000
+#: Refusals: usage, impossible, limits, bad input.
+_REFUSED = {2, 11, 22, 23, 31, 34}
+
+
+@dataclass
+class Seen:
+    """What was tried: the fields, and how often each exit code of each command came."""
+
+    fields: set[tuple[str, tuple[Any, ...]]] = field(default_factory=set)
+    codes: Counter[tuple[str, int]] = field(default_factory=Counter)
+
+    def __str__(self) -> str:
+        codes = ", ".join(f"{what} {code}: {n}" for (what, code), n in sorted(self.codes.items()))
+        return f"{len(self.fields)} fields, {sum(self.codes.values())} tries ({codes})"
+
+
+def files_of(folder: str) -> tuple[Path, Path]:
+    return DOMAINS / folder / "domain.pddl", DOMAINS / folder / "problem.pddl"
+
+
+@cache
+def _spaces(
+    options: ModelOptions, folder: str, kind: str, listed: tuple[ListedTask, ...]
+) -> Candidates:
+    domain, problem = read(folder)
+    if kind == "all":
+        return all_pairs(domain, [problem], options)
+    if not listed:
+        return from_problems(domain, [problem], options)
+    return from_listed(domain, [problem], list(listed), options)
+
+
+def candidates_of(data: dict[str, Any], folder: str, *, own: bool = False) -> Candidates:
+    """The tasks of a language file, or the problem's own one, with the file's model."""
+    model, tasks = data.get("model", {}), data.get("tasks", {"kind": "problems"})
+    unowned = model.get("unowned", "error")
+    options = ModelOptions(
+        tuple(data.get("robots", ())),
+        unowned=unowned,
+        cost=model.get("cost", "makespan"),
+        remember_actions=model.get("remember_actions", False),
+        slack=data.get("tolerance", {}).get("slack") or 0,
+        words_see_slack=model.get("words_see_slack", False),
+    )
+    listed = tuple(ListedTask(tuple(t["init"]), tuple(t["goal"])) for t in tasks.get("tasks", ()))
+    return _spaces(options, folder, "problems" if own else tasks["kind"], () if own else listed)
+
+
+def mixes(data: dict[str, Any], candidates: Candidates, *, silent: bool = False) -> bool:
+    """Whether the plans of each sentence mix freely, by listing them."""
+    words = data["states"]
+    for space in candidates.spaces:
+        keys = [space.model.codec.key(row) for row in space.rows]
+        word = {n: words.get(key, data["default"]) for n, key in enumerate(keys)}
+        number = {name: n for n, name in enumerate(sorted(set(word.values())))}
+        said = {n: 0 if silent else number[name] for n, name in word.items()}
+        if not naive.is_language(space, said, _MOST):
+            return False
+    return True
+
+
+def fails_as_claimed(data: dict[str, Any], candidates: Candidates) -> bool:
+    """Whether robots fail no more often than the file claims, by listing plans."""
+    claimed = data.get("tolerance", {})
+    if claimed.get("failure_mean") is None:
+        return False
+    found = []
+    for space in candidates.spaces:
+        keys = [space.model.codec.key(row) for row in space.rows]
+        names = [data["states"].get(key, data["default"]) for key in keys]
+        word = [sorted(set(names)).index(name) for name in names]
+        found += [failure(space, task, word, _MOST) for task in range(len(space.starts))]
+    mean, worst = float(sum(found) / len(found)), float(max(found))
+    return bool(mean <= claimed["failure_mean"] and worst <= claimed["failure_worst"])
+
+
+def require_true(data: dict[str, Any], folder: str, verified: Outcome) -> None:
+    """`verify` says of an edited file what is true of it."""
+    if verified.code in _REFUSED:
+        return
+    assert verified.code in (0, 1), verified.err
+    candidates = candidates_of(data, folder)
+    holds = mixes(data, candidates)
+    good = holds or fails_as_claimed(data, candidates)
+    assert good == (verified.code == 0), (verified.out, verified.err)
+    assert holds == verified.out.startswith("verified: ")
+    assert "proved" not in verified.out
+    assert "lower bound" not in verified.out
+
+
+def require_true_repair(data: dict[str, Any], folder: str, built: Outcome, path: Path) -> None:
+    """`build --start` writes a language that is one, with a bound that is one."""
+    assert path.exists() == (built.code == 0)
+    if built.code != 0:
+        assert built.code in _REFUSED, built.err
+        return
+    made = json.loads(path.read_text())
+    candidates = candidates_of(made, folder)
+    assert mixes(made, candidates)
+    bound = 1 if mixes(made, candidates, silent=True) else 2
+    guarantee = made["guarantee"]
+    assert guarantee["lower_bound"] == bound
+    assert guarantee["proved_minimal"] == (bound == len(made["words"]) == guarantee["size"])
+    path.unlink()
+
+
+def require_true_use(
+    data: dict[str, Any], folder: str, found: Outcome, value: Callable[[Any], object]
+) -> None:
+    """What a command says of the own task: covered only if the plans of each sentence mix in it.
+
+    Or, with a warning, if the file claims no more.
+    """
+    if found.code in _REFUSED:
+        return
+    assert found.code in (0, 1), found.err
+    if found.out:
+        candidates = candidates_of(data, folder, own=True)
+        assert found.out.strip() == str(value(candidates))
+        if found.code == 0 and "no coordination language" not in found.err:
+            assert mixes(data, candidates)
+
+
+def sentences(data: dict[str, Any], candidates: Candidates) -> dict[Any, str]:
+    """The sentence of each plan of the own task: plan (as texts) -> words."""
+    (space,) = candidates.spaces
+    found = {}
+    for plan in naive.listed(space, 0, _MOST):
+        keys = [space.model.codec.key(space.rows[n]) for n in naive.states(space, 0, plan)]
+        said = [data["states"].get(key, data["default"]) for key in keys]
+        words = [word for n, word in enumerate(said) if n == 0 or word != said[n - 1]]
+        while plan and not any(space.model.texts(plan[-1])):  # within slack plans end with a rest
+            plan = plan[:-1]
+        found[tuple(space.model.texts(step) for step in plan)] = " ".join(words)
+    return found
+
+
+def _bare(plan: Any) -> Any:
+    """A plan without parentheses, which may be left out."""
+    return tuple(tuple(text and text.strip("()") for text in step) for step in plan)
+
+
+@pytest.mark.parametrize("made", LANGUAGES)
+def test_language_files(coordlang: Command, tmp_path: Path, made: str) -> None:
+    files = files_of(CELLS)
+    path, edited, repaired = (tmp_path / name for name in ("l.json", "e.json", "r.json"))
+    assert coordlang("build", *files, *LANGUAGES[made], "-o", path).code in (0, 3)
+    data = json.loads(path.read_text())
+    del data["producer"]  # shown by nothing
+    own = candidates_of(data, CELLS, own=True)
+    plan, sentence = next(iter(sentences(data, own).items()))
+    steps = tmp_path / "plan.json"
+    steps.write_text(json.dumps({"plans": [{"actions": plan}]}))
+    seen = Seen()
+
+    def tried(what: str, place: Any, *arguments: object) -> Outcome:
+        found = coordlang(*arguments)
+        seen.fields.add((made, place))
+        seen.codes[what, found.code] += 1
+        return found
+
+    for place, other in edits(data, tuple(data["words"])):
+        edited.write_text(json.dumps(other))
+        require_true(other, CELLS, tried("verify", place, "verify", edited, *files))
+        start = "build", *files, "--start", edited, "-o", repaired
+        require_true_repair(other, CELLS, tried("build", place, *start), repaired)
+        said = tried("say", place, "say", edited, *files, steps)
+        require_true_use(other, CELLS, said, lambda own, e=other: sentences(e, own)[plan])  # type: ignore[misc]
+        understood = tried("understand", place, "understand", edited, *files, sentence, "--count")
+        require_true_use(
+            other,
+            CELLS,
+            understood,
+            lambda own, e=other: list(  # type: ignore[misc]
+                sentences(e, own).values()
+            ).count(sentence),
+        )
+        explained = tried("explain", place, "explain", edited, *files)
+        assert "needed" not in explained.out
+        if place[-1] != "method":  # any text, told as what the file claims
+            assert "proved minimal" not in explained.out
+    print(f"{made}: {seen}")
+
+
+def test_certificates(coordlang: Command, tmp_path: Path) -> None:
+    """No certificate proves more than is true: three words suffice."""
+    files = files_of(CELLS)
+    language, proof = tmp_path / "l.json", tmp_path / "c.json"
+    built = library.build(*map(str, files), tasks="all", method="minimal")
+    built.language.save(language)
+    write_certificate(built.certificate(), proof)
+    seen = Seen()
+    for place, other in edits(json.loads(proof.read_text())):
+        proof.write_text(json.dumps(other))
+        found = coordlang("verify", language, *files, "--certificate", proof, "--json")
+        seen.fields.add(("certificate", place))
+        seen.codes["verify", found.code] += 1
+        assert found.code in {0, 1, *_REFUSED}, found.err
+        if found.code == 0:
+            assert json.loads(found.out)["lower_bound"] == 3
+    print(f"certificate: {seen}")
+
+
+def test_lifted_files_and_coordinates(coordlang: Command, tmp_path: Path) -> None:
+    files = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "gw1-2x2.pddl"
+    lifted, edited, ground = (tmp_path / name for name in ("f.json", "e.json", "l.json"))
+    library.lift(*map(str, files), tasks="all", jobs=1).save(lifted)
+    data = json.loads(lifted.read_text())
+    del data["producer"]
+    places = {"coordinates": {f"c{y}-{x}": [x, y] for y in range(2) for x in range(2)}}
+    coordinates = tmp_path / "coordinates.json"
+    seen = Seen()
+    tries = [("lifted", place, other, places) for place, other in edits(data)]
+    tries += [("coordinates", place, data, other) for place, other in edits(places)]
+    for what, place, one, points in tries:
+        edited.write_text(json.dumps(one))
+        coordinates.write_text(json.dumps(points))
+        found = coordlang(
+            *("ground", edited, *files, "--coordinates", coordinates, "-o", ground, "--jobs", 1)
+        )
+        seen.fields.add((what, place))
+        seen.codes["ground", found.code] += 1
+        assert found.code in {0, 1, *_REFUSED}, found.err
+        if found.code == 0:
+            made = json.loads(ground.read_text())
+            domain, problem = read("grid", "gw1-2x2")
+            options = ModelOptions(
+                tuple(made["robots"]),
+                unowned=made["model"]["unowned"],
+                cost=made["model"]["cost"],
+                remember_actions=made["model"]["remember_actions"],
+            )
+            holds = mixes(made, from_problems(domain, [problem], options))
+            assert holds
+            assert made["guarantee"]["method"] == "lifted; verified here"
+            assert made["guarantee"]["lower_bound"] == 1
+    print(seen)
+
+
+def test_task_files_and_plans(coordlang: Command, tmp_path: Path) -> None:
+    files = files_of(CELLS)
+    language, tasks, steps = (tmp_path / name for name in ("l.json", "t.json", "p.json"))
+    assert coordlang("build", *files, "-o", language).code == 0
+    data = json.loads(language.read_text())
+    own = candidates_of(data, CELLS, own=True)
+    seen = Seen()
+    file = {"format": "coordlang/tasks", "version": 1, "tasks": data["tasks"]["tasks"]}
+    for place, other in edits(file):
+        tasks.write_text(json.dumps(other))
+        found = coordlang("verify", language, *files, "--tasks", tasks)
+        seen.fields.add(("tasks", place))
+        seen.codes["verify", found.code] += 1
+        if found.code not in _REFUSED:
+            listed = {"kind": "file", "tasks": other["tasks"]}
+            require_true({**data, "tasks": listed}, CELLS, found)
+    plans = json.loads(coordlang("plans", *files, "--max", 2, "--format", "json").out)
+    known = {_bare(plan): said for plan, said in sentences(data, own).items()}
+    for place, other in edits(plans):
+        steps.write_text(json.dumps(other))
+        found = coordlang("say", language, *files, steps)
+        seen.fields.add(("plans", place))
+        seen.codes["say", found.code] += 1
+        assert found.code in {0, 1, *_REFUSED}, found.err
+        if found.code == 0:
+            told = [known[_bare(plan["actions"])] for plan in other["plans"]]
+            assert found.out.split("\n")[:-1] == told
+    print(seen)
+
+
+def test_choices_files_say_nothing_that_a_monitor_believes(tmp_path: Path) -> None:
+    """What choices files say of the language is for people; the monitor acts on none of it."""
+    files = list(map(str, files_of(CELLS)))
+    built = library.build(*files)
+    sentence = library.explain(built.language, *files, task=True).sentences[0]
+    data = library.choices(built.language, *files, sentence, robot="r1").data()
+    told = {key: value for key, value in data.items() if key not in ("choices", "sentence")}
+    seen = Seen()
+    for place, other in edits(told):
+        seen.fields.add(("choices", place))
+        try:
+            monitor = Monitor({**other, "choices": data["choices"], "sentence": data["sentence"]})
+        except MonitorError:
+            seen.codes["monitor", 31] += 1
+            continue
+        seen.codes["monitor", 0] += 1
+        honest = Monitor(data)
+        while not honest.finished:
+            assert (monitor.allowed(), monitor.remaining) == (honest.allowed(), honest.remaining)
+            step = honest.allowed()[0]
+            monitor.did(step)
+            honest.did(step)
+    print(seen)
+
+
+def test_sentences_of_explain_are_understood(tmp_path: Path) -> None:
+    """`Language.data` is what its file holds, and what `explain` returns `understand` takes."""
+    files = list(map(str, files_of(CELLS)))
+    language = library.build(*files).language
+    language.save(tmp_path / "l.json")
+    assert language.data() == json.loads((tmp_path / "l.json").read_text())
+    for sentence in library.explain(language, *files, task=True).sentences:
+        assert library.understand(language, *files, sentence).count == sentence.plans
+        assert library.plan(language, *files, sentence).sentence == " ".join(sentence.words)
+
+
+def test_a_false_bound_is_not_repeated(coordlang: Command, tmp_path: Path) -> None:
+    """Six words that say they are the fewest, where three are: nobody says it after them."""
+    files = files_of("t-map")
+    path, new = tmp_path / "l.json", tmp_path / "new.json"
+    assert coordlang("build", *files, "--tasks", "all", "--method", "greedy", "-o", path).code == 0
+    data = json.loads(path.read_text())
+    data["words"] += [f"more{n}" for n in range(6 - len(data["words"]))]
+    data["guarantee"] |= {"size": 6, "lower_bound": 6, "proved_minimal": True, "method": "minimal"}
+    path.write_text(json.dumps(data))
+    verified = coordlang("verify", path, *files)
+    assert verified.code == 0
+    assert "not checked: the file claims that at least 6 words are needed" in verified.out
+    repaired = coordlang("build", *files, "--tasks", "all", "--start", path, "-o", new, "--json")
+    figures = json.loads(repaired.out)
+    assert (figures["words"], figures["lower_bound"]) == (6, 2)
+    assert not figures["proved_minimal"]
+    assert figures["method"] == "repair"
+    explained = coordlang("explain", path, *files).out
+    assert "the file claims at least 6 words (minimal); not checked here" in explained
+    page = tmp_path / "page.html"
+    assert coordlang("report", path, *files, "-o", page).code == 0
+    assert "proved minimal" not in page.read_text()
