@@ -13,7 +13,7 @@ import pickle
 import re
 import warnings
 from collections.abc import Callable, Iterator
-from concurrent.futures import CancelledError, Future
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -31,6 +31,10 @@ from planners.signals import postponed_signals
 
 #: Seconds in which a scheduler must answer.
 _CONNECTING = 10.0
+#: .. or in this part of the time that is left.
+_SHARE = 0.8
+#: Whose messages are ours to write.
+_LOGGERS = ("distributed", "tornado", "asyncio")
 #: Seconds between two looks at whether there are workers.
 _TICK = 0.2
 _ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?:[\w.-]+|\[[0-9a-fA-F:.]+\]):\d{1,5}")
@@ -62,19 +66,28 @@ def connected(
     UsageError
         Where no scheduler answers, or the versions of a worker are others than here.
     """
-    loggers = [logging.getLogger(name) for name in ("distributed", "asyncio", "tornado")]
-    levels = [logger.level for logger in loggers]
-    for logger in loggers:
-        logger.setLevel(logging.CRITICAL + 1)  # what matters is raised here, as an error of ours
-    try:
+    distributed = _distributed()
+    with _silence():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # versions are compared below
-            client = _client(where)
+            client = _client(distributed, where)
         try:
             yield partial(ClusterPool, client, where, versions_here(packages), packages, note)
         finally:
             with postponed_signals(), suppress(OSError, TimeoutError, RuntimeError):
                 client.close()
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """Let Dask log nothing in the block: what matters is raised, as an error of ours."""
+    names = [n for n in logging.root.manager.loggerDict if n.partition(".")[0] in _LOGGERS]
+    loggers = [logging.getLogger(name) for name in names]
+    levels = [logger.level for logger in loggers]
+    try:
+        for logger in loggers:
+            logger.setLevel(logging.CRITICAL + 1)
+        yield
     finally:
         for logger, level in zip(loggers, levels, strict=True):
             logger.setLevel(level)
@@ -188,8 +201,8 @@ def _other_version(address: str, difference: str) -> UsageError:
     )
 
 
-def _client(where: str) -> Any:
-    """A client of the cluster; its own library is imported where it is used."""
+def _distributed() -> Any:
+    """The library, imported where it is used."""
     try:
         import distributed
     except ImportError:
@@ -197,11 +210,19 @@ def _client(where: str) -> Any:
             "--scheduler needs the package distributed, which is not installed",
             remedy="Install it: pip install 'coordlang[cluster]'.",
         ) from None
+    return distributed
+
+
+def _client(distributed: Any, where: str) -> Any:
+    """A client of the cluster."""
     address = (
         where if _ADDRESS.fullmatch(where) and not Path(where).exists() else _address_in(where)
     )
-    seconds = min(_CONNECTING, time_left())
+    seconds = min(_CONNECTING, _SHARE * time_left())
     try:
+        # A client that fails goes on trying when it is thrown away: this does not.
+        with ThreadPoolExecutor(1) as thread:  # the caller may be in an event loop
+            thread.submit(asyncio.run, _shake_hands(distributed, address, seconds)).result()
         return distributed.Client(address, timeout=seconds, set_as_default=False)
     # Whatever answers, or a security that does not fit: TypeError, MemoryError of a length that
     # is noise, ..
@@ -212,6 +233,14 @@ def _client(where: str) -> Any:
             remedy="Start one: dask scheduler --scheduler-file FILE; tls:// needs certificates "
             "(docs/cluster.md).",
         ) from None
+
+
+async def _shake_hands(distributed: Any, address: str, seconds: float) -> None:
+    """Connect to a scheduler, and no more."""
+    security = distributed.Security().get_connection_args("client")
+    async with asyncio.timeout(seconds):  # Dask's own does not count the answer
+        comm = await distributed.comm.connect(address, timeout=seconds, **security)
+    await comm.close()
 
 
 class _SchedulerFile(msgspec.Struct):

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import re
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 
 from tests.support.cluster import ENVIRONMENT, needs_distributed, running_cluster
@@ -96,7 +98,7 @@ def test_two_terminals_with_a_worker_killed_in_the_middle(folder: Path) -> None:
     assert worker != command("workers")  # two commands with one worker each: one is killed whole
     with running_cluster(folder, 2, command("scheduler"), worker) as cluster:
         process = client(command("build"), folder)
-        until(lambda: list(folder.glob("jobs/*.job")) or process.poll() is not None, 120)
+        until(lambda: list(folder.glob("jobs/*.table")) or process.poll() is not None, 120)
         assert process.poll() is None, process.communicate()
         cluster.workers[0].kill(signal.SIGKILL)
         _, err = process.communicate(timeout=300)
@@ -110,6 +112,59 @@ def test_the_workers_of_the_page_are_two(folder: Path) -> None:
     with running_cluster(folder, 1, command("scheduler"), command("workers")) as cluster:
         log = cluster.workers[0].log
         until(lambda: log.read_text().count("Registered to") >= 2, 60)
+
+
+@needs_distributed
+def test_the_cluster_of_the_page_listens_on_this_machine_only(folder: Path) -> None:
+    with running_cluster(folder, 1, command("scheduler"), command("workers")) as cluster:
+        log = cluster.workers[0].log
+        until(lambda: log.read_text().count("Registered to") >= 2, 60)
+        hosts = [
+            connection.laddr.ip
+            for started in (cluster.scheduler, *cluster.workers)
+            for process in started.processes()
+            for connection in process.net_connections("inet")
+            if connection.status == psutil.CONN_LISTEN
+        ]
+    assert len(hosts) >= 4  # the scheduler, two workers, and who starts them
+    assert set(hosts) == {"127.0.0.1"}
+
+
+@needs_distributed
+@pytest.mark.thorough
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="the program openssl is not there")
+def test_only_who_has_a_key_joins(folder: Path) -> None:
+    key = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-subj", "/CN=coordlang"]
+    subprocess.run(
+        [*key, "-keyout", "key.pem", "-out", "cert.pem"],
+        cwd=folder,
+        check=True,
+        capture_output=True,
+    )
+    shutil.copy(folder / "cert.pem", folder / "ca.pem")
+    found = re.search(r"<!-- tls -->\n```sh\n(.*?)```\n", PAGE, re.DOTALL)
+    assert found is not None
+    (folder / "keys.sh").write_text(found[1])
+    here = "--host 127.0.0.1"
+    scheduler = (
+        f"dask scheduler --protocol tls --no-dashboard {here} --scheduler-file scheduler.json"
+    )
+    worker = f"dask worker --no-dashboard {here} --protocol tls --scheduler-file scheduler.json"
+    task = "domains/grid/domain.pddl domains/grid/corners-3x3.pddl"
+    work = f"-m coordlang coordination {task} --scheduler scheduler.json"
+    with running_cluster(
+        folder, 1, f"sh -c '. ./keys.sh; exec {scheduler}'", f"sh -c '. ./keys.sh; exec {worker}'"
+    ):
+        for keys, code in (". ./keys.sh; ", 0), ("", 2):
+            done = subprocess.run(
+                ["sh", "-c", f"{keys}{sys.executable} {work}"],
+                cwd=folder,
+                env=ENVIRONMENT,
+                capture_output=True,
+                text=True,
+            )
+            assert done.returncode == code, done.stderr
+            assert ("no Dask scheduler answers" in done.stderr) == (code == 2)
 
 
 @pytest.mark.skipif(

@@ -14,6 +14,7 @@ from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 
+import psutil
 import pytest
 
 from tests.support.domains import ROOT
@@ -53,6 +54,11 @@ class Started:
         with suppress(ProcessLookupError):
             os.killpg(self._process.pid, number)
 
+    def processes(self) -> list[psutil.Process]:
+        """Its processes."""
+        first = psutil.Process(self._process.pid)
+        return [first, *first.children(recursive=True)]
+
     def end(self) -> None:
         """End all of it."""
         self.kill(signal.SIGTERM)
@@ -89,13 +95,9 @@ class Cluster:
             started.end()
 
 
-SCHEDULER = (
-    "dask scheduler --scheduler-file scheduler.json --host 127.0.0.1 --port 0 --no-dashboard"
-)
-WORKER = (
-    "dask worker --scheduler-file scheduler.json --nworkers 1 --nthreads 1 --memory-limit 1GiB "
-    "--no-dashboard"
-)
+_HERE = "--host 127.0.0.1 --no-dashboard --dashboard-address 127.0.0.1:0"
+SCHEDULER = f"dask scheduler --scheduler-file scheduler.json --port 0 {_HERE}"
+WORKER = f"dask worker --scheduler-file scheduler.json --nworkers 1 --nthreads 1 --memory-limit 1GiB {_HERE}"
 
 
 @contextmanager

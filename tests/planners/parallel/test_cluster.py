@@ -3,9 +3,13 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
+import socket
 import socketserver
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,7 +23,8 @@ from planners.parallel import dask_cluster
 from planners.parallel.workers import Workers
 from planners.parallel.workers import workers as opened
 from tests.support import jobs
-from tests.support.cluster import Cluster, needs_distributed, running_cluster
+from tests.support.cluster import ENVIRONMENT, Cluster, needs_distributed, running_cluster
+from tests.support.domains import ROOT
 from tests.support.jobs import batch
 from tests.support.processes import until, workers
 
@@ -116,8 +121,19 @@ def noise() -> Iterator[str]:
         server.shutdown()
 
 
+@pytest.fixture
+def silence() -> Iterator[str]:
+    """The address of a port where nobody answers."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        yield f"tcp://127.0.0.1:{server.getsockname()[1]}"
+
+
 def test_there_is_no_cluster(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, noise: str, capfd: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    noise: str,
+    silence: str,
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr(dask_cluster, "_CONNECTING", 1.0)
     (tmp_path / "not.json").write_text("nothing")
@@ -126,6 +142,7 @@ def test_there_is_no_cluster(
     os.mkfifo(tmp_path / "pipe")
     for where in (
         noise,
+        silence,
         noise.replace("tcp", "tls"),
         "tcp://127.0.0.1:9",
         "127.0.0.1:9",
@@ -138,7 +155,24 @@ def test_there_is_no_cluster(
     ):
         with pytest.raises(UsageError, match="scheduler"), opened(scheduler=where):
             pytest.fail("there is none")
+    gc.collect()  # a client that has failed would go on
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("answer", ["noise", "silence"])
+def test_the_command_says_it_within_its_limit(answer: str, request: pytest.FixtureRequest) -> None:
+    world = ROOT / "domains" / "grid"
+    arguments = ["coordination", world / "domain.pddl", world / "corners-3x3.pddl"]
+    limits = ["--scheduler", request.getfixturevalue(answer), "--time-limit", "4"]
+    done = subprocess.run(
+        [sys.executable, "-m", "coordlang", *arguments, *limits],
+        capture_output=True,
+        text=True,
+        env=ENVIRONMENT,
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert len(done.stderr.splitlines()) == 2
+    assert "no Dask scheduler answers" in done.stderr
 
 
 @pytest.mark.slow
