@@ -20,11 +20,11 @@ from coordlang.api.optimal_plans import OptimalPlans
 from coordlang.api.options import Listing, Source
 from coordlang.api.presenting import Presented
 from coordlang.commands.keywords import with_options
-from planners.cache import search
 from planners.loading import PlanningInstance
 from planners.notebook import counted, html_table
 from planners.options import group, option
 from planners.search.heuristics import SearchHeuristic
+from planners.search.kept_plans import search
 from planners.search.optimal_plans import search as bounded_search
 from planners.search.plans import Plans
 

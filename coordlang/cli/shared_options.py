@@ -126,11 +126,10 @@ def kept_plans(function: CommandFunction) -> CommandFunction:
         require_libraries()  # before what imports them
         if no_cache:
             return function(**arguments)
-        from planners.cache import keeping_plans
-        from planners.cache.folder import Folder, default_folder
+        from planners.search.kept_plans import default_folder, keeping_plans, plan_store
 
         place = default_folder()
-        with keeping_plans(None if place is None else Folder(place)):
+        with keeping_plans(None if place is None else plan_store(place)):
             return function(**arguments)
 
     return wrapped
@@ -163,7 +162,7 @@ def jobs_options(function: CommandFunction) -> CommandFunction:
 
         if resume is not None:
             check_outputs(
-                [("--resume", os.path.join(resume, ".job") if resume else "")],
+                [("--resume", os.path.join(resume, ".table") if resume else "")],
                 [],
                 makes_folder=True,
             )

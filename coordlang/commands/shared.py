@@ -67,9 +67,8 @@ def limited(limits: Limits, kept: Kept) -> Iterator[None]:
         stack.enter_context(limited_memory(most))
         stack.enter_context(time_limit(limits.time_limit))
         if not kept.no_cache:
-            from planners.cache import keeping_plans
-            from planners.cache.folder import Folder, default_folder
+            from planners.search.kept_plans import default_folder, keeping_plans, plan_store
 
             place = default_folder()
-            stack.enter_context(keeping_plans(None if place is None else Folder(place)))
+            stack.enter_context(keeping_plans(None if place is None else plan_store(place)))
         yield

@@ -15,11 +15,11 @@ from coordlang.language.words import Language
 from coordlang.required.miscoordination import Miscoordination, miscoordination
 from coordlang.tasks.listed import goal_text, planning_task
 from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
-from planners.cache import search
 from planners.errors import OutOfMemory, Position, ProvedImpossible, UsageError
 from planners.joint.model import PlanningTask
 from planners.model_options import ModelOptions
 from planners.pddl.lifted import Domain, Problem
+from planners.search.kept_plans import search
 
 #: Tasks looked at for each one shown, so that enough of them require coordination.
 _TRIES = 12

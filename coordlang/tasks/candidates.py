@@ -13,12 +13,12 @@ import numpy as np
 from coordlang.tasks.listed import ListedTask, goal_text, listed_task, model_of_listed
 from coordlang.tasks.reached import MOST_STATES, explored_if_small, surely_unreachable, unchecked
 from coordlang.tasks.shared_search import SharedSearch
-from planners.cache import search, search_each
 from planners.errors import BadInput, Position, ProvedImpossible, note
 from planners.joint.model import NO_FACT, FullState, Goal, JointModel, PlanningTask
 from planners.loading import PlanningInstance, build
 from planners.model_options import ModelOptions
 from planners.pddl.lifted import Domain, Problem
+from planners.search.kept_plans import search, search_each
 from planners.search.optimal_plans import joined, plan_spaces, solvable
 from planners.search.plan_space import PlanSpace
 from planners.search.portions import Explored, PlanSpaces, Searched, Source

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from planners.cache import search
 from planners.joint.model import Goal, JointModel, PlanningTask
+from planners.search.kept_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.tables import find_rows
 

@@ -17,13 +17,13 @@ from coordlang.required.fewest_actions import FEWEST, fewest_actions
 from coordlang.required.miscoordination import Miscoordination, miscoordination
 from coordlang.tolerance.failures import NONE, Failures, failures
 from coordlang.tolerance.sampled import FailureEstimate
-from planners.cache import keeping_plans, search, shared_folder
-from planners.cache.folder import Folder
 from planners.joint.model import JointModel, PlanningTask
 from planners.loading import PlanningInstance
 from planners.notebook import counted
 from planners.parallel.batch import Batch, Table, digest
+from planners.parallel.store import Store
 from planners.parallel.workers import Workers
+from planners.search.kept_plans import keeping_plans, search, store_in_use
 from planners.search.plan_file import json_count
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
@@ -84,12 +84,12 @@ def answers(loaded: PlanningInstance, workers: Workers) -> list[TaskAnswer]:
     numbers = range(len(tasks))
     hashes = (loaded.domain.source.sha256, *(p.source.sha256 for p in loaded.problems))
     identity = digest(*hashes, repr(loaded.options))
-    shared = (model, tasks, shared_folder())
+    shared = (model, tasks, store_in_use())
     batch = Batch("coordination", _answer, shared, numbers, identity, [effort for _ in numbers])
     return [_read_answer(table) for table in workers.tables(batch)]
 
 
-def _answer(shared: tuple[JointModel, Sequence[PlanningTask], Folder | None], number: int) -> Table:
+def _answer(shared: tuple[JointModel, Sequence[PlanningTask], Store | None], number: int) -> Table:
     """One job: a task."""
     model, tasks, folder = shared
     with keeping_plans(folder):

@@ -11,12 +11,16 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, replace
 from os import PathLike
+from pathlib import Path
 from typing import Protocol
 
-from planners.errors import OutOfMemory
+import numpy as np
+
+from planners.errors import OutOfMemory, UsageError
 from planners.limits import has_memory_limit, memory_left
 from planners.parallel.batch import Batch, Done, Table
-from planners.parallel.store import KeptJobs
+from planners.parallel.store import Store
+from planners.parallel.versions import code_hash
 
 #: Estimated work, in nodes times robots, from which processes pay: each costs about half a second
 #: to start, in which one of them does some 100,000.
@@ -77,7 +81,7 @@ class Workers:
 
     processes: int = 1
     cluster: Callable[[Batch], Pool] | None = None
-    kept: KeptJobs | None = None
+    kept: Store | None = None
     worth: float = WORTH_PROCESSES
 
     def run(self, batch: Batch) -> Generator[Done]:
@@ -93,9 +97,9 @@ class Workers:
         if self.kept is None:
             yield from self._run(batch)
             return
-        paths = self.kept.keys(batch)
+        keys = _keys(batch)
         left = []
-        for number, key in enumerate(paths):
+        for number, key in enumerate(keys):
             table = self.kept.read(key)
             if table is None:
                 left.append(number)
@@ -110,7 +114,7 @@ class Workers:
             for done in following:
                 number = left[done.number]
                 if done.table is not None:
-                    self.kept.write(paths[number], done.table)
+                    self.kept.write(keys[number], done.table)
                 yield replace(done, number=number)
 
     def tables(self, batch: Batch) -> Generator[Table]:
@@ -208,6 +212,24 @@ def _require_more_tries(batch: Batch, lost: list[int], tries: Counter[int]) -> N
         )
 
 
+def _keys(batch: Batch) -> list[str]:
+    """The key of each job: of the function, what it works on, and the code."""
+    package = batch.function.__module__.partition(".")[0]
+    code = code_hash(package), code_hash("planners"), f"numpy {np.version.version}"
+    return [batch.key(number, " ".join(code)) for number in range(len(batch.jobs))]
+
+
+def _made(folder: Path) -> Path:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(
+            f"{folder} cannot be made: {error.strerror}",
+            remedy="Say --resume DIR, with a folder that you may write to.",
+        ) from None
+    return folder
+
+
 def cores() -> int:
     """The processors that this process may use, or, where the system does not say, all of them."""
     if hasattr(os, "sched_getaffinity"):
@@ -244,7 +266,7 @@ def workers(
         Where there is no such cluster, or no such folder can be made.
     """
     with ExitStack() as stack:
-        kept = None if resume is None else KeptJobs.in_folder(resume, note)
+        kept = None if resume is None else Store(_made(Path(resume)), say=note)
         cluster = None
         if scheduler is not None:
             from planners.parallel.dask_cluster import connected

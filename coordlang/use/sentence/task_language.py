@@ -17,13 +17,13 @@ from coordlang.tasks.candidates import Candidates, describe
 from coordlang.tasks.listed import ListedTask, model_of_listed
 from coordlang.use.sentence.fitting_plans import plans_with_sentence
 from coordlang.verification.by_definition import verify
-from planners.cache import search
 from planners.errors import BadInput, OutOfMemory, Position, note
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask
 from planners.messages import echoed
 from planners.model_options import ModelOptions
 from planners.pddl.formula_tree import conjuncts
 from planners.pddl.lifted import Domain, Problem
+from planners.search.kept_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.tables import Ints
 

@@ -11,9 +11,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from planners.cache import searching
 from planners.joint.model import JointModel, PlanningTask
-from planners.search import optimal_plans
+from planners.search import kept_plans, optimal_plans
 from planners.search.plan_space import PlanSpace
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
@@ -36,7 +35,7 @@ def no_search(monkeypatch: pytest.MonkeyPatch) -> None:
 
     # Not in its own module: what is imported now would keep it.
     other = SimpleNamespace(search=refused, joined=optimal_plans.joined)
-    monkeypatch.setattr(searching, "optimal_plans", other)
+    monkeypatch.setattr(kept_plans, "optimal_plans", other)
 
 
 def commands(language: Path, plan: Path, sentence: str) -> dict[str, tuple[object, ...]]:
@@ -100,7 +99,7 @@ def test_damage_is_said(coordlang: Command, folder: Path) -> None:
     entry.write_bytes(whole[:-1])
     outcome = coordlang(*arguments)
     assert (outcome.code, outcome.out) == (0, "18\n")
-    assert f"{entry} is damaged: it is ignored, and the task is searched again" in outcome.err
+    assert f"{entry} is damaged: it is ignored, and its result is worked out again" in outcome.err
     assert entry.read_bytes() == whole
     assert coordlang(*arguments).err == ""
 

@@ -22,7 +22,7 @@ from coordlang.verification.by_definition import verify
 from coordlang.verification.candidates import verify_candidates
 from planners.errors import BadInput, ProvedImpossible
 from planners.loading import load
-from planners.parallel.store import KeptJobs
+from planners.parallel.store import Store
 from planners.parallel.workers import Workers
 from planners.search.portions import Explored, Searched, cut
 from tests.support.domains import DOMAINS, all_tasks
@@ -130,7 +130,7 @@ def test_goals_are_cut_by_their_efforts_alone() -> None:
 def test_processes_and_kept_jobs_change_nothing(tmp_path: Path) -> None:
     candidates = all_tasks("grid", "gw1-2x2")
     whole = differences(candidates, HERE, portion=60.0)
-    kept = replace(EAGER, kept=KeptJobs.in_folder(tmp_path / "kept", pytest.fail))
+    kept = replace(EAGER, kept=Store(tmp_path / "kept", say=pytest.fail))
     for workers in (EAGER, kept, kept):
         again = differences(candidates, workers, portion=60.0)
         assert repr(again) == repr(whole)

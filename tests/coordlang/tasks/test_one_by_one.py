@@ -15,14 +15,13 @@ from coordlang.tasks import reached
 from coordlang.tasks.candidates import Candidates, describe, from_listed
 from coordlang.tasks.listed import ListedTask, goal_text
 from coordlang.tasks.reached import explored_if_small, surely_unreachable
-from planners.cache import searching
 from planners.errors import BadInput, Note, ProvedImpossible
 from planners.joint.model import JointModel, PlanningTask
 from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem, read_domain, read_problem
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.sexpr import Source
-from planners.search import optimal_plans
+from planners.search import kept_plans, optimal_plans
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans, counts
 from planners.search.reachable import explore
@@ -54,7 +53,7 @@ def searches(monkeypatch: pytest.MonkeyPatch) -> list[str]:
             done.append(task.name)
             return optimal_plans.search(model, task)
 
-    monkeypatch.setattr(searching, "optimal_plans", Counting)
+    monkeypatch.setattr(kept_plans, "optimal_plans", Counting)
     return done
 
 

@@ -15,7 +15,7 @@ from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary.failing_tuples import FailingTuples
 from coordlang.vocabulary.refuter import Refuter
-from planners.parallel.store import KeptJobs
+from planners.parallel.store import Store
 from planners.parallel.workers import Workers
 from planners.tables import Ints
 from tests.support.domains import all_tasks, own_task
@@ -104,7 +104,7 @@ def test_first_walks_find_the_same_in_other_processes_and_from_kept_jobs(
     def refuter(workers: Workers | None, first: Ints | None = None) -> Refuter:
         return Refuter(candidates.spaces, group, states, 0, first=first, workers=workers)
 
-    kept = Workers(kept=KeptJobs.in_folder(tmp_path, pytest.fail))
+    kept = Workers(kept=Store(tmp_path, say=pytest.fail))
     here = refuter(None)
     others = [refuter(workers) for workers in (Workers(2, worth=0), kept, kept)]
     jobs = len(list(tmp_path.iterdir()))

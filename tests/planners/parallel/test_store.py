@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Kept jobs: read again, never for another job, and never when they are damaged."""
+"""Kept results: read again, never for another job, never when damaged, and never executed."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+import sys
+from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -14,88 +17,125 @@ from hypothesis import strategies as st
 
 from planners.errors import UsageError
 from planners.parallel.batch import Batch, digest
-from planners.parallel.store import KeptJobs, as_bytes, from_bytes
-from planners.parallel.workers import Workers
-from tests.support import jobs
+from planners.parallel.store import Store, as_bytes, from_bytes
+from planners.parallel.workers import Workers, workers
+from tests.support import jobs as support
 from tests.support.jobs import batch
-
-
-def kept(folder: Path, note: Callable[[str], object] = pytest.fail) -> Workers:
-    return Workers(kept=KeptJobs.in_folder(folder, note))  # type: ignore[arg-type]
-
-
-def results(workers: Workers, given: Batch) -> list[list[int]]:
-    return [table["values"].tolist() for table in workers.tables(given)]
-
 
 PARTS = [range(low, low + 2) for low in range(0, 10, 2)]
 
 
-def test_what_is_kept_is_not_done_again(tmp_path: Path) -> None:
-    workers = kept(tmp_path / "folder")
-    first = results(workers, batch(jobs.squares, 3, PARTS))
-    assert len(list((tmp_path / "folder").iterdir())) == 5
-    kept_files = {path: path.stat().st_mtime_ns for path in (tmp_path / "folder").iterdir()}
-    assert results(workers, batch(jobs.squares, 3, PARTS)) == first
-    assert kept_files == {p: p.stat().st_mtime_ns for p in (tmp_path / "folder").iterdir()}
-    results(workers, batch(jobs.squares, 4, PARTS))  # of other words, as it were
-    assert len(list((tmp_path / "folder").iterdir())) == 10
-    results(workers, batch(jobs.squares, 3, [*PARTS, range(3)]))  # more of the same
-    assert len(list((tmp_path / "folder").iterdir())) == 11
+def results(store: Store, given: Batch) -> tuple[list[list[int]], int]:
+    """The results, and how many tables were not kept before."""
+    before = set(store.path.glob("*.table"))
+    found = [table["values"].tolist() for table in Workers(kept=store).tables(given)]
+    return found, len(set(store.path.glob("*.table")) - before)
 
 
-@pytest.mark.parametrize("damage", [b"", b"coordlang table 1\n", b"x" * 500, None])
-def test_a_damaged_file_is_said_and_its_job_done_again(
-    damage: bytes | None, tmp_path: Path
+def test_what_is_kept_is_not_done_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    squares = batch(support.squares, 3, PARTS)
+    store = Store(tmp_path / "folder", say=pytest.fail)
+    first, new = results(store, squares)
+    assert new == 5
+    assert results(store, batch(support.squares, 4, PARTS))[1] == 5  # of other words, as it were
+    more = results(store, batch(support.squares, 3, [*PARTS, range(3)]))  # more of the same
+    assert more == ([*first, [0, 3, 12]], 1)
+    monkeypatch.setattr(support, "squares", None)
+    assert results(store, replace(squares)) == (first, 0)
+
+    def other(_: str) -> str:
+        return "other code"
+
+    monkeypatch.setattr(sys.modules[Workers.__module__], "code_hash", other)
+    assert results(store, squares)[1] == 5
+
+
+@pytest.mark.parametrize("damage", [b"", b"coordlang table 1\n", b"x" * 500, None, "other"])
+def test_a_damaged_table_is_worked_out_again_and_said(
+    damage: bytes | str | None, tmp_path: Path
 ) -> None:
-    squares = batch(jobs.squares, 3, PARTS)
-    notes: list[str] = []
-    workers = kept(tmp_path, notes.append)
-    first = results(workers, squares)
-    path = sorted(tmp_path.iterdir())[2]
+    squares, notes = batch(support.squares, 3, PARTS), list[str]()
+    store = Store(tmp_path, say=notes.append)
+    first, _ = results(store, squares)
+    path, other = sorted(tmp_path.iterdir())[2:4]
     whole = path.read_bytes()
-    path.write_bytes(whole[:-1] + b"?" if damage is None else damage)
-    assert results(workers, squares) == first
-    assert notes == [f"{path} is damaged: its job is done again"]
+    if damage == "other":
+        path.write_bytes(other.read_bytes())
+    else:
+        path.write_bytes(damage if isinstance(damage, bytes) else whole[:-1] + b"?")
+    assert results(store, squares)[0] == first
+    assert notes == [f"{path} is damaged: it is ignored, and its result is worked out again"]
     assert path.read_bytes() == whole
 
 
-@pytest.mark.parametrize("make", [os.mkfifo, Path.mkdir])
-def test_what_is_no_file_is_said_and_left(make: Callable[[Path], None], tmp_path: Path) -> None:
-    """Nobody waits for whoever may write into a pipe, or read from it."""
-    notes: list[str] = []
-    workers, squares = kept(tmp_path, notes.append), batch(jobs.squares, 3, PARTS)
-    first = results(workers, squares)
-    path = sorted(tmp_path.iterdir())[2]
-    path.unlink()
-    make(path)
-    assert results(workers, squares) == first
-    assert len(notes) == 1
-    assert notes[0].endswith("its job is done again")
-
-
-def test_no_folder(tmp_path: Path) -> None:
-    (tmp_path / "file").touch()
-    with pytest.raises(UsageError, match="cannot be made"):
-        kept(tmp_path / "file" / "folder")
+def test_what_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
+    squares, notes = batch(support.squares, 3, PARTS), list[str]()
+    store = Store(tmp_path, say=notes.append)
+    first, _ = results(store, squares)
+    pipe, folder, device, link, *_ = sorted(tmp_path.iterdir())
+    for path in (pipe, folder, device, link):
+        path.unlink()
+    os.mkfifo(pipe)
+    folder.mkdir()
+    device.symlink_to("/dev/zero")
+    link.symlink_to(link)
+    assert results(store, squares)[0] == first
+    assert sorted(note.partition(":")[0] for note in notes) == sorted(
+        [
+            f"{pipe} is no file",
+            f"{folder} cannot be read (Is a directory)",
+            f"{device} is no file",
+            f"{link} cannot be read (Too many levels of symbolic links)",
+        ]
+    )
+    assert folder.is_dir()
+    assert store.path.joinpath(pipe).is_file()
 
 
 @given(st.binary(max_size=300))
 def test_no_bytes_are_taken_for_a_table(data: bytes) -> None:
-    assert from_bytes(data) is None
-    assert from_bytes(b"coordlang table 1\n" + data) is None
+    assert from_bytes("k", data) is None
+    head = b"coordlang table 1\n" + sha256(b"k\n" + data).hexdigest().encode() + b"\n"
+    assert from_bytes("k", head + data) is None  # whoever writes may know the hash
+
+
+@pytest.mark.parametrize(
+    "arrays",
+    [
+        [["a", "|O", [1]]],
+        [["a", "<i8", [-1]]],
+        [["a", "<i8", [10**12]]],
+        [["a", "<i8", [2**70]]],
+        [["a", "<i8", [2]]],
+        [["a", "<i8", []], ["b", "<i8", []]],
+        [["a", "nothing", [1]]],
+        [["a", "<U999999999", [1]]],
+        [["a", "i4,O", [1]]],
+        [],
+        {},
+    ],
+)
+def test_no_description_of_arrays_is_believed(arrays: object) -> None:
+    data = msgspec.json.encode(arrays) + b"\n" + bytes(8)
+    head = b"coordlang table 1\n" + sha256(b"k\n" + data).hexdigest().encode() + b"\n"
+    assert from_bytes("k", head + data) is None
 
 
 def test_tables_are_read_as_they_were_written() -> None:
-    table = {"a": np.arange(6).reshape(2, 3), "text": np.array("ß"), "empty": np.zeros((0, 2))}
-    read = from_bytes(as_bytes(table))
+    table = {
+        "a": np.arange(6).reshape(2, 3),
+        "text": np.array("ß"),
+        "empty": np.zeros((0, 2)),
+        "one": np.array(True),
+    }
+    read = from_bytes("k", as_bytes("k", table))
     assert read is not None
     assert read.keys() == table.keys()
     for name, array in table.items():
         assert (read[name].dtype, read[name].shape) == (array.dtype, array.shape)
         assert (read[name] == array).all()
-    with pytest.raises(ValueError, match="pickle"):
-        as_bytes({"objects": np.array([{}], object)})
+    with pytest.raises(ValueError, match="objects"):
+        as_bytes("k", {"objects": np.array([{}], object)})
 
 
 def test_digests_tell_values_apart() -> None:
@@ -125,3 +165,12 @@ def test_digests_tell_values_apart() -> None:
     assert digest(np.arange(4)[::2]) == digest(np.array([0, 2]))
     with pytest.raises(TypeError, match="no digest"):
         digest({1})
+
+
+def test_no_folder(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with (
+        pytest.raises(UsageError, match="cannot be made"),
+        workers(resume=tmp_path / "file" / "folder"),
+    ):
+        pytest.fail("there is no folder")

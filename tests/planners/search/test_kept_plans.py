@@ -19,19 +19,24 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from planners.cache import keeping_plans, search, searching, shared_folder
-from planners.cache.folder import Folder, default_folder
-from planners.cache.plan_spaces import as_table, key_of, model_digest, plan_space
 from planners.errors import BadInput, Note, ProvedImpossible
 from planners.joint.model import PlanningTask
 from planners.loading import PlanningInstance, build
 from planners.model_options import Cost, ModelOptions
 from planners.parallel.batch import Table
-from planners.parallel.store import as_bytes
+from planners.parallel.store import Store, as_bytes
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
-from planners.search import optimal_plans
+from planners.search import kept_plans, optimal_plans
+from planners.search.kept_plans import (
+    default_folder,
+    keeping_plans,
+    plan_store,
+    search,
+    store_in_use,
+)
 from planners.search.plan_space import PlanSpace
+from planners.search.plan_tables import as_table, key_of, model_digest, plan_space
 from tests.support.domains import DOMAINS
 from tests.support.random_pddl import KINDS, random_model
 
@@ -47,8 +52,8 @@ def loaded(
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Folder:
-    return Folder(tmp_path / "cache")
+def folder(tmp_path: Path) -> Store:
+    return plan_store(tmp_path / "cache")
 
 
 @pytest.fixture
@@ -61,12 +66,12 @@ def searches(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         done.append(task.name)
         return original(model, task, *rest)
 
-    monkeypatch.setattr(searching, "optimal_plans", SimpleNamespace(search=counting))
+    monkeypatch.setattr(kept_plans, "optimal_plans", SimpleNamespace(search=counting))
     return done
 
 
-def entries(folder: Folder) -> list[Path]:
-    return sorted(path for path in folder.path.rglob("*") if path.is_file())
+def entries(folder: Store) -> list[Path]:
+    return sorted(path for path in folder.path.parent.rglob("*") if path.is_file())
 
 
 def same(one: PlanSpace, other: PlanSpace) -> bool:
@@ -81,18 +86,18 @@ def same(one: PlanSpace, other: PlanSpace) -> bool:
     return True
 
 
-def test_nothing_is_kept_unasked(folder: Folder, searches: list[str]) -> None:
+def test_nothing_is_kept_unasked(folder: Store, searches: list[str]) -> None:
     world = loaded()
     search(world.model, world.tasks[0])
-    assert shared_folder() is None
+    assert store_in_use() is None
     with keeping_plans(folder):
-        assert shared_folder() is folder
+        assert store_in_use() is folder
         with keeping_plans(None):
             search(world.model, world.tasks[0])
     assert (len(searches), entries(folder)) == (2, [])
 
 
-def test_a_task_is_searched_once(folder: Folder, searches: list[str]) -> None:
+def test_a_task_is_searched_once(folder: Store, searches: list[str]) -> None:
     first = loaded()
     with keeping_plans(folder):
         found = search(first.model, first.tasks[0])
@@ -104,7 +109,7 @@ def test_a_task_is_searched_once(folder: Folder, searches: list[str]) -> None:
     assert same(found, read)
 
 
-def test_random_models_come_back_as_they_were(folder: Folder, searches: list[str]) -> None:
+def test_random_models_come_back_as_they_were(folder: Store, searches: list[str]) -> None:
     kept = 0
     for seed in range(30):
         text = random_model(seed, KINDS[seed % 3])
@@ -148,7 +153,7 @@ def damages(data: bytes) -> Iterator[bytes]:
         yield data[:position] + bytes([data[position] ^ 1]) + data[position + 1 :]
 
 
-def test_a_damaged_entry_is_ignored_said_and_replaced(folder: Folder, searches: list[str]) -> None:
+def test_a_damaged_entry_is_ignored_said_and_replaced(folder: Store, searches: list[str]) -> None:
     world = loaded()
     with keeping_plans(folder):
         found = search(world.model, world.tasks[0])
@@ -156,7 +161,9 @@ def test_a_damaged_entry_is_ignored_said_and_replaced(folder: Folder, searches: 
         whole = path.read_bytes()
         for number, data in enumerate(damages(whole), 1):
             path.write_bytes(data)
-            with pytest.warns(Note, match="damaged: it is ignored, and the task is searched again"):
+            with pytest.warns(
+                Note, match="damaged: it is ignored, and its result is worked out again"
+            ):
                 assert same(found, search(world.model, world.tasks[0]))
             assert len(searches) == 1 + number
             assert path.read_bytes() == whole
@@ -165,7 +172,7 @@ def test_a_damaged_entry_is_ignored_said_and_replaced(folder: Folder, searches: 
             search(world.model, world.tasks[0])
 
 
-def test_an_entry_of_another_task_is_ignored(folder: Folder, searches: list[str]) -> None:
+def test_an_entry_of_another_task_is_ignored(folder: Store, searches: list[str]) -> None:
     world = loaded()
     other = loaded(problem=PROBLEM.replace("(at r1 c0-0)", "(at r1 c0-1)", 1))
     with keeping_plans(folder):
@@ -174,7 +181,7 @@ def test_an_entry_of_another_task_is_ignored(folder: Folder, searches: list[str]
         search(other.model, other.tasks[0])
         (foreign,) = set(entries(folder)) - {path}
         shutil.copy(foreign, path)
-        with pytest.warns(Note, match="is not of this task"):
+        with pytest.warns(Note, match="is damaged"):
             assert same(found, search(world.model, world.tasks[0]))
     assert len(searches) == 3
 
@@ -249,8 +256,8 @@ def test_plans_that_are_none_in_the_model_are_not_believed() -> None:
 
 def test_the_oldest_entries_go(tmp_path: Path) -> None:
     table = {"numbers": np.arange(1000)}
-    size = len(as_bytes(table))
-    folder = Folder(tmp_path / "cache", most_bytes=5 * size)
+    size = len(as_bytes("k0", table))
+    folder = Store(tmp_path / "cache" / "plans-2", 5 * size)
     for number in range(5):
         folder.write(f"k{number}", table)
         os.utime(folder._path(f"k{number}"), (number, number))
@@ -265,7 +272,7 @@ def test_the_oldest_entries_go(tmp_path: Path) -> None:
     folder.write("k5", table)
     assert sorted(path.name for path in entries(folder)) == [
         ".k9.writing",
-        *("k0", "k2", "k3", "k4", "k5"),
+        *(f"{key}.table" for key in ("k0", "k2", "k3", "k4", "k5")),
     ]
     folder.write("large", {"numbers": np.arange(10_000)})
     assert len(entries(folder)) == 6
@@ -273,7 +280,7 @@ def test_the_oldest_entries_go(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("call", ["fsync", "replace"])
 def test_a_full_disk_is_said(
-    call: str, folder: Folder, searches: list[str], monkeypatch: pytest.MonkeyPatch
+    call: str, folder: Store, searches: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -290,13 +297,13 @@ def test_a_folder_that_cannot_be_written_to(tmp_path: Path, searches: list[str])
     (tmp_path / "file").write_text("")
     world = loaded()
     for place in (tmp_path / "file", tmp_path / "file" / "below"):
-        with keeping_plans(Folder(place)), pytest.warns(Note, match="not kept"):
+        with keeping_plans(plan_store(place)), pytest.warns(Note, match="not kept"):
             search(world.model, world.tasks[0])
     assert len(searches) == 2
 
 
 def test_a_folder_that_is_only_read(
-    folder: Folder, searches: list[str], monkeypatch: pytest.MonkeyPatch
+    folder: Store, searches: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What is there is read, and what is new is not kept (an administrator may write anywhere)."""
     world = loaded()
@@ -308,7 +315,7 @@ def test_a_folder_that_is_only_read(
         search(world.model, world.tasks[0])
         opened = os.open
         for name in ("utime", "unlink", "replace"):
-            monkeypatch.setattr(f"planners.cache.folder.os.{name}", refused)
+            monkeypatch.setattr(f"planners.parallel.store.os.{name}", refused)
         monkeypatch.setattr(
             os, "open", lambda p, f, *m, **k: refused() if f & os.O_CREAT else opened(p, f, *m, **k)
         )
@@ -327,7 +334,7 @@ def test_a_folder_that_is_only_read(
 
 @pytest.mark.parametrize("make", [os.mkfifo, Path.mkdir])
 def test_what_is_no_file_is_not_waited_for(
-    make: Callable[[Path], None], folder: Folder, searches: list[str]
+    make: Callable[[Path], None], folder: Store, searches: list[str]
 ) -> None:
     world = loaded()
     with keeping_plans(folder):
@@ -335,7 +342,7 @@ def test_what_is_no_file_is_not_waited_for(
         (entry,) = entries(folder)
         entry.unlink()
         make(entry)
-        with pytest.warns(Note, match="is ignored, and the task is searched again"):
+        with pytest.warns(Note, match="is ignored, and its result is worked out again"):
             search(world.model, world.tasks[0])
     assert len(searches) == 2
 
@@ -343,7 +350,7 @@ def test_what_is_no_file_is_not_waited_for(
 def test_many_at_once(tmp_path: Path) -> None:
     """Each reader gets a whole entry of its key, or none, while others write it and let it go."""
     tables = {f"k{number}": {"n": np.full(500 + number, number)} for number in range(10)}
-    folder = Folder(tmp_path, most_bytes=6 * len(as_bytes(tables["k0"])))
+    folder = Store(tmp_path / "plans-2", 6 * len(as_bytes("k0", tables["k0"])))
 
     def work(worker: int) -> int:
         read = 0
@@ -359,7 +366,7 @@ def test_many_at_once(tmp_path: Path) -> None:
     with warnings.catch_warnings(), ThreadPoolExecutor(6) as pool:
         warnings.simplefilter("error")
         assert sum(pool.map(work, range(6))) > 20
-    assert all(path.name in tables for path in entries(folder))
+    assert all(path.stem in tables for path in entries(folder))
 
 
 def test_where_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The search for all optimal plans, answered from a store where it was done before."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from planners.errors import CoordlangError, note
+from planners.joint.model import JointModel, PlanningTask
+from planners.search import optimal_plans
+from planners.search.plan_space import PlanSpace
+
+if TYPE_CHECKING:  # what reads and writes files is loaded where plans are kept
+    from planners.parallel.store import Store
+
+#: The version of the tables: those of another one are never looked at, and go in time.
+_FORM = 3
+#: Bytes that all tables together may take.
+_MOST_BYTES = 2**30
+
+
+@dataclass(slots=True)
+class _Cache:
+    """A store, and the digests of the models that were asked about: each is made once."""
+
+    store: Store
+    digests: dict[int, tuple[JointModel, str]] = field(default_factory=dict)
+
+    def key(self, model: JointModel, task: PlanningTask) -> str:
+        from planners.search.plan_tables import key_of, model_digest
+
+        found = self.digests.get(id(model))
+        if found is None:
+            found = self.digests[id(model)] = model, model_digest(model)
+        return key_of(found[1], task)
+
+
+#: What the code inside a `keeping_plans` block uses.  Outside there is none: a library looks into
+#: no folder of its user's unasked.
+_USED: ContextVar[_Cache | None] = ContextVar("plans that are kept", default=None)
+
+
+def plan_store(folder: Path) -> Store:
+    """The store of plans in a folder, bounded."""
+    from planners.parallel.store import Store
+
+    return Store(folder / f"plans-{_FORM}", _MOST_BYTES)
+
+
+def default_folder(environment: Mapping[str, str] = os.environ) -> Path | None:
+    """Where a user's plans are; None where the user wants none, or has no home.
+
+    ``$COORDLANG_CACHE`` if it is set (``off``: none), else ``coordlang`` in ``$XDG_CACHE_HOME``, or
+    in ``~/.cache``.
+    """
+    chosen = environment.get("COORDLANG_CACHE", "")
+    if chosen:
+        return None if chosen.lower() == "off" else Path(chosen)
+    base = environment.get("XDG_CACHE_HOME", "")
+    with suppress(RuntimeError):
+        # By its specification a relative path is ignored.
+        caches = Path(base) if os.path.isabs(base) else Path.home() / ".cache"
+        if caches.parent.is_dir():
+            return caches / "coordlang"
+    return None
+
+
+@contextmanager
+def keeping_plans(store: Store | None) -> Iterator[None]:
+    """Let `search` use a store inside of the block; None: no store."""
+    token = _USED.set(None if store is None else _Cache(store))
+    try:
+        yield
+    finally:
+        _USED.reset(token)
+
+
+def store_in_use() -> Store | None:
+    """The store that `search` uses here, to be used in other processes, too."""
+    used = _USED.get()
+    return None if used is None else used.store
+
+
+def search(model: JointModel, task: PlanningTask) -> PlanSpace:
+    """All optimal plans of one task, see `planners.search.optimal_plans.search`.
+
+    In a block of `keeping_plans` they are read from the store, if they are there, and else kept.
+    Those within slack are not kept, but the optimal ones are, by which they are found.
+    """
+    if model.slack:
+        makespan, _ = search(model.without_slack, task).cost_of(0)
+        return optimal_plans.search_within(model, task, makespan)
+    used = _USED.get()
+    if used is None:
+        return optimal_plans.search(model, task)
+    from planners.search.plan_tables import as_table, plan_space
+
+    key, store = used.key(model, task), used.store
+    table = store.read(key)
+    if table is not None:
+        space = plan_space(table, model, task)
+        if space is not None:
+            return space
+        store.ignore(key, f"a table of {store.path} is not of this task")
+    found = optimal_plans.search(model, task)
+    try:
+        store.write(key, as_table(found))
+    except (OSError, CoordlangError) as error:
+        said = error.strerror if isinstance(error, OSError) else str(error).partition("\n")[0]
+        note(
+            f"the plans that were found are not kept: {said} ({store.path})",
+            remedy="Say --no-cache, or set COORDLANG_CACHE to a folder that you may write to.",
+        )
+    return found
+
+
+def search_each(model: JointModel, tasks: Sequence[PlanningTask]) -> PlanSpace:
+    """`search` for each task, as one plan space in which every task has a goal of its own."""
+    return optimal_plans.joined([search(model, task) for task in tasks])
