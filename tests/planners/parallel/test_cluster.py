@@ -162,7 +162,11 @@ def test_there_is_no_cluster(
 @pytest.mark.parametrize("answer", ["noise", "silence"])
 def test_the_command_says_it_within_its_limit(answer: str, request: pytest.FixtureRequest) -> None:
     world = ROOT / "domains" / "grid"
-    arguments = ["coordination", world / "domain.pddl", world / "corners-3x3.pddl"]
+    arguments: list[str | Path] = [
+        "coordination",
+        world / "domain.pddl",
+        world / "corners-3x3.pddl",
+    ]
     limits = ["--scheduler", request.getfixturevalue(answer), "--time-limit", "4"]
     done = subprocess.run(
         [sys.executable, "-m", "coordlang", *arguments, *limits],
