@@ -9,11 +9,11 @@ import os
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
 import pytest
 
@@ -146,15 +146,15 @@ def ending() -> Iterator[None]:
 @pytest.mark.usefixtures("ending")
 def test_no_file_is_left_between_two(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The signal comes when the file beside has just been made, and nobody knows its name yet."""
-    make = tempfile.mkstemp
+    (tmp_path / "file").write_text("old")
+    make = os.open
 
-    def interrupted(*, prefix: str, dir: Path) -> tuple[int, str]:
-        made = make(prefix=prefix, dir=dir)
+    def interrupted(*arguments: Any, **keywords: Any) -> int:
+        made = make(*arguments, **keywords)
         signal.raise_signal(signal.SIGTERM)
         return made
 
-    monkeypatch.setattr(tempfile, "mkstemp", interrupted)
-    (tmp_path / "file").write_text("old")
+    monkeypatch.setattr(os, "open", interrupted)
     with pytest.raises(Interrupted):
         write_atomically(tmp_path / "file", b"new")
     assert [path.name for path in tmp_path.iterdir()] == ["file"]

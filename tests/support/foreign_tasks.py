@@ -254,7 +254,8 @@ def load(row: Row, cost: str, *, remember_actions: bool = False) -> Any:
     else:
         domain = read_domain(row.arguments[0])
         problem = read_problem(row.arguments[1], domain)
-    return build_model(domain, [problem], ModelOptions(choice, cost, remember_actions))  # type: ignore[arg-type]
+    options = replace(choice, cost=cost, remember_actions=remember_actions)  # type: ignore[arg-type]
+    return build_model(domain, [problem], options)
 
 
 def build(language: Language, seconds: float) -> dict[str, object]:

@@ -171,6 +171,9 @@ def test_build_for_given_problems(coordlang: Command, tmp_path: Path) -> None:
         "reasons": None,
         "failure_mean": 0,
         "failure_worst": 0,
+        "model": {"cost": "makespan"},
+        "unchecked": "not checked: the file claims that at least 2 words are needed, which a "
+        "certificate would prove",
     }
 
 

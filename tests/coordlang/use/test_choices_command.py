@@ -171,8 +171,7 @@ def test_a_broken_language_file(coordlang: Command, cells: Path) -> None:
     outcome = coordlang("choices", cells, *CELLS, "w0")
     assert outcome.code == 1
     assert (
-        "refuted: choices of this task miscoordinate; the file holds no coordination language"
-        in outcome.err
+        "refuted: choices of this task miscoordinate; the language does not cover it" in outcome.err
     )
 
 
