@@ -61,6 +61,8 @@ class Guarantee:
     @property
     def claim(self) -> str:
         """The bound and the method as they are told where nobody has checked them."""
+        if self.lower_bound == 1:
+            return f"{self.method}, as the file says"
         return (
             f"the file claims at least {counted(self.lower_bound, 'word')} ({self.method}); "
             "not checked here"
