@@ -8,8 +8,12 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+import msgspec
 import pytest
 
+from coordlang.api import languages
+from coordlang.building import Built
+from coordlang.certificate import Certificate
 from planners import sat
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
@@ -93,3 +97,24 @@ def test_no_bound_is_above_the_size(
             assert guarantee["lower_bound"] <= guarantee["size"]
         else:
             assert built.code == _INTERNAL, built.err
+
+
+def test_a_certificate_with_too_few_reasons_is_not_written(
+    coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a false refutation leaves them; the language, though right, is not written either."""
+    own = languages.certificate_of
+
+    def too_few(built: Built) -> Certificate:
+        whole = own(built)
+        return msgspec.structs.replace(whole, reasons=whole.reasons[:1])
+
+    monkeypatch.setattr(languages, "certificate_of", too_few)
+    files = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
+    built = coordlang(
+        *("build", *files, "--tasks", "all", "--method", "minimal", "--jobs", 1),
+        *("-o", tmp_path / "language.json", "--certificate", tmp_path / "proof.json"),
+    )
+    assert built.code == _INTERNAL
+    assert "the lower bound is not proved" in built.err
+    assert not [*tmp_path.iterdir()]
