@@ -203,6 +203,7 @@ def test_language_files(coordlang: Command, tmp_path: Path, made: str) -> None:
     plan, sentence = next(iter(sentences(data, own).items()))
     steps = tmp_path / "plan.json"
     steps.write_text(json.dumps({"plans": [{"actions": plan}]}))
+    tasks = ("--tasks", "all") if made == "all pairs" else ()
     seen = Seen()
 
     def tried(what: str, place: Any, *arguments: object) -> Outcome:
@@ -214,7 +215,7 @@ def test_language_files(coordlang: Command, tmp_path: Path, made: str) -> None:
     for place, other in edits(data, tuple(data["words"])):
         edited.write_text(json.dumps(other))
         require_true(other, CELLS, tried("verify", place, "verify", edited, *files))
-        start = "build", *files, "--start", edited, "-o", repaired
+        start = "build", *files, *tasks, "--start", edited, "-o", repaired
         require_true_repair(other, CELLS, tried("build", place, *start), repaired)
         said = tried("say", place, "say", edited, *files, steps)
         require_true_use(other, CELLS, said, lambda told: told[plan])

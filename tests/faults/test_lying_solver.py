@@ -11,8 +11,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from coordlang.api import languages
-from coordlang.building import Built
+from coordlang.building import Built, certificate_of
 from coordlang.certificate import Certificate
 from planners import sat
 from tests.support.command import Command
@@ -103,13 +102,12 @@ def test_a_certificate_with_too_few_reasons_is_not_written(
     coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As a false refutation leaves them; the language, though right, is not written either."""
-    own = languages.certificate_of
 
     def too_few(built: Built) -> Certificate:
-        whole = own(built)
+        whole = certificate_of(built)
         return msgspec.structs.replace(whole, reasons=whole.reasons[:1])
 
-    monkeypatch.setattr(languages, "certificate_of", too_few)
+    monkeypatch.setattr("coordlang.api.languages.certificate_of", too_few)
     files = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
     built = coordlang(
         *("build", *files, "--tasks", "all", "--method", "minimal", "--jobs", 1),
