@@ -133,7 +133,7 @@ def test_waiting_here_or_there_is_one_sentence_and_both_plans_are_named() -> Non
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("more", [{"sees_slack": True}, {"remember_actions": True}])
+@pytest.mark.parametrize("more", [{"words_see_slack": True}, {"remember_actions": True}])
 def test_what_tells_waits_apart(more: dict[str, bool]) -> None:
     seen = shipped("three-cells", "problem", slack=1, every=True, **more)
     assert build_language(seen, "minimal").language.guarantee.proved_minimal
