@@ -23,7 +23,21 @@ if TYPE_CHECKING:
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 
-from generate_extending import ROOMS, in_order  # noqa: E402 - it is beside this file
+#: The folders with modules, packages before what is in them.
+ROOMS = sorted(
+    {
+        path.parent.relative_to(HERE.parent).as_posix()
+        for package in ("planners", "coordlang")
+        for path in (HERE.parent / package).rglob("*.py")
+    },
+    key=lambda room: (not room.startswith("planners"), room),
+)
+
+
+def in_order(folder: Path) -> list[Path]:
+    """The modules of a folder by name."""
+    return sorted(path for path in folder.glob("*.py") if path.name != "__init__.py")
+
 
 import coordlang  # noqa: E402 - the one of this checkout
 
