@@ -58,7 +58,7 @@ nitpick_ignore_regex = [("py:.*", r"Axes|Drawing|types\.Annotated|.*\[.*")]
 
 default_role = "autolink"  # a name in single backticks links to its entry, where it has one
 autodoc_member_order = "bysource"
-autodoc_preserve_defaults = True
+autodoc_preserve_defaults = False  # signatures of functions with options are made, not written
 python_use_unqualified_type_names = True
 autosummary_generate = False
 numpydoc_show_class_members = False
