@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Options records: what a command or function can be asked for, said once.
 
-A record is a frozen dataclass whose fields are made by `option` and `group`. The command line's
-options, the keyword arguments of the Python function, the checks of their values and the tables of
-docs/cli.md all come from it.
+A record is a frozen dataclass whose fields are made by `option` and `group`. The keyword arguments
+of the Python function and the checks of their values come from it.
 """
 
 from __future__ import annotations

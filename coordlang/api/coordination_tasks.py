@@ -22,7 +22,7 @@ from coordlang.tolerance.failures import Failures, estimate_data, estimate_text
 from coordlang.tolerance.sampled import FailureEstimate
 from coordlang.tolerance.task_answers import FewestActions, answers
 from planners.notebook import counted, html_table
-from planners.options import group, option
+from planners.options import group
 from planners.search.plan_file import json_count
 
 
@@ -186,7 +186,6 @@ class Coordination(Presented):
 class CoordinationOptions:
     """What `coordination` can be asked for."""
 
-    as_json: bool = option(False, "One JSON object.", names=("--json",), only="cli")
     source: Source = group(Source)
     work: Jobs = group(Jobs)
 

@@ -13,7 +13,7 @@ from coordlang.api.presenting import Presented
 from coordlang.commands.keywords import with_options
 from planners.classical.fast_downward import optimal_cost
 from planners.errors import ProvedImpossible
-from planners.options import group, option
+from planners.options import group
 from planners.search.optimal_plans import search
 
 
@@ -57,7 +57,6 @@ class CrossCheck(Presented):
 class CheckOptions:
     """What `check` can be asked for."""
 
-    as_json: bool = option(False, "One JSON object.", names=("--json",), only="cli")
     source: Source = group(Source)
 
 

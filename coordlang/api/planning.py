@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from os import fspath
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from coordlang.api.inputs import (
     DomainSource,
@@ -17,7 +17,7 @@ from coordlang.api.inputs import (
 )
 from coordlang.api.layout import WIDTH, wrapped
 from coordlang.api.optimal_plans import OptimalPlans
-from coordlang.api.options import Listing, Source
+from coordlang.api.options import Source
 from coordlang.api.presenting import Presented
 from coordlang.commands.keywords import with_options
 from planners.loading import PlanningInstance
@@ -167,7 +167,6 @@ class InspectOptions:
         "files, one domain and one problem.",
         "DIR",
     )
-    as_json: bool = option(False, "One JSON object.", names=("--json",), only="cli")
     source: Source = group(Source)
 
 
@@ -200,14 +199,9 @@ def inspect(
 class PlansOptions:
     """What `plans` can be asked for."""
 
-    listing: Listing = group(Listing)
-    form: Literal["ipc", "json"] = option(
-        "ipc", "How plans are written.", names=("--format",), only="cli"
-    )
     heuristic: SearchHeuristic = option(
         "auto", "What the search is bounded by; the plans are the same."
     )
-    as_json: bool = option(False, "Short for --format json.", names=("--json",), only="cli")
     source: Source = group(Source)
 
 

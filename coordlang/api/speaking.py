@@ -6,12 +6,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike, fspath
-from typing import Any, Literal
+from typing import Any
 
 from coordlang.api.inputs import DomainSource, File, ProblemSource
 from coordlang.api.language_inputs import LanguageSource, read_task_language
 from coordlang.api.optimal_plans import OptimalPlans, PlanSteps
-from coordlang.api.options import Listing, Source
+from coordlang.api.options import Source
 from coordlang.api.presenting import Presented
 from coordlang.commands.keywords import with_options
 from coordlang.language.tolerance import Tolerance, tolerance_data
@@ -85,7 +85,6 @@ def given_sentence(sentence: SentenceSource | None) -> SentenceSource:
 class SayOptions:
     """What `say` can be asked for."""
 
-    as_json: bool = option(False, "One JSON object.", names=("--json",), only="cli")
     source: Source = group(Source)
 
 
@@ -171,26 +170,6 @@ class SentencePlans(OptimalPlans):
 class UnderstandOptions:
     """What `understand` can be asked for."""
 
-    listing: Listing = group(Listing)
-    form: Literal["ipc", "json", "dot"] = option(
-        "ipc", "How plans are written; dot draws them.", names=("--format",), only="cli"
-    )
-    nodes: int | None = option(
-        None,
-        "Cut the DAG to about N nodes (default: 200 for dot; json: not cut).",
-        "N",
-        least=1,
-        only="cli",
-    )
-    output: str | None = option(
-        None,
-        "Write to this file instead of stdout.",
-        "FILE",
-        names=("-o", "--output"),
-        only="cli",
-        is_output=True,
-    )
-    as_json: bool = option(False, "Short for --format json.", names=("--json",), only="cli")
     source: Source = group(Source)
 
 
@@ -324,10 +303,6 @@ class PlanOptions:
         "PREFERENCE",
     )
     heuristic: HeuristicName = option("relaxed", "The lower bound of A*.")
-    form: Literal["ipc", "json", "plansys2"] = option(
-        "ipc", "How the plan is written.", names=("--format",), only="cli"
-    )
-    as_json: bool = option(False, "Short for --format json.", names=("--json",), only="cli")
     source: Source = group(Source)
 
 
