@@ -63,7 +63,10 @@ class EngineOptions:
                 raise UPUsageError(f"there is no parameter {name!r}: there are {there_are}")
         try:
             if isinstance(robots, str) or not isinstance(robots, Iterable):
-                raise UsageError(f"robots must be a sequence of objects or names, not {robots!r}")
+                raise UsageError(
+                    f"robots must be a sequence, not {robots!r}",
+                    remedy="Give objects or their names in a list.",
+                )
             names = tuple(map(_name, robots))
             kind = None if robot_type is None else _name(robot_type)
             options = cls(names, kind, language=_read(language), **given)
@@ -75,15 +78,19 @@ class EngineOptions:
     def _check(self) -> None:
         """Raise `UsageError` for a value that a parameter does not have."""
         if self.sentence is not None and self.language is None:
-            raise UsageError("a sentence needs its language")
+            raise UsageError("a sentence needs its language", remedy="Give language, too.")
         if self.plan_kind is not None and self.plan_kind not in PLAN_KINDS:
             raise UsageError(
-                f"{self.plan_kind}: plans are partial-order, sequential or time-triggered"
+                f"there is no kind of plans {self.plan_kind}",
+                remedy="Plans are partial-order, sequential or time-triggered.",
             )
         if self.robots and self.robot_type is not None:
-            raise UsageError("give robots or robot_type, not both")
+            raise UsageError("give robots or robot_type, not both", remedy="Leave out one.")
         if not isinstance(self.remember_actions, bool):
-            raise UsageError(f"remember_actions must be True or False, not {self.remember_actions}")
+            raise UsageError(
+                f"remember_actions must not be {self.remember_actions}",
+                remedy="Give True or False.",
+            )
         self._without_language((), None)
 
     def translated(self, problem: Any) -> Translated:
@@ -138,7 +145,9 @@ def _name(thing: Any) -> str:
     """The name of an object or a type, which may be given by it."""
     name = thing if isinstance(thing, str) else getattr(thing, "name", None)
     if not isinstance(name, str):
-        raise UsageError(f"{thing!r} is no object or type and no name of one")
+        raise UsageError(
+            f"{thing!r} is no object or type", remedy="Give one of the problem's, or its name."
+        )
     return name
 
 
@@ -147,6 +156,7 @@ def _read(given: Language | str | None) -> Language | None:
     language = given if given is None or isinstance(given, Language) else read_language(given)
     if language is not None and language.tolerance is not None and language.tolerance.slack:
         raise UsageError(
-            "this language is for plans within slack, and this engine gives optimal plans only"
+            "this language is for plans within slack, and this engine gives optimal plans only",
+            remedy="Build the language without slack.",
         )
     return language
