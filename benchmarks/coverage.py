@@ -136,7 +136,7 @@ def map_of(scenario: Path) -> Path:
 def load(name: str, cost: str) -> PlanningInstance:
     """The joint model of a row."""
     from planners.loading import load as load_files
-    from planners.model_options import ModelOptions
+    from planners.pddl.model_options import ModelOptions
 
     if name.startswith("corners"):
         size, robots = name.split()[1:3]
@@ -158,7 +158,7 @@ def scenario(name: str) -> PlanningInstance:
 
 def far_apart(name: str) -> PlanningInstance:
     """Robots in cells that are far from each other: each new one as far as can be from all."""
-    from coordlang.movingai import read_map
+    from coordlang.sites.movingai import read_map
 
     stem, robots = name.removesuffix(" far apart").rsplit(", ", 1)
     path = SCENARIOS / f"{stem}.map"
@@ -192,7 +192,7 @@ def walked(
 
 def on_map(path: Path, file: Path, agents: int) -> PlanningInstance:
     """The first agents of a scenario file on a map."""
-    from coordlang.movingai import planning_files
+    from coordlang.sites.movingai import planning_files
     from planners.loading import load as load_files
 
     texts = planning_files(path, file, agents)

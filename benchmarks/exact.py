@@ -25,10 +25,10 @@ from gridmap import open_grid, ring
 from benchmarks import frame
 from benchmarks.frame import Figures, KeptRows, PrintedTable, on_grid
 from benchmarks.paper.suite import ROWS
-from coordlang.building import build_language
-from coordlang.tasks.candidates import Candidates, all_pairs
-from planners.limits import time_limit
+from coordlang.commands.building import build_language
+from coordlang.language.candidates import Candidates, all_pairs
 from planners.parallel.workers import Workers
+from planners.system.limits import time_limit
 
 FURTHER = ("open-2x6", "open-3x4", "open-3x5", "open-4x4", "ring-4x5")
 FIGURES = ("rounds", "abstract_rounds", "equivariant_rounds", "counterexamples", "walks", "clauses")

@@ -105,9 +105,9 @@ class Clock:
 
 def build(grid: Grid) -> Figures:
     """From PDDL text to a verified greedy language, in this process."""
+    from coordlang.language.candidates import all_pairs, from_problems
     from coordlang.language.partition import Partition
     from coordlang.required.all_differences import differences
-    from coordlang.tasks.candidates import all_pairs, from_problems
     from coordlang.verification.candidates import verify_candidates
     from coordlang.vocabulary import Job, greedy
     from planners.parallel.workers import Workers

@@ -25,62 +25,62 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from coordlang.api.coordination_tasks import coordination as coordination
-    from coordlang.api.cross_check import check as check
-    from coordlang.api.explaining import explain as explain
-    from coordlang.api.exporting import export as export
-    from coordlang.api.languages import build as build
-    from coordlang.api.languages import load_language as load_language
-    from coordlang.api.languages import verify as verify
-    from coordlang.api.lifting import ground as ground
-    from coordlang.api.lifting import lift as lift
-    from coordlang.api.planning import inspect as inspect
-    from coordlang.api.planning import load as load
-    from coordlang.api.planning import plans as plans
-    from coordlang.api.robot_choices import choices as choices
-    from coordlang.api.simulating import simulate as simulate
-    from coordlang.api.speaking import plan as plan
-    from coordlang.api.speaking import say as say
-    from coordlang.api.speaking import understand as understand
+    from coordlang.commands.coordination_tasks import coordination as coordination
+    from coordlang.commands.cross_check import check as check
+    from coordlang.commands.explaining import explain as explain
+    from coordlang.commands.exporting import export as export
+    from coordlang.commands.languages import build as build
+    from coordlang.commands.languages import load_language as load_language
+    from coordlang.commands.languages import verify as verify
+    from coordlang.commands.lifting import ground as ground
+    from coordlang.commands.lifting import lift as lift
+    from coordlang.commands.planning import inspect as inspect
+    from coordlang.commands.planning import load as load
+    from coordlang.commands.planning import plans as plans
+    from coordlang.commands.robot_choices import choices as choices
+    from coordlang.commands.simulating import simulate as simulate
+    from coordlang.commands.speaking import plan as plan
+    from coordlang.commands.speaking import say as say
+    from coordlang.commands.speaking import understand as understand
+    from coordlang.execution.fitting_plans import NoPlanFits as NoPlanFits
+    from coordlang.execution.monitor import Monitor as Monitor
+    from coordlang.execution.monitor import MonitorError as MonitorError
+    from coordlang.execution.monitor import NotAllowed as NotAllowed
+    from coordlang.execution.monitor import NotPossible as NotPossible
+    from coordlang.execution.plan_sentence import NotAPlan as NotAPlan
+    from coordlang.execution.plan_sentence import NotOptimal as NotOptimal
     from coordlang.language.words import Language as Language
     from coordlang.required.miscoordination import Inseparable as Inseparable
-    from coordlang.use.choices.monitor import Monitor as Monitor
-    from coordlang.use.choices.monitor import MonitorError as MonitorError
-    from coordlang.use.choices.monitor import NotAllowed as NotAllowed
-    from coordlang.use.choices.monitor import NotPossible as NotPossible
-    from coordlang.use.sentence.fitting_plans import NoPlanFits as NoPlanFits
-    from coordlang.use.sentence.plan_sentence import NotAPlan as NotAPlan
-    from coordlang.use.sentence.plan_sentence import NotOptimal as NotOptimal
-    from planners.errors import BadInput as BadInput
-    from planners.errors import CoordlangError as CoordlangError
-    from planners.errors import OutOfMemory as OutOfMemory
-    from planners.errors import OutOfTime as OutOfTime
-    from planners.errors import ProvedImpossible as ProvedImpossible
-    from planners.errors import Refuted as Refuted
-    from planners.errors import Unsupported as Unsupported
-    from planners.errors import UsageError as UsageError
-    from planners.limits import time_limit as time_limit
+    from planners.system.errors import BadInput as BadInput
+    from planners.system.errors import CoordlangError as CoordlangError
+    from planners.system.errors import OutOfMemory as OutOfMemory
+    from planners.system.errors import OutOfTime as OutOfTime
+    from planners.system.errors import ProvedImpossible as ProvedImpossible
+    from planners.system.errors import Refuted as Refuted
+    from planners.system.errors import Unsupported as Unsupported
+    from planners.system.errors import UsageError as UsageError
+    from planners.system.limits import time_limit as time_limit
 
 __version__ = "0.1.0"
 
 #: Module -> the public names that it defines.
 _DEFINED_IN = {
-    "coordlang.api.planning": ("load", "inspect", "plans"),
-    "coordlang.api.cross_check": ("check",),
-    "coordlang.api.coordination_tasks": ("coordination",),
-    "coordlang.api.languages": ("build", "verify", "load_language"),
-    "coordlang.api.lifting": ("lift", "ground"),
-    "coordlang.api.speaking": ("say", "understand", "plan"),
-    "coordlang.api.robot_choices": ("choices",),
-    "coordlang.api.simulating": ("simulate",),
-    "coordlang.api.explaining": ("explain",),
-    "coordlang.api.exporting": ("export",),
+    "coordlang.commands.planning": ("load", "inspect", "plans"),
+    "coordlang.commands.cross_check": ("check",),
+    "coordlang.commands.coordination_tasks": ("coordination",),
+    "coordlang.commands.languages": ("build", "verify", "load_language"),
+    "coordlang.commands.lifting": ("lift", "ground"),
+    "coordlang.commands.speaking": ("say", "understand", "plan"),
+    "coordlang.commands.robot_choices": ("choices",),
+    "coordlang.commands.simulating": ("simulate",),
+    "coordlang.commands.explaining": ("explain",),
+    "coordlang.commands.exporting": ("export",),
     "coordlang.language.words": ("Language",),
-    "coordlang.use.choices.monitor": ("Monitor", "MonitorError", "NotAllowed", "NotPossible"),
-    "coordlang.use.sentence.fitting_plans": ("NoPlanFits",),
-    "coordlang.use.sentence.plan_sentence": ("NotAPlan", "NotOptimal"),
+    "coordlang.execution.monitor": ("Monitor", "MonitorError", "NotAllowed", "NotPossible"),
+    "coordlang.execution.fitting_plans": ("NoPlanFits",),
+    "coordlang.execution.plan_sentence": ("NotAPlan", "NotOptimal"),
     "coordlang.required.miscoordination": ("Inseparable",),
-    "planners.errors": (
+    "planners.system.errors": (
         "CoordlangError",
         "Refuted",
         "UsageError",
@@ -90,7 +90,7 @@ _DEFINED_IN = {
         "BadInput",
         "Unsupported",
     ),
-    "planners.limits": ("time_limit",),
+    "planners.system.limits": ("time_limit",),
 }
 _MODULE_OF = {name: module for module, names in _DEFINED_IN.items() for name in names}
 

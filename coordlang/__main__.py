@@ -14,7 +14,7 @@ from typing import NoReturn
 import coordlang
 
 if sys.platform != "win32":  # it has no SIGHUP
-    from planners.signals import Interruptions
+    from planners.system.signals import Interruptions
 
 #: Digits of a number of plans: more than there are plans of any space that fits into memory.
 _DIGITS = 100_000
@@ -67,8 +67,8 @@ def _refused() -> int:
 
 
 def _run(interruptions: Interruptions) -> int:
-    from coordlang.cli import run
-    from coordlang.cli.standard_error import flush_stdout, whatever_stderr
+    from coordlang.commands.main import run
+    from coordlang.commands.standard_error import flush_stdout, whatever_stderr
 
     sys.stderr = whatever_stderr()
     code = run(sys.argv[1:], interruptions)

@@ -23,8 +23,8 @@ from typing import Literal
 from gridmap import GridMap, open_grid, read_map, ring, three_cells
 from picture import draw
 
-from coordlang.movingai import grid_problem_text, in_rows
-from planners.errors import BadInput, CoordlangError, UsageError
+from coordlang.sites.movingai import grid_problem_text, in_rows
+from planners.system.errors import BadInput, CoordlangError, UsageError
 
 HERE = Path(__file__).resolve().parent
 

@@ -9,8 +9,8 @@ from itertools import pairwise
 from pathlib import Path
 from random import Random
 
-from coordlang import movingai
-from coordlang.movingai import cell_name
+from coordlang.sites import movingai
+from coordlang.sites.movingai import cell_name
 
 Cell = tuple[int, int]
 
@@ -103,7 +103,7 @@ def three_cells() -> GridMap:
 
 
 def read_map(path: Path) -> GridMap:
-    """A map in the format of movingai.com, see `coordlang.movingai.read_map`."""
+    """A map in the format of movingai.com, see `coordlang.sites.movingai.read_map`."""
     return _of(set(movingai.read_map(path).passable))
 
 

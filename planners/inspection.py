@@ -15,6 +15,7 @@ import numpy as np
 from planners.grounding import GroundAction, idling_schemas
 from planners.joint.interference import footprint
 from planners.joint.model import JointModel, show
+from planners.joint.tables import Rows
 from planners.loading import PlanningInstance
 from planners.pddl.formula_tree import formula_text
 from planners.pddl.lifted import (
@@ -22,7 +23,6 @@ from planners.pddl.lifted import (
     StepAtom,
 )
 from planners.search.search_estimate import SearchEstimate, estimate
-from planners.tables import Rows
 
 #: States in which an example of interference is looked for.
 _LOOK_AT = 2000

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from planners.errors import BadInput, Position, UsageError
 from planners.grounding import (
     FEWER,
     ground_actions,
@@ -18,17 +17,18 @@ from planners.grounding import (
 from planners.grounding.networks import apply_network
 from planners.joint.assembly import SLACK_LEFT, assemble
 from planners.joint.model import JointModel, PlanningTask, show
-from planners.limits import reaching
-from planners.messages import echoed
-from planners.model_options import ModelOptions
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Atom, Domain, Problem
+from planners.pddl.model_options import ModelOptions
 from planners.pddl.robots import (
     Team,
     find_team,
     static_atoms,
     without_idle_environment,
 )
+from planners.system.errors import BadInput, Position, UsageError
+from planners.system.limits import reaching
+from planners.system.messages import echoed
 
 
 @dataclass(frozen=True, slots=True)

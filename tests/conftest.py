@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from coordlang.cli import run
+from coordlang.commands.main import run
 from tests.support.command import Command, Outcome
 from tests.support.domains import DOMAINS, Worlds, world_of
 

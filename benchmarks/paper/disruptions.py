@@ -2,7 +2,7 @@
 """Disruptions: subactions become impossible after the robots have committed.
 
 A robot that has committed to a plan succeeds if its part needs none of the forbidden subactions.
-One that has committed to a sentence succeeds if one of its own choices (`coordlang.use.choices`)
+One that has committed to a sentence succeeds if one of its own choices (`coordlang.execution`)
 needs none of them; it selects among these without observing the other robots.
 """
 
@@ -19,14 +19,14 @@ import numpy as np
 from benchmarks.paper.grid import task_cells
 from benchmarks.paper.task_choices import Disruption, TaskChoices
 from benchmarks.paper.warehouse import Delivery, human_in
+from coordlang.execution.task_language import languages_in_tasks
+from coordlang.language.candidates import Candidates
 from coordlang.language.sentences import Sentence, sentence_counts
 from coordlang.language.words import Language
-from coordlang.tasks.candidates import Candidates
-from coordlang.use.sentence.task_language import languages_in_tasks
-from planners.errors import OutOfMemory
 from planners.joint.model import JointModel
+from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints
+from planners.system.errors import OutOfMemory
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from benchmarks.paper.task_choices import sentence_of
-from coordlang.coordinates import Point
+from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.sentences import Sentence
-from coordlang.use.sentence.task_language import TaskLanguage
-from coordlang.use.simulation.floor import floor_of
-from coordlang.use.simulation.record import RunRecord, WishRecord
-from coordlang.use.simulation.runs import runs_of
-from coordlang.use.simulation.settings import Settings
-from coordlang.use.simulation.team import Agreement, Mission, mission
+from coordlang.simulation.floor import floor_of
+from coordlang.simulation.record import RunRecord, WishRecord
+from coordlang.simulation.runs import runs_of
+from coordlang.simulation.settings import Settings
+from coordlang.simulation.team import Agreement, Mission, mission
+from coordlang.sites.coordinates import Point
 from planners.search.plans import Plan
 
 

@@ -11,18 +11,18 @@ from random import Random
 from benchmarks.frame import DOMAINS, SHARED
 from benchmarks.paper.grid import cell_position, is_cell, placement
 from benchmarks.paper.suite import CORRIDOR, WORLDS, World, language_for
-from coordlang.building import build_language
-from coordlang.coordinates import Point
+from coordlang.commands.building import build_language
+from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
+from coordlang.language.candidates import Candidates, from_listed
+from coordlang.language.listed import ListedTask
 from coordlang.language.words import Language
-from coordlang.movingai import Cell, cell_name, grid_problem_text, in_rows, read_map
 from coordlang.required.choices import Choices
-from coordlang.tasks.candidates import Candidates, from_listed
-from coordlang.tasks.listed import ListedTask
-from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
-from planners.errors import BadInput, ProvedImpossible
+from coordlang.sites.coordinates import Point
+from coordlang.sites.movingai import Cell, cell_name, grid_problem_text, in_rows, read_map
 from planners.pddl import parse_problem, read_domain, read_problem
 from planners.pddl.lifted import Domain
 from planners.pddl.sexpr import Source
+from planners.system.errors import BadInput, ProvedImpossible
 
 #: Tasks of a floor whose tasks are drawn, and draws after which there are as many as there are.
 TASKS, DRAWS = 10, 400

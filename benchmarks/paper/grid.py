@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from string import ascii_lowercase
 
 from planners.joint.model import JointModel
+from planners.joint.tables import Rows
 from planners.search.plan_space import PlanSpace
-from planners.tables import Rows
 
 
 def is_cell(name: str) -> bool:

@@ -14,11 +14,11 @@ from random import Random
 import numpy as np
 
 from benchmarks.paper.task_choices import sentence_of
+from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.sentences import Sentence
-from coordlang.use.sentence.task_language import TaskLanguage
 from planners.joint.model import JointModel
+from planners.joint.tables import Rows
 from planners.search.plans import Plan, Plans, counts
-from planners.tables import Rows
 
 #: A robot's part of a plan: its labels, without the rest at its end.
 Part = tuple[int, ...]

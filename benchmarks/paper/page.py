@@ -11,7 +11,7 @@ from benchmarks.frame import Figures, markdown
 from benchmarks.paper.plots import save
 from benchmarks.paper.recipe import Recipe, Section, Settings
 from benchmarks.paper.runner import kept, records_of
-from planners.writing import write_atomically
+from planners.system.writing import write_atomically
 
 
 def write_page(recipes: Sequence[Recipe], settings: Settings, folder: Path, page: Path) -> None:

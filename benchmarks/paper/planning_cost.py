@@ -11,8 +11,8 @@ from benchmarks.paper.recipe import Recipe, Record, Result, Section, Settings, U
 from benchmarks.paper.reported import PLANNING_RATIO
 from benchmarks.paper.suite import METHODS, OTHERS, QUICK_ROW, ROW, TITLES, WORLDS, language_for
 from benchmarks.paper.tables import table
-from coordlang.use.sentence.guided_search import ExpandedStates, plan_under_sentence
-from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
+from coordlang.execution.guided_search import ExpandedStates, plan_under_sentence
+from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
 
 
 def units(settings: Settings) -> list[Unit]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from planners.writing import write_atomically
+from planners.system.writing import write_atomically
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -14,8 +14,8 @@ from time import perf_counter, process_time
 
 from benchmarks.frame import Figures, KeptRows, project
 from benchmarks.paper.recipe import Recipe, Record, Settings, Unit
-from planners.errors import OutOfMemory, OutOfTime
-from planners.limits import time_limit
+from planners.system.errors import OutOfMemory, OutOfTime
+from planners.system.limits import time_limit
 
 #: Packages whose versions are recorded with each result.
 _PACKAGES = ("coordlang", "numpy", "python-sat", "tarski")

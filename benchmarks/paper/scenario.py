@@ -29,9 +29,9 @@ from benchmarks.paper.suite import (
 )
 from benchmarks.paper.tables import percent, table
 from benchmarks.paper.task_choices import TaskChoices
-from coordlang.tasks.listed import ListedTask
-from coordlang.use.choices.automaton import Automaton
-from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
+from coordlang.execution.automaton import Automaton
+from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
+from coordlang.language.listed import ListedTask
 from planners.joint.model import JointModel
 from planners.search.plans import Plan, Plans
 

@@ -10,12 +10,12 @@ from fractions import Fraction
 from benchmarks.paper.recipe import Record, Result, Settings, Unit
 from benchmarks.paper.state_orders import RANDOM_ORDERS, SYSTEMATIC, greedy_partitions
 from benchmarks.paper.suite import METHODS, OTHERS, QUICK_ROW, ROW, WORLDS, language_for
+from coordlang.language.candidates import Candidates
 from coordlang.language.flexibility import Flexibility, flexibility
 from coordlang.language.sentences import Sentence, sentence, sentence_counts
 from coordlang.language.words import Language
-from coordlang.tasks.candidates import Candidates
+from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints
 
 #: Tasks whose own numbers are kept in the results.
 MOST_LISTED = 1000

@@ -15,20 +15,20 @@ from benchmarks.frame import markdown
 from benchmarks.paper.plots import MARKERS, Lines, Series, lines
 from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
 from benchmarks.paper.suite import CORRIDOR, OTHERS, ROWS, World
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
+from coordlang.language.candidates import Candidates
 from coordlang.language.sentences import sentence_counts
 from coordlang.language.tolerance import percent
 from coordlang.required.divergences import required_nodes, states_on_plans
 from coordlang.required.miscoordination import Inseparable
 from coordlang.symmetry.group import symmetry_group
-from coordlang.tasks.candidates import Candidates
 from coordlang.vocabulary.few_words import few_words
 from coordlang.vocabulary.flexibility_bound import bits_bounds
 from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.word_annealing import FewWordsSettings
+from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
-from planners.tables import Ints
 
 #: Worlds besides the rows of Table 1; those of three robots last.
 WORLDS = (

@@ -22,14 +22,14 @@ from benchmarks.paper.suite import CORRIDOR, language_for, method_of
 from benchmarks.paper.tables import share_of_runs
 from benchmarks.paper.task_choices import TaskChoices
 from benchmarks.paper.warehouse import WAREHOUSES, deliveries, human_in, listed_tasks
-from coordlang.use.sentence.task_language import languages_in_tasks
-from coordlang.use.simulation.pace import PACES
-from coordlang.use.simulation.record import RunRecord, WishRecord
-from coordlang.use.simulation.settings import Settings as How
-from coordlang.use.simulation.simulator import require_simulator
-from coordlang.use.simulation.team import Agreement
-from planners.errors import UsageError
+from coordlang.execution.task_language import languages_in_tasks
+from coordlang.simulation.pace import PACES
+from coordlang.simulation.record import RunRecord, WishRecord
+from coordlang.simulation.settings import Settings as How
+from coordlang.simulation.simulator import require_simulator
+from coordlang.simulation.team import Agreement
 from planners.search.plans import Plans
+from planners.system.errors import UsageError
 
 #: How robots drive: by each way to keep step, and where no lidar stops who was about to collide.
 _BLIND = "clock, no lidar"
@@ -234,7 +234,7 @@ _HUMAN = """\
 A human stands in a cell that is no corner, drawn uniformly, and only lidars see that, up to two
 cells away. The tasks are the legs of deliveries, as in the section on navigation, drawn uniformly,
 with the same plan for *plan* and *sentence*, by the clock. *Floor*: runs that end well, of robots
-with wheels; a robot that sees the human asks its choices (`coordlang.use` monitor) for a way that
+with wheels; a robot that sees the human asks its choices (`coordlang.execution` monitor) for a way that
 avoids the cell. *Joint model*: the same tasks, plans and cells in joint steps, where all know of
 the human before they start. In brackets 95 % intervals (Wilson). *Only there*: runs that end well
 in the joint model and not on the floor; *only here*: the other way round."""

@@ -8,11 +8,11 @@ from random import Random
 
 import numpy as np
 
+from coordlang.language.candidates import Candidates
 from coordlang.required.divergences import first_differences, states_on_plans
-from coordlang.tasks.candidates import Candidates
 from coordlang.vocabulary.greedy import greedy_partition
 from coordlang.vocabulary.separations import separations
-from planners.tables import Ints, find_rows
+from planners.joint.tables import Ints, find_rows
 
 #: Random orders of the states that experiments try.
 RANDOM_ORDERS = 100

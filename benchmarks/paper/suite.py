@@ -10,14 +10,14 @@ from pathlib import Path
 from benchmarks.frame import DOMAINS
 from benchmarks.paper.recipe import Record
 from benchmarks.paper.reported import TABLE_1
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
+from coordlang.commands.tolerating import WordLimit, build_few_words
+from coordlang.language.candidates import Candidates, all_pairs, from_listed, from_problems
+from coordlang.language.listed import ListedTask
+from coordlang.language.task_file import read_task_file
 from coordlang.language.words import Language
-from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
-from coordlang.tasks.listed import ListedTask
-from coordlang.tasks.task_file import read_task_file
-from coordlang.tolerating import WordLimit, build_few_words
-from planners.model_options import ModelOptions
 from planners.pddl import read_domain, read_problem
+from planners.pddl.model_options import ModelOptions
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,11 +14,11 @@ from benchmarks.paper.reported import TABLE_1
 from benchmarks.paper.state_orders import RANDOM_ORDERS, greedy_partitions
 from benchmarks.paper.suite import OTHERS, ROWS, WORLDS, World
 from benchmarks.paper.tables import by_world
-from coordlang.building import build_language
-from coordlang.tasks.candidates import Candidates
-from planners.errors import OutOfTime
-from planners.limits import time_limit
+from coordlang.commands.building import build_language
+from coordlang.language.candidates import Candidates
 from planners.search.plans import counts
+from planners.system.errors import OutOfTime
+from planners.system.limits import time_limit
 
 #: A column, the method, and whether only first differences count (alpha).
 METHODS = {

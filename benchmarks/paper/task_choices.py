@@ -9,12 +9,12 @@ from random import Random
 
 import numpy as np
 
+from coordlang.execution.automaton import Automaton, determinise
+from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.sentences import Sentence, sentence
-from coordlang.use.choices.automaton import Automaton, determinise
-from coordlang.use.sentence.task_language import TaskLanguage
+from planners.joint.tables import Bools
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, counts
-from planners.tables import Bools
 
 
 @dataclass(frozen=True, slots=True)

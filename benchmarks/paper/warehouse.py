@@ -16,7 +16,7 @@ from itertools import permutations, product
 from benchmarks.paper.grid import destinations, placement
 from benchmarks.paper.suite import World
 from benchmarks.paper.task_choices import Disruption
-from coordlang.tasks.listed import ListedTask
+from coordlang.language.listed import ListedTask
 from planners.joint.model import JointModel
 
 #: Warehouses: open maps and rings (border cells only), with their rows and columns.

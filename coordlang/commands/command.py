@@ -11,10 +11,10 @@ from typing import Any, get_origin
 
 import click
 
-from coordlang.cli.files import FILE, FOLDER, check_outputs, never_stdout
-from coordlang.cli.terminal import working
+from coordlang.commands.files import FILE, FOLDER, check_outputs, never_stdout
 from coordlang.commands.shared import Kept, Limits, limited
-from planners.options import Given, options_of, record_from
+from coordlang.commands.terminal import working
+from planners.system.options import Given, options_of, record_from
 
 #: Shows a result: gets it and the options, writes, and returns the exit code, None for 0.
 Show = Callable[[Any, Any], int | None]

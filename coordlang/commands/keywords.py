@@ -8,7 +8,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from planners.options import options_of, record_from
+from planners.system.options import options_of, record_from
 
 Result = TypeVar("Result")
 

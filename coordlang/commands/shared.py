@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import click
 
-from planners.options import option
+from planners.system.options import option
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class Limits:
     @property
     def bytes(self) -> int | None:
         """The most memory, None for no limit; `click.BadParameter` for what is no size."""
-        from planners.limits import default_memory_limit
+        from planners.system.limits import default_memory_limit
 
         if self.memory_limit is None:
             return default_memory_limit()
@@ -55,7 +55,7 @@ class Kept:
 @contextmanager
 def limited(limits: Limits, kept: Kept) -> Iterator[None]:
     """Run a block under limits, with plans kept unless the user says otherwise."""
-    from planners.limits import limited_memory, require_libraries, require_memory, time_limit
+    from planners.system.limits import limited_memory, require_libraries, require_memory, time_limit
 
     if limits.time_limit is not None and math.isnan(limits.time_limit):
         raise click.UsageError("--time-limit: expected a number of seconds")

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.tables import Ints
+from planners.joint.tables import Ints
 
 Bits = NDArray[np.bool_]
 

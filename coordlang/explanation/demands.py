@@ -13,9 +13,9 @@ import numpy as np
 from coordlang.explanation.cover import Cover
 from coordlang.language.partition import Partition
 from planners.joint.model import JointModel, own_text
+from planners.joint.tables import Bools, Ints, find_rows
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
-from planners.tables import Bools, Ints, find_rows
 
 #: More sets of plan-space nodes than this in one step, and a robot's subplans are not counted.
 _SETS = 5_000

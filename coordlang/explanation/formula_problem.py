@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from coordlang.vocabulary.sat import PartitionProblem, at_most
-from planners.tables import Ints
+from planners.joint.tables import Ints
 
 
 class FormulaProblem(PartitionProblem):

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from coordlang.coordinates import Point
 from coordlang.explanation.boxes import Points
 from coordlang.explanation.minimise import minimise
 from coordlang.language.words import Language
@@ -19,9 +18,10 @@ from coordlang.lifted.language import LiftedLanguage, Vector
 from coordlang.lifted.notation import feature_of
 from coordlang.lifted.wording import condition, english, formula
 from coordlang.lifted.world import States, World
-from planners.errors import Position, note
+from coordlang.sites.coordinates import Point
 from planners.joint.model import JointModel
 from planners.pddl.lifted import Domain, Problem
+from planners.system.errors import Position, note
 
 
 @dataclass(frozen=True, slots=True)

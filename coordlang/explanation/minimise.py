@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from coordlang.explanation.boxes import Bits, Points, conflicting, expand
 from coordlang.vocabulary.sat import Undecided, satisfiable
-from planners.errors import CoordlangError
-from planners.sat import sat_solver
+from planners.search.sat import sat_solver
+from planners.system.errors import CoordlangError
 
 #: Array elements looked at in expansions; decides how many passes are made.
 _WORK = 300_000_000

@@ -14,8 +14,8 @@ from itertools import combinations
 
 import numpy as np
 
+from planners.joint.tables import Bools
 from planners.pddl.lifted import Atom
-from planners.tables import Bools
 
 #: The arguments that the atoms of a group agree in.
 Key = tuple[str, ...]

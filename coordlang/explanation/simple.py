@@ -25,7 +25,7 @@ from coordlang.vocabulary.clauses import most_constrained_first, without_implied
 from coordlang.vocabulary.job import Assignment, Job, Outcome
 from coordlang.vocabulary.problems_by_size import ProblemsBySize, SolverBudget, close_bounds
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
-from planners.limits import run_until_stopped
+from planners.system.limits import run_until_stopped
 
 #: The terms of all formulas, and the variables that these limit.
 Lengths = tuple[int, int]

@@ -16,8 +16,8 @@ import numpy as np
 
 from coordlang.explanation.mutex_groups import Key, MutexGroup, mutex_groups
 from planners.joint.model import JointModel, show
+from planners.joint.tables import Bools, Ints, Rows, find_rows, unique_rows
 from planners.pddl.lifted import Atom
-from planners.tables import Bools, Ints, Rows, find_rows, unique_rows
 
 #: States and joint steps looked at to find out what holds in all reachable states.
 _STATES = 20_000

@@ -15,7 +15,7 @@ from coordlang.explanation.minimise import minimise
 from coordlang.explanation.variables import Valuation, valuation
 from coordlang.language.words import Language
 from planners.joint.model import JointModel
-from planners.tables import Ints, Rows, find_rows, unique_rows
+from planners.joint.tables import Ints, Rows, find_rows, unique_rows
 
 
 @dataclass(frozen=True, slots=True)

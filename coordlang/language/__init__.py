@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Words, sentences and language files."""
+"""Candidate tasks, words, sentences, and their files."""

@@ -22,10 +22,10 @@ from coordlang.language.record import (
 )
 from coordlang.language.tolerance import Tolerance
 from coordlang.language.words import Language
-from planners.errors import BadInput, Position
-from planners.files import read_bytes, require_seen
-from planners.messages import echoed
-from planners.writing import write_compressed
+from planners.system.errors import BadInput, Position
+from planners.system.files import read_bytes, require_seen
+from planners.system.messages import echoed
+from planners.system.writing import write_compressed
 
 #: What to do about a file that was changed or damaged.
 _BUILD_AGAIN = "Copy the file again, or build the language again: `coordlang build`."

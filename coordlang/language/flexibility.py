@@ -20,11 +20,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.errors import OutOfMemory
-from planners.limits import memory_left, more_memory
+from planners.joint.tables import Ints, ranges
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
-from planners.tables import Ints, ranges
+from planners.system.errors import OutOfMemory
+from planners.system.limits import memory_left, more_memory
 
 Floats = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from itertools import chain, islice, pairwise, repeat
 import numpy as np
 
 from planners.joint.states import StateCodec
-from planners.tables import Bools, Ints, Rows
+from planners.joint.tables import Bools, Ints, Rows
 
 #: Keys handled at a time, by default.
 BLOCK = 50_000

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planners.tables import Ints, Rows, find_rows, unique_rows
+from planners.joint.tables import Ints, Rows, find_rows, unique_rows
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,17 +8,17 @@ from dataclasses import dataclass, field
 from hashlib import sha256
 from typing import Any
 
+from coordlang.language.candidates import Candidates
 from coordlang.language.keys import keys_of
+from coordlang.language.task_file import task_data
 from coordlang.language.tolerance import Tolerance
-from coordlang.tasks.candidates import Candidates
-from coordlang.tasks.task_file import task_data
 from planners.joint.assembly import SLACK_LEFT
 from planners.joint.model import show
-from planners.notebook import counted
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.pddl_text import domain_text
 from planners.pddl.robots import fluent_predicates, static_atoms
 from planners.pddl.sexpr import JoinedSource, Source
+from planners.system.notebook import counted
 
 
 @dataclass(frozen=True, slots=True)

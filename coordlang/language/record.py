@@ -8,10 +8,10 @@ from typing import Annotated, Any
 import msgspec
 from msgspec import UNSET, Meta, UnsetType
 
-from coordlang.tasks.candidates import Kind
-from coordlang.tasks.listed import ListedTask
-from planners.files import FileFormat
-from planners.model_options import MOST_SLACK, Cost, Unowned
+from coordlang.language.candidates import Kind
+from coordlang.language.listed import ListedTask
+from planners.pddl.model_options import MOST_SLACK, Cost, Unowned
+from planners.system.files import FileFormat
 
 # What JSON Schema can say and the reader checks with messages of its own.
 _SOME = {"minItems": 1, "uniqueItems": True}

@@ -7,21 +7,21 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Any
 
-from coordlang.language.provenance import domain_sha256, states_sha256, world_sha256
-from coordlang.language.words import Language
-from coordlang.tasks.candidates import (
+from coordlang.language.candidates import (
     Candidates,
     all_pairs,
     from_listed,
     from_problems,
     from_recorded,
 )
-from coordlang.tasks.listed import ListedTask
-from planners.errors import BadInput, Position, UsageError
-from planners.messages import echoed
-from planners.model_options import ModelOptions
+from coordlang.language.listed import ListedTask
+from coordlang.language.provenance import domain_sha256, states_sha256, world_sha256
+from coordlang.language.words import Language
 from planners.pddl.lifted import Domain, Problem
+from planners.pddl.model_options import ModelOptions
 from planners.pddl.robots import ENVIRONMENT
+from planners.system.errors import BadInput, Position, UsageError
+from planners.system.messages import echoed
 
 
 def options_of(

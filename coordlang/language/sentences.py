@@ -11,9 +11,9 @@ from itertools import compress
 import numpy as np
 
 from coordlang.language.partition import Partition
-from planners.errors import OutOfMemory
+from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace
-from planners.tables import Bools, Ints
+from planners.system.errors import OutOfMemory
 
 #: A sentence as word numbers.
 Sentence = tuple[int, ...]

@@ -20,7 +20,7 @@ class Tolerance:
     ----------
     failure_mean, failure_worst
         How often robots miscoordinate that are told a sentence and then choose by themselves
-        (`coordlang.tolerance.failure`): over the tasks, and in the worst of them.  None: nothing
+        (`coordlang.required.failure`): over the tasks, and in the worst of them.  None: nothing
         is claimed, because it is a coordination language.
     slack
         The joint steps by which plans may be longer than the least makespan; None: by none.

@@ -16,11 +16,11 @@ from coordlang.language.keys import keys_of, read_keys
 from coordlang.language.partition import Partition
 from coordlang.language.provenance import Guarantee, Provenance
 from coordlang.language.tolerance import Tolerance
-from planners.errors import BadInput
 from planners.joint.model import JointModel
-from planners.messages import echoed
-from planners.notebook import counted, html_table
-from planners.tables import Rows
+from planners.joint.tables import Rows
+from planners.system.errors import BadInput
+from planners.system.messages import echoed
+from planners.system.notebook import counted, html_table
 
 
 @dataclass(frozen=True, slots=True, repr=False)

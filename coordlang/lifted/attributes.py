@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from coordlang.lifted.world import NONE, Pair, World
-from planners.tables import Ints
+from planners.joint.tables import Ints
 
 Pairs = Sequence[Pair]
 

@@ -13,8 +13,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from coordlang.vocabulary.sat import satisfiable
-from planners.sat import sat_solver
-from planners.tables import Bools, Ints
+from planners.joint.tables import Bools, Ints
+from planners.search.sat import sat_solver
 
 #: Members are compared with each other where they are at most so many.
 _COMPARED = 4_000

@@ -15,7 +15,7 @@ import numpy as np
 
 from coordlang.lifted.attributes import distances, links
 from coordlang.lifted.world import NONE, States
-from planners.tables import Bools, Ints
+from planners.joint.tables import Bools, Ints
 
 
 @dataclass(frozen=True, slots=True, order=True)

@@ -19,7 +19,7 @@ import numpy as np
 from coordlang.lifted.attributes import attribute, distances
 from coordlang.lifted.concepts import Gap, Size
 from coordlang.lifted.world import ANY, NONE, States
-from planners.tables import Ints
+from planners.joint.tables import Ints
 
 #: The value of a feature whose terms name no object, or one without the attribute.
 UNDEFINED = -2

@@ -12,16 +12,16 @@ from typing import Annotated, Any
 import msgspec
 from msgspec import Meta
 
+from coordlang.language.candidates import Kind
 from coordlang.language.duplicate_keys import duplicate_key
 from coordlang.language.file import present, require_idling
 from coordlang.language.record import DomainRecord, ModelRecord
 from coordlang.lifted.language import LiftedLanguage, Vector, Verified
 from coordlang.lifted.notation import LARGEST, feature_of
-from coordlang.tasks.candidates import Kind
-from planners.errors import BadInput, Position
-from planners.files import FileFormat, read_bytes, require_seen
-from planners.messages import echoed
-from planners.writing import write_compressed
+from planners.system.errors import BadInput, Position
+from planners.system.files import FileFormat, read_bytes, require_seen
+from planners.system.messages import echoed
+from planners.system.writing import write_compressed
 
 #: What words of states are called whose values a language does not have.
 _OWN_WORD = re.compile(r"v-?[0-9]+([.]-?[0-9]+)*")

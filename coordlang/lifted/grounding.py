@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
+from coordlang.language.candidates import Candidates
 from coordlang.language.provenance import Guarantee, Provenance, provenance_of
 from coordlang.language.words import Language
 from coordlang.lifted.file import written_values
 from coordlang.lifted.language import LiftedLanguage
 from coordlang.lifted.world import States
-from coordlang.tasks.candidates import Candidates
-from planners.errors import BadInput, Position
+from planners.system.errors import BadInput, Position
 
 #: Whether the words were verified in the problem, refuted there, or neither.
 Known = Literal["verified", "refuted", "unknown"]

@@ -9,14 +9,14 @@ from functools import cached_property
 
 import numpy as np
 
-from coordlang.coordinates import Point
+from coordlang.language.candidates import Candidates
 from coordlang.language.partition import Partition
 from coordlang.lifted.features import Feature
 from coordlang.lifted.world import States, World
-from coordlang.tasks.candidates import Candidates
+from coordlang.sites.coordinates import Point
 from coordlang.verification.candidates import verify_candidates
+from planners.joint.tables import Ints
 from planners.parallel.workers import Workers
-from planners.tables import Ints
 
 Progress = Callable[[str], None]
 

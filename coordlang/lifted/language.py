@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from coordlang.language.candidates import Kind
 from coordlang.language.partition import Partition
 from coordlang.lifted.features import Feature
 from coordlang.lifted.world import States
-from coordlang.tasks.candidates import Kind
-from planners.tables import Ints
+from planners.joint.tables import Ints
 
 #: Entries of tables (states, objects) that are filled at a time.
 _ENTRIES = 20_000_000
@@ -26,7 +26,7 @@ Vector = tuple[int, ...]
 class Verified:
     """A problem on which a lifted language was verified by definition.
 
-    ``kind`` says which candidate tasks these were (`coordlang.tasks.candidates.Candidates`),
+    ``kind`` says which candidate tasks these were (`coordlang.language.candidates.Candidates`),
     ``states`` and ``tasks`` count them and the states on their plans, ``words`` the words that
     these states have.
     """

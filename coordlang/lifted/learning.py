@@ -26,10 +26,10 @@ from coordlang.lifted.world import States
 from coordlang.required.miscoordination import Inseparable, inseparable
 from coordlang.symmetry.group import SymmetryGroup
 from coordlang.vocabulary.refuter import Refuter
-from planners.errors import Position, ProvedImpossible
-from planners.limits import run_until_stopped
+from planners.joint.tables import Bools, Ints
 from planners.parallel.workers import Workers
-from planners.tables import Bools, Ints
+from planners.system.errors import Position, ProvedImpossible
+from planners.system.limits import run_until_stopped
 
 #: What comes first: simple features, then few words over them, or the other way round.  None:
 #: simple features, and a word for each of their combinations.

@@ -15,7 +15,7 @@ import numpy as np
 
 from coordlang.language.warping import Clause, pair
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
-from planners.tables import Ints
+from planners.joint.tables import Ints
 
 #: Conflicts that the solver may spend on one partition.
 _CONFLICTS = 100_000

@@ -30,8 +30,8 @@ from coordlang.lifted.features import (
     Sign,
     Term,
 )
-from planners.errors import BadInput, Position
-from planners.messages import echoed
+from planners.system.errors import BadInput, Position
+from planners.system.messages import echoed
 
 _TOKEN = re.compile(r"[()]|[^\s()]+")
 #: Longer definitions are refused; no feature of ours is as long.

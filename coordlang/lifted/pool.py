@@ -35,7 +35,7 @@ from coordlang.lifted.features import (
     Term,
 )
 from coordlang.lifted.world import ANY, States, World, named_objects
-from planners.tables import Ints
+from planners.joint.tables import Ints
 
 #: Objects that a count names, at most.
 _NAMED = 2

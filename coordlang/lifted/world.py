@@ -13,13 +13,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from coordlang.coordinates import Point, from_names
+from coordlang.sites.coordinates import Point, from_names
 from planners.joint.model import JointModel
 from planners.joint.states import TrueFacts
+from planners.joint.tables import Bools, Ints, Rows
 from planners.loading import PlanningInstance
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.robots import static_atoms
-from planners.tables import Bools, Ints, Rows
 
 #: No object, or a number that is not defined.
 NONE = -1

@@ -14,22 +14,22 @@ from typing import Any
 
 import numpy as np
 
-from coordlang.coordinates import Point
+from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.cover import Cover
 from coordlang.explanation.descriptions import WordDescriptions, describe_words
 from coordlang.explanation.lifted_words import LiftedWords
 from coordlang.explanation.text import term_text
 from coordlang.explanation.words import all_covers, mapped_states
 from coordlang.language.words import Language
-from coordlang.places.world import World, find_world
 from coordlang.report.layout import graph_layout, spread
 from coordlang.report.places import place_layout
 from coordlang.report.shown import Selection
 from coordlang.report.task import Tables, TaskPart, task_data, task_summary
-from coordlang.use.sentence.task_language import TaskLanguage
+from coordlang.sites.coordinates import Point
+from coordlang.sites.world import World, find_world
 from planners.joint.model import JointModel, own_text
 from planners.joint.states import split_atoms
-from planners.tables import find_rows
+from planners.joint.tables import find_rows
 
 #: States of the language beyond which their graph is not drawn, they are not listed, formulas are
 #: not sought.

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from coordlang.execution.automaton import determinise
+from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.sentences import Sentence, sentence, sentence_counts
 from coordlang.report.layout import layer_orders
-from coordlang.use.choices.automaton import determinise
-from coordlang.use.sentence.task_language import TaskLanguage
-from planners.errors import OutOfMemory
+from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans, counts
-from planners.tables import Ints
+from planners.system.errors import OutOfMemory
 
 #: Plan-space edges of one task beyond which plans are drawn.
 EDGES = 4_000

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.graphs import csgraph
-from planners.tables import Ints
+from planners.joint.tables import Ints
+from planners.search.graphs import csgraph
 
 Floats = NDArray[np.float64]
 

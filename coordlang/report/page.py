@@ -10,7 +10,7 @@ from importlib.metadata import version
 from importlib.resources import files
 from typing import Any
 
-from coordlang.coordinates import Point
+from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.lifted_words import lifted_words
 from coordlang.explanation.text import counted
 from coordlang.language.provenance import domain_sha256
@@ -20,11 +20,11 @@ from coordlang.report.data import MOST_PLACES, page_data
 from coordlang.report.shown import select_tasks
 from coordlang.report.simulated import simulated_data, summary
 from coordlang.report.task import task_part
-from coordlang.use.sentence.task_language import TaskLanguage
-from coordlang.use.simulation.record import SimulationRecord
-from planners.errors import OutOfMemory, Position
-from planners.model_options import ModelOptions
+from coordlang.simulation.record import SimulationRecord
+from coordlang.sites.coordinates import Point
 from planners.pddl.lifted import Domain, Problem
+from planners.pddl.model_options import ModelOptions
+from planners.system.errors import OutOfMemory, Position
 
 #: What a page has at most, in bytes.
 LARGEST = 5_000_000

@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from coordlang.coordinates import Point, from_names
 from coordlang.report.layout import graph_layout
+from coordlang.sites.coordinates import Point, from_names
 
 
 @dataclass(frozen=True, slots=True)

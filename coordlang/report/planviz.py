@@ -11,12 +11,12 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from coordlang.coordinates import Point
-from coordlang.places.world import World, find_world
+from coordlang.execution.task_language import TaskLanguage
 from coordlang.report.places import place_layout
-from coordlang.use.sentence.task_language import TaskLanguage
-from planners.errors import UsageError
+from coordlang.sites.coordinates import Point
+from coordlang.sites.world import World, find_world
 from planners.search.plans import Plans
+from planners.system.errors import UsageError
 
 #: A cell: row and column, from 0.
 Cell = tuple[int, int]

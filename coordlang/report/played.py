@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from coordlang.execution.task_language import TaskLanguage
 from coordlang.required.miscoordination import Miscoordination
-from coordlang.use.sentence.task_language import TaskLanguage
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,16 +10,16 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from random import Random
 
+from coordlang.execution.task_language import TaskLanguage, language_in_task
+from coordlang.language.listed import goal_text, planning_task
 from coordlang.language.recorded import recorded_list
 from coordlang.language.words import Language
 from coordlang.required.miscoordination import Miscoordination, miscoordination
-from coordlang.tasks.listed import goal_text, planning_task
-from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
-from planners.errors import OutOfMemory, Position, ProvedImpossible, UsageError
 from planners.joint.model import PlanningTask
-from planners.model_options import ModelOptions
 from planners.pddl.lifted import Domain, Problem
+from planners.pddl.model_options import ModelOptions
 from planners.search.kept_plans import search
+from planners.system.errors import OutOfMemory, Position, ProvedImpossible, UsageError
 
 #: Tasks looked at for each one shown, so that enough of them require coordination.
 _TRIES = 12

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from coordlang.language.provenance import domain_sha256
-from coordlang.use.simulation.record import EventRecord, RunRecord, SimulationRecord
-from planners.errors import BadInput, Position
+from coordlang.simulation.record import EventRecord, RunRecord, SimulationRecord
 from planners.joint.model import own_text
 from planners.pddl.lifted import Domain
+from planners.system.errors import BadInput, Position
 
 #: Poses of all robots in all runs that a page holds; at least one run is in it.
 MOST_POSES = 20_000

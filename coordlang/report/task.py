@@ -9,21 +9,21 @@ from typing import Any
 
 import numpy as np
 
+from coordlang.execution.task_language import TaskLanguage
+from coordlang.language.listed import goal_text
 from coordlang.language.partition import Partition
-from coordlang.places.world import World
 from coordlang.report.graph import Graph, ShownSentences, plan_graph, shown_sentences
 from coordlang.report.played import Played, play
 from coordlang.report.shown import ShownTask
+from coordlang.required.failure import TooManyToCount, failure_probability
 from coordlang.required.miscoordination import Miscoordination
-from coordlang.tasks.listed import goal_text
-from coordlang.tolerance.failure import TooManyToCount, failure_probability
-from coordlang.use.sentence.task_language import TaskLanguage
+from coordlang.sites.world import World
 from coordlang.verification.by_definition import verify
-from planners.errors import OutOfMemory
 from planners.joint.model import JointModel
 from planners.joint.states import split_atoms
+from planners.joint.tables import Ints, Rows
 from planners.search.plans import counts
-from planners.tables import Ints, Rows
+from planners.system.errors import OutOfMemory
 
 #: Additions beyond which it is not counted how often robots fail in a task.
 _ADDITIONS = 300_000

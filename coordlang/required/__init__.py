@@ -1,5 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where coordination is required.
-
-Composition walks, first and last differences, miscoordination shown.
-"""
+"""Where coordination is required, and how often robots fail without a word."""

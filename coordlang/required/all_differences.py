@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from coordlang.language.candidates import Candidates
 from coordlang.required.divergences import (
     Divergences,
     FirstDifferences,
@@ -28,12 +29,11 @@ from coordlang.required.miscoordination import (
 )
 from coordlang.required.partings import minimal
 from coordlang.symmetry.goals import SymmetricGoals, symmetric_goals
-from coordlang.tasks.candidates import Candidates
-from planners.limits import reaching
+from planners.joint.tables import Ints
 from planners.parallel.batch import Batch, Table, digest
 from planners.parallel.workers import Workers
 from planners.search.portions import PORTION, Explored, Source, cut
-from planners.tables import Ints
+from planners.system.limits import reaching
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,10 +16,10 @@ from itertools import product
 import numpy as np
 
 from coordlang.required.choices import Choices
-from planners.limits import reaching
+from planners.joint.tables import Bools, Ints, ranges, spans, unique_tuples
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.tables import Bools, Ints, ranges, spans, unique_tuples
+from planners.system.limits import reaching
 
 #: The labels of all robots in one joint step.
 Labels = tuple[int, ...]

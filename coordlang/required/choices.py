@@ -16,9 +16,9 @@ from itertools import product
 import numpy as np
 
 from coordlang.required.label_sets import END, LabelSets
-from planners.limits import reaching
+from planners.joint.tables import Bools, Ints, unique_tuples
 from planners.search.plan_space import PlanSpace
-from planners.tables import Bools, Ints, unique_tuples
+from planners.system.limits import reaching
 
 #: A robot's choices below some node: each first label with the set of what may follow it.
 Moves = dict[int, int]

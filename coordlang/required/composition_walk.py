@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coordlang.required.choices import Choices
-from planners.errors import OutOfMemory
-from planners.limits import memory_left, more_memory
+from planners.joint.tables import Bools, Ints, spans
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.tables import Bools, Ints, spans
+from planners.system.errors import OutOfMemory
+from planners.system.limits import memory_left, more_memory
 
 #: Bytes for which it is not asked how much memory is left, which takes longer than small layers.
 _ALWAYS_THERE = 1 << 20

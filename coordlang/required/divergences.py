@@ -14,8 +14,8 @@ import numpy as np
 from coordlang.required.choices import Choices
 from coordlang.required.label_sets import LabelSets
 from coordlang.required.partings import Partings
+from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace
-from planners.tables import Bools, Ints
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,9 +16,9 @@ from coordlang.required.choices import Choices
 from coordlang.required.label_sets import LabelSets
 from planners.joint.composition import cost_of
 from planners.joint.model import JointModel
-from planners.model_options import Cost
+from planners.joint.tables import Ints
+from planners.pddl.model_options import Cost
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints
 
 #: The cost that has these plans only.
 FEWEST: Cost = "makespan+actions"

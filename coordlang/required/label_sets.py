@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planners.tables import Bools, Ints, unique_tuples
+from planners.joint.tables import Bools, Ints, unique_tuples
 
 #: The set that holds only the empty sequence.
 END = 0

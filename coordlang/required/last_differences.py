@@ -25,12 +25,12 @@ import numpy as np
 
 from coordlang.required.choices import Choices
 from coordlang.required.composition_walk import FAILED, can_fail, moves
-from planners.errors import OutOfMemory
 from planners.joint.states import bits
-from planners.limits import memory_left, more_memory
+from planners.joint.tables import Bools, Ints, unique_tuples
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.tables import Bools, Ints, unique_tuples
+from planners.system.errors import OutOfMemory
+from planners.system.limits import memory_left, more_memory
 
 #: The shared state (-1: there is none, the plans end in different states), then the different ones,
 #: sorted.

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from coordlang.language.candidates import describe
 from coordlang.required.breaks import Trail as Trail
 from coordlang.required.breaks import break_in_same_states, earliest_break
 from coordlang.required.choices import Choices
-from coordlang.tasks.candidates import describe
-from planners.errors import ProvedImpossible
 from planners.joint.model import PlanningTask
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
+from planners.system.errors import ProvedImpossible
 
 #: Characters of a state or goal that a message shows in full.
 _LONGEST = 100

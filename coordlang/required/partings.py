@@ -18,8 +18,8 @@ from itertools import combinations, product
 import numpy as np
 
 from coordlang.required.choices import Choices
+from planners.joint.tables import Bools, Ints, find_rows, ranges, spans, unique_rows, unique_tuples
 from planners.search.edge_index import EdgeIndex
-from planners.tables import Bools, Ints, find_rows, ranges, spans, unique_rows, unique_tuples
 
 #: Rows of a table handled together.
 _CHUNK = 1_000_000

@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from coordlang.language.candidates import Candidates
 from coordlang.symmetry.graph import Renaming
-from coordlang.tasks.candidates import Candidates
 from planners.grounding import GroundAction
 from planners.joint.model import FullState, Goal
+from planners.joint.tables import Ints, find_rows
 from planners.pddl.formula_tree import Compound, Leaf, fold
 from planners.pddl.lifted import Atom, Not, StepAtom
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints, find_rows
 
 
 class SymmetryCheck:

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from coordlang.language.candidates import Candidates
 from coordlang.symmetry.check import SymmetryCheck
 from coordlang.symmetry.graph import automorphism_generators
-from coordlang.tasks.candidates import Candidates
-from planners.graphs import parts_of_graph
-from planners.tables import Ints, unique_rows
+from planners.joint.tables import Ints, unique_rows
+from planners.search.graphs import parts_of_graph
 
 #: Pairs of a goal and a state, times robots, from which on symmetries are looked for: below, what
 #: they save takes no longer than to find them.

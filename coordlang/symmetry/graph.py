@@ -17,7 +17,7 @@ from collections.abc import Hashable, Iterable, Mapping, Sequence, Set
 
 import numpy as np
 
-from coordlang.tasks.candidates import Candidates
+from coordlang.language.candidates import Candidates
 from planners.joint.model import FullState, Goal, JointModel
 from planners.pddl.formula_tree import fold
 from planners.pddl.lifted import Atom, Domain, Formula, Not, Problem, StepAtom

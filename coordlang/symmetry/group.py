@@ -17,6 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
+from coordlang.language.candidates import Candidates
 from coordlang.language.warping import Clause, pair
 from coordlang.symmetry.check import SymmetryCheck
 from coordlang.symmetry.graph import (
@@ -25,9 +26,8 @@ from coordlang.symmetry.graph import (
     automorphism_generators,
     joined_order,
 )
-from coordlang.tasks.candidates import Candidates
+from planners.joint.tables import Ints
 from planners.pddl.robots import natural
-from planners.tables import Ints
 
 #: Elements of the largest group that is used, the identity among them: each multiplies the clauses.
 LARGEST_GROUP = 64

@@ -13,9 +13,9 @@ import numpy as np
 
 from coordlang.symmetry.graph import Renaming
 from coordlang.symmetry.group import LARGEST_GROUP, Symmetry, SymmetryGroup, generated
+from planners.joint.tables import Ints, find_rows
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints, find_rows
 
 
 def symmetries_of_part(

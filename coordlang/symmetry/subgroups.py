@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from planners.tables import Ints
+from planners.joint.tables import Ints
 
 #: Numbers of elements of a group.
 Subgroup = frozenset[int]

@@ -38,15 +38,21 @@ from unified_planning.model.metrics import MinimizeMakespan
 from unified_planning.model.problem_kind_versioning import LATEST_PROBLEM_KIND_VERSION
 from unified_planning.plans import PlanKind
 
+from coordlang.execution.fitting_plans import NoPlanFits
+from coordlang.execution.plan_sentence import NotAPlan, NotOptimal, sentence_of_plan
+from coordlang.execution.task_language import TaskLanguage, language_in_task
 from coordlang.unified import NAME
 from coordlang.unified.options import PLAN_KINDS, EngineOptions, in_parameters
 from coordlang.unified.plans import NoSteps, of_up, to_up
 from coordlang.unified.translation import FEATURES, Translated
-from coordlang.use.sentence.fitting_plans import NoPlanFits
-from coordlang.use.sentence.plan_sentence import NotAPlan, NotOptimal, sentence_of_plan
-from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
 from planners.check.validate import validate
-from planners.errors import (
+from planners.grounding import idling_schemas
+from planners.loading import build
+from planners.search.optimal_plans import search
+from planners.search.plan_file import Texts
+from planners.search.plan_space import PlanSpace
+from planners.search.plans import Plans
+from planners.system.errors import (
     BadInput,
     CoordlangError,
     Note,
@@ -56,13 +62,7 @@ from planners.errors import (
     Unsupported,
     UsageError,
 )
-from planners.grounding import idling_schemas
-from planners.limits import time_limit
-from planners.loading import build
-from planners.search.optimal_plans import search
-from planners.search.plan_file import Texts
-from planners.search.plan_space import PlanSpace
-from planners.search.plans import Plans
+from planners.system.limits import time_limit
 
 #: What ends a search without a plan, and what it means; the first that fits counts.
 _STATUS = {

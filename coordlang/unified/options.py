@@ -15,10 +15,10 @@ from coordlang.language.file import read_language
 from coordlang.language.recorded import options_of
 from coordlang.language.words import Language
 from coordlang.unified.translation import Concurrency, Subactions, Translated, translate
-from planners.errors import BadInput, CoordlangError, UsageError
-from planners.model_options import ModelOptions
-from planners.options import record_from
+from planners.pddl.model_options import ModelOptions
 from planners.pddl.robots import find_team
+from planners.system.errors import BadInput, CoordlangError, UsageError
+from planners.system.options import record_from
 
 #: The kinds of plans that the engine returns and validates.
 PLAN_KINDS = (

@@ -25,11 +25,11 @@ from unified_planning.plans import (
 )
 
 from coordlang.unified.translation import Translated
-from planners.errors import UsageError
 from planners.joint.model import JointModel
 from planners.pddl.robots import Team
 from planners.search.plan_file import Texts, numbered_actions
 from planners.search.plans import Plan, Plans
+from planners.system.errors import UsageError
 
 
 class NoSteps(Exception):

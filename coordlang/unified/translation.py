@@ -18,11 +18,11 @@ from unified_planning.model.multi_agent import MultiAgentProblem
 from unified_planning.model.problem_kind import FEATURES as ALL_FEATURES
 
 from coordlang.unified.names import Names
-from planners.errors import BadInput, Unsupported, UsageError
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain
 from planners.pddl.lifted import Problem as PddlProblem
 from planners.pddl.sexpr import Source
+from planners.system.errors import BadInput, Unsupported, UsageError
 
 #: Action -> robot -> its part, as in joint-action PDDL: ``{"swap": {"r1": "(move ?a ?b)", "r2":
 #: "(move ?b ?a)"}}``.

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether words are a coordination language, by definition, in code of its own."""
+"""Is it a coordination language?  By definition; and why fewer words do not suffice."""

@@ -24,10 +24,10 @@ from coordlang.verification.leads import ANY, NEVER
 from coordlang.verification.mixtures import FAILED
 from coordlang.verification.trace import trace
 from coordlang.verification.walk_tables import WalkTables
-from planners.errors import OutOfMemory
-from planners.limits import memory_left, more_memory, reaching
+from planners.joint.tables import Bools, Ints, ranges, spans, unique_tuples
 from planners.search.plan_space import PlanSpace
-from planners.tables import Bools, Ints, ranges, spans, unique_tuples
+from planners.system.errors import OutOfMemory
+from planners.system.limits import memory_left, more_memory, reaching
 
 #: Moves of the walk handled together.
 _CHUNK = 2_000_000

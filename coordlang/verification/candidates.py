@@ -12,14 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from coordlang.language.candidates import Candidates
 from coordlang.language.partition import Partition
-from coordlang.tasks.candidates import Candidates
 from coordlang.verification.by_definition import Verdict, verify
-from planners.limits import reaching
 from planners.parallel.batch import Batch, Table, digest
 from planners.parallel.workers import Workers
 from planners.search.plan_space import PlanSpace
 from planners.search.portions import PORTION, Source, cut
+from planners.system.limits import reaching
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,9 +15,9 @@ from itertools import pairwise
 import numpy as np
 
 from coordlang.verification.views import numbered
-from planners.limits import reaching
+from planners.joint.tables import Bools, Ints, ranges, unique_tuples
 from planners.search.plan_space import PlanSpace
-from planners.tables import Bools, Ints, ranges, unique_tuples
+from planners.system.limits import reaching
 
 #: The set that holds the empty sequence only.
 _EMPTY = 0

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planners.tables import Ints, unique_codes
+from planners.joint.tables import Ints, unique_codes
 
 #: The other plan may say any word.
 ANY = -1

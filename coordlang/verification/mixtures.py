@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints
 
 #: In place of the node that a mixture reaches: it is no optimal plan any more.
 FAILED = -1

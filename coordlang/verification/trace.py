@@ -8,7 +8,7 @@ import numpy as np
 from coordlang.required.miscoordination import Trail
 from coordlang.verification.mixtures import FAILED
 from coordlang.verification.walk_tables import WalkTables
-from planners.tables import Ints, ranges
+from planners.joint.tables import Ints, ranges
 
 
 def trace(tables: WalkTables, goal: int) -> tuple[Trail, int]:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planners.joint.tables import Ints, ranges, unique_codes, unique_tuples
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints, ranges, unique_codes, unique_tuples
 
 
 @dataclass(frozen=True, slots=True)

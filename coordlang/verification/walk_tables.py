@@ -17,8 +17,8 @@ from coordlang.verification.continuations import Continuations
 from coordlang.verification.leads import Leads
 from coordlang.verification.mixtures import FAILED, Mixtures
 from coordlang.verification.views import Views, views_of_robot
+from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace
-from planners.tables import Bools, Ints
 
 
 class Cut:

@@ -22,8 +22,8 @@ from coordlang.vocabulary.problems_by_size import ProblemsBySize, SolverBudget
 from coordlang.vocabulary.recent_tuples import RecentTuples
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
-from planners.sat import SolverName
-from planners.tables import Ints
+from planners.joint.tables import Ints
+from planners.search.sat import SolverName
 
 #: Clauses that are taken of a refuted partition, and failing tuples after which longer ones are not
 #: looked for.

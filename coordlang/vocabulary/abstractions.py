@@ -20,10 +20,10 @@ from itertools import combinations
 import networkx as nx
 import numpy as np
 
-from coordlang.tasks.candidates import Candidates
+from coordlang.language.candidates import Candidates
 from planners.joint.model import JointModel
+from planners.joint.tables import Bools, Ints
 from planners.search.state_variables import StateVariable, state_variables
-from planners.tables import Bools, Ints
 
 #: Variables that are looked at, and values of one for which distances are taken, at most.
 _VARIABLES, _VALUES = 12, 200

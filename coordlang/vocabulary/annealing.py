@@ -22,7 +22,7 @@ from coordlang.vocabulary.clauses import without_implied
 from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.necessary_clauses import TaskPart
 from coordlang.vocabulary.objective import Objective
-from planners.tables import Ints
+from planners.joint.tables import Ints
 
 
 @dataclass(frozen=True, slots=True)

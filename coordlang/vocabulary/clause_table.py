@@ -12,7 +12,7 @@ import numpy as np
 
 from coordlang.vocabulary.distinct_rows import MULTIPLIER
 from coordlang.vocabulary.orbit_words import OrbitWords
-from planners.tables import Bools, Ints
+from planners.joint.tables import Bools, Ints
 
 #: Clause and orbit as one number.
 _RADIX = 1 << 32

@@ -16,17 +16,17 @@ import networkx as nx
 import numpy as np
 from networkx.algorithms.isomorphism import GraphMatcher
 
+from coordlang.language.candidates import Candidates
 from coordlang.symmetry.graph import Renaming, joined_order
 from coordlang.symmetry.group import SymmetryGroup
 from coordlang.symmetry.of_part import symmetries_of_part
-from coordlang.tasks.candidates import Candidates
 from coordlang.vocabulary.necessary_clauses import NecessaryClauses
 from coordlang.vocabulary.partitions import Partitions, Refutation
 from coordlang.vocabulary.problems_by_size import SolverBudget
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import Undecided
+from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace
-from planners.tables import Bools, Ints
 
 #: Sets of objects and contained instances that are looked at, at most.
 _SETS, _INSTANCES = 400, 40

@@ -19,9 +19,9 @@ from coordlang.required.choices import Choices
 from coordlang.required.composition_walk import FAILED, Moves, can_fail, moves
 from coordlang.vocabulary.leads import NO_LEAD, NO_WORD, PARTED, Leads
 from coordlang.vocabulary.next_words import NextWords
+from planners.joint.tables import Bools, Ints, unique_tuples
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.tables import Bools, Ints, unique_tuples
 
 #: Where no way leads to a violation; some steps may be added to it.
 _FAR = np.iinfo(np.int64).max // 4

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.tables import Ints, find_rows
+from planners.joint.tables import Ints, find_rows
 
 #: An odd multiplier: what is equal has equal keys, other things nearly never.
 MULTIPLIER = np.uint64(0x9E3779B97F4A7C15)

@@ -24,8 +24,8 @@ from coordlang.vocabulary.problems_by_size import SolverBudget
 from coordlang.vocabulary.recent_tuples import RecentTuples
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import Undecided, satisfiable
-from planners.sat import SolverName, sat_solver
-from planners.tables import Ints
+from planners.joint.tables import Ints
+from planners.search.sat import SolverName, sat_solver
 
 #: Subgroups that are looked at, and maps to permutations of words for each of them.
 _SUBGROUPS, _ACTIONS = 60, 60

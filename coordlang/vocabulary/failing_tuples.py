@@ -22,8 +22,8 @@ from coordlang.symmetry.group import SymmetryGroup
 from coordlang.vocabulary.counterexamples import Counterexamples
 from coordlang.vocabulary.distinct_rows import MULTIPLIER, DistinctRows, row_keys
 from coordlang.vocabulary.job import Evidence
+from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace
-from planners.tables import Bools, Ints
 
 #: Images of clauses returned at a time, at most.
 _RETURNED = 800

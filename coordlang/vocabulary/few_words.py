@@ -2,8 +2,8 @@
 """The partition into K words under which robots fail least often: all of them, or annealing.
 
 With too few words no partition is a coordination language; this is the best that can be said with
-them (`coordlang.tolerance.failure`).  Partitions are measured on tables of plans, and the best few
-are recounted exactly.
+them (`coordlang.required.failure`).  Partitions are measured on tables of plans, and the best
+few are recounted exactly.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from random import Random
 
 import numpy as np
 
-from coordlang.tolerance.failure import TooManyToCount
-from coordlang.tolerance.plan_table import PlanTable, plan_table
+from coordlang.required.failure import TooManyToCount
+from coordlang.required.plan_table import PlanTable, plan_table
 from coordlang.vocabulary.fewest_failures import EQUAL, RECOUNTED, FewWords, Search
 from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.word_annealing import FewWordsSettings, anneal, measure_of
-from planners.errors import OutOfTime
-from planners.limits import little_time_after, run_until_stopped
 from planners.search.plan_space import PlanSpace
+from planners.system.errors import OutOfTime
+from planners.system.limits import little_time_after, run_until_stopped
 
 #: Partitions up to which all are tried.
 _ALL = 50_000

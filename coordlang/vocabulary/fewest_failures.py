@@ -11,10 +11,10 @@ from math import inf
 import numpy as np
 
 from coordlang.language.flexibility import Floats
-from coordlang.tolerance.failure import FailureProbability, failure_probability
+from coordlang.required.failure import FailureProbability, failure_probability
 from coordlang.vocabulary.job import Assignment
+from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints
 
 #: The worst task is searched for by a norm with this exponent, which has slopes everywhere.
 _NORM = 8

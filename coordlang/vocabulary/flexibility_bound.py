@@ -21,9 +21,9 @@ import numpy as np
 
 from coordlang.language.flexibility import MANY, Floats
 from planners.joint.states import bits
+from planners.joint.tables import Bools
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, counts
-from planners.tables import Bools
 
 #: Plans of a task up to which its boxes are looked at.
 MOST_PLANS = 3_000

@@ -21,9 +21,9 @@ from coordlang.vocabulary.annealing import Annealing, AnnealingSettings, Violati
 from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from coordlang.vocabulary.job import Assignment, Job, Outcome
 from coordlang.vocabulary.necessary_clauses import task_parts
-from planners.errors import OutOfMemory
-from planners.limits import run_until_stopped
-from planners.tables import Ints
+from planners.joint.tables import Ints
+from planners.system.errors import OutOfMemory
+from planners.system.limits import run_until_stopped
 
 _USUAL = AnnealingSettings()
 #: The search ends where no language is more flexible by more than rounding.

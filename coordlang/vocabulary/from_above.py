@@ -17,7 +17,7 @@ from coordlang.vocabulary.job import Assignment, word_count
 from coordlang.vocabulary.local_search import LocalSearch
 from coordlang.vocabulary.merging import merged
 from coordlang.vocabulary.refuter import Refuter
-from planners.tables import Ints
+from planners.joint.tables import Ints
 
 #: States from which on words are also looked for by local search.
 LOCAL_FROM = 200

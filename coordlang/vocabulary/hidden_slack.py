@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from coordlang.language.candidates import Candidates
 from coordlang.language.partition import Partition
 from coordlang.required.all_differences import Differences
 from coordlang.required.divergences import (
@@ -23,7 +24,6 @@ from coordlang.required.divergences import (
     states_on_plans,
 )
 from coordlang.required.miscoordination import Inseparable
-from coordlang.tasks.candidates import Candidates
 from coordlang.verification.candidates import verify_candidates
 from planners.parallel.workers import Workers
 

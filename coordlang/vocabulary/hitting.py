@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from coordlang.vocabulary.sat import at_most, satisfiable
-from planners.sat import sat_solver
+from planners.search.sat import sat_solver
 
 StateSet = frozenset[int]
 

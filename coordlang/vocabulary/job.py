@@ -6,10 +6,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from coordlang.language.candidates import Candidates
 from coordlang.language.warping import Clause
 from coordlang.required.divergences import FirstDifferences
 from coordlang.symmetry.group import Symmetry
-from coordlang.tasks.candidates import Candidates
 from coordlang.vocabulary.counterexamples import Counterexample
 from planners.parallel.workers import Workers
 from planners.search.plan_space import PlanSpace

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planners.tables import Ints
+from planners.joint.tables import Ints
 
 #: The lead of two sentences that are alike.
 NO_LEAD = 0

@@ -21,7 +21,7 @@ from coordlang.vocabulary.orbit_words import OrbitWords
 from coordlang.vocabulary.recent_tuples import RecentTuples
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.tabu import TabuSearch
-from planners.tables import Ints
+from planners.joint.tables import Ints
 
 #: Kinds that race at most, evenly over those that there are: the first heat must not take long.
 _KINDS = 64

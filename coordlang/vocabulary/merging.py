@@ -17,7 +17,7 @@ from coordlang.vocabulary.clause_table import ClauseTable
 from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.orbit_words import OrbitWords
 from coordlang.vocabulary.refuter import Refuter
-from planners.tables import Bools, Ints
+from planners.joint.tables import Bools, Ints
 
 #: Failing tuples after which longer ones are not looked for, and clauses that are taken of them.
 _ENOUGH, _AT_ONCE = 500, 300

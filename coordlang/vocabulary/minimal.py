@@ -32,10 +32,10 @@ from coordlang.vocabulary.problems_by_size import SolverBudget
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import Undecided
 from coordlang.vocabulary.separating import short_separating_search
-from planners.errors import OutOfMemory
-from planners.limits import run_until_stopped
+from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints
+from planners.system.errors import OutOfMemory
+from planners.system.limits import run_until_stopped
 
 #: Combinations of plans' next steps up to which separating words are looked for first.
 _SEPARATING_COMBINATIONS = 4_000_000

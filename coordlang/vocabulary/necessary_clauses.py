@@ -19,9 +19,9 @@ from coordlang.vocabulary.counterexamples import (
     many_counterexamples,
 )
 from coordlang.vocabulary.job import Evidence
+from planners.joint.tables import Bools, Ints
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.tables import Bools, Ints
 
 #: Counterexamples taken at a time.
 _AT_A_TIME = 200

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coordlang.vocabulary.leads import Leads
+from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace
-from planners.tables import Bools, Ints
 
 #: Words that are told apart; of more, those with one remainder count as one.
 _MOST_WORDS = 62

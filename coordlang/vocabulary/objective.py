@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coordlang.language.flexibility import MANY, Floats, edge_shares
+from planners.joint.tables import Bools, Ints, ranges
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
-from planners.tables import Bools, Ints, ranges
 
 #: Numbers that tell sentences apart.
 Hashes = NDArray[np.uint64]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coordlang.symmetry.subgroups import GroupTable, WordAction
-from planners.tables import Ints
+from planners.joint.tables import Ints
 
 #: Where each word goes.
 _Permutation = tuple[int, ...]

@@ -17,7 +17,7 @@ from coordlang.vocabulary.clauses import (
 from coordlang.vocabulary.job import Evidence
 from coordlang.vocabulary.problems_by_size import ProblemsBySize
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
-from planners.sat import SolverName
+from planners.search.sat import SolverName
 
 #: Conflicts within which most partitions are found; after so many the solver is likely on the way
 #: to a proof.

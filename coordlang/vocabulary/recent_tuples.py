@@ -11,7 +11,7 @@ import numpy as np
 
 from coordlang.vocabulary.failing_tuples import Agreeing, agreeing_rows
 from coordlang.vocabulary.refuter import Refuter
-from planners.tables import Ints
+from planners.joint.tables import Ints
 
 
 @dataclass(frozen=True, slots=True)

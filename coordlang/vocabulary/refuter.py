@@ -22,10 +22,10 @@ from coordlang.vocabulary.failing_tuples import Agreeing, FailingTuples
 from coordlang.vocabulary.job import Evidence
 from coordlang.vocabulary.necessary_clauses import TaskPart
 from planners.joint.model import FullState
+from planners.joint.tables import Ints
 from planners.parallel.batch import Batch, Table, digest
 from planners.parallel.workers import Workers
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints
 
 #: Tasks are searched for counterexamples in parts, one after another: at least so many parts ..
 _LEAST_PARTS = 8

@@ -21,7 +21,7 @@ from coordlang.vocabulary.hitting import LeastHitting, StateSet, greedy_hitting
 from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.problems_by_size import ProblemsBySize, SolverBudget, close_bounds
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
-from planners.limits import run_until_stopped
+from planners.system.limits import run_until_stopped
 
 #: Comparisons of clauses to find which are implied, a second's work: the solver finds the others.
 _COMPARISONS = 5_000_000

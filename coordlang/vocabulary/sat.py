@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from coordlang.language.warping import Clause, Pair, pair
-from planners.sat import SolverName, sat_solver, solve_slice
+from planners.search.sat import SolverName, sat_solver, solve_slice
 
 #: Conflicts after which the solver comes back, to let signals (time limit, Ctrl-C) be heard.
 _SLICE = 2_000
@@ -203,7 +203,7 @@ def satisfiable(
     Parameters
     ----------
     solver
-        Made by `planners.sat.sat_solver`; signals are heard between slices of its work.
+        Made by `planners.search.sat.sat_solver`; signals are heard between slices of its work.
     assumptions
         Literals that are assumed besides.
     conflicts

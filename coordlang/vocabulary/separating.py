@@ -29,8 +29,8 @@ from coordlang.vocabulary.separations import (
     ordered,
     separations,
 )
-from planners.errors import OutOfMemory
-from planners.limits import run_until_stopped
+from planners.system.errors import OutOfMemory
+from planners.system.limits import run_until_stopped
 
 #: Greedy partitions, each under the constraints that the one before broke, before SAT takes over.
 _GREEDY_ROUNDS = 20

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from coordlang.vocabulary.clause_table import ClauseTable
-from planners.tables import Ints
+from planners.joint.tables import Ints
 
 #: Moves for which a word is tabu: at least one, at random so many more ..
 _TENURE = 10

@@ -12,11 +12,11 @@ from typing import Protocol
 import numpy as np
 
 from coordlang.language.flexibility import Floats
-from coordlang.tolerance.failure import TooManyToCount, failure_probability
-from coordlang.tolerance.plan_table import PlanTable
+from coordlang.required.failure import TooManyToCount, failure_probability
+from coordlang.required.plan_table import PlanTable
 from coordlang.vocabulary.fewest_failures import EQUAL, Search
 from coordlang.vocabulary.job import Assignment
-from planners.tables import Ints
+from planners.joint.tables import Ints
 
 #: Additions of one exact count up to which tasks with many plans are counted, not drawn.
 _ADDITIONS = 20_000

@@ -11,8 +11,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 
-from planners.errors import BadInput
-from planners.messages import echoed
 from planners.pddl.lifted import (
     And,
     Atom,
@@ -29,6 +27,8 @@ from planners.pddl.lifted import (
     Variable,
 )
 from planners.pddl.robots import Team, fluent_predicates, objects_of
+from planners.system.errors import BadInput
+from planners.system.messages import echoed
 
 #: The true fluents; what is static comes from the problem.
 State = frozenset[Atom]

@@ -22,7 +22,6 @@ from planners.check.meaning import (
     ground_atom,
     text_of,
 )
-from planners.errors import BadInput
 from planners.pddl.lifted import (
     And,
     Atom,
@@ -38,6 +37,7 @@ from planners.pddl.lifted import (
     StepAtom,
 )
 from planners.pddl.robots import Team
+from planners.system.errors import BadInput
 
 #: One entry per robot: the text of its subaction, or None for idling.
 Labels = Sequence[str | None]

@@ -28,10 +28,10 @@ from planners.classical import (
     compile_classical,
     to_pddl,
 )
-from planners.errors import CoordlangError, OutOfMemory
 from planners.joint.model import JointModel, PlanningTask
-from planners.limits import default_memory_limit, has_memory_limit, memory_left, more_memory
-from planners.signals import postponed_signals
+from planners.system.errors import CoordlangError, OutOfMemory
+from planners.system.limits import default_memory_limit, has_memory_limit, memory_left, more_memory
+from planners.system.signals import postponed_signals
 
 #: A* finds an optimal plan with any admissible heuristic.  Of 111 shipped, foreign and small CoDMAP
 #: rows blind search decided 95 in 20 s, LM-cut 94: in select-then-apply LM-cut sees little of the
@@ -91,8 +91,8 @@ def optimal_cost(
 ) -> FastDownwardAnswer:
     """The optimal cost of a task according to Fast Downward.
 
-    It stops where the `planners.limits.time_limit` around is over; its translator and its search
-    may have the memory that this process may have.
+    It stops where the `planners.system.limits.time_limit` around is over; its translator and its
+    search may have the memory that this process may have.
 
     Parameters
     ----------

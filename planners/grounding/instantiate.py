@@ -10,13 +10,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 
-from planners.errors import BadInput, Unsupported
 from planners.grounding.actions import GroundAction, GroundEffect
 from planners.grounding.bindings import Binding, Bindings
 from planners.grounding.interned import Interned
 from planners.grounding.reachability import reachable_arguments
-from planners.limits import reaching
-from planners.messages import echoed
 from planners.pddl.formula_tree import label, literals
 from planners.pddl.formulas import MAX_COST
 from planners.pddl.lifted import (
@@ -38,6 +35,9 @@ from planners.pddl.lifted import (
     Truth,
 )
 from planners.pddl.robots import Team, fluent_predicates, static_atoms
+from planners.system.errors import BadInput, Unsupported
+from planners.system.limits import reaching
+from planners.system.messages import echoed
 
 #: What to try when grounding is too much.
 FEWER = "fewer objects, or actions with fewer parameters"

@@ -10,9 +10,7 @@ from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
 from itertools import combinations, product
 
-from planners.errors import BadInput
 from planners.grounding.actions import GroundAction
-from planners.messages import echoed
 from planners.pddl.formula_tree import conjuncts
 from planners.pddl.lifted import (
     And,
@@ -26,6 +24,8 @@ from planners.pddl.lifted import (
     have_common,
 )
 from planners.pddl.robots import objects_of
+from planners.system.errors import BadInput
+from planners.system.messages import echoed
 
 #: (constraint, binding of its parameters) -> the ground actions that match.
 _Groups = dict[tuple[str, tuple[str, ...]], list[GroundAction]]

@@ -21,11 +21,11 @@ from math import prod
 from threading import current_thread, main_thread
 from typing import TYPE_CHECKING, Any
 
-from planners.errors import CoordlangError, OutOfMemory
-from planners.limits import memory_left
 from planners.pddl.formula_tree import required_atoms
 from planners.pddl.lifted import Atom, Domain, Formula, Schema, Variable
 from planners.pddl.robots import natural
+from planners.system.errors import CoordlangError, OutOfMemory
+from planners.system.limits import memory_left
 
 if TYPE_CHECKING:
     from clingo import Control, Symbol

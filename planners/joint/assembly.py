@@ -12,8 +12,8 @@ from planners.joint.facts import FactTable
 from planners.joint.joint_actions import JointActionStepper
 from planners.joint.model import IDLE, JointModel, Stepper
 from planners.joint.states import StateCodec
-from planners.model_options import Cost
 from planners.pddl.lifted import Atom, Domain, Problem, StepAtom
+from planners.pddl.model_options import Cost
 from planners.pddl.robots import Team, fluent_predicates, natural, static_atoms
 
 #: The predicate of the facts that say how many joint steps of the slack are left.

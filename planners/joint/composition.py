@@ -10,7 +10,6 @@ from itertools import combinations, product
 
 import numpy as np
 
-from planners.errors import OutOfMemory
 from planners.grounding import GroundAction
 from planners.joint.conditions import Evaluator, Labels, speaks_of_step
 from planners.joint.interference import Choices, compatible, conflict
@@ -18,11 +17,12 @@ from planners.joint.model import Options, Steps
 from planners.joint.operators import Operators
 from planners.joint.states import StateCodec
 from planners.joint.step_clauses import Clause, StepClauses, Waiting, clauses
-from planners.limits import memory_left, more_memory
-from planners.model_options import Cost
+from planners.joint.tables import Bools, Ints, Rows, ranges, spans
 from planners.pddl.formula_tree import conjuncts, formula_text, signed
 from planners.pddl.lifted import Atom, Formula, StepAtom
-from planners.tables import Bools, Ints, Rows, ranges, spans
+from planners.pddl.model_options import Cost
+from planners.system.errors import OutOfMemory
+from planners.system.limits import memory_left, more_memory
 
 
 class ComposingStepper:

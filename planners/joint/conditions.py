@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from planners.joint.facts import FactTable
 from planners.joint.states import test_bits
+from planners.joint.tables import Bools, Ints, Rows
 from planners.pddl.formula_tree import Compound, Leaf, conjuncts, fold, literals, signed
 from planners.pddl.lifted import And, Atom, Formula, Not, Or, StepAtom, Truth
-from planners.tables import Bools, Ints, Rows
 
 Labels = NDArray[np.int32]
 

@@ -7,15 +7,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from planners.errors import BadInput, Position
 from planners.grounding import GroundAction, GroundEffect
 from planners.joint.composition import cost_of
 from planners.joint.conditions import Evaluator
 from planners.joint.model import Options, Steps
 from planners.joint.operators import Operators
 from planners.joint.states import StateCodec
-from planners.model_options import Cost
-from planners.tables import Ints, Rows
+from planners.joint.tables import Ints, Rows
+from planners.pddl.model_options import Cost
+from planners.system.errors import BadInput, Position
 
 
 class JointActionStepper:

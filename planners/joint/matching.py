@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planners.joint.states import TrueFacts, test_bits
-from planners.tables import Ints, Rows, ranges
+from planners.joint.tables import Ints, Rows, ranges
 
 #: Looking up one true fact takes about as long as testing so many.
 _LOOK_UP = 3

@@ -14,14 +14,14 @@ from typing import Protocol
 
 import numpy as np
 
-from planners.errors import Position
 from planners.grounding import GroundAction, Impossible
 from planners.joint.conditions import Evaluator, Labels
 from planners.joint.states import StateCodec
-from planners.model_options import Cost
+from planners.joint.tables import Bools, Ints, Rows
 from planners.pddl.formula_tree import label
 from planners.pddl.lifted import Atom, Formula, StepAtom
-from planners.tables import Bools, Ints, Rows
+from planners.pddl.model_options import Cost
+from planners.system.errors import Position
 
 #: The text of label 0.
 IDLE = "idle"

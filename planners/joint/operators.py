@@ -11,8 +11,8 @@ from planners.grounding import GroundAction, GroundEffect
 from planners.joint.conditions import Evaluator, speaks_of_step, split_condition
 from planners.joint.matching import Matcher
 from planners.joint.states import StateCodec
+from planners.joint.tables import Bools, Ints, Rows
 from planners.pddl.lifted import TRUE, Formula
-from planners.tables import Bools, Ints, Rows
 
 
 class Operators:

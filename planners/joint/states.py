@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.errors import BadInput
 from planners.joint.facts import FactTable
-from planners.messages import echoed
-from planners.tables import Bools, Ints, Rows
+from planners.joint.tables import Bools, Ints, Rows
+from planners.system.errors import BadInput
+from planners.system.messages import echoed
 
 _BLOCK_BITS = 64
 

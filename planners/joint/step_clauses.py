@@ -16,9 +16,9 @@ import numpy as np
 
 from planners.joint.conditions import Evaluator
 from planners.joint.states import test_bits
+from planners.joint.tables import Bools, Ints, Rows, ranges
 from planners.pddl.formula_tree import Compound, Leaf, fold
 from planners.pddl.lifted import And, Atom, Formula, Not, Or, StepAtom, Truth
-from planners.tables import Bools, Ints, Rows, ranges
 
 #: Literals in the clauses of one formula, beyond which it is evaluated as it is.
 _MOST = 4_000

@@ -22,12 +22,12 @@ from uuid import uuid4
 
 import msgspec
 
-from planners.errors import CoordlangError, OutOfMemory, UsageError
-from planners.limits import time_left
-from planners.messages import echoed
 from planners.parallel.batch import Batch
 from planners.parallel.versions import differing, versions_here
-from planners.signals import postponed_signals
+from planners.system.errors import CoordlangError, OutOfMemory, UsageError
+from planners.system.limits import time_left
+from planners.system.messages import echoed
+from planners.system.signals import postponed_signals
 
 #: Seconds in which a scheduler must answer.
 _CONNECTING = 10.0

@@ -18,11 +18,11 @@ from multiprocessing.context import SpawnContext, SpawnProcess
 from types import ModuleType
 from typing import Any
 
-from planners.errors import OutOfMemory, UsageError
-from planners.limits import lacks_memory
 from planners.parallel.batch import Batch
 from planners.parallel.worker import begin, do
-from planners.signals import ENDING, postponed_signals
+from planners.system.errors import OutOfMemory, UsageError
+from planners.system.limits import lacks_memory
+from planners.system.signals import ENDING, postponed_signals
 
 #: Seconds in which a worker that is asked to end cleans up.
 _STOPPING = 1.0
@@ -150,7 +150,8 @@ def _spawning() -> Iterator[None]:
 
 
 def _cannot_start(error: OSError | None) -> UsageError | OutOfMemory:
-    why = "they end at once" if error is None else error.strerror or str(error)
+    # A pool whose workers ended while a job was handed over says "handle is closed", without errno.
+    why = error.strerror if error is not None and error.strerror else "they end at once"
     kind = OutOfMemory if error is not None and lacks_memory(error) else UsageError
     return kind(
         f"worker processes cannot be started: {why}",

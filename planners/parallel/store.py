@@ -20,9 +20,9 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from planners.errors import note
 from planners.parallel.batch import Table
-from planners.writing import write_atomically
+from planners.system.errors import note
+from planners.system.writing import write_atomically
 
 _HEAD = b"coordlang table 1\n"
 _ENDING = ".table"

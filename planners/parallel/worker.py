@@ -17,8 +17,8 @@ from multiprocessing.connection import Connection
 from types import FrameType
 from typing import Any
 
-from planners.errors import CoordlangError
-from planners.signals import ENDING
+from planners.system.errors import CoordlangError
+from planners.system.signals import ENDING
 
 #: The exit code of a worker that was asked to end.
 _ASKED_TO_END = 75
@@ -88,7 +88,7 @@ def _packed(error: Exception) -> bytes:
 def _limit(memory: int) -> None:
     import numpy as np
 
-    from planners.limits import address_space, limit_memory
+    from planners.system.limits import address_space, limit_memory
 
     np.zeros((8, 8)) @ np.zeros((8, 8))
     limit_memory(address_space() + memory)

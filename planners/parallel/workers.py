@@ -16,11 +16,11 @@ from typing import Protocol
 
 import numpy as np
 
-from planners.errors import OutOfMemory, UsageError
-from planners.limits import has_memory_limit, memory_left
 from planners.parallel.batch import Batch, Done, Table
 from planners.parallel.store import Store
 from planners.parallel.versions import code_hash
+from planners.system.errors import OutOfMemory, UsageError
+from planners.system.limits import has_memory_limit, memory_left
 
 #: Estimated work, in nodes times robots, from which processes pay: each costs about half a second
 #: to start, in which one of them does some 100,000.

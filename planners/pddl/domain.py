@@ -7,14 +7,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from planners.limits import reaching
-from planners.messages import echoed
 from planners.pddl.lifted import Domain, Signatures
 from planners.pddl.names import Names, group, read_objects, token, typed_list
 from planners.pddl.network import read_network
 from planners.pddl.schemas import action_name, arity_of, check_parts, read_schema
 from planners.pddl.sections import Sections, read_header
 from planners.pddl.sexpr import Document, Expression, Group, Source, Token, parse, read_source
+from planners.system.limits import reaching
+from planners.system.messages import echoed
 
 
 def read_domain(path: str | Path) -> Domain:

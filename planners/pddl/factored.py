@@ -13,8 +13,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
-from planners.errors import BadInput, Position
-from planners.messages import echoed
 from planners.pddl.domain import read_domain
 from planners.pddl.formula_tree import Leaf, fold, with_parts
 from planners.pddl.lifted import (
@@ -32,6 +30,8 @@ from planners.pddl.lifted import (
 )
 from planners.pddl.problem import read_problem
 from planners.pddl.sexpr import JoinedSource
+from planners.system.errors import BadInput, Position
+from planners.system.messages import echoed
 
 _AtomKind = TypeVar("_AtomKind", Atom, StepAtom)
 

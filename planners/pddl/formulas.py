@@ -7,8 +7,6 @@ import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
-from planners.errors import BadInput, Unsupported
-from planners.messages import echoed
 from planners.pddl.lifted import (
     TRUE,
     And,
@@ -25,6 +23,8 @@ from planners.pddl.lifted import (
 )
 from planners.pddl.names import Names, group, is_token, known, token
 from planners.pddl.sexpr import Expression, Group, Token
+from planners.system.errors import BadInput, Unsupported
+from planners.system.messages import echoed
 
 #: How PDDL writes a number.
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)$")

@@ -7,10 +7,10 @@ from collections.abc import Collection, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 
-from planners.errors import BadInput, Unsupported, note
-from planners.messages import echoed, visible
 from planners.pddl.lifted import Domain, Signatures, Variable, have_common
 from planners.pddl.sexpr import Document, Expression, Group, Token
+from planners.system.errors import BadInput, Unsupported, note
+from planners.system.messages import echoed, visible
 
 #: Characters of a wrong name that are compared with the declared names.
 _LONGEST_COMPARED = 200

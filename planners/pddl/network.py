@@ -9,10 +9,10 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from planners.messages import echoed
 from planners.pddl.lifted import Constraint, Schema
 from planners.pddl.names import Names, group, known, token
 from planners.pddl.sexpr import Expression, Group, Token
+from planners.system.messages import echoed
 
 #: What a constraint looks like.
 _FORM = (

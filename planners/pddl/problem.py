@@ -6,14 +6,14 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from planners.errors import Unsupported
-from planners.limits import reaching
-from planners.messages import echoed
 from planners.pddl.formulas import NUMBER, read_formula
 from planners.pddl.lifted import Atom, Domain, Formula, Problem
 from planners.pddl.names import Names, group, known, read_objects, token
 from planners.pddl.sections import Sections, read_header
 from planners.pddl.sexpr import Document, Group, Source, Token, parse, read_source
+from planners.system.errors import Unsupported
+from planners.system.limits import reaching
+from planners.system.messages import echoed
 
 
 def read_problem(path: str | Path, domain: Domain) -> Problem:

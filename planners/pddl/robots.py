@@ -8,10 +8,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
-from planners.errors import BadInput, UsageError, note
-from planners.messages import echoed
-from planners.model_options import ModelOptions, Unowned
 from planners.pddl.lifted import And, Atom, Domain, Problem, Schema
+from planners.pddl.model_options import ModelOptions, Unowned
+from planners.system.errors import BadInput, UsageError, note
+from planners.system.messages import echoed
 
 #: The name of the extra robot that owns actions without a robot, under ``--unowned environment``.
 ENVIRONMENT = "environment"

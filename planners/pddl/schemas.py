@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import re
 
-from planners.files import require_seen
-from planners.messages import echoed
 from planners.pddl.formulas import read_effects, read_formula
 from planners.pddl.lifted import TRUE, Formula, Part, Schema
 from planners.pddl.names import Names, group, is_token, token, typed_list
 from planners.pddl.sexpr import SUBACTION, Comment, Document, Expression, Group, Token
+from planners.system.files import require_seen
+from planners.system.messages import echoed
 
 #: What an action looks like.
 _FORM = "As in (:action move :parameters (?r - robot ?to - place) :precondition .. :effect ..)."

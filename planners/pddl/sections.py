@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-from planners.errors import Unsupported
-from planners.messages import echoed
 from planners.pddl.names import group, token
 from planners.pddl.sexpr import Document, Group
+from planners.system.errors import Unsupported
+from planners.system.messages import echoed
 
 #: Keyword -> the sections that it begins, in the order of the file.
 Sections = dict[str, list[Group]]

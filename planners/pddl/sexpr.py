@@ -15,9 +15,9 @@ from itertools import accumulate
 from pathlib import Path
 from unicodedata import normalize
 
-from planners.errors import BadInput, Position
-from planners.files import not_utf8, read_stored_bytes, require_seen
-from planners.messages import UNSEEN, echoed
+from planners.system.errors import BadInput, Position
+from planners.system.files import not_utf8, read_stored_bytes, require_seen
+from planners.system.messages import UNSEEN, echoed
 
 #: Deeper nesting than this is refused: no domain needs it, and the passes behind recurse.
 MAX_DEPTH = 200
@@ -205,7 +205,7 @@ def parse(source: Source) -> Document:
 
     Raises `BadInput` for unbalanced parentheses, a section in another one (where a parenthesis is
     missing), text outside of parentheses, nesting beyond `MAX_DEPTH`, names with characters of
-    `planners.messages.UNSEEN`, or two names that Unicode makes one.
+    `planners.system.messages.UNSEEN`, or two names that Unicode makes one.
     """
     reader = _Reader(source)
     _require_seen(source)

@@ -13,8 +13,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.errors import ProvedImpossible
 from planners.joint.model import JointModel, Options, PlanningTask, Steps
+from planners.joint.tables import Ints, Rows
 from planners.search.cost_limit import CostLimit
 from planners.search.exact_bound import exact_bound
 from planners.search.goals import FAR
@@ -26,7 +26,7 @@ from planners.search.reachable import PieceSizes
 from planners.search.state_table import Packing, StateTable
 from planners.search.state_variables import StateVariable
 from planners.search.unreachable import searched
-from planners.tables import Ints, Rows
+from planners.system.errors import ProvedImpossible
 
 _NEVER = np.iinfo(np.int32).max
 #: In place of the layer of a state: no optimal plan passes through it.

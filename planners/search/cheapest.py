@@ -20,9 +20,9 @@ import numpy as np
 
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import JointModel, PlanningTask
+from planners.joint.tables import Ints
 from planners.search.goals import goal_facts
 from planners.search.questions import FixedPlans, Literals, OutOfEffort, Plan
-from planners.tables import Ints
 
 #: Conflicts for the try by cores.
 _FIRST = 300_000

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from planners.joint.tables import Bools, Ints, Numbers, Rows
 from planners.search.goals import FAR, Values
-from planners.tables import Bools, Ints, Numbers, Rows
 
 
 class CostLimit:

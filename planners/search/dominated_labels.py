@@ -17,10 +17,10 @@ from planners.grounding import GroundAction
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import JointModel
 from planners.joint.step_clauses import clauses
+from planners.joint.tables import Bools, Ints
 from planners.pddl.formula_tree import literals
 from planners.pddl.lifted import TRUE, Atom, StepAtom
 from planners.search.state_variables import StateVariable
-from planners.tables import Bools, Ints
 
 
 def dominated_pairs(model: JointModel, variables: Sequence[StateVariable]) -> list[Bools]:

@@ -7,10 +7,10 @@ from collections import defaultdict
 from collections.abc import Sequence
 from itertools import product
 
-from planners.errors import note
 from planners.joint.model import JointModel, show
 from planners.pddl.lifted import Atom, Domain, Problem
 from planners.search.state_variables import counted_groups
+from planners.system.errors import note
 
 
 def note_doubled(domain: Domain, problems: Sequence[Problem], model: JointModel) -> None:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,14 +20,14 @@ import numpy as np
 
 from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, PlanningTask
-from planners.limits import reaching
+from planners.joint.tables import Bools, Ints, Rows
 from planners.search.cheapest import cheapest
 from planners.search.mutexes import mutexes
 from planners.search.plan_formula import PlanFormula, TooManyClauses
 from planners.search.questions import FixedPlans, Literals, OutOfEffort, Plan
 from planners.search.reachable import PieceSizes
 from planners.search.state_variables import StateVariable
-from planners.tables import Bools, Ints, Rows
+from planners.system.limits import reaching
 
 #: Ways that were asked for last, of which so many may pass that no more are asked for.
 _RECENT = 200

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 
 from planners.joint.conditions import split_condition
 from planners.joint.model import FullState, Goal, JointModel
+from planners.joint.tables import Ints, Rows
 from planners.pddl.formula_tree import required_atoms
 from planners.pddl.lifted import Formula
-from planners.tables import Ints, Rows
 
 #: The value of a state from which the goal is proved unreachable.
 FAR = 2**30

@@ -11,14 +11,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
 
-from planners.errors import UsageError
+from planners.system.errors import UsageError
 
 if TYPE_CHECKING:
     from planners.joint.model import Goal, JointModel, Options, PlanningTask
+    from planners.joint.tables import Ints, Rows
     from planners.search.goals import Values
     from planners.search.projections import Projections
     from planners.search.state_variables import StateVariable
-    from planners.tables import Ints, Rows
 
 HeuristicName = Literal["relaxed", "manhattan", "projections", "blind"]
 #: What a search for all optimal plans takes; ``auto`` chooses one.

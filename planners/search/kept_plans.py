@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from planners.errors import CoordlangError, note
 from planners.joint.model import JointModel, PlanningTask
 from planners.search import optimal_plans
 from planners.search.plan_space import PlanSpace
+from planners.system.errors import CoordlangError, note
 
 if TYPE_CHECKING:  # what reads and writes files is loaded where plans are kept
     from planners.parallel.store import Store

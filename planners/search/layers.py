@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from planners.joint.model import JointModel
+from planners.joint.tables import Bools, Ints, Numbers
 from planners.search.state_table import StateTable
-from planners.tables import Bools, Ints, Numbers
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,11 +7,11 @@ import re
 
 import numpy as np
 
-from planners.errors import UsageError
 from planners.joint.model import Goal, JointModel
+from planners.joint.tables import Ints, Rows
 from planners.pddl.lifted import Atom
 from planners.search.goals import FAR, Values, goal_facts, ways_to_facts
-from planners.tables import Ints, Rows
+from planners.system.errors import UsageError
 
 #: What is somewhere: predicate, the other arguments, and which argument the place is.
 _Thing = tuple[str, tuple[str, ...], int]

@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planners.errors import OutOfMemory
-from planners.graphs import csgraph
 from planners.grounding import GroundAction
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import JointModel
+from planners.joint.tables import Bools, Ints, Rows
 from planners.pddl.lifted import TRUE
 from planners.search.goals import positive_facts
-from planners.tables import Bools, Ints, Rows
+from planners.search.graphs import csgraph
+from planners.system.errors import OutOfMemory
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

@@ -14,9 +14,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from planners.errors import ProvedImpossible
 from planners.joint.model import Goal, JointModel, PlanningTask
-from planners.limits import reaching
+from planners.joint.tables import Bools, Ints, Numbers, Rows, ranges, unique_rows
 from planners.search.bounded_search import BoundedSearch
 from planners.search.exact_bound import SMALLER
 from planners.search.heuristics import search_heuristic
@@ -26,7 +25,8 @@ from planners.search.reachable import PIECES, PieceSizes, Space
 from planners.search.slack import explore_within, require_rest, seeing, seen_rows
 from planners.search.state_variables import state_variables
 from planners.search.unreachable import searched
-from planners.tables import Bools, Ints, Numbers, Rows, ranges, unique_rows
+from planners.system.errors import ProvedImpossible
+from planners.system.limits import reaching
 
 #: Where fewer than one in so many states are new, only the joint steps into these are looked at.
 _FEW = 8

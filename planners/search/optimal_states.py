@@ -13,10 +13,10 @@ import numpy as np
 
 from planners.joint.conditions import Labels
 from planners.joint.model import Goal, JointModel, Options
+from planners.joint.tables import Bools, Ints, Rows
 from planners.search.exact_bound import ExactBound
 from planners.search.heuristics import Heuristic
 from planners.search.layers import Edges
-from planners.tables import Bools, Ints, Rows
 
 #: States from which ways are tried, the ways that are followed from each, and the share of them
 #: that has to lead to the goal.

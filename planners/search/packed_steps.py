@@ -16,9 +16,9 @@ import numpy as np
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import JointModel, Options, Steps
 from planners.joint.states import TrueFacts
+from planners.joint.tables import Ints, Rows
 from planners.search.state_table import Packing
 from planners.search.state_variables import StateVariable
-from planners.tables import Ints, Rows
 
 #: Pairs of labels that change the same variable, of which at most so many are looked at.
 _PAIRS = 20_000_000

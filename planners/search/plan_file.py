@@ -11,11 +11,11 @@ from typing import Annotated, Any
 import msgspec
 from msgspec import Meta
 
-from planners.errors import BadInput, Position
-from planners.files import FileFormat, read_text
 from planners.joint.model import JointModel
-from planners.messages import echoed
 from planners.search.plans import Plan, Plans
+from planners.system.errors import BadInput, Position
+from planners.system.files import FileFormat, read_text
+from planners.system.messages import echoed
 
 #: Each robot's subaction, None for idling.
 Texts = tuple[str | None, ...]

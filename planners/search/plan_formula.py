@@ -21,13 +21,13 @@ from planners.joint.composition import ComposingStepper
 from planners.joint.interference import Choices
 from planners.joint.model import FullState, Goal, JointModel
 from planners.joint.step_clauses import Clause, clauses
+from planners.joint.tables import Ints, Rows
 from planners.pddl.formula_tree import Leaf, negated
 from planners.pddl.lifted import TRUE, Formula
 from planners.search.dominated_labels import dominated_pairs
 from planners.search.mutexes import Pair
 from planners.search.questions import FixedPlans, Literals, OutOfEffort, Plan, Questions
 from planners.search.state_variables import StateVariable
-from planners.tables import Ints, Rows
 
 
 class TooManyClauses(Exception):

@@ -18,8 +18,8 @@ import numpy as np
 
 from planners.joint.conditions import Labels
 from planners.joint.model import Goal, JointModel
-from planners.notebook import counted, html_table
-from planners.tables import Bools, Ints, Rows, ranges
+from planners.joint.tables import Bools, Ints, Rows, ranges
+from planners.system.notebook import counted, html_table
 
 
 @dataclass(frozen=True, slots=True)

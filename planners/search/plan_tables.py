@@ -10,12 +10,12 @@ import numpy as np
 
 from planners.grounding import GroundAction
 from planners.joint.model import FullState, JointModel, PlanningTask
+from planners.joint.tables import Ints, unique_rows
 from planners.parallel.batch import Table, digest
 from planners.parallel.versions import code_hash
 from planners.pddl.formula_tree import formula_text, label
 from planners.pddl.lifted import And, Formula, Or
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints, unique_rows
 
 #: The arrays of a plan space that are kept, with their types and numbers of dimensions.
 _ARRAYS = {

@@ -14,16 +14,16 @@ from typing import Protocol, overload
 
 import numpy as np
 
-from planners.errors import OutOfMemory
-from planners.graphs import parts_of_graph
 from planners.joint.model import FullState, Goal, JointModel
-from planners.limits import memory_left, more_memory
+from planners.joint.tables import Bools, Ints, Rows
 from planners.parallel.batch import digest
+from planners.search.graphs import parts_of_graph
 from planners.search.optimal_plans import distances, plan_spaces
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, PieceSizes, Space
 from planners.search.slack import seen_rows
-from planners.tables import Bools, Ints, Rows
+from planners.system.errors import OutOfMemory
+from planners.system.limits import memory_left, more_memory
 
 #: Estimated nodes times robots in one portion.  Smaller ones find the same label sets again and
 #: again, larger ones leave cores without work.

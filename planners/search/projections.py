@@ -19,9 +19,9 @@ import numpy as np
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import Goal, JointModel, Options
 from planners.joint.states import TrueFacts
+from planners.joint.tables import Ints, Rows
 from planners.search.goals import FAR, goal_facts
 from planners.search.state_variables import StateVariable
-from planners.tables import Ints, Rows
 
 
 @dataclass(frozen=True, slots=True)

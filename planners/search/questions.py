@@ -11,8 +11,15 @@ from itertools import chain
 
 import numpy as np
 
-from planners.sat import SolverName, propagates, sat_solver, simplified, solve_slice, split_clauses
-from planners.tables import Ints, ranges
+from planners.joint.tables import Ints, ranges
+from planners.search.sat import (
+    SolverName,
+    propagates,
+    sat_solver,
+    simplified,
+    solve_slice,
+    split_clauses,
+)
 
 #: Hard questions and many easy ones: Glucose takes about half as long as MiniSat for the hard ones,
 #: and its version 4.2 half as long as 4.1 for the hardest (least cost in elevators p07: 23 s, 40).

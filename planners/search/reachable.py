@@ -10,8 +10,8 @@ import numpy as np
 
 from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, Steps
-from planners.limits import reaching
-from planners.tables import Ints, Rows, find_rows, ranges, unique_rows
+from planners.joint.tables import Ints, Rows, find_rows, ranges, unique_rows
+from planners.system.limits import reaching
 
 #: What to try besides a larger limit.
 FEWER = "fewer objects or robots"

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from planners.joint.model import Goal, JointModel
+from planners.joint.tables import Bools, Ints, Rows
 from planners.search.goals import FAR, Values, goal_facts, ways_to_facts
-from planners.tables import Bools, Ints, Rows
 
 #: Truth values held at a time.
 _BITS = 1 << 24

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from planners.joint.model import JointModel, PlanningTask
+from planners.joint.tables import Rows, find_rows, unique_rows
 from planners.search.bounded_search import probe_size
 from planners.search.goals import FAR, Values
 from planners.search.heuristics import search_heuristic
 from planners.search.reachable import PIECES
 from planners.search.relaxed import relaxed
 from planners.search.state_variables import state_variables
-from planners.tables import Rows, find_rows, unique_rows
 
 #: Joint steps composed for all layers together, at most.
 _STEPS = 100_000

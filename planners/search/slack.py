@@ -16,16 +16,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from planners.errors import UsageError
 from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, PlanningTask, Steps
-from planners.limits import reaching
+from planners.joint.tables import Bools, Ints, Rows, find_rows, unique_rows
 from planners.search.goals import FAR
 from planners.search.heuristics import search_heuristic
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, PieceSizes, Space, blocks, joined_steps
 from planners.search.state_variables import state_variables
-from planners.tables import Bools, Ints, Rows, find_rows, unique_rows
+from planners.system.errors import UsageError
+from planners.system.limits import reaching
 
 
 def explore_within(

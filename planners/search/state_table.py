@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.joint.states import StateCodec, TrueFacts
+from planners.joint.tables import Bools, Ints, Rows
 from planners.search.state_variables import StateVariable
-from planners.tables import Bools, Ints, Rows
 
 #: Numbers of states in the hash table; -1: the slot is free.
 _Slots = NDArray[np.int32]

@@ -18,9 +18,9 @@ from itertools import combinations
 from planners.grounding import GroundAction
 from planners.joint.conditions import split_condition
 from planners.joint.model import JointModel
+from planners.joint.tables import Rows
 from planners.pddl.formula_tree import literals
 from planners.pddl.lifted import TRUE, Atom, StepAtom
-from planners.tables import Rows
 
 #: Predicates, each with a position of the object, that facts of one variable may have.
 _SHAPES = 3

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 from planners.joint.model import FullState, Goal, JointModel, show
+from planners.joint.tables import Rows
 from planners.pddl.formula_tree import required_atoms
-from planners.tables import Rows
 
 #: States in which the reason why actions cannot share a step is looked for.
 _LOOK_AT = 1_000

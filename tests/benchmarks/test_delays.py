@@ -17,13 +17,13 @@ from benchmarks.paper.late_robots import DelayTrials, Execution, Part
 from benchmarks.paper.recipe import Record, Settings
 from benchmarks.paper.suite import WORLDS, language_for
 from benchmarks.paper.task_choices import sentence_of
-from coordlang.tolerance.failure import failure_probability
-from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
+from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
+from coordlang.required.failure import failure_probability
 from planners.joint.model import JointModel, PlanningTask
+from planners.joint.tables import Rows
 from planners.loading import load
 from planners.search.optimal_plans import search
 from planners.search.plans import Plan, Plans
-from planners.tables import Rows
 from tests.support.domains import DOMAINS
 
 

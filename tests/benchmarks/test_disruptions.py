@@ -18,8 +18,8 @@ from benchmarks.paper.scenario import subplans
 from benchmarks.paper.suite import language_for
 from benchmarks.paper.task_choices import Disruption, TaskChoices
 from benchmarks.paper.warehouse import LAYOUTS, WAREHOUSES, deliveries, human_in, listed_tasks
-from coordlang.tolerance.sampled import wilson
-from coordlang.use.sentence.task_language import TaskLanguage
+from coordlang.execution.task_language import TaskLanguage
+from coordlang.required.sampled import wilson
 from planners.search.plans import Plan
 from tests.support import naive
 from tests.support.domains import all_tasks

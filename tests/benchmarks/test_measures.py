@@ -18,9 +18,9 @@ from coordlang.language.flexibility import flexibility as measured
 from coordlang.language.partition import Partition
 from coordlang.language.sentences import sentence_counts
 from coordlang.required.divergences import states_on_plans
-from coordlang.tolerance.sampled import wilson
+from coordlang.required.sampled import wilson
 from coordlang.verification.by_definition import verify
-from planners.errors import OutOfMemory
+from planners.system.errors import OutOfMemory
 from tests.support import naive
 from tests.support.domains import all_tasks
 from tests.support.task_languages import task_languages, three_cells

@@ -21,11 +21,11 @@ from benchmarks.paper.reported import (
     TABLE_1,
 )
 from benchmarks.paper.suite import CORRIDOR, OTHERS, ROWS, WORLDS, language_for
-from coordlang.use.sentence.guided_search import ExpandedStates
-from coordlang.use.sentence.task_language import languages_in_tasks
+from coordlang.execution.guided_search import ExpandedStates
+from coordlang.execution.task_language import languages_in_tasks
 from coordlang.vocabulary.sat import PartitionProblem
-from planners.errors import OutOfTime
 from planners.search.plans import Plans
+from planners.system.errors import OutOfTime
 from tests.support.domains import all_tasks
 from tests.support.task_languages import task_languages, three_cells
 

@@ -16,8 +16,8 @@ from benchmarks.paper import silence
 from benchmarks.paper.recipe import Record, Settings
 from benchmarks.paper.silence import plan_bits, sentence_bits
 from benchmarks.paper.suite import WORLDS, World
-from coordlang.movingai import planning_files
 from coordlang.required.divergences import required_nodes
+from coordlang.sites.movingai import planning_files
 from coordlang.vocabulary.flexibility_bound import bits_bounds
 from planners.search.plans import Plan
 from tests.support import naive

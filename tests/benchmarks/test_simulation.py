@@ -13,8 +13,8 @@ from benchmarks.paper import floors, simulation
 from benchmarks.paper.driving import counted, is_well
 from benchmarks.paper.floors import DRAWS, FLOORS, foreign_map, tasks_of
 from benchmarks.paper.recipe import Record, Settings, Unit
-from coordlang.use.sentence.task_language import TaskLanguage
-from coordlang.use.simulation.record import EventRecord, RunRecord
+from coordlang.execution.task_language import TaskLanguage
+from coordlang.simulation.record import EventRecord, RunRecord
 from planners.search.plans import Plans
 from tests.support.domains import DOMAINS
 
@@ -91,9 +91,9 @@ def test_tasks_are_drawn_the_same_each_time() -> None:
 
 def test_three_robots_on_the_t_map_need_no_word() -> None:
     """Which is why they are not simulated: by the definition, on every task."""
-    from coordlang.movingai import grid_problem_text
+    from coordlang.language.candidates import all_pairs
     from coordlang.required.choices import Choices
-    from coordlang.tasks.candidates import all_pairs
+    from coordlang.sites.movingai import grid_problem_text
     from planners.pddl import parse_problem, read_domain
     from planners.pddl.sexpr import Source
 

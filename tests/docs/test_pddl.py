@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from coordlang.cli import run
-from planners.errors import Unsupported
+from coordlang.commands.main import run
 from planners.loading import build
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
+from planners.system.errors import Unsupported
 from tests.support.domains import ROOT
 from tests.support.pages import DOCS, blocks, code, links, rows, sections
 

@@ -11,12 +11,12 @@ from typing import Any
 
 import pytest
 
-from coordlang.cli import run
+from coordlang.commands.main import run
+from coordlang.language.candidates import all_pairs
 from coordlang.language.file import read_language
 from coordlang.language.recorded import options_of
 from coordlang.language.sentences import sentence
-from coordlang.tasks.candidates import all_pairs
-from coordlang.tasks.task_file import read_task_file
+from coordlang.language.task_file import read_task_file
 from planners.pddl import read_domain, read_problem
 from planners.search.plans import Plans, counts
 from tests.support.domains import ROOT

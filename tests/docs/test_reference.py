@@ -12,9 +12,9 @@ from pathlib import Path
 import click
 import pytest
 
-from coordlang.cli.exit_codes import BROKEN_PIPE, INTERRUPTED
-from coordlang.cli.group import COMMANDS, cli
-from planners.errors import CoordlangError
+from coordlang.commands.exit_codes import BROKEN_PIPE, INTERRUPTED
+from coordlang.commands.group import COMMANDS, cli
+from planners.system.errors import CoordlangError
 from tests.support.domains import ROOT
 from tests.support.pages import DOCS, PAGES, anchor, blocks, code, links, prose, rows, sections
 
@@ -111,7 +111,7 @@ def test_nothing_is_mentioned_that_does_not_exist(page: Path) -> None:
 
 def test_exit_codes() -> None:
     importlib.import_module("planners.classical.fast_downward")
-    importlib.import_module("coordlang.building")
+    importlib.import_module("coordlang.commands.building")
     listed = [int(cells[0]) for cells in rows(sections(CLI)["Exit codes"])]
     assert listed == sorted(listed)
     assert set(listed) == {

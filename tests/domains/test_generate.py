@@ -14,8 +14,8 @@ import pytest
 from generate import main, scenario
 from gridmap import open_grid
 
-from planners.errors import UsageError
 from planners.loading import load
+from planners.system.errors import UsageError
 from tests.support.domains import DOMAINS
 
 #: The folders that the generator writes; the other worlds are written by hand.

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from gridmap import open_grid, read_map, ring
 
-from planners.errors import BadInput
+from planners.system.errors import BadInput
 from tests.support.domains import SHARED
 
 

@@ -13,17 +13,17 @@ from xml.etree import ElementTree
 
 import pytest
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
 from coordlang.required.miscoordination import Inseparable, miscoordination
 from coordlang.verification.by_definition import verify
 from planners.classical.fast_downward import optimal_cost
-from planners.limits import time_limit
 from planners.loading import PlanningInstance, load
-from planners.model_options import Cost, ModelOptions
+from planners.pddl.model_options import Cost, ModelOptions
 from planners.pddl.robots import static_atoms
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from planners.search.reachable import Space
+from planners.system.limits import time_limit
 from tests.support.console import run_command
 from tests.support.domains import DOMAINS, Worlds
 from tests.support.pages import blocks, commands, links

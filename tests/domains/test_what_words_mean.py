@@ -15,9 +15,9 @@ from pathlib import Path
 
 import pytest
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
+from coordlang.language.candidates import Candidates
 from coordlang.language.words import Language
-from coordlang.tasks.candidates import Candidates
 from coordlang.verification.by_definition import Verdict, verify
 from planners.joint.states import split_atoms
 from tests.support.console import run_command

@@ -14,16 +14,18 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from coordlang.building import Built, build_language, certificate_of
-from coordlang.certificate import Certificate, check, encode, read_certificate
+from coordlang.commands.building import Built, build_language, certificate_of
 from coordlang.language.file import read_language
-from coordlang.tasks.task_file import read_task_file
-from planners.errors import BadInput, OutOfMemory, Refuted
-from planners.files import read_bytes
-from planners.limits import time_limit
+from coordlang.language.task_file import read_task_file
+from coordlang.verification.certificate_clauses import encode
+from coordlang.verification.certificate_file import Certificate, read_certificate
+from coordlang.verification.check_certificate import check
 from planners.pddl import parse_domain
 from planners.pddl.sexpr import Source
 from planners.search.plan_file import read_plans
+from planners.system.errors import BadInput, OutOfMemory, Refuted
+from planners.system.files import read_bytes
+from planners.system.limits import time_limit
 from tests.support.command import Command, own_process
 from tests.support.domains import DOMAINS, all_tasks
 from tests.support.forks import fork_command
@@ -80,7 +82,7 @@ def test_a_file_without_end_is_refused(tmp_path: Path) -> None:
 def test_what_would_not_fit_is_out_of_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("planners.files.memory_left", lambda: 64 * MIB)
+    monkeypatch.setattr("planners.system.files.memory_left", lambda: 64 * MIB)
     assert read_bytes(bomb(tmp_path / "fits.gz", 16))
     with pytest.raises(OutOfMemory, match=r"bomb\.gz: reading 17 MiB takes 68 MiB.* 64 MiB are"):
         read_bytes(bomb(tmp_path / "bomb.gz", 17))
@@ -178,7 +180,7 @@ def test_nothing_is_said_of_no_states(built: Built, certificate: Certificate) ->
 
 
 def test_a_formula_that_would_not_fit_is_not_made(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("coordlang.certificate.encoding.memory_left", lambda: 60 * MIB)
+    monkeypatch.setattr("coordlang.verification.certificate_clauses.memory_left", lambda: 60 * MIB)
     clauses = [frozenset({two}) for two in combinations(range(80), 2)]
     tracemalloc.start()
     try:
@@ -190,10 +192,10 @@ def test_a_formula_that_would_not_fit_is_not_made(monkeypatch: pytest.MonkeyPatc
     finally:
         tracemalloc.stop()
     # The estimate has room for the solver, and is of the right size.
-    monkeypatch.setattr("coordlang.certificate.encoding.memory_left", lambda: made)
+    monkeypatch.setattr("coordlang.verification.certificate_clauses.memory_left", lambda: made)
     with pytest.raises(OutOfMemory, match="20 words for 80 states"):
         encode(clauses, 20)
-    monkeypatch.setattr("coordlang.certificate.encoding.memory_left", lambda: 4 * made)
+    monkeypatch.setattr("coordlang.verification.certificate_clauses.memory_left", lambda: 4 * made)
     assert encode(clauses, 20) == cnf
 
 

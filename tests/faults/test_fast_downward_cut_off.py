@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from coordlang.api.inputs import read_instance
-from coordlang.api.options import Source
+from coordlang.commands.inputs import read_instance
+from coordlang.commands.options import Source
 from planners.classical import LONGEST, ClassicalTask, compile_classical, fast_downward, to_pddl
 from planners.classical.fast_downward import SEARCH, FastDownwardFailed, answered, total_cost
 from tests.support.domains import DOMAINS

@@ -18,11 +18,11 @@ from typing import Any
 import pytest
 
 import coordlang as library
-from coordlang.certificate import write_certificate
-from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
-from coordlang.tasks.listed import ListedTask
-from coordlang.use.choices.monitor import Monitor, MonitorError
-from planners.model_options import ModelOptions
+from coordlang.execution.monitor import Monitor, MonitorError
+from coordlang.language.candidates import Candidates, all_pairs, from_listed, from_problems
+from coordlang.language.listed import ListedTask
+from coordlang.verification.certificate_file import write_certificate
+from planners.pddl.model_options import ModelOptions
 from planners.search.plan_space import PlanSpace
 from tests.support import naive
 from tests.support.command import Command, Outcome

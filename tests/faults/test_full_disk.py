@@ -18,8 +18,8 @@ from typing import Any
 
 import pytest
 
-from planners.errors import UsageError
-from planners.writing import copy_folders
+from planners.system.errors import UsageError
+from planners.system.writing import copy_folders
 from tests.support.command import Outcome
 from tests.support.domains import DOMAINS
 from tests.support.forks import fork, fork_command

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 import coordlang
-from coordlang.cli import run
+from coordlang.commands.main import run
 from tests.support.domains import DOMAINS
 from tests.support.forks import fork_command
 

@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 import coordlang
-from coordlang.cli.group import COMMANDS
-from coordlang.movingai import planning_files
+from coordlang.commands.group import COMMANDS
+from coordlang.sites.movingai import planning_files
 from tests.support.command import own_process
 from tests.support.domains import DOMAINS
 

@@ -11,9 +11,9 @@ from typing import Any
 import msgspec
 import pytest
 
-from coordlang.building import Built, certificate_of
-from coordlang.certificate import Certificate
-from planners import sat
+from coordlang.commands.building import Built, certificate_of
+from coordlang.verification.certificate_file import Certificate
+from planners.search import sat
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
 
@@ -107,7 +107,7 @@ def test_a_certificate_with_too_few_reasons_is_not_written(
         whole = certificate_of(built)
         return msgspec.structs.replace(whole, reasons=whole.reasons[:1])
 
-    monkeypatch.setattr("coordlang.api.languages.certificate_of", too_few)
+    monkeypatch.setattr("coordlang.commands.languages.certificate_of", too_few)
     files = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
     built = coordlang(
         *("build", *files, "--tasks", "all", "--method", "minimal", "--jobs", 1),

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from coordlang.certificate import read_certificate
 from coordlang.language.file import read_language
-from planners.errors import OutOfTime, UsageError
-from planners.writing import write_atomically
+from coordlang.verification.certificate_file import read_certificate
+from planners.system.errors import OutOfTime, UsageError
+from planners.system.writing import write_atomically
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
 from tests.support.forks import fork_command
@@ -27,7 +27,7 @@ NAME_MAX = os.pathconf("/", "PC_NAME_MAX")
 
 @pytest.fixture
 def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("coordlang.api.inputs.read_domain", lambda *_: pytest.fail("no work"))
+    monkeypatch.setattr("coordlang.commands.inputs.read_domain", lambda *_: pytest.fail("no work"))
 
 
 @pytest.fixture
@@ -226,7 +226,7 @@ def test_a_certificate_that_is_not_made_leaves_no_old_one(
     def stop(_: object) -> None:
         raise limit
 
-    monkeypatch.setattr("coordlang.api.languages.certificate_of", stop)
+    monkeypatch.setattr("coordlang.commands.languages.certificate_of", stop)
     outcome = coordlang(*BUILD, *PAIR)
     assert _pair(old_pair) == "new, alone"
     if limit is KeyboardInterrupt:
@@ -358,7 +358,7 @@ def test_a_language_and_its_certificate_are_written_together(
     coordlang: Command, here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Another command writes to the same file while this one works out its certificate."""
-    from coordlang.api.languages import BuiltLanguage
+    from coordlang.commands.languages import BuiltLanguage
 
     own = BuiltLanguage.certificate
 

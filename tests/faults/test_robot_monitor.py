@@ -20,8 +20,8 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from coordlang.use.choices import monitor as monitor_module
-from coordlang.use.choices.monitor import Monitor, MonitorError, NotAllowed, NotPossible
+from coordlang.execution import monitor as monitor_module
+from coordlang.execution.monitor import Monitor, MonitorError, NotAllowed, NotPossible
 
 LENGTH = 10_000
 DEEP = 100_000

@@ -17,8 +17,8 @@ from typing import Any
 
 import pytest
 
-from planners.signals import ENDING, Interrupted, postponed_signals
-from planners.writing import write_atomically
+from planners.system.signals import ENDING, Interrupted, postponed_signals
+from planners.system.writing import write_atomically
 from tests.support.command import own_process
 from tests.support.domains import DOMAINS
 
@@ -51,8 +51,8 @@ main()
 _MODULES = (
     "1",
     "click",
-    "coordlang.cli.group",
-    "coordlang.cli.plans",
+    "coordlang.commands.group",
+    "coordlang.commands.plans",
     "msgspec",
     "numpy",
     "clingo",
@@ -112,7 +112,7 @@ def test_a_signal_that_is_ignored_stays_so() -> None:
     """So start ``nohup`` and shells what is to go on."""
     code = (
         "import os, signal\nfor n in (1, 2, 15): signal.signal(n, signal.SIG_IGN)\n"
-        "from planners.signals import Interruptions\nfound = Interruptions()\n"
+        "from planners.system.signals import Interruptions\nfound = Interruptions()\n"
         "for n in (1, 2, 15): os.kill(os.getpid(), n)\nprint(found.first)"
     )
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
@@ -121,7 +121,7 @@ def test_a_signal_that_is_ignored_stays_so() -> None:
 
 def test_a_signal_that_a_finalizer_lost_is_sent_again() -> None:
     code = (
-        "import os, time\nfrom planners.signals import Interrupted, Interruptions\n"
+        "import os, time\nfrom planners.system.signals import Interrupted, Interruptions\n"
         "Interruptions()\n"
         "class Loses:\n    def __del__(self): os.kill(os.getpid(), 15)\n"
         "try:\n    Loses()\n    time.sleep(30)\nexcept Interrupted as end:\n    print(end.number)"

@@ -14,12 +14,12 @@ from typing import get_args
 
 import pytest
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
 from coordlang.vocabulary.sat import PartitionProblem
-from planners.errors import OutOfTime
-from planners.limits import time_left, time_limit
-from planners.sat import SolverName, propagates, sat_solver, solve_slice
-from planners.signals import Interruptions
+from planners.search.sat import SolverName, propagates, sat_solver, solve_slice
+from planners.system.errors import OutOfTime
+from planners.system.limits import time_left, time_limit
+from planners.system.signals import Interruptions
 from tests.support.command import Outcome
 from tests.support.domains import DOMAINS, all_tasks
 from tests.support.forks import fork, fork_command
@@ -79,7 +79,7 @@ def interrupt_often(solver: SolverName, times: int) -> None:
         again = choice.uniform(0.0, 0.05) if turn % 2 else None
         ended = interrupted(solver, choice.uniform(0.03, 0.25), again)
         codes[ended.code] += 1
-        assert ended.code == 0 or "planners.signals.Interrupted: SIGINT" in ended.err, ended
+        assert ended.code == 0 or "planners.system.signals.Interrupted: SIGINT" in ended.err, ended
     assert set(codes) <= {0, 70}  # 70: the second signal came after the first was caught
 
 

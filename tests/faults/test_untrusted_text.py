@@ -18,9 +18,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from coordlang.cli import run
-from planners.errors import BadInput, Position
-from planners.messages import UNSEEN, echoed, sentence, visible
+from coordlang.commands.main import run
+from planners.system.errors import BadInput, Position
+from planners.system.messages import UNSEEN, echoed, sentence, visible
 from tests.fuzz.pieces import renamed
 from tests.support.classical_models import CORRIDOR, CORRIDOR_TASK
 from tests.support.command import Command, Outcome

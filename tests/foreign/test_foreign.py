@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from coordlang.cli import run
+from coordlang.commands.main import run
+from coordlang.language.patterns import varied_tasks
 from coordlang.required.miscoordination import Inseparable
-from coordlang.tasks.patterns import varied_tasks
 from tests.support import foreign_tasks as foreign
 from tests.support.domains import SHARED
 from tests.support.foreign_tasks import (

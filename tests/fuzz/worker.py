@@ -15,7 +15,7 @@ def serve() -> None:
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
     # `run` is imported before any memory limit is set.
-    from coordlang.cli import run
+    from coordlang.commands.main import run
 
     def reply(data: dict[str, Any]) -> None:
         answers.write(json.dumps(data) + "\n")

@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planners.graphs import parts_of_graph
-from planners.limits import limit_processor_time
+from planners.search.graphs import parts_of_graph
+from planners.system.limits import limit_processor_time
 from tests.support.command import own_process
 from tests.support.domains import DOMAINS
 from tests.support.forks import fork
@@ -46,9 +46,9 @@ def test_scipy_is_not_loaded_where_it_does_not_fit() -> None:
     """BLAS would ask for memory without end, and hear no signal."""
     program = """
 import os, sys
-from planners.errors import OutOfMemory
-from planners.graphs import csgraph
-from planners.limits import address_space, limit_memory
+from planners.system.errors import OutOfMemory
+from planners.search.graphs import csgraph
+from planners.system.limits import address_space, limit_memory
 before, _ = dict(os.environ), limit_memory(address_space() + (int(sys.argv[1]) << 20))
 try:
     csgraph().connected_components

@@ -11,10 +11,10 @@ import pytest
 from planners.inspection import inspect
 from planners.joint.composition import ComposingStepper
 from planners.loading import PlanningInstance, build, load
-from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.formula_tree import formula_text
 from planners.pddl.formulas import read_formula
+from planners.pddl.model_options import ModelOptions
 from planners.pddl.names import Names
 from planners.pddl.sexpr import Source, parse
 from planners.search.reachable import explore

@@ -21,11 +21,17 @@ from coordlang.required.label_sets import LabelSets
 from coordlang.required.miscoordination import miscoordination
 from coordlang.verification import by_definition as verify
 from planners import grounding
-from planners.errors import OutOfMemory, OutOfTime
 from planners.grounding import instantiate
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import Options, Stepper, Steps
-from planners.limits import (
+from planners.joint.tables import Rows
+from planners.loading import PlanningInstance, load
+from planners.search.edge_index import EdgeIndex
+from planners.search.optimal_plans import plan_spaces, search
+from planners.search.plan_space import PlanSpace
+from planners.search.reachable import PieceSizes, count, explore
+from planners.system.errors import OutOfMemory, OutOfTime
+from planners.system.limits import (
     limited_memory,
     little_time_after,
     reaching,
@@ -33,12 +39,6 @@ from planners.limits import (
     time_left,
     time_limit,
 )
-from planners.loading import PlanningInstance, load
-from planners.search.edge_index import EdgeIndex
-from planners.search.optimal_plans import plan_spaces, search
-from planners.search.plan_space import PlanSpace
-from planners.search.reachable import PieceSizes, count, explore
-from planners.tables import Rows
 from tests.support.domains import DOMAINS
 
 
@@ -346,7 +346,7 @@ def test_combinations_that_do_not_fit_are_not_made() -> None:
 def test_what_linux_says_of_memory_is_what_psutil_says(monkeypatch: pytest.MonkeyPatch) -> None:
     import psutil
 
-    from planners import limits as module
+    from planners.system import limits as module
 
     assert module.address_space() == pytest.approx(psutil.Process().memory_info().vms, rel=0.02)
     left = psutil.virtual_memory().available

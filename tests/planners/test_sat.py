@@ -11,8 +11,8 @@ from itertools import product
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planners.sat import propagates, sat_solver, simplified, split_clauses
 from planners.search.questions import Questions
+from planners.search.sat import propagates, sat_solver, simplified, split_clauses
 
 VARIABLES = 6
 literal = st.integers(1, VARIABLES).flatmap(lambda v: st.sampled_from((v, -v)))

@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from planners.errors import ProvedImpossible
 from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, PlanningTask, Steps
-from planners.limits import reaching
+from planners.joint.tables import Ints, Rows, find_rows, unique_rows
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, PieceSizes, blocks
 from planners.search.unreachable import searched
-from planners.tables import Ints, Rows, find_rows, unique_rows
+from planners.system.errors import ProvedImpossible
+from planners.system.limits import reaching
 
 _FAR = np.iinfo(np.int64).max // 4
 #: The steps of a layer in pieces: (number of the first state, steps).

@@ -7,9 +7,9 @@ import numpy as np
 
 from coordlang.required.breaks import Trail
 from coordlang.required.composition_walk import FAILED, moves
+from planners.joint.tables import Ints, unique_tuples
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints, unique_tuples
 
 
 def walk_to_a_break(space: PlanSpace, starts: Ints, *, together: bool) -> Trail | None:

@@ -8,16 +8,16 @@ from functools import cache
 from itertools import product
 from random import Random
 
+from coordlang.language.candidates import Candidates, all_pairs, from_listed, from_problems
+from coordlang.language.listed import ListedTask
 from coordlang.required.miscoordination import inseparable
-from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
-from coordlang.tasks.listed import ListedTask
-from planners.errors import ProvedImpossible
 from planners.joint.states import split_atoms
-from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
+from planners.pddl.model_options import ModelOptions
 from planners.pddl.sexpr import Source
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan
+from planners.system.errors import ProvedImpossible
 from tests.support import naive
 from tests.support.composition_walk import walk
 from tests.support.domains import all_tasks

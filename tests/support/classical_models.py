@@ -12,12 +12,12 @@ import pytest
 
 from planners.classical import selection
 from planners.classical.immediate import Immediate
+from planners.joint.tables import Rows
 from planners.loading import PlanningInstance, build
-from planners.model_options import Cost, ModelOptions, Unowned
 from planners.pddl.domain import parse_domain
+from planners.pddl.model_options import Cost, ModelOptions, Unowned
 from planners.pddl.problem import parse_problem
 from planners.pddl.sexpr import Source
-from planners.tables import Rows
 
 COSTS: tuple[Cost, ...] = ("makespan", "makespan+actions")
 FORMS = {"explicit": 100_000, "select-then-apply": 0}

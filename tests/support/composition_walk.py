@@ -15,9 +15,9 @@ import numpy as np
 
 from coordlang.required.composition_walk import FAILED, moves
 from coordlang.required.divergences import Divergences
+from planners.joint.tables import Bools, Ints, unique_tuples
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.tables import Bools, Ints, unique_tuples
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from coordlang.cli import run
+from coordlang.commands.main import run
 from tests.support.pages import Block, Command
 
 #: A line of a console block that stands for any number of lines; at the end of a line, for the rest

@@ -10,9 +10,9 @@ import numpy as np
 from coordlang.required.composition_walk import FAILED, moves
 from coordlang.vocabulary.counterexamples import Counterexample, _backward, _Layer, _layer, _retrace
 from coordlang.vocabulary.leads import NO_WORD, PARTED, Leads
+from planners.joint.tables import Ints, unique_tuples
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints, unique_tuples
 
 
 def walked(space: PlanSpace, word: Ints, most: int) -> Iterator[Counterexample]:

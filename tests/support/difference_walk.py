@@ -9,9 +9,9 @@ import numpy as np
 
 from coordlang.required.composition_walk import FAILED, moves
 from coordlang.required.last_differences import DifferenceWalk, _Layer
+from planners.joint.tables import Ints, unique_tuples
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints, unique_tuples
 
 
 class UncutWalk(DifferenceWalk):

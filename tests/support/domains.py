@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
+from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from planners.loading import PlanningInstance, load
-from planners.model_options import ModelOptions
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Domain, Problem
+from planners.pddl.model_options import ModelOptions
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import Space, explore

@@ -9,18 +9,18 @@ from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
+from coordlang.language.candidates import Candidates, from_listed
+from coordlang.language.patterns import varied_tasks
 from coordlang.language.sentences import Sentence, sentence
 from coordlang.language.words import Language as WordLanguage
 from coordlang.required.divergences import required_nodes
-from coordlang.tasks.candidates import Candidates, from_listed
-from coordlang.tasks.patterns import varied_tasks
-from planners.limits import time_limit
 from planners.loading import build as build_model
-from planners.model_options import ModelOptions
 from planners.pddl import read_domain, read_problem
 from planners.pddl.factored import read_factored
+from planners.pddl.model_options import ModelOptions
 from planners.search.plans import Plans
+from planners.system.limits import time_limit
 from tests.support.domains import SHARED
 
 #: A plan: for each step and robot the subaction's text, None for idling.
@@ -178,7 +178,7 @@ BY_NAME = {row.name: row for row in ROWS}
 
 @dataclass(frozen=True, slots=True)
 class Language:
-    """Varied tasks of a row (`coordlang.tasks.patterns`), and what the words say there.
+    """Varied tasks of a row (`coordlang.language.patterns`), and what the words say there.
 
     ``told``: what a sentence says of a plan; all plans of a sentence agree on it, in at least the
     share ``agree`` of the tasks whose plans differ in it.  ``left`` is what a sentence mostly

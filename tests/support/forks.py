@@ -11,7 +11,7 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from planners.signals import ENDING
+from planners.system.signals import ENDING
 from tests.support.command import Outcome, own_process
 
 

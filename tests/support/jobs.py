@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from planners.errors import BadInput, Position
 from planners.parallel.batch import Batch, Function, Table, digest
+from planners.system.errors import BadInput, Position
 
 
 def squares(shared: int, job: range) -> Table:

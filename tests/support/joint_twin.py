@@ -10,15 +10,15 @@ from itertools import islice
 import pytest
 
 from planners.check.validate import State, validate
-from planners.errors import BadInput, ProvedImpossible
 from planners.loading import PlanningInstance, build, task_of
-from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import And, Formula, Not, Problem
+from planners.pddl.model_options import ModelOptions
 from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plans import Plans
 from planners.search.reachable import explore
+from planners.system.errors import BadInput, ProvedImpossible
 from tests.support.naive_joint_steps import TooLarge, Twin
 from tests.support.random_pddl import RandomModel
 

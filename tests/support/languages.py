@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from random import Random
 
+from coordlang.language.candidates import Candidates
 from coordlang.language.words import Language
-from coordlang.tasks.candidates import Candidates
 
 
 def language_of(words: dict[str, str], names: tuple[str, ...]) -> Language:

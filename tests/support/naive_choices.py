@@ -12,8 +12,8 @@ from functools import cached_property
 from itertools import product
 from math import prod
 
-from coordlang.use.choices.monitor import Detour
-from coordlang.use.sentence.task_language import TaskLanguage
+from coordlang.execution.monitor import Detour
+from coordlang.execution.task_language import TaskLanguage
 from planners.search.plans import Plan, Plans
 from tests.support import naive
 

@@ -5,7 +5,7 @@ list of states.
 
 from __future__ import annotations
 
-from coordlang.use.sentence.task_language import TaskLanguage
+from coordlang.execution.task_language import TaskLanguage
 from planners.search.plans import Plan, Plans
 from tests.support.naive import listed
 

@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 
 from planners.joint.model import JointModel, PlanningTask
+from planners.joint.tables import Rows
 from planners.search.plans import Plan
-from planners.tables import Rows
 
 #: A joint step: its labels, its cost, and the state that it leads to.
 Step = tuple[tuple[int, ...], int, bytes]

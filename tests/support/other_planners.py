@@ -14,18 +14,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
+from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
+from coordlang.exports.pddl import PddlExport, export_pddl, plan_names
+from coordlang.language.candidates import from_problems
 from coordlang.language.sentences import sentence, task_sentences
 from coordlang.required.miscoordination import Inseparable
-from coordlang.tasks.candidates import from_problems
-from coordlang.use.export.pddl import PddlExport, export_pddl, plan_names
-from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
 from planners.classical.fast_downward import total_cost
-from planners.errors import CoordlangError, OutOfMemory
-from planners.limits import time_limit
-from planners.model_options import ModelOptions
 from planners.pddl import read_domain, read_problem
+from planners.pddl.model_options import ModelOptions
 from planners.search.plans import Plans
+from planners.system.errors import CoordlangError, OutOfMemory
+from planners.system.limits import time_limit
 from tests.support.domains import DOMAINS
 
 #: More plans than this are not listed, neither by us nor by others.

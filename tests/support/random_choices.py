@@ -12,15 +12,15 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
+from coordlang.execution.task_language import TaskLanguage
+from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.language.partition import Partition
 from coordlang.required.miscoordination import Inseparable
-from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
-from coordlang.use.sentence.task_language import TaskLanguage
 from coordlang.verification.by_definition import verify
-from planners.errors import ProvedImpossible
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans
+from planners.system.errors import ProvedImpossible
 from tests.support import naive
 from tests.support.naive_choices import Listed, listed
 from tests.support.random_chores import random_chores

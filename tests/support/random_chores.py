@@ -12,9 +12,9 @@ from __future__ import annotations
 
 from random import Random
 
-from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain, Problem
+from planners.pddl.model_options import ModelOptions
 from planners.pddl.sexpr import Source
 
 DOMAIN = """(define (domain chores) (:types robot chore thing)

@@ -6,12 +6,12 @@ from __future__ import annotations
 from dataclasses import replace
 from random import Random
 
-from planners.errors import BadInput
 from planners.loading import PlanningInstance, build
-from planners.model_options import Cost, ModelOptions
 from planners.pddl import parse_domain, parse_problem
+from planners.pddl.model_options import Cost, ModelOptions
 from planners.pddl.sexpr import Source
 from planners.search.reachable import Space, explore
+from planners.system.errors import BadInput
 from tests.support.random_models import random_model
 from tests.support.random_pddl import random_model as random_pddl
 

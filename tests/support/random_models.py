@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from random import Random
 
-from planners.model_options import Cost, ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain, Problem
+from planners.pddl.model_options import Cost, ModelOptions
 from planners.pddl.sexpr import Source
 
 

@@ -13,7 +13,7 @@ from itertools import product
 from random import Random
 from typing import Literal
 
-from planners.model_options import Unowned
+from planners.pddl.model_options import Unowned
 
 Kind = Literal["agent", "plain", "joint"]
 KINDS: tuple[Kind, ...] = ("agent", "plain", "joint")

@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
+from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.required.miscoordination import inseparable
-from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
-from planners.errors import BadInput, ProvedImpossible
-from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
+from planners.pddl.model_options import ModelOptions
 from planners.pddl.sexpr import Source
 from planners.search.plan_space import PlanSpace
+from planners.system.errors import BadInput, ProvedImpossible
 from tests.support.random_models import random_model
 from tests.support.random_pddl import random_model as random_pddl
 

@@ -7,10 +7,10 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
-from coordlang.tasks.task_file import read_task_file
-from planners.model_options import ModelOptions
+from coordlang.language.candidates import Candidates, all_pairs, from_listed, from_problems
+from coordlang.language.task_file import read_task_file
 from planners.pddl import read_domain, read_problem
+from planners.pddl.model_options import ModelOptions
 from tests.support.domains import DOMAINS
 
 Row = dict[str, str]

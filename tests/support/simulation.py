@@ -5,14 +5,14 @@ from __future__ import annotations
 
 from functools import cache
 
-from coordlang.building import build_language
-from coordlang.use.sentence.best_sentence import best_sentence
-from coordlang.use.sentence.task_language import TaskLanguage, language_in_task
-from coordlang.use.simulation.floor import Floor, floor_of
-from coordlang.use.simulation.record import SimulationRecord
-from coordlang.use.simulation.runs import record_of, runs_of
-from coordlang.use.simulation.settings import Settings
-from coordlang.use.simulation.team import Agreement, Mission, mission
+from coordlang.commands.building import build_language
+from coordlang.execution.best_sentence import best_sentence
+from coordlang.execution.task_language import TaskLanguage, language_in_task
+from coordlang.simulation.floor import Floor, floor_of
+from coordlang.simulation.record import SimulationRecord
+from coordlang.simulation.runs import record_of, runs_of
+from coordlang.simulation.settings import Settings
+from coordlang.simulation.team import Agreement, Mission, mission
 from tests.support.domains import own_task, read
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from coordlang.tasks.candidates import Candidates
+from coordlang.language.candidates import Candidates
 from planners.joint.model import FullState, Goal, JointModel, show
 from planners.pddl.lifted import And, Atom, Not, Or, Truth
 from planners.pddl.robots import fluent_predicates

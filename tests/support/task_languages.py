@@ -8,21 +8,21 @@ from random import Random
 
 from hypothesis import assume
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
+from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
+from coordlang.language.candidates import Candidates, from_listed, from_problems
+from coordlang.language.listed import ListedTask
 from coordlang.language.partition import Partition
 from coordlang.language.words import Language
 from coordlang.required.miscoordination import Inseparable
-from coordlang.tasks.candidates import Candidates, from_listed, from_problems
-from coordlang.tasks.listed import ListedTask
-from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
-from planners.errors import ProvedImpossible
 from planners.loading import build
-from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain, Problem
+from planners.pddl.model_options import ModelOptions
 from planners.pddl.sexpr import Source
 from planners.search.plans import Plans
 from planners.search.reachable import explore
+from planners.system.errors import ProvedImpossible
 from tests.support.domains import DOMAINS, all_tasks, own_task
 from tests.support.random_chores import random_chores
 from tests.support.random_models import graph_text, random_model

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from itertools import product
 
+from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
-from planners.tables import Ints
 
 #: The words by which plan 1 is ahead of another plan, and those by which it is behind.
 Lead = tuple[tuple[int, ...], tuple[int, ...]]

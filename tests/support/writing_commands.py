@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import coordlang
-from coordlang.certificate import write_certificate
+from coordlang.verification.certificate_file import write_certificate
 from tests.support.domains import DOMAINS
 
 FILES = [str(DOMAINS / "grid" / name) for name in ("domain.pddl", "gw1-2x2.pddl")]

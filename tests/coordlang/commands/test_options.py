@@ -11,11 +11,11 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from coordlang.api.options import Source
 from coordlang.commands.command import arguments_by_name, command
 from coordlang.commands.keywords import with_options
-from planners.errors import UsageError
-from planners.options import group, option
+from coordlang.commands.options import Source
+from planners.system.errors import UsageError
+from planners.system.options import group, option
 
 
 @dataclass(frozen=True, slots=True)

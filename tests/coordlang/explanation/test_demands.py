@@ -10,15 +10,15 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
+from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
 from coordlang.explanation import word_formulas
 from coordlang.explanation.demands import RobotPart, SentenceDemands, sentence_demands
 from coordlang.explanation.text import demands_text
-from coordlang.tasks.candidates import all_pairs, from_problems
-from coordlang.use.sentence.task_language import TaskLanguage, languages_in_tasks
-from planners.errors import ProvedImpossible
+from coordlang.language.candidates import all_pairs, from_problems
 from planners.pddl import read_domain, read_problem
 from planners.search.plans import Plan, Plans
+from planners.system.errors import ProvedImpossible
 from tests.support import naive
 from tests.support.command import Command
 from tests.support.domains import DOMAINS, all_tasks

@@ -10,7 +10,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
 from coordlang.explanation import Cover, Literal, Variable, word_formulas
 from coordlang.explanation.boxes import Points, expand
 from coordlang.explanation.descriptions import describe_words
@@ -18,14 +18,14 @@ from coordlang.explanation.minimise import minimise
 from coordlang.explanation.text import literal_text, pddl_condition, shown
 from coordlang.explanation.variables import truth, valuation
 from coordlang.explanation.words import all_covers, mapped_states
+from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.language.words import Language
-from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
-from planners.errors import ProvedImpossible
 from planners.joint.model import show
-from planners.model_options import ModelOptions
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Atom
+from planners.pddl.model_options import ModelOptions
 from planners.search.reachable import explore
+from planners.system.errors import ProvedImpossible
 from tests.support.domains import DOMAINS, all_tasks
 from tests.support.languages import language_of, random_language
 from tests.support.random_models import random_model

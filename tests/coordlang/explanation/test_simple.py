@@ -13,13 +13,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
 from coordlang.explanation.formula_problem import FormulaProblem
 from coordlang.explanation.simple import _Search, simple
 from coordlang.explanation.variables import valuation
 from coordlang.explanation.words import mapped_states, word_formulas
 from coordlang.vocabulary.job import Assignment, Outcome
-from planners.errors import OutOfTime
+from planners.system.errors import OutOfTime
 from tests.support.candidates import failing, is_language, partitions, small_worlds
 from tests.support.domains import all_tasks
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from coordlang.language.keys import keys_of, read_keys
-from planners.errors import BadInput
 from planners.joint.facts import FactTable
 from planners.joint.states import StateCodec
+from planners.joint.tables import Rows
 from planners.pddl.lifted import Atom
-from planners.tables import Rows
+from planners.system.errors import BadInput
 
 
 def random_codec(random: Random) -> StateCodec:

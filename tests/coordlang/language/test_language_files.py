@@ -9,17 +9,17 @@ from pathlib import Path
 
 import pytest
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
+from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.language.file import read_language, to_bytes
 from coordlang.language.partition import Partition
 from coordlang.symmetry.group import symmetry_group
-from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.verification.by_definition import verify
-from planners.errors import BadInput
 from planners.pddl import parse_domain, parse_problem, read_domain
 from planners.pddl.sexpr import Source
 from planners.search.plans import Plans, counts
-from planners.writing import write_atomically
+from planners.system.errors import BadInput
+from planners.system.writing import write_atomically
 from tests.support import naive
 from tests.support.command import Command
 from tests.support.domains import DOMAINS, all_tasks

@@ -16,11 +16,11 @@ import jsonschema
 import pytest
 
 import coordlang
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
 from coordlang.language.file import language_from_bytes, read_language, to_bytes, write_language
 from coordlang.language.record import json_schema
 from coordlang.language.tolerance import Tolerance
-from planners.errors import BadInput, Position
+from planners.system.errors import BadInput, Position
 from tests.support.command import Command
 from tests.support.domains import DOMAINS, all_tasks
 

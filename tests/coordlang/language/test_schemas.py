@@ -14,24 +14,24 @@ import jsonschema
 import pytest
 
 import coordlang as api
-from coordlang.building import build_language, certificate_of
-from coordlang.certificate import read_certificate, write_certificate
-from coordlang.cli.schema import SCHEMAS
-from coordlang.coordinates import read_coordinates
+from coordlang.commands.building import build_language, certificate_of
+from coordlang.commands.schema import SCHEMAS
+from coordlang.execution.choices import choices
+from coordlang.execution.choices_file import to_bytes
+from coordlang.execution.monitor import Monitor, MonitorError
+from coordlang.execution.task_language import languages_in_tasks
+from coordlang.language.listed import ListedTask
 from coordlang.language.sentences import task_sentences
+from coordlang.language.task_file import read_task_file, tasks_text
 from coordlang.lifted.file import read_lifted
 from coordlang.lifted.file import to_bytes as lifted_bytes
-from coordlang.tasks.listed import ListedTask
-from coordlang.tasks.task_file import read_task_file, tasks_text
-from coordlang.use.choices.choices import choices
-from coordlang.use.choices.file import to_bytes
-from coordlang.use.choices.monitor import Monitor, MonitorError
-from coordlang.use.sentence.task_language import languages_in_tasks
-from coordlang.use.simulation.record import read_simulation
-from coordlang.use.simulation.record import to_bytes as simulated_bytes
-from planners.errors import BadInput
+from coordlang.simulation.record import read_simulation
+from coordlang.simulation.record import to_bytes as simulated_bytes
+from coordlang.sites.coordinates import read_coordinates
+from coordlang.verification.certificate_file import read_certificate, write_certificate
 from planners.search.plan_file import read_plans, to_json
 from planners.search.plans import Plans
+from planners.system.errors import BadInput
 from tests.support.command import Command
 from tests.support.domains import DOMAINS, ROOT, all_tasks
 

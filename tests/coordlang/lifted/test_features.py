@@ -37,10 +37,10 @@ from coordlang.lifted.features import UNDEFINED, Feature, Least
 from coordlang.lifted.notation import feature_of
 from coordlang.lifted.pool import pool_of
 from coordlang.lifted.world import States, World
-from planners.errors import BadInput, Position
+from planners.joint.tables import Rows
 from planners.loading import load
 from planners.search.reachable import explore
-from planners.tables import Rows
+from planners.system.errors import BadInput, Position
 from tests.support.domains import DOMAINS
 from tests.support.naive_features import members, value
 

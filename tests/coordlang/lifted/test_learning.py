@@ -13,6 +13,7 @@ import families
 import numpy as np
 import pytest
 
+from coordlang.language.candidates import all_pairs
 from coordlang.language.partition import Partition
 from coordlang.lifted.choosing import SimplestHitting, undominated
 from coordlang.lifted.features import Feature
@@ -20,12 +21,11 @@ from coordlang.lifted.instance import Instance
 from coordlang.lifted.language import LiftedLanguage
 from coordlang.lifted.learning import Learned, find_vectors, learn
 from coordlang.lifted.pool import pool_of
-from coordlang.tasks.candidates import all_pairs
 from coordlang.verification.by_definition import verify
-from planners.errors import ProvedImpossible
+from planners.joint.tables import Ints
 from planners.pddl import parse_problem, read_domain
 from planners.pddl.sexpr import Source
-from planners.tables import Ints
+from planners.system.errors import ProvedImpossible
 from tests.support.domains import DOMAINS, all_tasks
 
 

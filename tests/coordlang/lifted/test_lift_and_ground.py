@@ -11,15 +11,15 @@ from pathlib import Path
 import pytest
 
 import coordlang
-from coordlang.api.grounding import coordinates_of
-from coordlang.api.lifting import Lifted
+from coordlang.commands.grounding import coordinates_of
+from coordlang.commands.lifting import Lifted
 from coordlang.lifted.file import lifted_from_bytes, read_lifted, to_bytes
 from coordlang.lifted.language import LiftedLanguage
 from coordlang.required.miscoordination import Inseparable
-from planners.errors import BadInput, Note, Position, ProvedImpossible, Refuted, UsageError
 from planners.pddl import parse_problem, read_domain
 from planners.pddl.lifted import Problem
 from planners.pddl.sexpr import Source
+from planners.system.errors import BadInput, Note, Position, ProvedImpossible, Refuted, UsageError
 from tests.support.domains import DOMAINS
 
 GRID = DOMAINS / "grid" / "domain.pddl"

@@ -10,12 +10,12 @@ import pytest
 from generate import problem_text, scenario
 from gridmap import GridMap, path
 
+from coordlang.language.candidates import Candidates, all_pairs
 from coordlang.language.partition import Partition
-from coordlang.tasks.candidates import Candidates, all_pairs
 from coordlang.verification.by_definition import verify
+from planners.joint.tables import Ints
 from planners.pddl import parse_problem, read_domain
 from planners.pddl.sexpr import Source
-from planners.tables import Ints
 from tests.support.domains import DOMAINS
 
 

@@ -8,7 +8,7 @@ import pytest
 from coordlang.lifted.features import UNDEFINED
 from coordlang.lifted.notation import feature_of
 from coordlang.lifted.wording import condition, english, formula
-from planners.errors import Position
+from planners.system.errors import Position
 
 #: Definition, formula, a value, what it means, in English.
 WORDED = [

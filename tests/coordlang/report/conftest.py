@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
+from coordlang.language.candidates import all_pairs, from_listed, from_problems
+from coordlang.language.task_file import read_task_file
 from coordlang.language.words import Language
 from coordlang.report.page import Report, make_report
-from coordlang.tasks.candidates import all_pairs, from_listed, from_problems
-from coordlang.tasks.task_file import read_task_file
-from planners.model_options import ModelOptions
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Domain, Problem
+from planners.pddl.model_options import ModelOptions
 from tests.support.domains import DOMAINS
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from itertools import product
 
 import pytest
 
+from coordlang.execution.task_language import language_in_task
 from coordlang.report.page import LARGEST, make_report
-from coordlang.use.sentence.task_language import language_in_task
 from planners.pddl.lifted import And
 from planners.search.plans import Plans
 from tests.coordlang.report.conftest import (

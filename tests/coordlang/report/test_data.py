@@ -11,7 +11,9 @@ from typing import Any
 
 import pytest
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
+from coordlang.execution.task_language import language_in_task
+from coordlang.language.candidates import all_pairs, from_problems
 from coordlang.language.sentences import sentence
 from coordlang.report import graph
 from coordlang.report.data import page_data
@@ -19,10 +21,8 @@ from coordlang.report.page import make_report
 from coordlang.report.shown import select_tasks
 from coordlang.report.task import task_part
 from coordlang.required.miscoordination import Inseparable
-from coordlang.tasks.candidates import all_pairs, from_problems
-from coordlang.use.sentence.task_language import language_in_task
-from planners.errors import ProvedImpossible, UsageError
 from planners.search.plans import Plans
+from planners.system.errors import ProvedImpossible, UsageError
 from tests.coordlang.report.conftest import data_of, make_language, make_world, refuted
 from tests.support.random_models import random_model
 

@@ -11,10 +11,10 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.coordinates import from_names, read_coordinates
 from coordlang.report.layout import graph_layout, layer_orders, spread
 from coordlang.report.places import place_layout
-from planners.errors import BadInput
+from coordlang.sites.coordinates import from_names, read_coordinates
+from planners.system.errors import BadInput
 
 
 def test_names_of_grids_tell_rows_and_columns() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 import coordlang as door
 from coordlang.report.planviz import planviz
-from planners.errors import UsageError
+from planners.system.errors import UsageError
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
 from tests.support.task_languages import shipped

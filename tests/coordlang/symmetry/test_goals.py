@@ -9,15 +9,15 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
+from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.required import all_differences
 from coordlang.required.all_differences import Differences, differences
 from coordlang.required.miscoordination import Inseparable, separable
 from coordlang.symmetry.goals import SymmetricGoals, symmetric_goals
-from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
-from planners.model_options import ModelOptions
 from planners.parallel.workers import Workers
 from planners.pddl import parse_problem, read_domain, read_problem
+from planners.pddl.model_options import ModelOptions
 from planners.pddl.sexpr import Source
 from planners.search.portions import PORTION
 from tests.support.domains import DOMAINS, all_tasks

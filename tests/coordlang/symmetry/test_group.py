@@ -9,16 +9,16 @@ from random import Random
 import numpy as np
 import pytest
 
+from coordlang.language.candidates import Candidates, all_pairs, from_listed, from_problems
+from coordlang.language.listed import ListedTask
 from coordlang.symmetry.check import SymmetryCheck
 from coordlang.symmetry.graph import automorphism_generators
 from coordlang.symmetry.group import Symmetry, SymmetryGroup, generated, symmetry_group
-from coordlang.tasks.candidates import Candidates, all_pairs, from_listed, from_problems
-from coordlang.tasks.listed import ListedTask
-from planners.errors import ProvedImpossible
 from planners.joint.states import split_atoms
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
 from planners.search.plans import Plans, counts
+from planners.system.errors import ProvedImpossible
 from tests.support import slow_symmetry
 from tests.support.domains import all_tasks
 from tests.support.random_models import random_model

@@ -40,9 +40,10 @@ from unified_planning.plans import (
     TimeTriggeredPlan,
 )
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
+from coordlang.execution.task_language import languages_in_tasks
+from coordlang.language.candidates import from_problems
 from coordlang.language.sentences import task_sentences
-from coordlang.tasks.candidates import from_problems
 from coordlang.unified import engine as engine_module
 from coordlang.unified import register
 from coordlang.unified.engine import CoordlangEngine
@@ -50,10 +51,9 @@ from coordlang.unified.names import Names
 from coordlang.unified.options import PLAN_KINDS
 from coordlang.unified.plans import label
 from coordlang.unified.translation import translate
-from coordlang.use.sentence.task_language import languages_in_tasks
 from planners.loading import load
-from planners.model_options import ModelOptions
 from planners.pddl import read_domain
+from planners.pddl.model_options import ModelOptions
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from tests.support.command import Command

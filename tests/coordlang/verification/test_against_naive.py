@@ -12,16 +12,16 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.language.partition import Partition
 from coordlang.required.divergences import first_differences
 from coordlang.required.miscoordination import inseparable, miscoordination
-from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary.greedy import greedy_partition
 from coordlang.vocabulary.separations import separations
-from planners.errors import ProvedImpossible
 from planners.joint.model import FullState
 from planners.search.plan_space import PlanSpace
+from planners.system.errors import ProvedImpossible
 from tests.support import naive
 from tests.support.random_models import random_model
 

@@ -10,13 +10,13 @@ from random import Random
 import numpy as np
 import pytest
 
+from coordlang.language.candidates import all_pairs, from_problems
 from coordlang.language.partition import Partition
 from coordlang.required.divergences import first_differences, states_on_plans
-from coordlang.tasks.candidates import all_pairs, from_problems
 from coordlang.verification import leads
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary import Job, greedy
-from planners.errors import BadInput, ProvedImpossible
+from planners.system.errors import BadInput, ProvedImpossible
 from tests.support.domains import all_tasks, own_task
 from tests.support.random_models import random_model
 from tests.support.verification_walk import violation

@@ -13,10 +13,10 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
+from coordlang.language.candidates import Candidates
 from coordlang.language.partition import Partition
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
-from coordlang.tasks.candidates import Candidates
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary.abstract_words import AbstractSearch
 from coordlang.vocabulary.abstractions import abstractions

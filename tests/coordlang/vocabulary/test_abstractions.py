@@ -9,11 +9,11 @@ from collections.abc import Callable, Hashable
 import numpy as np
 import pytest
 
+from coordlang.language.candidates import Candidates
 from coordlang.language.keys import keys_of
 from coordlang.symmetry.group import symmetry_group
-from coordlang.tasks.candidates import Candidates
 from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
-from planners.tables import Ints
+from planners.joint.tables import Ints
 from tests.support.domains import all_tasks
 
 Cell = tuple[int, int]

@@ -15,13 +15,14 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.building import build_language, certificate_of
-from coordlang.certificate import Certificate, Reason, check
-from coordlang.certificate.make import _reason
+from coordlang.commands.building import build_language, certificate_of
+from coordlang.language.candidates import Candidates, all_pairs
 from coordlang.language.warping import pair
 from coordlang.symmetry.group import Symmetry, symmetry_group
 from coordlang.symmetry.of_part import symmetries_of_part
-from coordlang.tasks.candidates import Candidates, all_pairs
+from coordlang.verification.certificate_file import Certificate, Reason
+from coordlang.verification.check_certificate import check
+from coordlang.verification.make_certificate import _reason
 from coordlang.vocabulary.contained import (
     ContainedInstance,
     _ends,
@@ -30,12 +31,12 @@ from coordlang.vocabulary.contained import (
     tasks_of_one_orbit,
 )
 from coordlang.vocabulary.problems_by_size import SolverBudget
-from planners.errors import Refuted
+from planners.joint.tables import Bools
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan
-from planners.tables import Bools
+from planners.system.errors import Refuted
 from tests.support import naive
 from tests.support.domains import all_tasks
 from tests.support.random_models import random_model

@@ -12,18 +12,18 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
+from coordlang.language.candidates import Candidates
 from coordlang.language.partition import Partition
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.symmetry.subgroups import group_table
-from coordlang.tasks.candidates import Candidates
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary.abstractions import abstractions
 from coordlang.vocabulary.equivariant import EquivariantSearch, _Kind, _Kinds, _Orbits
 from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.orbit_words import OrbitWords
 from coordlang.vocabulary.refuter import Refuter
-from planners.tables import Ints
+from planners.joint.tables import Ints
 from tests.support.domains import all_tasks
 
 

@@ -11,13 +11,13 @@ from typing import Any
 
 import pytest
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
+from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.required.miscoordination import inseparable
-from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.vocabulary import METHODS, Job, Outcome
 from coordlang.vocabulary import exhaustive as by_brute_force
 from coordlang.vocabulary.job import Assignment
-from planners.errors import OutOfMemory, OutOfTime, ProvedImpossible
+from planners.system.errors import OutOfMemory, OutOfTime, ProvedImpossible
 from tests.support import naive
 from tests.support.candidates import states_of
 from tests.support.composition_walk import walk
@@ -88,10 +88,10 @@ def test_stopped_while_it_checks(
     method: str, error: BaseException, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A limit while a better partition is verified: the one before it is left."""
-    import coordlang.building
+    import coordlang.commands.building
 
     candidates = all_tasks("grid", "gw1-2x2")
-    verified = coordlang.building._verified
+    verified = coordlang.commands.building._verified
     checked: list[Assignment] = []
 
     def late(given: Candidates, partition: Assignment, *others: Any) -> object:
@@ -100,7 +100,7 @@ def test_stopped_while_it_checks(
         checked.append(partition)
         return verified(given, partition, *others)
 
-    monkeypatch.setattr(coordlang.building, "_verified", late)
+    monkeypatch.setattr(coordlang.commands.building, "_verified", late)
     built = build_language(candidates, method)
     assert built.verdict.holds
     assert len(built.language.words) == len(set(checked[0].values()))

@@ -13,17 +13,17 @@ import numpy as np
 import pytest
 
 import coordlang as library
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
+from coordlang.language.candidates import Candidates
 from coordlang.required.choices import Choices
 from coordlang.required.divergences import states_on_plans
-from coordlang.tasks.candidates import Candidates
-from coordlang.tolerance.failure import failure_probability
-from coordlang.tolerance.plan_table import plan_table
+from coordlang.required.failure import failure_probability
+from coordlang.required.plan_table import plan_table
 from coordlang.vocabulary import few_words as module
 from coordlang.vocabulary.few_words import few_words, partitions
 from coordlang.vocabulary.fewest_failures import canonical
 from coordlang.vocabulary.word_annealing import FewWordsSettings
-from planners.errors import OutOfTime
+from planners.system.errors import OutOfTime
 from tests.support import naive
 from tests.support.candidates import on_graph
 from tests.support.command import Command

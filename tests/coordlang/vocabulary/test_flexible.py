@@ -12,19 +12,19 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
+from coordlang.language.candidates import Candidates, from_listed, from_problems
 from coordlang.language.flexibility import flexibility
-from coordlang.tasks.candidates import Candidates, from_listed, from_problems
-from coordlang.tasks.task_file import read_task_file
+from coordlang.language.task_file import read_task_file
 from coordlang.vocabulary.annealing import AnnealingSettings
 from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Assignment, Outcome
 from coordlang.vocabulary.objective import Objective
-from planners.errors import ProvedImpossible
 from planners.pddl import read_domain, read_problem
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan
+from planners.system.errors import ProvedImpossible
 from tests.support import naive
 from tests.support.candidates import (
     failing,

@@ -12,12 +12,12 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
+from coordlang.language.candidates import Candidates
 from coordlang.language.partition import Partition
 from coordlang.language.warping import Clause, pair
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.symmetry.subgroups import GroupTable, WordAction, group_table
-from coordlang.tasks.candidates import Candidates
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary import from_above
 from coordlang.vocabulary.abstract_words import AbstractSearch
@@ -29,7 +29,7 @@ from coordlang.vocabulary.orbit_words import OrbitWords
 from coordlang.vocabulary.problems_by_size import SolverBudget
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.tabu import TabuSearch
-from planners.tables import Ints
+from planners.joint.tables import Ints
 from tests.support.domains import all_tasks
 from tests.support.random_spaces import random_spaces
 

@@ -11,10 +11,10 @@ from random import Random
 import numpy as np
 import pytest
 
+from coordlang.language.candidates import Candidates
 from coordlang.language.partition import Partition
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.symmetry.subgroups import WordAction, group_table
-from coordlang.tasks.candidates import Candidates
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary.clause_table import ClauseTable
 from coordlang.vocabulary.job import Assignment

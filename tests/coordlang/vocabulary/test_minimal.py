@@ -10,15 +10,15 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
+from coordlang.language.candidates import all_pairs, from_problems
 from coordlang.language.sentences import sentence
 from coordlang.language.warping import Clause, pair, separation_clause, warping_clause
 from coordlang.required.miscoordination import inseparable
-from coordlang.tasks.candidates import all_pairs, from_problems
 from coordlang.vocabulary.clauses import without_implied
 from coordlang.vocabulary.problems_by_size import ProblemsBySize
 from coordlang.vocabulary.sat import PartitionProblem
-from planners.errors import ProvedImpossible
+from planners.system.errors import ProvedImpossible
 from tests.support import naive
 from tests.support.candidates import states_of
 from tests.support.domains import all_tasks

@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
 from coordlang.vocabulary.hitting import LeastHitting, greedy_hitting
 from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.repair import _Repair, repair
-from planners.errors import OutOfTime
+from planners.system.errors import OutOfTime
 from tests.support.candidates import failing, is_language, small_worlds
 from tests.support.domains import all_tasks
 

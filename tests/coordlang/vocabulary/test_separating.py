@@ -11,13 +11,13 @@ from itertools import combinations, count
 
 import pytest
 
-from coordlang.building import build_language
+from coordlang.commands.building import build_language
+from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.required.last_differences import DifferenceWalk
 from coordlang.required.miscoordination import inseparable
-from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.vocabulary.exhaustive import _partitions
 from coordlang.vocabulary.separations import alternatives, constraints
-from planners.errors import ProvedImpossible
+from planners.system.errors import ProvedImpossible
 from tests.support import naive
 from tests.support.candidates import states_of
 from tests.support.composition_walk import walk

@@ -10,17 +10,17 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.building import build_language, certificate_of
-from coordlang.certificate import check
+from coordlang.commands.building import build_language, certificate_of
+from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.language.partition import Partition
 from coordlang.required.divergences import first_differences, states_on_plans
 from coordlang.required.miscoordination import Inseparable
-from coordlang.tasks.candidates import Candidates, all_pairs, from_problems
 from coordlang.verification.by_definition import verify
-from planners.errors import BadInput, ProvedImpossible, Refuted, UsageError
-from planners.model_options import ModelOptions
+from coordlang.verification.check_certificate import check
 from planners.pddl import read_domain, read_problem
+from planners.pddl.model_options import ModelOptions
 from planners.search.plans import counts
+from planners.system.errors import BadInput, ProvedImpossible, Refuted, UsageError
 from tests.support.domains import DOMAINS
 from tests.support.naive import is_language
 from tests.support.random_models import random_model

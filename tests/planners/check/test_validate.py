@@ -15,12 +15,12 @@ import planners.check.rules
 import planners.check.validate
 from planners.check.rules import Rules
 from planners.check.validate import Labels, Verdict, validate
-from planners.errors import BadInput
-from planners.model_options import ModelOptions, Unowned
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import And, Atom, Domain, Not, Problem
+from planners.pddl.model_options import ModelOptions, Unowned
 from planners.pddl.robots import Team, find_team
 from planners.pddl.sexpr import Source
+from planners.system.errors import BadInput
 
 World = tuple[Domain, Problem, Team]
 
@@ -641,8 +641,8 @@ def test_the_checker_shares_only_the_nouns() -> None:
     ours = {name for name in imported if name and name.startswith("planners")}
     # Besides the nouns: the errors, and how their messages quote what a file holds.
     assert ours == {
-        "planners.errors",
-        "planners.messages",
+        "planners.system.errors",
+        "planners.system.messages",
         "planners.pddl.lifted",
         "planners.pddl.robots",
     }

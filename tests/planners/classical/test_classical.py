@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 
 from planners import classical as plain_module
 from planners.classical import ClassicalTask, compile_classical, to_pddl
-from planners.errors import BadInput, ProvedImpossible
 from planners.joint.model import JointModel, PlanningTask
 from planners.loading import build
-from planners.model_options import Cost, ModelOptions
 from planners.pddl.domain import parse_domain
+from planners.pddl.model_options import Cost, ModelOptions
 from planners.pddl.problem import parse_problem
 from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import search
 from planners.search.reachable import explore
+from planners.system.errors import BadInput, ProvedImpossible
 from tests.support.classical_models import (
     CORRIDOR,
     CORRIDOR_TASK,

@@ -11,13 +11,13 @@ from hypothesis import event, example, given, reject, settings
 from hypothesis import strategies as st
 
 from planners.classical import compile_classical
-from planners.errors import BadInput, ProvedImpossible
 from planners.joint.model import JointModel, PlanningTask
 from planners.loading import PlanningInstance
-from planners.model_options import Cost
+from planners.pddl.model_options import Cost
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from planners.search.reachable import explore
+from planners.system.errors import BadInput, ProvedImpossible
 from tests.support.classical_models import (
     COSTS,
     FORMS,

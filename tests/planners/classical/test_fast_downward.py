@@ -21,13 +21,13 @@ import pytest
 from planners import classical as plain_module
 from planners.classical import fast_downward
 from planners.classical.fast_downward import FastDownwardFailed, optimal_cost
-from planners.errors import OutOfMemory, OutOfTime, ProvedImpossible
-from planners.limits import time_limit
 from planners.loading import PlanningInstance, build, load
-from planners.model_options import Cost, ModelOptions
 from planners.pddl import parse_domain, parse_problem
+from planners.pddl.model_options import Cost, ModelOptions
 from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import search
+from planners.system.errors import OutOfMemory, OutOfTime, ProvedImpossible
+from planners.system.limits import time_limit
 from tests.support.domains import ROOT, SHARED
 
 FOREIGN = SHARED / "foreign"

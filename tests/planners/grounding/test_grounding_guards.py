@@ -17,9 +17,9 @@ from planners.grounding.bindings import Bindings
 from planners.grounding.instantiate import _Grounder
 from planners.grounding.interned import Interned
 from planners.loading import build
-from planners.model_options import ModelOptions, Unowned
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import FALSE, And, Formula, StepAtom
+from planners.pddl.model_options import ModelOptions, Unowned
 from planners.pddl.robots import find_team
 from planners.pddl.sexpr import Source
 from tests.support.naive_grounding import NaiveGrounding, without_impossible

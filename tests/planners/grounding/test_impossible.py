@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import pytest
 
-from planners.errors import ProvedImpossible
 from planners.loading import PlanningInstance, build
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Atom
@@ -13,6 +12,7 @@ from planners.pddl.robots import static_atoms
 from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import search
 from planners.search.reachable import explore
+from planners.system.errors import ProvedImpossible
 from tests.support.joint_twin import built
 from tests.support.random_pddl import Kind, random_model
 

@@ -12,11 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planners.check.rules import Rules
-from planners.errors import BadInput
 from planners.loading import PlanningInstance, build
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Atom, Domain
 from planners.pddl.sexpr import Source
+from planners.system.errors import BadInput
 from tests.support.joint_twin import check_model
 from tests.support.random_pddl import RandomModel, random_model
 

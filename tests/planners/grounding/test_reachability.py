@@ -10,12 +10,12 @@ import time
 
 import pytest
 
-from planners.errors import CoordlangError, OutOfTime
 from planners.grounding.reachability import _least_model, reachable_arguments
-from planners.limits import time_limit
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.sexpr import Source
+from planners.system.errors import CoordlangError, OutOfTime
+from planners.system.limits import time_limit
 
 DOMAIN = """(define (domain views) (:requirements :typing :multi-agent) (:types robot place)
   (:predicates (at ?r - robot ?p - place) (seen ?a ?b ?c - place))

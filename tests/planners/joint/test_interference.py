@@ -11,15 +11,15 @@ from planners.check.rules import Rules
 from planners.check.validate import validate
 from planners.classical import compile_classical
 from planners.classical.selectors import clashes
-from planners.errors import ProvedImpossible
 from planners.joint.interference import conflict, footprint
 from planners.loading import PlanningInstance, build
-from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import StepAtom
+from planners.pddl.model_options import ModelOptions
 from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
+from planners.system.errors import ProvedImpossible
 from tests.support.joint_twin import built
 from tests.support.naive_classical import optimal_plans
 from tests.support.random_pddl import random_model

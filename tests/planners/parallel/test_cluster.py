@@ -17,11 +17,11 @@ from typing import Any
 
 import pytest
 
-from planners.errors import BadInput, CoordlangError, OutOfTime, UsageError
-from planners.limits import time_limit
 from planners.parallel import dask_cluster
 from planners.parallel.workers import Workers
 from planners.parallel.workers import workers as opened
+from planners.system.errors import BadInput, CoordlangError, OutOfTime, UsageError
+from planners.system.limits import time_limit
 from tests.support import jobs
 from tests.support.cluster import ENVIRONMENT, Cluster, needs_distributed, running_cluster
 from tests.support.domains import ROOT

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from planners.errors import BadInput, OutOfMemory, OutOfTime, UsageError
-from planners.limits import address_space, limited_memory, time_limit
 from planners.parallel.workers import Workers
+from planners.system.errors import BadInput, OutOfMemory, OutOfTime, UsageError
+from planners.system.limits import address_space, limited_memory, time_limit
 from tests.support import jobs
 from tests.support.domains import ROOT
 from tests.support.jobs import batch

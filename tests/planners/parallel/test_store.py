@@ -15,10 +15,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planners.errors import UsageError
 from planners.parallel.batch import Batch, digest
 from planners.parallel.store import Store, as_bytes, from_bytes
 from planners.parallel.workers import Workers, workers
+from planners.system.errors import UsageError
 from tests.support import jobs as support
 from tests.support.jobs import batch
 

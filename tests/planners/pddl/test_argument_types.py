@@ -9,9 +9,9 @@ from random import Random
 
 import pytest
 
-from planners.errors import BadInput
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
+from planners.system.errors import BadInput
 
 TYPES = ("t0", "t1", "t2", "t3", "t4")
 

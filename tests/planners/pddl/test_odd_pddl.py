@@ -14,8 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from planners.errors import BadInput
 from planners.pddl.sexpr import Source, parse
+from planners.system.errors import BadInput
 from tests.support.command import Command
 
 DOMAIN = """(define (domain hall)

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from planners.errors import BadInput, Note
 from planners.loading import PlanningInstance, build
-from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
+from planners.pddl.model_options import ModelOptions
 from planners.pddl.robots import find_team
 from planners.pddl.sexpr import Source
+from planners.system.errors import BadInput, Note
 from tests.support.command import Command
 
 HIKERS = """(define (domain hike) (:types hiker place - object)

@@ -12,12 +12,11 @@ from random import Random
 import numpy as np
 import pytest
 
-from planners.errors import BadInput, ProvedImpossible
 from planners.joint.model import FullState, JointModel, PlanningTask
 from planners.loading import PlanningInstance, build, load
-from planners.model_options import Cost, ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Atom
+from planners.pddl.model_options import Cost, ModelOptions
 from planners.pddl.sexpr import Source
 from planners.search import exact_bound, optimal_states
 from planners.search.heuristics import CHOICES
@@ -26,6 +25,7 @@ from planners.search.plan_space import PlanSpace
 from planners.search.projections import Projections
 from planners.search.reachable import PIECES
 from planners.search.state_variables import state_variables
+from planners.system.errors import BadInput, ProvedImpossible
 from tests.support import blind_search
 from tests.support.classical_models import read
 from tests.support.domains import DOMAINS

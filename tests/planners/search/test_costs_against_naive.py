@@ -16,18 +16,18 @@ import pytest
 
 from planners.check.validate import Moment, State, validate
 from planners.classical import compile_classical
-from planners.errors import BadInput
 from planners.joint.model import show
 from planners.loading import PlanningInstance, build, task_of
-from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import And, Formula, Not
+from planners.pddl.model_options import ModelOptions
 from planners.pddl.sexpr import Source
 from planners.search.dominated_labels import dominated_pairs
 from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plans import Plans
 from planners.search.reachable import explore
 from planners.search.state_variables import state_variables
+from planners.system.errors import BadInput
 from tests.support.naive_classical import optimal_plans
 from tests.support.naive_joint_steps import TooLarge, Twin
 from tests.support.random_pddl import Kind, random_model

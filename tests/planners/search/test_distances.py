@@ -8,10 +8,10 @@ from random import Random
 import numpy as np
 import pytest
 
+from planners.joint.tables import Bools
 from planners.loading import build
 from planners.search.optimal_plans import distances
 from planners.search.reachable import Space, explore
-from planners.tables import Bools
 from tests.support.random_models import random_model
 
 

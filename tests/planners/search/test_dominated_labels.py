@@ -9,16 +9,16 @@ from random import Random
 import numpy as np
 import pytest
 
-from planners.errors import BadInput
 from planners.joint.model import JointModel
+from planners.joint.tables import Rows, unique_rows
 from planners.loading import PlanningInstance, build
-from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
+from planners.pddl.model_options import ModelOptions
 from planners.pddl.sexpr import Source
 from planners.search.cheapest import label_costs
 from planners.search.dominated_labels import dominated_pairs
 from planners.search.state_variables import state_variables
-from planners.tables import Rows, unique_rows
+from planners.system.errors import BadInput
 from tests.support.random_instances import random_instance
 
 #: States of one model that are looked at.

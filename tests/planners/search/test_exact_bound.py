@@ -11,10 +11,10 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from planners.errors import BadInput, ProvedImpossible
 from planners.joint.model import JointModel, PlanningTask
+from planners.joint.tables import Rows
 from planners.loading import PlanningInstance
-from planners.model_options import Cost
+from planners.pddl.model_options import Cost
 from planners.search import exact_bound as exact_bounds
 from planners.search.cheapest import label_costs, least_cost
 from planners.search.dominated_labels import dominated_pairs
@@ -24,7 +24,7 @@ from planners.search.plan_formula import PlanFormula, TooManyClauses
 from planners.search.questions import OutOfEffort
 from planners.search.reachable import PIECES
 from planners.search.state_variables import state_variables
-from planners.tables import Rows
+from planners.system.errors import BadInput, ProvedImpossible
 from tests.support import blind_search
 from tests.support.random_instances import random_instance
 

@@ -8,13 +8,13 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from planners.errors import UsageError
 from planners.joint.model import Goal, JointModel
+from planners.joint.tables import Rows
 from planners.loading import PlanningInstance, build, load
 from planners.search.goals import FAR
 from planners.search.heuristics import HEURISTICS, heuristic
 from planners.search.reachable import Space, explore
-from planners.tables import Rows
+from planners.system.errors import UsageError
 from tests.support.domains import DOMAINS
 from tests.support.random_models import random_model
 

@@ -19,13 +19,12 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from planners.errors import BadInput, Note, ProvedImpossible
 from planners.joint.model import PlanningTask
 from planners.loading import PlanningInstance, build
-from planners.model_options import Cost, ModelOptions
 from planners.parallel.batch import Table
 from planners.parallel.store import Store, as_bytes
 from planners.pddl import parse_domain, parse_problem
+from planners.pddl.model_options import Cost, ModelOptions
 from planners.pddl.sexpr import Source
 from planners.search import kept_plans, optimal_plans
 from planners.search.kept_plans import (
@@ -37,6 +36,7 @@ from planners.search.kept_plans import (
 )
 from planners.search.plan_space import PlanSpace
 from planners.search.plan_tables import as_table, key_of, model_digest, plan_space
+from planners.system.errors import BadInput, Note, ProvedImpossible
 from tests.support.domains import DOMAINS
 from tests.support.random_pddl import KINDS, random_model
 
@@ -287,7 +287,7 @@ def test_a_full_disk_is_said(
 
     world = loaded()
     with monkeypatch.context() as patched, keeping_plans(folder):
-        patched.setattr(f"planners.writing.os.{call}", full)
+        patched.setattr(f"planners.system.writing.os.{call}", full)
         with pytest.warns(Note, match="not kept: .*No space left"):
             search(world.model, world.tasks[0])
     assert (len(searches), entries(folder)) == (1, [])

@@ -12,13 +12,13 @@ import pytest
 from planners.joint.composition import ComposingStepper
 from planners.joint.conditions import split_condition
 from planners.joint.model import JointModel
+from planners.joint.tables import Rows
 from planners.loading import PlanningInstance, build
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import TRUE, Formula
 from planners.pddl.sexpr import Source
 from planners.search.mutexes import mutexes
 from planners.search.state_variables import state_variables
-from planners.tables import Rows
 from tests.support.random_instances import explored, random_instance
 
 #: Joint labels beyond which a model that remembers them has too many states to explore.

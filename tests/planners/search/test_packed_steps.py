@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from planners.joint.model import JointModel
+from planners.joint.tables import Rows
 from planners.search import packed_steps, state_table
 from planners.search.layers import Edges
 from planners.search.packed_steps import PackedSteps
 from planners.search.state_table import Packing, StateTable
 from planners.search.state_variables import StateVariable, state_variables
-from planners.tables import Rows
 from tests.support.domains import world_of
 from tests.support.random_instances import explored, random_instance
 

@@ -7,13 +7,13 @@ from random import Random
 
 import pytest
 
-from planners.errors import ProvedImpossible
 from planners.loading import PlanningInstance, build, load
-from planners.model_options import Cost, ModelOptions
 from planners.pddl import parse_domain, parse_problem
+from planners.pddl.model_options import Cost, ModelOptions
 from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import search
 from planners.search.plans import counts
+from planners.system.errors import ProvedImpossible
 from tests.support.domains import DOMAINS
 from tests.support.plan_formula import NotWritten, PlanFormula, answer, listed
 

@@ -6,17 +6,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coordlang.api.feasibility import feasibility
-from planners.errors import BadInput, ProvedImpossible
+from coordlang.commands.feasibility import feasibility
 from planners.joint.model import JointModel
+from planners.joint.tables import Rows, find_rows, unique_rows
 from planners.loading import PlanningInstance, build, load
-from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
+from planners.pddl.model_options import ModelOptions
 from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import search
 from planners.search.reachable import explore
 from planners.search.search_estimate import estimate
-from planners.tables import Rows, find_rows, unique_rows
+from planners.system.errors import BadInput, ProvedImpossible
 from tests.support.domains import DOMAINS
 from tests.support.random_pddl import random_model
 

@@ -12,14 +12,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planners.errors import BadInput, ProvedImpossible, UsageError
 from planners.joint.model import JointModel, PlanningTask
 from planners.loading import PlanningInstance, build, load
-from planners.model_options import ModelOptions
+from planners.pddl.model_options import ModelOptions
 from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
 from planners.search.reachable import explore
+from planners.system.errors import BadInput, ProvedImpossible, UsageError
 from tests.support.domains import DOMAINS
 from tests.support.naive_slack import Sequences, TooMany
 from tests.support.random_models import random_model

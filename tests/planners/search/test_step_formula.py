@@ -10,11 +10,11 @@ from planners.joint.composition import ComposingStepper
 from planners.joint.conditions import speaks_of_step
 from planners.joint.model import JointModel
 from planners.loading import build
-from planners.model_options import ModelOptions
 from planners.pddl import parse_domain, parse_problem
+from planners.pddl.model_options import ModelOptions
 from planners.pddl.sexpr import Source
-from planners.sat import sat_solver
 from planners.search.plan_formula import TooManyClauses, step_formula
+from planners.search.sat import sat_solver
 from tests.support.random_instances import random_instance
 
 

@@ -1,0 +1,307 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A language as a person reads it: ``explain``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from coordlang.commands.grounding import coordinates_of
+from coordlang.commands.inputs import DomainSource, ProblemSource, read_planning
+from coordlang.commands.keywords import with_options
+from coordlang.commands.language_inputs import LanguageSource, language_for
+from coordlang.commands.options import Source
+from coordlang.commands.presenting import Presented
+from coordlang.commands.speaking import SentenceSource
+from coordlang.execution.task_language import TaskLanguage, language_in_task
+from coordlang.explanation.cover import Cover
+from coordlang.explanation.demands import SentenceDemands, sentence_demands
+from coordlang.explanation.descriptions import WordDescriptions, describe_words
+from coordlang.explanation.lifted_words import LiftedWords, lifted_words
+from coordlang.explanation.text import (
+    cover_data,
+    demands_data,
+    demands_text,
+    descriptions_text,
+    pddl_condition,
+    shown,
+)
+from coordlang.explanation.words import MappedStates, all_covers, mapped_states
+from coordlang.language.candidates import describe
+from coordlang.language.sentences import TaskSentence, task_sentences
+from coordlang.language.tolerance import Tolerance, tolerance_data
+from planners.search.plan_file import json_count
+from planners.search.plans import Plans
+from planners.system.errors import UsageError
+from planners.system.notebook import counted, html_table
+from planners.system.options import group, option
+
+#: Sentences of a task that the text lists.
+SENTENCES_SHOWN = 10
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class WordsExplained(Presented):
+    """Each word as a short formula, exact in every state that the language maps.
+
+    ``lifted``: formulas over features, if the words are functions of features; else None.
+    """
+
+    used: TaskLanguage
+    mapped: MappedStates
+    covers: Mapping[str, Cover]
+    descriptions: WordDescriptions
+    lifted: LiftedWords | None = None
+
+    @property
+    def formulas(self) -> dict[str, str]:
+        """Word -> its formula as text, exact by itself."""
+        return {word: shown(cover) for word, cover in self.covers.items()}
+
+    @property
+    def pddl(self) -> dict[str, str]:
+        """Word -> its formula as a PDDL condition."""
+        return {word: pddl_condition(cover) for word, cover in self.covers.items()}
+
+    @property
+    def states(self) -> dict[str, int]:
+        """Word -> how many of the mapped states it holds."""
+        return dict(zip(self.mapped.words, self.mapped.states, strict=True))
+
+    def facts(self) -> Mapping[str, object]:
+        """Return the main facts, as a notebook shows them."""
+        return self.formulas
+
+    def data(self) -> dict[str, Any]:
+        """Return words, variables and formulas as JSON data."""
+        variables = self.mapped.valuation.variables
+        return {
+            "words": self.states,
+            "default": self.used.language.default,
+            "variables": [{"name": v.name, "values": list(v.value_texts)} for v in variables],
+            "formulas": {word: cover_data(cover) for word, cover in self.covers.items()},
+            "told": {
+                "in_order": self.descriptions.in_order,
+                "rules": [
+                    {"word": word, "text": shown(cover) if cover else None}
+                    for word, cover in self.descriptions.rules
+                ],
+            },
+            **({"lifted": self.lifted.data()} if self.lifted else {}),
+        }
+
+    def __str__(self) -> str:
+        return f"{self.head}\n{self.formulas_text()}"
+
+    def formulas_text(self) -> str:
+        """Return the formulas as text, without what the language is."""
+        lines = [self.lifted.text(), "In this problem:"] if self.lifted else []
+        if self.descriptions.in_order:
+            lines.append("The first formula that is true in a state gives its word:")
+        lines.append(descriptions_text(self.descriptions, self.mapped))
+        default = self.used.language.default
+        if not self.mapped.word.size:
+            return "\n".join([*lines, f"No state is mapped: the word is always {default}."])
+        meant = self.used.model.kept_plan
+        lines.append(
+            f"Exact in all {counted(sum(self.mapped.states), 'mapped state')}. No {meant} of "
+            f"these tasks leaves them; elsewhere the word is {default}."
+        )
+        return "\n".join([*lines, *self._proof()])
+
+    @property
+    def head(self) -> str:
+        """What the language is, in a line."""
+        language = self.used.language
+        number = language.provenance.tasks["count"]
+        tasks = counted(number, "task") if number else "no recorded task"
+        words, robots = counted(len(language.words), "word"), ", ".join(self.used.model.robots)
+        line = f"{words} for {tasks} of {robots}; {language.guarantee.claim}."
+        tolerance = language.tolerance
+        if tolerance is not None and tolerance.warning is not None:
+            line += f"\n{tolerance.warning[0].upper()}{tolerance.warning[1:]}."
+        return line
+
+    def _proof(self) -> list[str]:
+        """Return what is proved of the formulas' lengths, in at most one line."""
+        rules = self.descriptions.rules
+        long = [word for word, cover in rules if cover and not cover.fewest]
+        if long:
+            return [
+                f"Fewer terms may suffice for {', '.join(long)}; "
+                "for the others it is proved that they do not."
+            ]
+        if self.descriptions.length > 1:
+            return ["It is proved that no formula can do with fewer terms."]
+        return []
+
+
+@dataclass(frozen=True, repr=False)
+class Explanation(Presented):
+    """The words as formulas, and the sentences of one task, found when they are asked for.
+
+    ``only`` is the one sentence that was asked for (word numbers), or None; ``with_demands``:
+    whether the text and the data say what each sentence asks of each robot.
+    """
+
+    words: WordsExplained
+    only: tuple[int, ...] | None
+    with_demands: bool
+
+    @cached_property
+    def all_sentences(self) -> tuple[TaskSentence, ...]:
+        """All sentences of the task, those that leave most plans open first.
+
+        Raises `OutOfMemory` beyond 100,000 sentences.
+        """
+        used = self.words.used
+        return tuple(task_sentences(used.space, used.task, used.partition))
+
+    @property
+    def sentences(self) -> tuple[TaskSentence, ...]:
+        """The sentences that were asked for: one, or all."""
+        if self.only is None:
+            return self.all_sentences
+        wanted = tuple(self.words.used.partition.words[word] for word in self.only)
+        return tuple(s for s in self.all_sentences if s.words == wanted)
+
+    def demands(self, most: int | None = None) -> list[SentenceDemands]:
+        """Return what the (first) sentences ask of each robot."""
+        used = self.words.used
+        return [
+            sentence_demands(
+                used.plans_with(used.words_of(sentence.words)), used.partition, self.words.covers
+            )
+            for sentence in self.sentences[:most]
+        ]
+
+    @property
+    def formulas(self) -> dict[str, str]:
+        """Word -> its formula as text."""
+        return self.words.formulas
+
+    @property
+    def covered(self) -> bool:
+        """Whether the task is one that the language guarantees."""
+        return self.words.used.covered
+
+    @property
+    def tolerance(self) -> Tolerance | None:
+        """What may go wrong, or be longer, under the language; None: nothing."""
+        return self.words.used.tolerance
+
+    def facts(self) -> Mapping[str, object]:
+        """Return the main facts, as a notebook shows them."""
+        return {"formulas": self.formulas, "covered": self.covered}
+
+    def data(self) -> dict[str, Any]:
+        """Return words and sentences as JSON data."""
+        used = self.words.used
+        listed = [_sentence_data(sentence) for sentence in self.sentences]
+        for entry, asks in zip(listed, self.demands() if self.with_demands else (), strict=False):
+            entry |= demands_data(asks)
+        return {
+            **self.words.data(),
+            "task": describe(used.space, used.task),
+            "covered": used.covered,
+            "sentences": listed,
+            **tolerance_data(used.tolerance),
+        }
+
+    def __str__(self) -> str:
+        return f"{self.words.head}\n\n{self.task_text()}\n\n{self.words.formulas_text()}"
+
+    def _repr_html_(self) -> str:
+        states = self.words.states
+        rows = [(word, f"{states[word]:,}", text) for word, text in self.formulas.items()]
+        return html_table(("word", "states", "formula"), rows)
+
+    def task_text(self) -> str:
+        """Return the task's sentences as text, without the words."""
+        used = self.words.used
+        total = Plans.of(used.space, used.task).count
+        steps, _ = used.space.cost_of(used.task)
+        plans = f"{counted(total, 'optimal plan')} of"
+        if used.model.slack:
+            plans = f"{counted(total, 'plan')} within slack {used.model.slack}, of at most"
+        lines = [
+            f"The task {describe(used.space, used.task)}",
+            f"has {plans} {counted(steps, 'step')} "
+            f"in {counted(len(self.all_sentences), 'sentence')}.",
+        ]
+        if self.with_demands and used.guaranteed:
+            lines.append(
+                "Each robot may choose for itself: whatever the others choose, "
+                f"it is {'a' if used.model.slack else 'an'} {used.model.kept_plan}."
+            )
+        if self.with_demands:
+            for asks in self.demands(SENTENCES_SHOWN):
+                lines += ["", demands_text(asks)]
+        else:
+            for sentence in self.sentences[:SENTENCES_SHOWN]:
+                plans = counted(sentence.plans, "plan")
+                lines.append(f'  "{" ".join(sentence.words)}" leaves {plans} open.')
+        more = len(self.sentences) - SENTENCES_SHOWN
+        if more > 0:
+            lines.append(f"  .. and {counted(more, 'more sentence')}")
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True, slots=True)
+class ExplainOptions:
+    """What `explain` can be asked for."""
+
+    task: bool = option(False, "Also show what the sentences of PROBLEM's task ask of each robot.")
+    sentence: SentenceSource | None = option(None, "With --task: this sentence only.", "S")
+    formula_per_word: bool = option(
+        False, "Describe every word by a formula of its own, also where less would do."
+    )
+    source: Source = group(Source)
+
+    def __post_init__(self) -> None:
+        if self.sentence is not None and not self.task:
+            raise UsageError("--sentence: only with --task", remedy="Add --task.")
+
+
+@with_options(ExplainOptions)
+def explain(
+    language: LanguageSource,
+    domain: DomainSource | None = None,
+    problem: ProblemSource | None = None,
+    *,
+    options: ExplainOptions,
+) -> Explanation:
+    """Explain a language: each word as a short formula, and the sentences of a task.
+
+    Raises
+    ------
+    OutOfMemory
+        If the task has more than 100,000 sentences.
+    NoPlanFits
+        If no optimal plan has the sentence.
+    """
+    files = read_planning(domain, [problem], options.source, most=1)
+    read, position = language_for(language, files)
+    first = files.problems[0]
+    used = language_in_task(read, files.domain, first, files.options_of(read), position)
+    only = None if options.sentence is None else used.words_of(options.sentence)
+    if only is not None:
+        used.plans_with(only)
+    mapped = mapped_states(used.language, used.model)
+    covers = all_covers(mapped)
+    descriptions = describe_words(mapped, covers, options.formula_per_word)
+    points = coordinates_of(None, first)
+    lifted = lifted_words(read, files.domain, first, used.model, points, position)
+    return Explanation(
+        WordsExplained(used, mapped, covers, descriptions, lifted), only, options.task
+    )
+
+
+def _sentence_data(sentence: TaskSentence) -> dict[str, Any]:
+    return {
+        "sentence": " ".join(sentence.words),
+        "plans": json_count(sentence.plans),
+        "choices": [[list(own) for own in step] for step in sentence.choices],
+    }

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""All optimal plans of a task as a value: counted, listed lazily, drawn at random."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
+from typing import Any
+
+from coordlang.commands.presenting import Presented
+from planners.search.plan_file import Texts, texts, to_ipc, to_json, to_plansys2
+from planners.search.plans import Plan, Plans
+from planners.system.notebook import html_table
+
+#: One plan: for each joint step, each robot's subaction as text, None where it idles.
+PlanSteps = tuple[Texts, ...]
+
+
+class OptimalPlans(Presented):
+    """All optimal plans of one task (``Pi(I, G)``), in a stable order.
+
+    Iteration is lazy: nothing is listed until it is asked for, and the number of plans is known
+    without listing them.  A plan is a tuple of joint steps, and a joint step has one text for each
+    robot, None where it idles.
+
+    Examples
+    --------
+    >>> plans = coordlang.plans("domain.pddl", "problem.pddl")         # doctest: +SKIP
+    >>> plans.count, plans.makespan                                    # doctest: +SKIP
+    (2, 4)
+    >>> next(iter(plans))[0]                                           # doctest: +SKIP
+    (None, '(move r2 c1-0 c1-1)')
+    """
+
+    __slots__ = ("_plans",)
+
+    def __init__(self, plans: Plans) -> None:
+        self._plans = plans
+
+    @property
+    def count(self) -> int:
+        """The exact number of plans: different sequences of joint actions.
+
+        With slack of those with all steps that are allowed, the last ones at rest.
+        """
+        return self._plans.count
+
+    @property
+    def makespan(self) -> int:
+        """The number of joint steps of every optimal plan; with slack some take more."""
+        return self.cost[0]
+
+    @property
+    def slack(self) -> int:
+        """How many joint steps more than ``makespan`` plans may take."""
+        return self._plans.space.model.slack
+
+    @property
+    def cost(self) -> tuple[int, int]:
+        """The optimal cost: joint steps, and the second component (0 where the cost has none)."""
+        space = self._plans.space
+        return space.least_makespan(0), space.cost_of(0)[1]
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The robots, in the order in which a joint step lists them."""
+        return self._plans.space.model.robots
+
+    def __iter__(self) -> Iterator[PlanSteps]:
+        return map(self._texts, self._plans)
+
+    def __getitem__(self, rank: int) -> PlanSteps:
+        """Return the plan at a position, 0 to ``count - 1``; raises `IndexError` outside."""
+        return self._texts(self._plans.unrank(rank))
+
+    def rank(self, plan: Sequence[Texts]) -> int | None:
+        """Return the position of a plan, None if it is no optimal plan of the task."""
+        numbers = self._numbers(plan)
+        return None if numbers is None else self._plans.rank(numbers)
+
+    def sample(self, number: int, seed: int = 0) -> list[PlanSteps]:
+        """Draw plans uniformly and independently; the same seed draws the same plans."""
+        return [self._texts(plan) for plan in self._plans.sample(number, seed)]
+
+    def ipc(self, plan: Sequence[Texts]) -> str:
+        """Return a plan as an IPC plan file (docs/formats.md).
+
+        Raises
+        ------
+        ValueError
+            If it is no optimal plan of the task.
+        """
+        return to_ipc(self._plans, self._known(plan))
+
+    def plansys2(self, plan: Sequence[Texts]) -> str:
+        """Return a plan as PlanSys2 reads it (docs/formats.md); raises as `ipc`."""
+        return to_plansys2(self._plans, self._known(plan))
+
+    def data(self, listed: Sequence[Sequence[Texts]]) -> dict[str, Any]:
+        """Return the data of a JSON plan file with these plans in it (docs/formats.md)."""
+        return to_json(self._plans, [self._known(plan) for plan in listed])
+
+    def facts(self) -> Mapping[str, object]:
+        """Return the main facts, as a notebook shows them."""
+        return {"count": self.count, "makespan": self.makespan, "robots": self.robots}
+
+    def _repr_html_(self) -> str:
+        first = next(iter(self))
+        rows = [(str(n), *(text or "" for text in step)) for n, step in enumerate(first, 1)]
+        title = f"plan 1 of {self.count:,}, {self.makespan} steps"
+        return html_table(("step", *self.robots), rows, title)
+
+    def first(self, most: int) -> list[PlanSteps]:
+        """Return the first plans of the order, at most so many."""
+        return list(islice(self, most))
+
+    def _texts(self, plan: Plan) -> PlanSteps:
+        return texts(self._plans.space.model, self._plans.without_rest(plan))
+
+    def _numbers(self, plan: Sequence[Texts]) -> Plan | None:
+        model = self._plans.space.model
+        steps = [model.numbers(step) for step in plan]
+        if None in steps:
+            return None
+        return self._plans.padded(tuple(step for step in steps if step is not None))
+
+    def _known(self, plan: Sequence[Texts]) -> Plan:
+        numbers = self._numbers(plan)
+        if numbers is None or self._plans.rank(numbers) is None:
+            raise ValueError(f"this is no {self._plans.space.model.kept_plan} of the task")
+        return numbers

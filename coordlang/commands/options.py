@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Options that several functions and commands share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from os import PathLike, fspath
+from typing import Literal
+
+from planners.pddl.model_options import ModelOptions
+from planners.system.errors import UsageError
+from planners.system.options import group, option
+
+Unsolvable = Literal["fail", "skip"]
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """How domain and problems are read.
+
+    ``given`` are the names of the model options that were given: a language file records them all,
+    and one that was given must not contradict it.
+    """
+
+    factored: str | PathLike[str] | None = option(
+        None,
+        "In place of DOMAIN and PROBLEM: the folder of each robot's own domain and problem file.",
+        "DIR",
+    )
+    model: ModelOptions = group(ModelOptions)
+    given: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class Jobs:
+    """Who does large work: processes here, or a cluster; and where finished parts are kept."""
+
+    jobs: int | None = option(
+        None, "Processes for large work (default: one for each core).", "N", least=1
+    )
+    scheduler: str | PathLike[str] | None = option(
+        None, "Do the work on this running Dask cluster instead.", "ADDRESS|FILE"
+    )
+    resume: str | PathLike[str] | None = option(
+        None, "Keep finished parts here, and go on with those that are kept.", "DIR"
+    )
+    note: Callable[[str], None] | None = option(
+        None, "Called with what a person should read; else it is a warning.", only="python"
+    )
+
+    def __post_init__(self) -> None:
+        if self.jobs is not None and self.scheduler is not None:
+            raise UsageError(
+                "--jobs counts processes of this machine, and --scheduler sends the work elsewhere",
+                remedy="Give one of them.",
+            )
+        if self.scheduler is not None:
+            object.__setattr__(self, "scheduler", fspath(self.scheduler))

@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A language and other candidate tasks -> a verified language that differs in few states."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+
+import numpy as np
+
+from coordlang.commands.building import Built, Clock
+from coordlang.language.candidates import Candidates, require_solvable
+from coordlang.language.keys import keys_of, read_keys
+from coordlang.language.partition import Partition
+from coordlang.language.provenance import Guarantee, provenance_of
+from coordlang.language.words import Language
+from coordlang.required.all_differences import differences
+from coordlang.required.miscoordination import Miscoordination
+from coordlang.verification.by_definition import Verdict
+from coordlang.verification.candidates import verify_candidates
+from coordlang.vocabulary.job import Assignment, Job
+from coordlang.vocabulary.repair import Repair, repair
+from planners.joint.tables import Ints, Rows, find_rows
+from planners.parallel.workers import Workers
+
+#: What a language file names as the method of a repaired language.
+METHOD = "repair"
+
+
+@dataclass(frozen=True, slots=True)
+class ChangedState:
+    """A state, by its key, with the word that it had and the one that it has."""
+
+    state: str
+    old: str
+    new: str
+
+
+@dataclass(frozen=True, slots=True)
+class Repaired:
+    """What became of a language.
+
+    Attributes
+    ----------
+    witness
+        Plans of one sentence of the old language that miscoordinate; None: it still holds, and no
+        word was changed.
+    changed
+        The states that have another word than before, by their keys.
+    changes_bound
+        Every language for the tasks changes the word of so many states at least.
+    new_words
+        The words that are new.
+    new_words_bound
+        Every language that changes so few states has at least so many new words.
+    new_states
+        States on plans of the tasks that the old language does not list.
+    gone
+        States of the old language that the problem cannot have any more.
+    """
+
+    witness: Miscoordination | None
+    changed: tuple[ChangedState, ...] = ()
+    changes_bound: int = 0
+    new_words: tuple[str, ...] = ()
+    new_words_bound: int = 0
+    new_states: int = 0
+    gone: int = 0
+
+    @property
+    def still_holds(self) -> bool:
+        """Whether the old language serves the tasks as it is."""
+        return self.witness is None
+
+
+def repair_language(
+    candidates: Candidates,
+    start: Language,
+    *,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda _: None,
+    workers: Workers | None = None,
+) -> tuple[Built, Repaired]:
+    """Change the words of as few states as makes a language serve candidate tasks.
+
+    The result is verified by definition.  States that are on no plan of the candidate tasks keep
+    their words.
+
+    Parameters
+    ----------
+    candidates
+        The tasks that it must serve.
+    start
+        The language; states that the tasks' problem cannot have are left out.
+    seed
+        Recorded.
+    progress
+        Called with a line of text now and then.
+    workers
+        Who does jobs; None: this process.
+
+    Raises
+    ------
+    Inseparable, ProvedImpossible, OutOfMemory
+        As `coordlang.commands.building.build_language` does.
+    """
+    require_solvable(candidates)
+    workers = workers or Workers()
+    clock = Clock()
+    found = differences(candidates, workers, progress)
+    clock.note("coordination")
+    states = tuple(found.states.tolist())
+    old = _Old.of(start, candidates)
+    new_states = len(states) - len(old.words_of(states))
+    progress("verifying the old language")
+    verdict = verify_candidates(old.partition, candidates, workers, progress)
+    clock.note("verify")
+    job = Job(candidates, states, found.first, seed=seed)
+    if verdict.holds:
+        kept = Repaired(None, new_states=new_states, gone=old.gone)
+        return _built(old.partition, job, verdict, clock), kept
+    verified: list[tuple[Assignment, Partition, Verdict]] = []
+
+    def check(assignment: Assignment) -> None:
+        partition = old.repaired(assignment)
+        after = verify_candidates(partition, candidates, workers, progress)
+        if not after.holds:
+            raise AssertionError(f"the repaired words are no language: {after.witness}")
+        verified.append((assignment, partition, after))
+
+    job = replace(job, progress=progress, check=check)
+    result = repair(job, old.words_of(states), len(old.partition.words), old.partition.default)
+    clock.note("repair")
+    partition, after = next((p, v) for a, p, v in verified if a is result.partition)
+    repaired = Repaired(
+        verdict.witness,
+        old.changes(result, partition),
+        result.changes_bound,
+        tuple(word for word in partition.words if word not in old.partition.words),
+        result.new_words_bound,
+        new_states,
+        old.gone,
+    )
+    return _built(partition, job, after, clock, result), repaired
+
+
+def _built(
+    partition: Partition,
+    job: Job,
+    verdict: Verdict,
+    clock: Clock,
+    result: Repair | None = None,
+) -> Built:
+    """The language of a partition; what its old file claims of fewer words is not believed."""
+    candidates = job.candidates
+    guarantee = Guarantee.of(METHOD, len(partition.words), job.lower_bound)
+    provenance = provenance_of(candidates, guarantee, {"program": "coordlang"})
+    return Built(
+        language=Language.of(partition, candidates.model, provenance),
+        first_differences=job.first_differences,
+        states=len(job.states),
+        verdict=verdict,
+        figures=result.figures if result else {},
+        seconds=clock.seconds,
+        stopped=result.stopped if result else None,
+        job=job,
+        evidence={},
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Old:
+    """The old words in the model of the candidate tasks.
+
+    ``listed`` (states) is the place in ``partition`` of each candidate state that the language
+    lists, -1 where it does not.  ``gone`` of its states are none of this model.
+    """
+
+    candidates: Candidates
+    partition: Partition
+    listed: Ints
+    gone: int
+
+    @classmethod
+    def of(cls, language: Language, candidates: Candidates) -> _Old:
+        _, wrong = read_keys(candidates.model.codec, language.states)
+        if len(wrong):
+            language = _without(language, set(wrong.tolist()))
+        partition = language.partition(candidates.model)
+        listed = find_rows(partition.rows, candidates.rows)
+        return cls(candidates, partition, listed, len(wrong))
+
+    def words_of(self, states: Sequence[int]) -> dict[int, int]:
+        """The word numbers of those states that the language lists."""
+        places = self.listed[list(states)].tolist()
+        word = self.partition.word.tolist()
+        return {s: word[p] for s, p in zip(states, places, strict=True) if p >= 0}
+
+    def repaired(self, assignment: Assignment) -> Partition:
+        """The partition with other words of some states; words without states are left out."""
+        states = sorted(assignment)
+        fresh = self.listed[states] < 0
+        rows: Rows = np.concatenate((self.partition.rows, self.candidates.rows[states][fresh]))
+        given = np.array([assignment[state] for state in states], np.int64)
+        word = np.concatenate((self.partition.word, given[fresh]))
+        word[self.listed[states][~fresh]] = given[~fresh]
+        used, number = np.unique(word, return_inverse=True)
+        names = _names(self.partition.words, used.tolist())
+        most = int(np.bincount(number).argmax())
+        default = used.tolist().index(self.partition.default) if self._default_in(used) else most
+        return Partition.of_table(names, rows, number.reshape(-1), default)
+
+    def _default_in(self, used: Ints) -> bool:
+        return self.partition.default in used
+
+    def changes(self, result: Repair, partition: Partition) -> tuple[ChangedState, ...]:
+        """The changed states, sorted by their keys."""
+        rows = self.candidates.rows[list(result.changed)]
+        names = zip(
+            keys_of(self.candidates.model.codec, rows),
+            self.partition.word_of(rows).tolist(),
+            partition.word_of(rows).tolist(),
+            strict=True,
+        )
+        old, new = self.partition.words, partition.words
+        return tuple(ChangedState(key, old[was], new[now]) for key, was, now in sorted(names))
+
+
+def _without(language: Language, places: set[int]) -> Language:
+    """A language without the states at some places of its list."""
+    kept = [item for n, item in enumerate(language.states.items()) if n not in places]
+    return replace(language, states=dict(kept))
+
+
+def _names(old: Sequence[str], used: Sequence[int]) -> tuple[str, ...]:
+    """The names of the words that are used; new ones are called as no old one is."""
+    fresh = (name for name in (f"w{n}" for n in count()) if name not in old)
+    return tuple(old[word] if word < len(old) else next(fresh) for word in used)

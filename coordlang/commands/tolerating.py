@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Candidate tasks and a number of words -> words under which robots fail as rarely as possible."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from coordlang.commands.building import Built, Clock
+from coordlang.language.candidates import Candidates, require_solvable
+from coordlang.language.partition import Partition
+from coordlang.language.provenance import Guarantee, provenance_of
+from coordlang.language.tolerance import Tolerance
+from coordlang.language.words import Language
+from coordlang.required.all_differences import differences
+from coordlang.required.choices import Choices
+from coordlang.required.divergences import Divergences, FirstDifferences, states_on_plans
+from coordlang.required.failures import Failures
+from coordlang.required.miscoordination import Inseparable
+from coordlang.symmetry.group import symmetry_group
+from coordlang.verification.by_definition import Verdict
+from coordlang.verification.candidates import verify_candidates
+from coordlang.vocabulary.few_words import few_words
+from coordlang.vocabulary.fewest_failures import FewWords
+from coordlang.vocabulary.greedy import greedy
+from coordlang.vocabulary.hidden_slack import hidden_differences
+from coordlang.vocabulary.job import Assignment, Job
+from planners.parallel.workers import Workers
+from planners.search.portions import require_room
+from planners.system.errors import UsageError
+from planners.system.limits import little_time_after
+from planners.system.messages import echoed
+
+#: What a file says of how the words were found.
+METHOD = "few-words"
+
+
+@dataclass(frozen=True, slots=True)
+class WordLimit:
+    """How many words a language may have, and what is then minimised.
+
+    Attributes
+    ----------
+    words
+        The most words; 1 is silence.
+    worst
+        Minimise how often robots fail in the worst task, not over all tasks.
+
+    Raises
+    ------
+    UsageError
+        For what is no number of words, one or more.
+    """
+
+    words: int
+    worst: bool = False
+
+    def __post_init__(self) -> None:
+        is_number = isinstance(self.words, int) and not isinstance(self.words, bool)
+        if not is_number or self.words < 1:
+            raise UsageError(
+                f"a language has a word at least, not {echoed(str(self.words))}",
+                remedy="--words 1 is silence.",
+            )
+
+
+def build_few_words(
+    candidates: Candidates,
+    limit: WordLimit,
+    *,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda _: None,
+    workers: Workers | None = None,
+) -> tuple[Built, FewWords]:
+    """Find words, at most so many, under which robots that choose by themselves fail least often.
+
+    Where they never do, the words are verified by definition, as every coordination language.
+
+    Parameters
+    ----------
+    candidates
+        The tasks that they are for.  Plans of them may be inseparable.
+    limit
+        How many words.
+    seed
+        Of all random choices.
+    progress
+        Called with a line of text now and then.
+    workers
+        Who does jobs; None: this process.
+
+    Raises
+    ------
+    ProvedImpossible
+        There is no candidate task.
+    TooManyToCount
+        Not even how often robots fail in silence can be counted.
+    """
+    require_solvable(candidates)
+    require_room(candidates.source)
+    workers = workers or Workers()
+    clock = Clock()
+    first, language = _first_differences(candidates, workers, progress)
+    clock.note("coordination")
+    states = tuple(states_on_plans(candidates.spaces).tolist())
+    job = Job(candidates, states, first, seed=seed, progress=progress)
+    found = few_words(
+        candidates.spaces,
+        states,
+        len(candidates.rows),
+        limit.words,
+        worst=limit.worst,
+        seed=seed,
+        language=language,
+        symmetries=symmetry_group(candidates).permutations if limit.words > 1 else (),
+        progress=progress,
+    )
+    clock.note("vocabulary")
+    partition = Partition.of_states(candidates.rows, found.partition)
+    verdict = Verdict(False, candidates.count, 0, None)
+    if not found.failures.worst:
+        with little_time_after(found.stopped):
+            verdict = verify_candidates(partition, candidates, workers, progress)
+        if not verdict.holds:
+            raise AssertionError(f"no robot fails, but these words do: {verdict.witness}")
+    clock.note("verify")
+    is_interrupted = isinstance(found.stopped, KeyboardInterrupt)
+    guarantee = Guarantee.of(METHOD, len(partition.words), job.lower_bound, verdict.holds)
+    failures = Failures(found.failures.mean, found.failures.worst)
+    provenance = provenance_of(candidates, guarantee, {"program": "coordlang"})
+    if not verdict.holds:
+        slack = provenance.tolerance.slack if provenance.tolerance else None
+        tolerance = failures.tolerance or Tolerance()
+        provenance = replace(provenance, tolerance=replace(tolerance, slack=slack))
+    built = Built(
+        language=Language.of(partition, candidates.model, provenance),
+        first_differences=first,
+        states=len(states),
+        verdict=verdict,
+        figures=_figures(found),
+        seconds=clock.seconds,
+        # No search was left where nothing fails.
+        stopped=None if verdict.holds and not is_interrupted else found.stopped,
+        job=job,
+        evidence={},
+        failures=failures,
+    )
+    return built, found
+
+
+def _figures(found: FewWords) -> dict[str, float]:
+    return {
+        "silence_mean": float(found.silence.mean),
+        "silence_worst": float(found.silence.worst),
+        "partitions_measured": found.measured,
+        "partitions_recounted": found.recounted,
+        "least_of_all_partitions": found.is_best,
+    }
+
+
+def _first_differences(
+    candidates: Candidates, workers: Workers, progress: Callable[[str], None]
+) -> tuple[FirstDifferences, Assignment | None]:
+    """Where coordination is required, and a language if there is one.
+
+    Where plans are inseparable there is none, and divergences are not defined; nor are they where
+    states hide slack.
+    """
+    hidden = candidates.model.hides_slack
+    try:
+        found = (hidden_differences if hidden else differences)(candidates, workers, progress)
+    except Inseparable:
+        return _without_divergences(candidates), None
+    if hidden:
+        return found.first, {state: word for word, state in enumerate(found.states.tolist())}
+    job = Job(candidates, tuple(found.states.tolist()), found.first)
+    return found.first, greedy(job).partition
+
+
+def _without_divergences(candidates: Candidates) -> FirstDifferences:
+    spaces = candidates.spaces
+    none = Divergences(np.zeros(0, np.int64), np.zeros((0, len(candidates.model.robots)), np.int64))
+    requiring = sum(int(Choices(space).requires[space.starts].sum()) for space in spaces)
+    nodes, edges = (sum(map(len, spaces)), sum(len(space.targets()) for space in spaces))
+    return FirstDifferences(none, requiring, nodes, edges, 0, 0)

@@ -1,0 +1,332 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A robot's subplans as the smallest deterministic automaton over its own subactions.
+
+The robot's subplans are what the plans of a plan space are when only its own subactions are seen.
+All of them have one length, so the automaton has no cycles and its states lie in layers, one a
+step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from itertools import pairwise
+from math import log10
+from operator import and_, or_
+from typing import NamedTuple
+
+import numpy as np
+
+from planners.joint.tables import Ints, ranges, unique_tuples
+from planners.search.plan_space import PlanSpace
+from planners.system.errors import OutOfMemory
+from planners.system.limits import memory_left, more_memory
+
+#: Bytes that one member of a subset takes, with its share of everything else.
+_MEMBER_BYTES = 160
+#: Up to so many bytes the free memory is not looked up.
+_SMALL = 1 << 24
+
+
+class Knowledge(NamedTuple):
+    """What a robot knows in a state, whatever the others do.
+
+    ``true`` are the facts that are certainly true, ``possible`` those that are possibly true, as
+    sets of bits: fact k is bit k.
+    """
+
+    true: int
+    possible: int
+
+    @property
+    def unknown(self) -> int:
+        """The facts that may be true or false."""
+        return self.possible & ~self.true
+
+
+@dataclass(frozen=True, slots=True)
+class Automaton:
+    """A deterministic automaton over one robot's label numbers (0: idle).
+
+    State 0 is where it starts.  Nothing but its own module indexes ``first``, ``label`` and
+    ``target``.
+
+    Parameters
+    ----------
+    layers
+        ``layers[k]`` are the states after k joint steps; those of the last layer are final.
+    first, label, target
+        The edges out of state s are ``first[s]`` to ``first[s + 1]``, sorted by their label; each
+        has a label and a target.
+    left
+        For each state the exact number of subplans from it on, at least 1.
+    known
+        For each state what the robot knows there; all empty where no knowledge was computed.
+    """
+
+    layers: tuple[range, ...]
+    first: Ints
+    label: Ints
+    target: Ints
+    left: tuple[int, ...]
+    known: tuple[Knowledge, ...]
+
+    def __len__(self) -> int:
+        """Count the states."""
+        return len(self.left)
+
+    @property
+    def count(self) -> int:
+        """The number of subplans that it accepts."""
+        return self.left[0]
+
+    @property
+    def steps(self) -> int:
+        """The length of its subplans in joint steps."""
+        return len(self.layers) - 1
+
+    @property
+    def out_degrees(self) -> Ints:
+        """The number of edges out of each state."""
+        return np.diff(self.first)
+
+    def moves(self, state: int) -> list[tuple[int, int]]:
+        """The pairs (label, next state) of a state, sorted."""
+        edges = slice(int(self.first[state]), int(self.first[state + 1]))
+        return list(zip(self.label[edges].tolist(), self.target[edges].tolist(), strict=True))
+
+    def edges_from(self, states: Ints) -> tuple[Ints, Ints]:
+        """All edges out of many states: for each its position in ``states``, and its number."""
+        degrees = self.out_degrees[states]
+        return np.repeat(np.arange(len(states)), degrees), ranges(self.first[states], degrees)
+
+    def labels(self, edges: Ints) -> Ints:
+        """The labels of these edges."""
+        found: Ints = self.label[edges]
+        return found
+
+    def targets(self, edges: Ints) -> Ints:
+        """The states that these edges lead to."""
+        found: Ints = self.target[edges]
+        return found
+
+
+def determinise(
+    space: PlanSpace, robot: int, truth: Mapping[int, int] | None = None, most: int | None = None
+) -> Automaton:
+    """The least automaton of a robot's subplans over the plans of a plan space.
+
+    Without ``truth`` it is the minimal deterministic automaton that accepts exactly the robot's
+    subplans.  With ``truth`` it also gives for each state what is known there: the facts that have
+    one value in all joint states that plans with the same own beginning can be in.  Then it is the
+    least automaton that accepts the subplans and gives this output (a Moore machine: states are
+    merged that agree on the knowledge, now and after every continuation).
+
+    Three passes over the layers: nodes that behave alike are one (upwards), subset construction
+    (downwards), equal futures are one (upwards).  Linear but for the subsets, of which there may be
+    exponentially many.
+
+    Parameters
+    ----------
+    space
+        The plans of one task.
+    robot
+        The robot's number.
+    truth
+        For each state (its number in ``space.rows``) its true facts as bits.
+    most
+        The most members that all subsets together may have; None: as many as the memory holds.
+
+    Raises
+    ------
+    OutOfMemory
+        With an estimate, before the subsets fill the memory or when they have more than ``most``
+        members.
+    """
+    layers, start = _quotient(space, robot, truth)
+    moves: list[list[dict[int, int]]] = []
+    known: list[list[Knowledge]] = []
+    subsets: list[tuple[int, ...]] = [(start,)]
+    members = 0
+    for depth, layer in enumerate(reversed(layers)):
+        known.append([_knowledge(layer, subset) for subset in subsets])
+        following: dict[tuple[int, ...], int] = {}
+        here: list[dict[int, int]] = []
+        for subset in subsets:
+            after = _after(layer, subset)
+            here.append(
+                {own: following.setdefault(to, len(following)) for own, to in after.items()}
+            )
+            members += len(subset)
+            if len(here) % 1024 == 0:
+                _check(space, robot, members, most, depth, len(layers) - 1)
+        moves.append(here)
+        subsets = list(following)
+        _check(space, robot, members, most, depth, len(layers) - 1)
+    return minimised(moves, known)
+
+
+#: A state of an automaton by what it is: what is known there, and its moves to states of the next
+#: layer by their labels.
+_Behaviour = tuple[Knowledge, tuple[tuple[int, int], ...]]
+
+
+def minimised(
+    moves: Sequence[Sequence[Mapping[int, int]]], known: Sequence[Sequence[Knowledge]]
+) -> Automaton:
+    """The least automaton of a deterministic one given in layers.
+
+    States are merged that agree on what is known now and after every continuation.
+
+    Parameters
+    ----------
+    moves
+        ``moves[k][s]`` leads from state s of layer k by a label to a state of layer k + 1; layer 0
+        has one state.
+    known
+        ``known[k][s]`` is what is known in state s of layer k.
+    """
+    merged: list[list[_Behaviour]] = []
+    class_below: list[int] = []
+    for here, knowledge in zip(reversed(moves), reversed(known), strict=True):
+        number: dict[_Behaviour, int] = {}
+        class_here = []
+        for known_there, move in zip(knowledge, here, strict=True):
+            after = tuple(sorted((own, class_below[to]) for own, to in move.items()))
+            class_here.append(number.setdefault((known_there, after), len(number)))
+        class_below = class_here
+        merged.append(list(number))
+    merged.reverse()
+    return _numbered(merged)
+
+
+def _numbered(merged: Sequence[Sequence[_Behaviour]]) -> Automaton:
+    """Number the states in the order in which a walk by layers and labels meets them.
+
+    The same automaton has the same numbers.
+    """
+    order = [0]
+    bounds, first, label, target, known = [0], [0], [], [], []
+    for layer in merged:
+        bounds.append(bounds[-1] + len(order))
+        found: dict[int, int] = {}
+        for state in order:
+            knowledge, moves = layer[state]
+            known.append(knowledge)
+            for own, to in moves:
+                label.append(own)
+                target.append(bounds[-1] + found.setdefault(to, len(found)))
+            first.append(len(label))
+        order = list(found)
+    left = [1] * len(known)
+    for state in range(bounds[-2] - 1, -1, -1):
+        left[state] = sum(left[to] for to in target[first[state] : first[state + 1]])
+    return Automaton(
+        layers=tuple(range(a, b) for a, b in pairwise(bounds)),
+        first=np.array(first, np.int64),
+        label=np.array(label, np.int64),
+        target=np.array(target, np.int64),
+        left=tuple(left),
+        known=tuple(known),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Layer:
+    """Classes of the nodes of one layer: their moves, label -> classes; their true facts."""
+
+    moves: list[dict[int, tuple[int, ...]]]
+    truth: list[int]
+
+
+def _quotient(
+    space: PlanSpace, robot: int, truth: Mapping[int, int] | None
+) -> tuple[list[_Layer], int]:
+    """The layers in classes, the goal's first, and the class of the start.
+
+    Nodes are one class if they agree on ``truth`` and lead by the same own labels to the same
+    classes.
+
+    Merging them changes no set of own continuations (a bisimulation), and makes subsets small.
+    """
+    layers: list[_Layer] = []
+    class_of = np.zeros(len(space), np.int64)  # of each node, within its layer
+    for number, span in enumerate(space.layers):
+        edges = space.layer_edges(number)
+        own = space.robot_labels(robot, edges.edges)
+        pairs = _own_moves(edges.source - span.start, own, class_of[edges.target], span)
+        layer, class_of[span] = _classes(pairs, space.state[span].tolist(), truth)
+        layers.append(layer)
+    return layers, int(class_of[space.starts[0]])
+
+
+def _own_moves(source: Ints, label: Ints, target: Ints, nodes: slice) -> list[Ints]:
+    """For each node of a layer the different pairs (own label, class led to), sorted."""
+    table = np.column_stack((source, label, target))
+    bounds = [int(column.max(initial=0)) + 1 for column in table.T]
+    table, _ = unique_tuples(table, bounds)
+    ends = np.searchsorted(table[:, 0], np.arange(nodes.stop - nodes.start + 1)).tolist()
+    moves = np.ascontiguousarray(table[:, 1:])
+    return [moves[a:b] for a, b in pairwise(ends)]
+
+
+def _classes(
+    pairs: Sequence[Ints], states: Sequence[int], truth: Mapping[int, int] | None
+) -> tuple[_Layer, list[int]]:
+    """The classes of one layer, and the number of each node's class."""
+    classes: dict[tuple[int, bytes], int] = {}
+    layer = _Layer([], [])
+    number = []
+    for state, own in zip(states, pairs, strict=True):
+        facts = truth[state] if truth is not None else 0
+        key = (facts, own.tobytes())
+        if key not in classes:
+            classes[key] = len(classes)
+            layer.moves.append(_grouped(own.tolist()))
+            layer.truth.append(facts)
+        number.append(classes[key])
+    return layer, number
+
+
+def _grouped(pairs: list[list[int]]) -> dict[int, tuple[int, ...]]:
+    """Sorted pairs (label, class) as label -> sorted classes."""
+    found: dict[int, list[int]] = {}
+    for own, to in pairs:
+        found.setdefault(own, []).append(to)
+    return {own: tuple(classes) for own, classes in found.items()}
+
+
+def _after(layer: _Layer, subset: tuple[int, ...]) -> dict[int, tuple[int, ...]]:
+    """Where a subset of classes leads by each label."""
+    if len(subset) == 1:
+        return layer.moves[subset[0]]
+    found: dict[int, set[int]] = {}
+    for member in subset:
+        for own, classes in layer.moves[member].items():
+            found.setdefault(own, set()).update(classes)
+    return {own: tuple(sorted(classes)) for own, classes in sorted(found.items())}
+
+
+def _knowledge(layer: _Layer, subset: tuple[int, ...]) -> Knowledge:
+    truth = {layer.truth[member] for member in subset}
+    return Knowledge(reduce(and_, truth), reduce(or_, truth))
+
+
+def _check(
+    space: PlanSpace, robot: int, members: int, most: int | None, depth: int, steps: int
+) -> None:
+    size = members * _MEMBER_BYTES
+    if (most is None or members <= most) and (size < _SMALL or size < memory_left()):
+        return
+    # The rest at the rate at which they grew so far.
+    growth = log10(max(members, 1)) / max(depth, 1)
+    estimate = 10 ** min(18.0, log10(size / 2**30) + growth * max(steps - depth, 0))
+    smaller = space.model.smaller("another sentence", "a smaller task")
+    raise OutOfMemory(
+        f"the choices of {space.model.robots[robot]} have too many different histories: "
+        f"after {depth + 1} of {steps} "
+        f"steps their subsets have {members:,} members, at this rate about {estimate:,.1f} GiB in "
+        "the end",
+        remedy=f"Use {smaller}, or {more_memory()}.",
+    )

@@ -1,0 +1,303 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The best sentence for a task, by preferences in order of weight."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from heapq import heapify, heappop, heappush
+
+from coordlang.execution.preferences import Memory, PlanPreference, Preference
+from coordlang.execution.task_language import TaskLanguage
+from planners.search.plan_space import PlanSpace
+from planners.system.errors import OutOfMemory
+from planners.system.limits import memory_left, more_memory
+
+#: Bytes of one entry of a prefix's counts.
+_ENTRY_BYTES = 200
+#: In `_Graph.open`: the plan ends, with no further word.
+_END = -1
+
+
+@dataclass(frozen=True, slots=True)
+class BestSentence:
+    """The best sentence, and what became of each preference.
+
+    Parameters
+    ----------
+    words
+        Its word numbers.
+    plans
+        The exact number of plans that it leaves open.
+    values
+        One value for each preference: the number of words, the number of plans, or (grade of the
+        worst plan left open, grade of the best).
+    prefixes
+        How many prefixes of sentences were looked at.
+    """
+
+    words: tuple[int, ...]
+    plans: int
+    values: tuple[int | tuple[int, int], ...]
+    prefixes: int
+
+
+def best_sentence(
+    task_language: TaskLanguage, preferences: Sequence[Preference], most: int | None = None
+) -> BestSentence:
+    """Find the best sentence of the task by preferences in order of weight.
+
+    The second one decides where the first is equal, and so on.
+
+    - ``shortest``: fewest words;
+    - ``most-plans``: most optimal plans have it;
+    - a `PlanPreference`: the worst plan that the sentence leaves open has the best grade, then the
+      best plan has.  The robots may end up with any of these plans, so the worst one is what the
+      sentence promises.
+
+    Of sentences that are equal in all preferences the one with fewest words is taken, then the
+    first by word numbers.
+
+    Best-first search over prefixes of sentences, with a bound on what any continuation can give;
+    prefixes that lead to the same nodes with the same counts are one.  ``shortest`` alone takes as
+    many prefixes as the sentence has words.  The other preferences ask for the best string of a
+    nondeterministic automaton, which has no polynomial algorithm in general (for ``most-plans`` cf.
+    Lyngsø and Pedersen 2002 on hidden Markov models).
+
+    Raises
+    ------
+    OutOfMemory
+        When the prefixes have more than ``most`` entries, or more than the memory holds.
+    """
+    graph = _Graph.of(task_language, preferences)
+    start = _Prefix((graph.word[0],), {0: 1}, None)
+    queue = [(graph.bound(start), start.words, 0, start)]
+    seen: set[object] = set()
+    entries, prefixes, pushed = 0, 0, 0
+    while queue:
+        _, words, _, prefix = heappop(queue)
+        if prefix.whole is not None:
+            return BestSentence(words, prefix.whole.plans, graph.values(prefix), prefixes)
+        same = graph.continuation(prefix)
+        if same in seen:
+            continue  # the one that was here before is as good, and shorter or smaller
+        seen.add(same)
+        prefixes += 1
+        for longer in graph.extensions(prefix):
+            entries, pushed = entries + len(longer.counts), pushed + 1
+            heappush(queue, (graph.bound(longer), longer.words, pushed, longer))
+        if (most is not None and entries > most) or entries * _ENTRY_BYTES > memory_left():
+            raise OutOfMemory(
+                f"{prefixes:,} beginnings of sentences were looked at, and the best sentence is "
+                "not decided yet",
+                remedy="Prefer the shortest sentence first, use a smaller task, or "
+                f"{more_memory()}.",
+            )
+    raise AssertionError("a task has at least one sentence")
+
+
+@dataclass(frozen=True, slots=True)
+class _Whole:
+    """The plans of a whole sentence.
+
+    How many, and for each `PlanPreference` the worst and the best grade.
+    """
+
+    plans: int
+    grades: tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Prefix:
+    """The prefix of a sentence.
+
+    ``counts`` has how many beginnings of plans come to each point with the first state of the last
+    word.  ``whole`` is there for a whole sentence.
+    """
+
+    words: tuple[int, ...]
+    counts: dict[int, int]
+    whole: _Whole | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Graph:
+    """The task's plans as paths of *points*.
+
+    A point is a plan-space node with what the preferences remember there.  Points are numbered from
+    the start on, layer by layer.  ``following[p]`` holds pairs (point, number of joint actions);
+    ``node`` and ``word`` are those of each point.  The rest bounds the continuations of plans from
+    p on: ``more[p]`` is the least number of further words, ``grades[p]`` the least grade for each
+    `PlanPreference`, and ``open[p]``, if ``most-plans`` is a preference, has for each next word how
+    many plans from p can have one sentence with it, at most.
+    """
+
+    preferences: tuple[Preference, ...]
+    following: list[list[tuple[int, int]]]
+    node: list[int]
+    word: list[int]
+    more: list[int]
+    grades: list[tuple[int, ...]]
+    open: list[dict[int, int]]
+
+    @classmethod
+    def of(cls, task_language: TaskLanguage, preferences: Sequence[Preference]) -> _Graph:
+        automata = [one for one in preferences if isinstance(one, PlanPreference)]
+        following, node, memories = _points(task_language, automata)
+        word = [int(task_language.word[n]) for n in node]
+        size = len(node)
+        graph = cls(tuple(preferences), following, node, word, [0] * size, [()] * size, [])
+        if "most-plans" in preferences:
+            graph.open.extend({} for _ in node)
+        for point in reversed(range(size)):
+            if following[point]:
+                graph._bound_by_followers(point)
+            else:
+                graph._bound_at_end(point, automata, memories[point])
+        return graph
+
+    def _bound_at_end(
+        self, point: int, automata: Sequence[PlanPreference], memories: tuple[Memory, ...]
+    ) -> None:
+        """The bounds at a point where plans end."""
+        graded = zip(automata, memories, strict=True)
+        self.grades[point] = tuple(one.grade(memory) for one, memory in graded)
+        if self.open:
+            self.open[point][_END] = 1
+
+    def _bound_by_followers(self, point: int) -> None:
+        """The bounds at a point, from those of the points after it."""
+        here, after = self.word[point], self.following[point]
+        self.more[point] = min(self.more[q] + (self.word[q] != here) for q, _ in after)
+        self.grades[point] = tuple(map(min, zip(*(self.grades[q] for q, _ in after), strict=True)))
+        if not self.open:
+            return
+        plans = self.open[point]
+        for q, number in after:
+            if self.word[q] == here:
+                for word, count in self.open[q].items():
+                    plans[word] = plans.get(word, 0) + number * count
+            else:
+                most = max(self.open[q].values())
+                plans[self.word[q]] = plans.get(self.word[q], 0) + number * most
+
+    def continuation(self, prefix: _Prefix) -> object:
+        """What the continuations of a prefix and their values depend on."""
+        points = prefix.counts.items() if self.open else prefix.counts
+        return prefix.words[-1], frozenset(points)
+
+    def extensions(self, prefix: _Prefix) -> list[_Prefix]:
+        """The prefixes with one word more, and the whole sentence if some plan ends here."""
+        word = prefix.words[-1]
+        inside, todo = dict(prefix.counts), list(prefix.counts)
+        further: dict[int, dict[int, int]] = {}
+        ended: dict[int, int] = {}
+        heapify(todo)
+        while todo:
+            point = heappop(todo)
+            if not self.following[point]:
+                ended[point] = inside[point]
+            for q, number in self.following[point]:
+                if self.word[q] == word and q not in inside:
+                    heappush(todo, q)
+                counts = inside if self.word[q] == word else further.setdefault(self.word[q], {})
+                counts[q] = counts.get(q, 0) + inside[point] * number
+        found = [_Prefix((*prefix.words, w), counts, None) for w, counts in further.items()]
+        return [*found, self._whole(prefix, ended)] if ended else found
+
+    def _whole(self, prefix: _Prefix, ended: dict[int, int]) -> _Prefix:
+        """A prefix as a whole sentence; ``ended`` has the plans that end at each point."""
+        columns = zip(*(self.grades[p] for p in ended), strict=True)
+        whole = _Whole(sum(ended.values()), tuple((max(c), min(c)) for c in columns))
+        return _Prefix(prefix.words, {}, whole)
+
+    def values(self, prefix: _Prefix) -> tuple[int | tuple[int, int], ...]:
+        """The value of a whole sentence in each preference."""
+        assert prefix.whole is not None
+        grades = iter(prefix.whole.grades)
+        worth = {"shortest": len(prefix.words), "most-plans": prefix.whole.plans}
+        return tuple(
+            worth[one] if isinstance(one, str) else next(grades) for one in self.preferences
+        )
+
+    def bound(self, prefix: _Prefix) -> tuple[object, ...]:
+        """The best values that any sentence with this prefix can have.
+
+        The smaller the better; the length last.
+        """
+        if prefix.whole is not None:
+            signs = (
+                -value if one == "most-plans" and isinstance(value, int) else value
+                for one, value in zip(self.preferences, self.values(prefix), strict=True)
+            )
+            return (*signs, len(prefix.words))
+        length = len(prefix.words) + min(self.more[p] for p in prefix.counts)
+        grades = iter(self._best_grades(prefix))
+        result: list[object] = []
+        for one in self.preferences:
+            if one == "shortest":
+                result.append(length)
+            elif one == "most-plans":
+                result.append(-self._most_plans(prefix))
+            else:
+                result.append(next(grades))
+        return (*result, length)
+
+    def _most_plans(self, prefix: _Prefix) -> int:
+        total: dict[int, int] = {}
+        for point, count in prefix.counts.items():
+            for word, plans in self.open[point].items():
+                total[word] = total.get(word, 0) + count * plans
+        return max(total.values())
+
+    def _best_grades(self, prefix: _Prefix) -> list[tuple[int, int]]:
+        """The (worst, best) grades at least.
+
+        Some node's plans go on, and all that came to this node can go on in the same way.
+        """
+        by_node: dict[int, list[tuple[int, ...]]] = {}
+        for point in prefix.counts:
+            by_node.setdefault(self.node[point], []).append(self.grades[point])
+        best = map(min, zip(*(self.grades[p] for p in prefix.counts), strict=True))
+        of_node = [tuple(map(max, zip(*grades, strict=True))) for grades in by_node.values()]
+        worst = map(min, zip(*of_node, strict=True))
+        return list(zip(worst, best, strict=True))
+
+
+def _points(
+    task_language: TaskLanguage, automata: Sequence[PlanPreference]
+) -> tuple[list[list[tuple[int, int]]], list[int], list[tuple[Memory, ...]]]:
+    """The points that plans pass, layer by layer.
+
+    What follows each of them, its node, its memories.
+    """
+    space, node = task_language.space, task_language.start
+    start = node, tuple(one.start(int(space.state[node])) for one in automata)
+    number = {start: 0}
+    points, following = [start], []
+    for node, memories in points:  # grows while it is walked
+        after: dict[int, int] = {}
+        for edge in space.out_edges(node):
+            target = space.target_of(edge)
+            there = target, _remembered(space, automata, memories, edge, target)
+            if there not in number:
+                number[there] = len(points)
+                points.append(there)
+            after[number[there]] = after.get(number[there], 0) + 1
+        following.append(sorted(after.items()))
+    return following, [node for node, _ in points], [memories for _, memories in points]
+
+
+def _remembered(
+    space: PlanSpace,
+    automata: Sequence[PlanPreference],
+    memories: tuple[Memory, ...],
+    edge: int,
+    target: int,
+) -> tuple[Memory, ...]:
+    """What the preferences remember after an edge."""
+    if not automata:
+        return ()
+    labels, state = space.labels_of(edge), int(space.state[target])
+    steps = zip(automata, memories, strict=True)
+    return tuple(one.step(memory, labels, state) for one, memory in steps)

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Choices files: robots' choices as JSON (docs/formats.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import reduce
+from operator import or_
+from typing import Any
+
+import msgspec
+from msgspec import UNSET
+
+from coordlang.execution.choices import Choices, RobotChoices
+from coordlang.execution.choices_record import ChoicesFile, RobotRecord, StateRecord
+from coordlang.execution.monitor import FORMAT, IDLE, VERSION, Monitor
+from coordlang.language.candidates import describe
+from coordlang.language.tolerance import tolerance_data
+from planners.joint.model import JointModel
+from planners.search.plan_file import json_count
+from planners.search.plans import Plans
+
+
+def to_record(choices: Choices, robots: Sequence[int] | None = None) -> ChoicesFile:
+    """The content of a choices file, of all robots or of those with these numbers."""
+    task_language = choices.task_language
+    return ChoicesFile(
+        format=FORMAT,
+        version=VERSION,
+        domain=dict(task_language.language.provenance.domain) if task_language.language else {},
+        robots=list(task_language.model.robots),
+        task=describe(task_language.space, task_language.task),
+        sentence=task_language.text(choices.words),
+        plans=json_count(Plans.of(choices.fits).count),
+        covered=task_language.covered,
+        guaranteed=choices.guaranteed,
+        tolerance=tolerance_data(task_language.tolerance).get("tolerance", UNSET),
+        combinations_walked=choices.mixtures.nodes if choices.mixtures is not None else None,
+        choices=[_robot(choices, own) for own in choices.of(robots)],
+    )
+
+
+def to_data(choices: Choices, robots: Sequence[int] | None = None) -> dict[str, Any]:
+    """The data of a choices file, of all robots or of those with these numbers."""
+    data: dict[str, Any] = msgspec.to_builtins(to_record(choices, robots))
+    return data
+
+
+def to_bytes(choices: Choices, robots: Sequence[int] | None = None) -> bytes:
+    """The text of a choices file: the same choices give the same bytes."""
+    return msgspec.json.encode(to_record(choices, robots)) + b"\n"
+
+
+def monitor(choices: Choices, robot: str) -> Monitor:
+    """A run-time monitor of one robot's choices.
+
+    Raises `coordlang.execution.monitor.MonitorError` for an unknown robot.
+    """
+    names = choices.task_language.model.robots
+    return Monitor(to_data(choices, [names.index(robot)] if robot in names else None), robot)
+
+
+def _robot(choices: Choices, own: RobotChoices) -> RobotRecord:
+    model, automaton = choices.task_language.model, own.automaton
+    texts = model.codec.facts.texts
+    sometimes_known = reduce(or_, (known.true | ~known.possible for known in automaton.known))
+    facts = [fact for fact in range(len(texts)) if sometimes_known >> fact & 1]
+    return RobotRecord(
+        robot=model.robots[own.robot],
+        steps=automaton.steps,
+        subplans=json_count(automaton.count),
+        atoms=own.atoms,
+        facts=[texts[fact] for fact in facts],
+        others=[text for fact, text in enumerate(texts) if not sometimes_known >> fact & 1],
+        states=[
+            _state(model, own, facts, step, state)
+            for step, states in enumerate(automaton.layers)
+            for state in states
+        ],
+    )
+
+
+def _state(
+    model: JointModel, own: RobotChoices, facts: Sequence[int], step: int, state: int
+) -> StateRecord:
+    automaton = own.automaton
+    known = automaton.known[state]
+    moves = automaton.moves(state)
+    return StateRecord(
+        step=step,
+        left=json_count(automaton.left[state]),
+        next={model.label_text(own.robot, label) or IDLE: to for label, to in moves},
+        true=[number for number, fact in enumerate(facts) if known.true >> fact & 1],
+        unknown=[number for number, fact in enumerate(facts) if known.unknown >> fact & 1],
+    )

@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every combination of the robots' choices, walked.
+
+Are they all optimal, and in which states can they be?
+
+A direct proof, from the definition, for one task and one sentence: nodes are ``(a_1 .. a_n, y)``,
+the state of each robot's automaton and the plan-space node that all of them together have reached.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from coordlang.execution.automaton import Automaton
+from coordlang.execution.task_language import TaskLanguage
+from coordlang.required.miscoordination import Miscoordination, Trail, describe_failure
+from planners.joint.conditions import Labels
+from planners.joint.model import JointModel
+from planners.joint.tables import Ints, spans, unique_tuples
+from planners.search.edge_index import EdgeIndex
+from planners.search.plan_space import PlanSpace, UnfoldingStep
+from planners.system.errors import OutOfMemory
+from planners.system.limits import memory_left, more_memory
+
+#: Joint moves handled at a time.
+_CHUNK = 1_000_000
+#: Up to so many bytes the free memory is not looked up.
+SMALL = 1 << 24
+
+
+@dataclass(frozen=True, slots=True)
+class Mixtures:
+    """What the robots can do together when each takes its choices as it likes.
+
+    ``space``: all of it, again as a plan space of one task, its nodes being ``(a_1 .. a_n, y)``;
+    None if some combination is no optimal plan, and then ``violation`` shows one.  ``nodes`` counts
+    what was walked.
+    """
+
+    space: PlanSpace | None
+    violation: Miscoordination | None
+    nodes: int
+
+    @property
+    def holds(self) -> bool:
+        """Whether every combination is an optimal plan."""
+        return self.violation is None
+
+
+@dataclass(frozen=True, slots=True)
+class _JointMoves:
+    """The joint moves out of one layer.
+
+    ``step`` has them as edges of the unfolded plan space; ``labels`` (moves, robots) are the
+    robots' labels.
+    """
+
+    step: UnfoldingStep
+    labels: Labels
+
+
+def walk_mixtures(
+    task_language: TaskLanguage,
+    fits: PlanSpace,
+    automata: Sequence[Automaton],
+    words: Sequence[int],
+    index: EdgeIndex | None = None,
+    most: int | None = None,
+) -> Mixtures:
+    """Walk all combinations of the robots' subplans in the task's optimal plans, layer by layer.
+
+    At most (product of the automata's layers) * (layer of the plan space) nodes.
+
+    Parameters
+    ----------
+    task_language
+        The language and the task.
+    fits
+        The plans with the sentence.
+    automata
+        Each robot's subplans in them.
+    words
+        The word numbers of the sentence.
+    index
+        ``EdgeIndex.of(task_language.space)``, to be given when many sentences of one plan space are
+        looked at.
+    most
+        The most joint moves to hold; None: as many as the memory holds.
+
+    Raises
+    ------
+    OutOfMemory
+        With an estimate, before the joint moves fill the memory or beyond ``most`` of them.
+    """
+    space = task_language.space
+    index = index or EdgeIndex.of(space)
+    robots = len(automata)
+    table = np.array([[0] * robots + [task_language.start]])
+    layers = [table[:, robots]]
+    steps: list[_JointMoves] = []
+    walked, held = 1, 0
+    for step in range(automata[0].steps):
+        _check(space.model, automata, table, step, held, most)
+        source, labels, after = _moves(automata, table)
+        edge = _edges(index, table[source, robots], labels)
+        broken = np.flatnonzero(edge < 0)
+        if len(broken):
+            last = int(source[broken[0]]), tuple(labels[broken[0]].tolist())
+            paths = _breaking_plans(fits, steps, *last)
+            return Mixtures(None, _violation(task_language, paths, words), walked)
+        reached = np.column_stack((after, space.targets(edge)))
+        table, number = unique_tuples(reached, [*(len(a) for a in automata), len(space)])
+        steps.append(_JointMoves(UnfoldingStep(source, edge, number), labels))
+        layers.append(table[:, robots])
+        walked += len(table)
+        held += 40 * len(edge) + table.nbytes
+    unfolding = [moves.step for moves in steps]
+    found = PlanSpace.from_layers(space, layers, unfolding, task_language.task)
+    return Mixtures(found, None, walked)
+
+
+def _moves(automata: Sequence[Automaton], table: Ints) -> tuple[Ints, Labels, Ints]:
+    """All joint moves: (source, labels, next states of the automata).
+
+    Sorted by source and labels.
+    """
+    source = np.arange(len(table))
+    labels: list[Ints] = []
+    after: list[Ints] = []
+    for robot, own in enumerate(automata):
+        earlier, edges = own.edges_from(table[source, robot])
+        source = source[earlier]
+        labels = [*(column[earlier] for column in labels), own.labels(edges)]
+        after = [*(column[earlier] for column in after), own.targets(edges)]
+    return source, np.stack(labels, axis=1).astype(np.int32), np.stack(after, axis=1)
+
+
+def _edges(index: EdgeIndex, node: Ints, labels: Labels) -> Ints:
+    """The optimal edge of each node with these labels; -1 where there is none."""
+    parts = []
+    for span in spans(np.ones(len(node)), _CHUNK):
+        prefix = node[span]
+        for robot in range(labels.shape[1]):
+            prefix = index.follow(robot, prefix, labels[span, robot])
+        parts.append(prefix)
+    return np.concatenate(parts)
+
+
+def _breaking_plans(
+    fits: PlanSpace, steps: Sequence[_JointMoves], node: int, labels: tuple[int, ...]
+) -> list[list[tuple[int, ...]]]:
+    """For each robot a plan with the sentence, as labels; their mixture breaks.
+
+    ``node`` of the last layer walked is where it does, ``labels`` is the joint step that is none.
+    """
+    done = [labels]
+    for moves in reversed(steps):
+        arrival = int(np.flatnonzero(moves.step.target == node)[0])
+        done.append(tuple(moves.labels[arrival].tolist()))
+        node = int(moves.step.source[arrival])
+    done.reverse()
+    return [
+        _with_beginning(fits, robot, [step[robot] for step in done]) for robot in range(len(labels))
+    ]
+
+
+def _violation(
+    task_language: TaskLanguage, plans: Sequence[list[tuple[int, ...]]], words: Sequence[int]
+) -> Miscoordination:
+    """Plans whose mixture breaks, described in the task's own plan space."""
+    space, start = task_language.space, task_language.start
+    paths = [space.path_with(start, plan) for plan in plans]
+    edges = tuple(zip(*(path for path in paths if path is not None), strict=True))
+    names = tuple(task_language.partition.words[w] for w in words)
+    return describe_failure(space, Trail(start, edges), names)
+
+
+def _with_beginning(fits: PlanSpace, robot: int, subplan: Sequence[int]) -> list[tuple[int, ...]]:
+    """A plan, as labels, in which a robot begins with these labels of its own."""
+    path = fits.path_of_robots(int(fits.starts[0]), [robot], [[label] for label in subplan])
+    assert path is not None, "the robot's automaton accepts its subplans only"
+    return [fits.labels_of(edge) for edge in path]
+
+
+def _check(
+    model: JointModel,
+    automata: Sequence[Automaton],
+    table: Ints,
+    step: int,
+    held: int,
+    most: int | None,
+) -> None:
+    """Estimate a layer's joint moves before they are made."""
+    size = np.ones(len(table))
+    for robot, own in enumerate(automata):
+        size *= own.out_degrees[table[:, robot]]
+    moves = float(size.sum())
+    needed = held + moves * (48 + 24 * len(automata))
+    if (most is not None and moves + held / 40 > most) or (
+        needed > SMALL and needed > memory_left()
+    ):
+        smaller = model.smaller("a smaller task")
+        states = " x ".join(f"{len(own.layers[step]):,}" for own in automata)
+        raise OutOfMemory(
+            f"step {step + 1} has {moves:,.0f} combinations of what the robots may do ({states} "
+            "states of their "
+            f"automata): about {needed / 2**30:,.1f} GiB",
+            remedy=f"Leave out --check, use {smaller} or {more_memory()}.",
+        )

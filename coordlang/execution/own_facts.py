@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The facts that a robot's own subactions alone change.
+
+The robot knows their values without regard to what the others do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from coordlang.execution.automaton import Automaton, Knowledge, minimised
+from planners.grounding import GroundAction
+from planners.joint.model import JointModel
+from planners.pddl.lifted import TRUE
+
+#: What a subaction certainly does to facts: True adds the fact, False deletes it.
+Changes = dict[int, bool]
+
+
+@dataclass(frozen=True, slots=True)
+class OwnFacts:
+    """The facts of which every change is certain from the robot's own label.
+
+    All as sets of bits: bit k is fact k.
+
+    Parameters
+    ----------
+    mask
+        These facts.
+    others
+        The other facts.
+    adds, deletes
+        For each label number the own facts that it adds and deletes.
+    """
+
+    mask: int
+    others: int
+    adds: tuple[int, ...]
+    deletes: tuple[int, ...]
+
+    @classmethod
+    def of(cls, model: JointModel, robot: int) -> OwnFacts:
+        """Determine them from the ground actions, without regard to what is reachable.
+
+        A fact is own if no action without this robot changes it, no conditional effect does, and
+        two (joint) actions with the same own part change it in the same way.
+        """
+        variants, others = _variants(model, robot)
+        mask = ((1 << len(model.codec.facts)) - 1) & ~others
+        labels = range(len(model.labels[robot]))
+        first = [variants[label][0] if label in variants else {} for label in labels]
+        return cls(
+            mask=mask,
+            others=others,
+            adds=tuple(_bits(fact for fact, adds in own.items() if adds) & mask for own in first),
+            deletes=tuple(
+                _bits(fact for fact, adds in own.items() if not adds) & mask for own in first
+            ),
+        )
+
+
+def with_own_facts(automaton: Automaton, own: OwnFacts, start: int) -> Automaton:
+    """The least automaton that accepts the same subplans and gives the values of the own facts.
+
+    Parameters
+    ----------
+    automaton
+        The robot's subplans.
+    own
+        The facts that its subactions alone change.
+    start
+        The bits of the facts that are true at first.
+    """
+    moves: list[list[dict[int, int]]] = []
+    known: list[list[Knowledge]] = []
+    layer = [(0, start & own.mask)]
+    for _ in automaton.layers:
+        following: dict[tuple[int, int], int] = {}
+        here = []
+        for state, true in layer:
+            step = {}
+            for label, to in automaton.moves(state):
+                after = (true & ~own.deletes[label]) | own.adds[label]
+                step[label] = following.setdefault((to, after), len(following))
+            here.append(step)
+        moves.append(here)
+        known.append([Knowledge(true, true | own.others) for _, true in layer])
+        layer = list(following)
+    return minimised(moves, known)
+
+
+def _variants(model: JointModel, robot: int) -> tuple[dict[int, list[Changes]], int]:
+    """What the actions of each label certainly do, and the facts that are not own."""
+    others = _bits(model.slack_facts)  # they change by themselves
+    variants: dict[int, list[Changes]] = {}
+    for action in model.actions:
+        certain, uncertain = _changes(model, action)
+        others |= uncertain
+        if robot in action.owners:
+            label = model.label_number(robot, action.part_of(robot))
+            assert label is not None, action.label
+            variants.setdefault(label, []).append(certain)
+        else:
+            others |= _bits(certain)
+    for changes in variants.values():
+        others |= _bits(_ambiguous(changes))
+    return variants, others
+
+
+def _changes(model: JointModel, action: GroundAction) -> tuple[Changes, int]:
+    """What an action certainly does, and the facts that it changes under a condition only."""
+    certain: Changes = {}
+    uncertain = 0
+    for effect in action.effects:
+        fact = model.codec.facts.index.get(effect.atom)
+        if fact is None:
+            continue
+        if effect.condition != TRUE:
+            uncertain |= 1 << fact
+        elif effect.adds or fact not in certain:  # what is both deleted and added counts as added
+            certain[fact] = effect.adds
+    return certain, uncertain
+
+
+def _ambiguous(variants: Sequence[Changes]) -> Iterator[int]:
+    """The facts that variants of one label change in different ways."""
+    first = variants[0]
+    for other in variants[1:]:
+        yield from (fact for fact in {*first, *other} if first.get(fact) != other.get(fact))
+
+
+def _bits(facts: Iterable[int]) -> int:
+    found = 0
+    for fact in facts:
+        found |= 1 << fact
+    return found

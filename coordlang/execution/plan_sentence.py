@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Plan -> sentence; and what is wrong with a plan that has none."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from coordlang.execution.task_language import TaskLanguage
+from coordlang.language.sentences import sentence
+from planners.joint.model import IDLE, FullState, Goal, JointModel
+from planners.joint.tables import Rows
+from planners.pddl.formula_tree import conjuncts, formula_text
+from planners.search.plan_file import NoSuchAction, Texts, read_plans
+from planners.search.plans import Plan, Plans
+from planners.system.errors import BadInput, Position, Refuted
+
+
+class NotAPlan(Refuted):
+    """These joint steps are no plan of the task.
+
+    Parameters
+    ----------
+    step
+        The first step that cannot be taken, from 0; the plan's length if only the goal fails at the
+        end.
+    reason
+        Why, in words.
+    position
+        Where it stands in the plan file.
+    remedy
+        What can be done.
+    """
+
+    def __init__(
+        self, step: int, reason: str, position: Position | None = None, remedy: str | None = None
+    ) -> None:
+        super().__init__(f"this is no plan: {reason}", position=position, remedy=remedy)
+        self.step = step
+
+
+class NotOptimal(Refuted):
+    """A plan of the task, but not an optimal one: only optimal plans have a sentence.
+
+    Parameters
+    ----------
+    step
+        The first step, from 0, with which the plan is the beginning of no optimal plan any more.
+    excess
+        Its cost above the optimal one: (steps, second component).
+    reason
+        How much too expensive it is and where it leaves all optimal plans, in words.
+    slack
+        The joint steps more that plans may take.
+    """
+
+    def __init__(self, step: int, excess: tuple[int, int], reason: str, slack: int = 0) -> None:
+        meant = f"within slack {slack}" if slack else "optimal"
+        option = f" --slack {slack}" if slack else ""
+        super().__init__(
+            f"this plan is not {meant}: {reason}",
+            remedy=f"`coordlang plans DOMAIN PROBLEM{option}` writes the plans that are.",
+        )
+        self.step = step
+        self.excess = excess
+
+
+@dataclass(frozen=True, slots=True)
+class ExecutedPlan:
+    """A plan, optimal or not, carried out from the initial state.
+
+    ``labels`` are its label numbers, ``rows`` the states that it passes through (one more than
+    steps), ``second`` is the second component of its cost.
+    """
+
+    labels: Plan
+    rows: list[Rows]
+    second: int
+
+
+def sentence_of_plan(task_language: TaskLanguage, plan: Sequence[Texts]) -> tuple[int, ...]:
+    """The sentence of an optimal plan (the paper's TSC).
+
+    O(steps) expansions.
+
+    Parameters
+    ----------
+    task_language
+        The language and the task.
+    plan
+        ``plan[k][i]`` is the subaction of robot i in step k as text, None if it idles (as
+        `planners.search.plan_file.read_plans` gives it).
+
+    Returns
+    -------
+    tuple of int
+        Word numbers; `TaskLanguage.text` writes them as text.
+
+    Raises
+    ------
+    NotAPlan
+        With the first step that cannot be taken.
+    NotOptimal
+        With the first step that leaves all optimal plans.
+    """
+    executed = execute(task_language, plan)
+    space, node = task_language.space, task_language.start
+    words = [int(task_language.word[node])]
+    with_rest = Plans(space, node, []).padded(executed.labels) if space.model.slack else None
+    for step, labels in enumerate(with_rest or executed.labels):
+        edge = space.edge_with(node, labels)
+        if edge is None:
+            raise _not_optimal(task_language, plan, executed, step)
+        node = space.target_of(edge)
+        words.append(int(task_language.word[node]))
+    return sentence(words)
+
+
+def execute(task_language: TaskLanguage, plan: Sequence[Texts]) -> ExecutedPlan:
+    """Carry out a plan of the task, optimal or not, step by step.
+
+    Raises `NotAPlan` for a step that cannot be taken, or if the goal does not hold at the end.
+    """
+    model, space = task_language.model, task_language.space
+    init = model.forgetting_slack(space.rows[space.state[task_language.start]])
+    rows, second, numbers = [init], 0, []
+    for number, step in enumerate(plan):
+        labels = _label_numbers(model, step, number)
+        steps = model.successors(rows[-1][None, :])
+        found = (steps.labels == labels).all(axis=1).nonzero()[0]
+        if not len(found):
+            raise NotAPlan(
+                number,
+                f"step {number + 1} cannot be taken: {model.why_not(rows[-1], labels)}",
+                remedy=f"The state before it is {model.state_text(rows[-1])}.",
+            )
+        rows.append(steps.result[found[0]])
+        second += int(steps.cost[found[0]])
+        numbers.append(labels)
+    if not model.holds(_goal(task_language), rows[-1][None, :])[0]:
+        unmet = _unmet_goal(task_language, rows[-1])
+        raise NotAPlan(
+            len(plan),
+            f"after {_steps(len(plan))} {unmet}",
+            remedy="Give the whole plan: it ends where the goal holds.",
+        )
+    return ExecutedPlan(tuple(numbers), rows, second)
+
+
+def read_plan_file(path: str | Path, model: JointModel) -> list[tuple[Texts, ...]]:
+    """Read the plans of a plan file (docs/formats.md), in the spelling of the model.
+
+    Raises `BadInput` for a file that is not a plan file or holds no plan, `NotAPlan` for an action
+    that the problem does not have.
+    """
+    try:
+        plans = read_plans(path, model)
+    except NoSuchAction as error:
+        raise NotAPlan(
+            error.step,
+            f"in step {error.step + 1}, {error.what}",
+            position=error.position,
+            remedy=error.remedy,
+        ) from None
+    if not plans:
+        raise BadInput(
+            "there is no plan in it",
+            position=Position(str(path)),
+            remedy="`coordlang plans DOMAIN PROBLEM` writes plans.",
+        )
+    return [tuple(tuple(map(_spelling, step)) for step in plan) for plan in plans]
+
+
+def _spelling(text: str | None) -> str | None:
+    if text is None or text.strip().lower() == IDLE:
+        return None
+    return "(" + " ".join(re.findall(r"[^\s()]+", text.lower())) + ")"
+
+
+def _goal(task_language: TaskLanguage) -> Goal:
+    space = task_language.space
+    goal: Goal = space.goals[space.goal[task_language.start]]
+    return goal
+
+
+def _label_numbers(model: JointModel, step: Texts, number: int) -> tuple[int, ...]:
+    found = model.numbers(step)
+    if found is not None:
+        return found
+    robot, text = next(
+        (name, text)
+        for robot, (name, text) in enumerate(zip(model.robots, step, strict=True))
+        if model.label_number(robot, text) is None
+    )
+    raise NotAPlan(
+        number,
+        f"in step {number + 1}, {robot} has no subaction {text}",
+        remedy="It is misspelt, belongs to another robot, can never be applied in this problem, or "
+        "is idling, which is left out (`coordlang inspect DOMAIN PROBLEM`).",
+    )
+
+
+def _unmet_goal(task_language: TaskLanguage, row: Rows) -> str:
+    """The first part of the goal that does not hold."""
+    goal = _goal(task_language)
+    if isinstance(goal, FullState):
+        return "the state is not the goal state"
+    part = next(
+        part for part in conjuncts(goal) if not task_language.model.holds(part, row[None, :])[0]
+    )
+    return f"the goal is not reached: {formula_text(part)} does not hold"
+
+
+def _not_optimal(
+    task_language: TaskLanguage, plan: Sequence[Texts], executed: ExecutedPlan, step: int
+) -> NotOptimal:
+    """The error that says how much too expensive a plan is, and where it leaves optimal ones."""
+    model, space = task_language.model, task_language.space
+    makespan, second = space.cost_of(task_language.task)
+    excess = max(0, len(plan) - makespan), executed.second - second
+    if excess[0]:
+        enough = f"{makespan} {'is' if makespan == 1 else 'are'} enough"
+        if model.slack:
+            least = space.least_makespan(task_language.task)
+            enough = f"with slack {model.slack} {makespan} are allowed, as {least} are enough"
+        wrong = f"it takes {_steps(len(plan))}, and {enough}"
+    else:
+        what = "subactions" if model.cost == "makespan+actions" else "action costs of"
+        few = "are as few as can be" if not model.slack else "are within the slack"
+        wrong = (
+            f"its {_steps(len(plan))} {few}, "
+            f"but with {executed.second} {what} where {second} are enough"
+        )
+    if step == makespan:
+        reason = f"{wrong}: the goal holds before step {step + 1} already"
+    else:
+        state = model.state_text(executed.rows[step])
+        doing = ", ".join(
+            f"{robot} {text or 'idles'}"
+            for robot, text in zip(model.robots, plan[step], strict=True)
+        )
+        kept = "plans within it" if model.slack else "optimal plans"
+        reason = f"{wrong}; with step {step + 1} ({doing}) it leaves all {kept}, at {state}"
+    return NotOptimal(step, excess, reason, model.slack)
+
+
+def _steps(number: int) -> str:
+    return f"{number} step{'s' * (number != 1)}"

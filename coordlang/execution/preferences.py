@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the sentence for a task should be like: preferences by which the best one is chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from coordlang.execution.task_language import TaskLanguage
+from planners.joint.model import JointModel
+from planners.joint.states import split_atoms
+from planners.pddl.lifted import Atom
+from planners.system.errors import BadInput, UsageError
+from planners.system.messages import echoed
+
+#: What a preference remembers of a plan's beginning.
+Memory = tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PlanPreference:
+    """A preference about single plans: an automaton that reads a plan and gives it a grade.
+
+    The lower the grade, the better.  A state is given by its number in the plan space's table.
+
+    Parameters
+    ----------
+    text
+        How it is written on the command line.
+    start
+        Gives the memory in the initial state.
+    step
+        Gives the memory after a joint step (labels) into a state.
+    grade
+        Gives the grade of a plan by the memory at its end.
+    grades
+        What each grade means, in words.
+    """
+
+    text: str
+    start: Callable[[int], Memory]
+    step: Callable[[Memory, tuple[int, ...], int], Memory]
+    grade: Callable[[Memory], int]
+    grades: tuple[str, ...]
+
+
+#: ``"shortest"`` and ``"most-plans"`` are preferences about whole sentences.
+Preference = str | PlanPreference
+
+
+def read_preference(task_language: TaskLanguage, text: str) -> Preference:
+    """Read ``shortest``, ``most-plans``, ``first:ROBOT`` or ``avoid:ATOMS``.
+
+    Raises `UsageError` for anything else.
+    """
+    kind, _, argument = text.strip().partition(":")
+    if text.strip() in ("shortest", "most-plans"):
+        return text.strip()
+    if kind == "first":
+        return goes_first(task_language.model, argument.strip().lower())
+    if kind == "avoid":
+        return avoids(task_language, argument)
+    raise UsageError(
+        f"--prefer {echoed(text)}: there is no such preference",
+        remedy='Use shortest, most-plans, first:ROBOT or avoid:"(ATOM) ..".',
+    )
+
+
+def goes_first(model: JointModel, robot: str) -> PlanPreference:
+    """The preference that a robot goes first.
+
+    A robot *acts* in a step if it does not idle.  Robot r goes before robot q in a plan if, in the
+    first step in which one of the two acts and the other one does not, it is r that acts.  Grades:
+    0 if r goes before every other robot, 2 if some other robot goes before r, else 1.
+
+    Raises `UsageError` for a robot that the model does not have.
+    """
+    own = model.robot_number(robot)
+    if own is None:
+        raise UsageError(
+            f"--prefer first:{robot}: there is no such robot",
+            remedy=f"The robots are {', '.join(model.robots)}.",
+        )
+    others = tuple(other for other in range(len(model.robots)) if other != own)
+    grades = (
+        f"{robot} goes first",
+        f"no robot goes before {robot}",
+        f"another robot goes before {robot}",
+    )
+    order = _Order(own)
+    return PlanPreference(f"first:{robot}", lambda _: others, order.step, order.grade, grades)
+
+
+@dataclass(frozen=True, slots=True)
+class _Order:
+    """Who acts before robot number ``robot``; the memory are the robots of which it is still open.
+
+    ``_LATE`` is the memory once one of them has acted before it.
+    """
+
+    robot: int
+
+    def step(self, memory: Memory, labels: tuple[int, ...], _state: int) -> Memory:
+        if memory == _LATE:
+            return memory
+        acts = labels[self.robot] != 0
+        others = {other: labels[other] != 0 for other in memory}
+        if not acts and any(others.values()):
+            return _LATE
+        return tuple(other for other in memory if others[other] == acts)
+
+    def grade(self, memory: Memory) -> int:
+        if memory == _LATE:
+            return 2
+        return 1 if memory else 0
+
+
+_LATE = (-1,)
+
+
+def avoids(task_language: TaskLanguage, atoms: str) -> PlanPreference:
+    """The preference that no state of the plan, the first and last included, has all these atoms.
+
+    Grades: 0 if so, else 1; always 0 where one of the atoms can never be true.  Raises `UsageError`
+    for text that is not a list of atoms of the problem.
+    """
+    try:
+        wanted = split_atoms(" ".join(atoms.lower().split()).replace("( ", "(").replace(" )", ")"))
+    except BadInput as error:
+        raise UsageError(f"--prefer avoid:{atoms}: {error.what}", remedy=error.remedy) from None
+    if not wanted:
+        raise UsageError(
+            "--prefer avoid: expected atoms", remedy='As in --prefer avoid:"(at r1 c1-1)".'
+        )
+    facts, never = _facts_of(task_language, wanted)
+    codec = task_language.model.codec
+    states = codec.facts_part(task_language.space.rows)
+    mask = codec.mask(facts)
+    hit: list[int] = ((states & mask) == mask).all(axis=1).astype(int).tolist()
+    if never:
+        hit = [0] * len(states)
+    text = " ".join(wanted)
+    why = f": {never[0]} can never be true" if never else ""
+    grades = (f"it keeps away from {text}{why}", f"it passes through {text}")
+    return PlanPreference(
+        f"avoid:{text}",
+        lambda state: (hit[state],),
+        lambda memory, _, state: (memory[0] or hit[state],),
+        lambda memory: memory[0],
+        grades,
+    )
+
+
+def _facts_of(task_language: TaskLanguage, texts: Sequence[str]) -> tuple[list[int], list[str]]:
+    """The numbers of the atoms that can change, and those that can never be true.
+
+    Left out is what is always true.  Raises `UsageError` for what is no atom of the problem.
+    """
+    model, declared = task_language.model, task_language.declared
+    facts, never = [], []
+    for text in texts:
+        predicate, *args = text[1:-1].split(" ")
+        number = model.codec.facts.number_of(text)
+        if number is not None:
+            facts.append(number)
+        elif declared is not None and declared.has(predicate, args):
+            if Atom(predicate, tuple(args)) not in model.statics:
+                never.append(text)
+        else:
+            raise UsageError(
+                f"--prefer avoid:{text}: this is no atom of the problem",
+                remedy="Write a predicate of the domain with objects of the problem, as in "
+                f"{next(iter(model.codec.facts.texts), '(at r1 c1-1)')}.",
+            )
+    return facts, never

@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A language and one task in which it is used."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from coordlang.execution.fitting_plans import plans_with_sentence
+from coordlang.language.candidates import Candidates, describe
+from coordlang.language.listed import ListedTask, model_of_listed
+from coordlang.language.partition import Partition
+from coordlang.language.recorded import check_source, options_of, recorded_list
+from coordlang.language.tolerance import Tolerance
+from coordlang.language.words import Language
+from coordlang.verification.by_definition import verify
+from planners.joint.model import FullState, Goal, JointModel, PlanningTask
+from planners.joint.tables import Ints
+from planners.pddl.formula_tree import conjuncts
+from planners.pddl.lifted import Domain, Problem
+from planners.pddl.model_options import ModelOptions
+from planners.search.kept_plans import search
+from planners.search.plan_space import PlanSpace
+from planners.system.errors import BadInput, OutOfMemory, Position, note
+from planners.system.messages import echoed
+
+
+@dataclass(frozen=True, slots=True)
+class Declared:
+    """What a domain and a problem declare: predicates, with their numbers of arguments, objects."""
+
+    predicates: Mapping[str, frozenset[int]]
+    objects: Collection[str]
+
+    def has(self, predicate: str, args: Sequence[str]) -> bool:
+        """Whether this is an atom over declared names, be it possible or not."""
+        known = len(args) in self.predicates.get(predicate, ())
+        return known and all(name in self.objects for name in args)
+
+
+@dataclass(frozen=True, slots=True)
+class TaskLanguage:
+    """A language with the optimal plans of one task.
+
+    Parameters
+    ----------
+    language
+        The language.
+    partition
+        The same as a partition of the model's states.
+    space
+        The optimal plans of the task, and perhaps of further ones.
+    task
+        The number of the task in ``space.starts``.
+    word
+        The word number of every plan-space node.
+    covered
+        Whether it is one of the language's candidate tasks and nothing worse happens in it than
+        the language says.  For any other task nothing is guaranteed.
+    holds
+        Whether the plans of each sentence mix freely in the task: verified here.
+    declared
+        The names of domain and problem; None where there is only a model.
+    """
+
+    language: Language
+    partition: Partition
+    space: PlanSpace
+    task: int
+    word: Ints
+    covered: bool
+    declared: Declared | None = None
+    holds: bool = True
+
+    @property
+    def start(self) -> int:
+        """The plan-space node of the task's initial state."""
+        return int(self.space.starts[self.task])
+
+    @property
+    def guaranteed(self) -> bool:
+        """Whether the plans of a sentence mix freely in this task, one of the language's."""
+        return self.covered and self.holds
+
+    @property
+    def tolerance(self) -> Tolerance | None:
+        """What may go wrong, or be longer, under the language; None: nothing."""
+        return self.language.tolerance if self.language else None
+
+    @property
+    def model(self) -> JointModel:
+        """The joint model of the task."""
+        return self.space.model
+
+    def words_of(self, text: str | Iterable[str]) -> tuple[int, ...]:
+        """Word numbers of a sentence, ``"w2 w0"`` or ``("w2", "w0")``.
+
+        Raises `BadInput` for an empty sentence, a word that the language does not have, or equal
+        neighbours, which no sentence has.
+        """
+        words = text.split() if isinstance(text, str) else list(text)
+        if not words:
+            raise BadInput(
+                "the sentence is empty", remedy="It begins with the word of the initial state."
+            )
+        number = {word: n for n, word in enumerate(self.partition.words)}
+        for index, word in enumerate(words, 1):
+            if word not in number:
+                raise BadInput(
+                    f"word {index} of the sentence, {echoed(word)}, is no word of this language",
+                    remedy=f"Its words are {', '.join(self.partition.words)}.",
+                )
+        for index, (before, word) in enumerate(pairwise(words), 1):
+            if before == word:
+                raise BadInput(
+                    f"the sentence says {echoed(word)} twice in a row "
+                    f"(words {index} and {index + 1})",
+                    remedy="Write a word once, however long the plan stays in it.",
+                )
+        return tuple(number[word] for word in words)
+
+    def plans_with(self, words: Sequence[int]) -> PlanSpace:
+        """The task's plans with the sentence ``words``; see `plans_with_sentence`."""
+        return plans_with_sentence(self.space, self.word, self.task, words, self.partition.words)
+
+    def text(self, words: Sequence[int]) -> str:
+        """A sentence as it is written."""
+        return " ".join(self.partition.words[word] for word in words)
+
+    def __repr__(self) -> str:
+        """The language and the task, not the plan space."""
+        task = describe(self.space, self.task)
+        return f"TaskLanguage({self.language!r}, task={task!r}, covered={self.covered})"
+
+
+def language_in_task(
+    language: Language,
+    domain: Domain,
+    problem: Problem,
+    options: ModelOptions | None = None,
+    position: Position | None = None,
+) -> TaskLanguage:
+    """A language in the task of a PDDL problem.
+
+    Raises `BadInput` when domain or problem are not the language's, `ProvedImpossible` for an
+    unsolvable task.
+    """
+    position = position or Position("the language file")
+    check_source(language, domain, [problem], position)
+    listed = recorded_list(language)
+    options = options or options_of(language)
+    loaded, recorded = model_of_listed(domain, [problem], listed, options, position)
+    unknown = _atoms(language) - set(loaded.model.codec.facts.texts)
+    if unknown:
+        # What can be true depends on where tasks start: the states in the language file must
+        # be possible here.
+        all_true = ListedTask(tuple(sorted(unknown)), ())
+        loaded, (*recorded, _) = model_of_listed(
+            domain, [problem], [*listed, all_true], options, position
+        )
+    space = search(loaded.model, loaded.tasks[0])
+    partition = language.partition(loaded.model)
+    covered = _covers(language, space, recorded)
+    holds = covered and _holds(partition, space)
+    covered &= holds or language.may_fail
+    word = partition.word_of(space.rows)[space.state]
+    declared = Declared(domain.predicates, problem.objects)
+    return TaskLanguage(language, partition, space, 0, word, covered, declared, holds)
+
+
+def _holds(partition: Partition, space: PlanSpace) -> bool:
+    """Whether words are a coordination language in a plan space, by definition.
+
+    False, with a note, where the verification does not fit into the memory.
+    """
+    try:
+        return verify(partition, [space]).holds
+    except OutOfMemory as error:
+        note(f"what the language promises is not verified here: {error.what}")
+        return False
+
+
+def languages_in_tasks(language: Language, candidates: Candidates) -> Iterator[TaskLanguage]:
+    """A language in each of its candidate tasks."""
+    partition = language.partition(candidates.model)
+    for space in candidates.spaces:
+        word = partition.word_of(space.rows)[space.state]
+        for task in range(len(space.starts)):
+            yield TaskLanguage(language, partition, space, task, word, True)
+
+
+def _covers(language: Language, space: PlanSpace, recorded: Sequence[PlanningTask]) -> bool:
+    """Whether the (one) task of a plan space is a candidate task of the language.
+
+    The guarantee is about a task's optimal plans, so a task with the same optimal plans as a
+    candidate is one too: under ``--tasks all``, a task whose optimal plans all end in one state.
+    """
+    model = space.model
+    row = space.rows[space.state[space.starts[0]]]
+    if language.provenance.tasks["kind"] == "all":
+        ends = np.unique(space.state[space.layer == 0])
+        return len(ends) == 1 and all(
+            model.codec.key(state) in language.states for state in (row, space.rows[ends[0]])
+        )
+    init = model.forgetting_slack(row)
+    return any(
+        _literals(task.goal) == _literals(space.goals[0]) and (task.init == init).all()
+        for task in recorded
+    )
+
+
+def _literals(goal: Goal) -> frozenset[object]:
+    return frozenset((goal,) if isinstance(goal, FullState) else conjuncts(goal))
+
+
+def _atoms(language: Language) -> set[str]:
+    """All atoms in the state keys, without those of remembered actions."""
+    keys = [key for key in language.states if key]
+    found = set(" ".join(keys).replace(") (", ")\0(").split("\0"))
+    return {atom for atom in found if atom and not atom.startswith("(last ")}

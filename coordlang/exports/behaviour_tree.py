@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Each robot's choices under a sentence as a behaviour tree, in the XML of BehaviorTree.CPP 4.
+
+A tree for each robot, all in one file; a robot runs the one with its name.  It is a sequence of the
+joint steps.  In each of them it waits for the step to begin (``AwaitStep``), chooses one of the
+subactions that the robot's automaton allows (``Chooses``), checks that what the robot knows and the
+subaction needs does hold (``Holds``), and does it.  The automaton's state is an entry of the
+tree's blackboard, so that the tree is as large as the automaton and no larger, although a behaviour
+tree has no way back.  Its own nodes are those that BehaviorTree.CPP brings: ``Sequence``,
+``Fallback``, ``Script``, ``ScriptCondition``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from xml.etree import ElementTree as ET
+
+from coordlang.execution.choices import Choices, RobotChoices
+from planners.grounding import GroundAction
+from planners.joint.model import IDLE, JointModel
+from planners.pddl.formula_tree import required_atoms
+
+#: The leaves that a robot has to bring besides its actions: name -> (kind, port, what it does).
+LEAVES = {
+    "AwaitStep": ("Action", "step", "is running until this joint step begins; steps count from 0"),
+    "Chooses": ("Condition", "subaction", "succeeds if the robot wants to do this now"),
+    "Holds": ("Condition", "fact", "succeeds if this fact is true now"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class _Move:
+    """What a robot may do in a state of its automaton."""
+
+    number: int
+    state: int
+    label: int
+    target: int
+
+
+def behaviour_trees(choices: Choices) -> str:
+    """All robots' choices as one XML document.
+
+    Each robot's tree can do exactly the robot's subplans: for every one of them there is one way to
+    answer the ``Chooses`` with which the tree does it.  Linear in the automata.
+    """
+    model = choices.task_language.model
+    root = ET.Element("root", BTCPP_format="4", main_tree_to_execute=model.robots[0])
+    root.append(ET.Comment(_comment(choices)))
+    for own in choices.robots:
+        root.append(_tree(model, own))
+    root.append(_models(model, choices))
+    ET.indent(root)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
+
+
+def _comment(choices: Choices) -> str:
+    sentence = " ".join(choices.task_language.partition.words[word] for word in choices.words)
+    if choices.guaranteed:
+        kind = choices.task_language.model.kept_plan
+        article = "a" if choices.task_language.model.slack else "an"
+        promise = f"Whatever each robot chooses, all of them together follow {article} {kind}."
+    elif choices.task_language.covered:
+        promise = "This is no coordination language: choices of different robots need not mix."
+    else:
+        promise = "The language does not cover this task: choices of different robots need not mix."
+    leaves = "".join(
+        f"\n    {name} ({kind}, {port}): {does}." for name, (kind, port, does) in LEAVES.items()
+    )
+    text = f' Sentence "{sentence}". {promise}\n  Leaves besides the actions:{leaves}\n  '
+    return text.replace("--", "- -")  # two hyphens end a comment
+
+
+def _tree(model: JointModel, own: RobotChoices) -> ET.Element:
+    """One robot's tree."""
+    name = model.robots[own.robot]
+    tree = ET.Element("BehaviorTree", ID=name)
+    steps = ET.SubElement(tree, "Sequence", name=name)
+    ET.SubElement(steps, "Script", code="state := 0")
+    actions = {
+        action.label: action
+        for action in model.actions
+        if own.robot in action.owners and not action.parts
+    }
+    for step, states in enumerate(own.automaton.layers[:-1]):
+        moves = [
+            _Move(number, state, label, target)
+            for number, (state, label, target) in enumerate(
+                (state, *move) for state in states for move in own.automaton.moves(state)
+            )
+        ]
+        here = ET.SubElement(steps, "Sequence", name=f"step {step}")
+        ET.SubElement(here, "Action", ID="AwaitStep", step=str(step))
+        here.append(_choosing(model, own, moves))
+        here.append(_acting(model, own, moves, actions))
+    return tree
+
+
+def _choosing(model: JointModel, own: RobotChoices, moves: Sequence[_Move]) -> ET.Element:
+    """Choose a move of the present state: the first that is wanted, else the last.
+
+    Nothing is done here, so that an action that fails is never followed by another choice.
+    """
+    choose = ET.Element("Fallback", name="choose")
+    last = {move.state: move.number for move in moves}
+    for move in moves:
+        branch = ET.SubElement(choose, "Sequence")
+        ET.SubElement(branch, "ScriptCondition", code=f"state == {move.state}")
+        if last[move.state] != move.number:
+            text = model.label_text(own.robot, move.label) or IDLE
+            ET.SubElement(branch, "Condition", ID="Chooses", subaction=text)
+        ET.SubElement(branch, "Script", code=f"move := {move.number}")
+    return choose
+
+
+def _acting(
+    model: JointModel,
+    own: RobotChoices,
+    moves: Sequence[_Move],
+    actions: Mapping[str, GroundAction],
+) -> ET.Element:
+    """Do the chosen move: of the branches only its own can succeed."""
+    act = ET.Element("Fallback", name="act")
+    index = model.codec.facts.index
+    for move in moves:
+        branch = ET.SubElement(act, "Sequence")
+        ET.SubElement(branch, "ScriptCondition", code=f"move == {move.number}")
+        text = model.label_text(own.robot, move.label)
+        if text is not None:
+            known = own.automaton.known[move.state].true
+            needed = required_atoms(actions[text].precondition) if text in actions else ()
+            numbers = {index[atom] for atom in needed if atom in index}
+            for fact in sorted(model.codec.facts.texts[n] for n in numbers if known >> n & 1):
+                ET.SubElement(branch, "Condition", ID="Holds", fact=fact)
+            branch.append(_action(text))
+        ET.SubElement(branch, "Script", code=f"state := {move.target}")
+    return act
+
+
+def _action(text: str) -> ET.Element:
+    """``(move r1 a b)`` as a leaf ``move`` with the ports ``arg0`` (r1), ``arg1`` and ``arg2``."""
+    name, *arguments = text.strip("()").split()
+    ports = {f"arg{number}": argument for number, argument in enumerate(arguments)}
+    return ET.Element("Action", {"ID": name, "subaction": text, **ports})
+
+
+def _models(model: JointModel, choices: Choices) -> ET.Element:
+    """The ports of all leaves, which editors of trees ask for."""
+    found = ET.Element("TreeNodesModel")
+    for name, (kind, port, _) in LEAVES.items():
+        found.append(_leaf_model(kind, name, [port]))
+    ports: dict[str, int] = {}
+    for own in choices.robots:
+        for _, label, _ in _edges(own):
+            if (text := model.label_text(own.robot, label)) is not None:
+                name, *arguments = text.strip("()").split()
+                ports[name] = max(ports.get(name, 0), len(arguments))
+    for name, number in sorted(ports.items()):
+        own_ports = ["subaction", *(f"arg{n}" for n in range(number))]
+        found.append(_leaf_model("Action", name, own_ports))
+    return found
+
+
+def _edges(own: RobotChoices) -> Iterable[tuple[int, int, int]]:
+    for state in range(len(own.automaton)):
+        for label, target in own.automaton.moves(state):
+            yield state, label, target
+
+
+def _leaf_model(kind: str, name: str, ports: Sequence[str]) -> ET.Element:
+    found = ET.Element(kind, ID=name)
+    for port in ports:
+        ET.SubElement(found, "input_port", name=port)
+    return found

@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How often robots that choose by themselves miscoordinate: failure probabilities, exactly.
+
+The speaker draws one of a task's N optimal plans uniformly and says its sentence s.  Each of the n
+robots draws one of the ``n_s`` plans with that sentence, uniformly and independently, and follows
+its part.  With ``good_s`` of the n-tuples of these plans mixing to an optimal plan of the task, of
+whatever sentence, ``P(fail) = sum_s n_s / N * (1 - good_s / n_s^n)``.  One word for all states is
+silence; a coordination language has probability 0.
+
+No plans are listed: of plan i the mixture uses robot i's labels only, so ``good_s`` is the sum over
+the optimal plans of the product over robots of the number of plans with sentence s in which the
+robot does the same (Proposition 25 of docs/concepts.md).
+"""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from math import prod
+
+import numpy as np
+
+from coordlang.required.choices import Choices
+from coordlang.required.label_sets import LabelSets
+from coordlang.required.weighted_sets import END, Multiple, WeightedSets
+from planners.joint.tables import Ints
+from planners.search.plan_space import PlanSpace
+from planners.system.errors import OutOfMemory
+from planners.system.limits import reaching
+
+#: Additions of one count after which it is given up, some minutes of work.
+MOST = 50_000_000
+
+
+class TooManyToCount(OutOfMemory):
+    """A failure probability that would take more work than it is allowed."""
+
+
+@dataclass(frozen=True, slots=True)
+class FailureProbability:
+    """How often robots miscoordinate, over some tasks: exactly.
+
+    ``tasks`` has one probability for each task, in their order.
+    """
+
+    tasks: tuple[Fraction, ...]
+
+    @property
+    def mean(self) -> Fraction:
+        """The probability for a task drawn uniformly."""
+        return mean(self.tasks)
+
+    @property
+    def worst(self) -> Fraction:
+        """That of the task in which robots fail most often."""
+        return max(self.tasks)
+
+
+def failure_probability(
+    spaces: Iterable[PlanSpace], words: Iterable[Ints | None], most: int = MOST
+) -> FailureProbability:
+    """Count how often robots miscoordinate in all tasks of some plan spaces.
+
+    Parameters
+    ----------
+    spaces
+        The plan spaces.
+    words
+        For each the word number of each node; None: silence.
+    most
+        The most additions.
+
+    Raises
+    ------
+    TooManyToCount
+        Beyond that.
+    """
+    sets = WeightedSets(LabelSets())
+    found: list[Fraction] = []
+    for space, word in zip(spaces, words, strict=True):
+        found += FailureCount(space, word, sets, most).tasks()
+    return FailureProbability(tuple(found))
+
+
+def failure_of_sentence(
+    space: PlanSpace, start: int, fits: PlanSpace, most: int = MOST
+) -> Fraction:
+    """How often robots miscoordinate in a task once a sentence was said.
+
+    Parameters
+    ----------
+    space, start
+        The optimal plans of the task, and the node of its initial state.
+    fits
+        Those with the sentence, as a plan space of one task.
+    most
+        The most additions.
+
+    Raises
+    ------
+    TooManyToCount
+        Beyond that.
+    """
+    sets = WeightedSets(LabelSets())
+    begin = int(fits.starts[0])
+    (parts,) = FailureCount(fits, None, sets, most).by_sentence({begin})[begin].values()
+    factors, chosen = zip(*parts, strict=True)
+    good = prod(factors) * FailureCount(space, None, sets, most).good(chosen, start)
+    size = factors[0] * sets.totals[chosen[0]]
+    return 1 - Fraction(good, size**space.robots)
+
+
+def mean(values: Sequence[Fraction]) -> Fraction:
+    """The mean of exact numbers; those with one denominator are added first."""
+    numerators: Counter[int] = Counter()
+    for value in values:
+        numerators[value.denominator] += value.numerator
+    total = sum(
+        (Fraction(numerators[below], below) for below in sorted(numerators)), start=Fraction(0)
+    )
+    return total / len(values)
+
+
+#: Plans from a node with one sentence: for each robot how many of them have each of its sequences.
+_Parts = tuple[Multiple, ...]
+
+
+class FailureCount:
+    """The failure probabilities of the tasks of one plan space.
+
+    Parameters
+    ----------
+    space
+        The optimal plans of the tasks.
+    word
+        The word number of each node; None: silence.
+    sets
+        Weighted sets, which plan spaces of one model may share.
+    most
+        The most additions of ``sets`` and this count together.
+    """
+
+    def __init__(
+        self, space: PlanSpace, word: Ints | None, sets: WeightedSets, most: int = MOST
+    ) -> None:
+        self.space = space
+        self.choices = Choices(space, sets.sets)
+        self._word: list[int] = [0] * len(space) if word is None else word.tolist()
+        self._sets = sets
+        self._most = most
+        self._targets: list[int] = space.targets().tolist()
+        columns = (space.robot_labels(robot).tolist() for robot in range(space.robots))
+        self._labels: list[tuple[int, ...]] = list(zip(*columns, strict=True))
+        self._good: dict[tuple[int, ...], int] = {}
+        self._sentences: dict[tuple[int, int], int] = {}
+
+    def tasks(self) -> list[Fraction]:
+        """The failure probability of each task."""
+        requires = self.choices.requires
+        starts: list[int] = self.space.starts.tolist()
+        asked = {start for start in starts if requires[start]}
+
+        def so_far() -> str:
+            return (
+                f"failures counted with {self._sets.work:,} additions, over {len(self.space):,} "
+                f"states on {self.space.model.kept_plans}"
+            )
+
+        with reaching(so_far, self.space.model.smaller("smaller tasks")):
+            found = self._probabilities(asked)
+        return [found.get(start, Fraction(0)) for start in starts]
+
+    def _probabilities(self, asked: set[int]) -> dict[int, Fraction]:
+        """Of these starting nodes, from the goals up."""
+        if not asked:
+            return {}
+        said = self.by_sentence(asked)
+        return {node: self._probability(node, list(said[node].values())) for node in sorted(asked)}
+
+    def by_sentence(self, nodes: set[int]) -> dict[int, dict[int, _Parts]]:
+        """The plans from these nodes, and from all below them, by the number of their sentence."""
+        said: dict[int, dict[int, _Parts]] = {}
+        for node in np.flatnonzero(self.space.descendants(np.array(sorted(nodes)))).tolist():
+            said[node] = self._said(node, said)
+        return said
+
+    def _said(self, node: int, said: dict[int, dict[int, _Parts]]) -> dict[int, _Parts]:
+        """The plans from a node by sentence, given those from the nodes below it."""
+        word, robots = self._word[node], range(self.space.robots)
+        edges = self.space.out_edges(node)
+        if not edges:
+            return {self._front(word, -1): tuple((1, END) for _ in robots)}
+        moves: dict[int, list[dict[int, list[Multiple]]]] = {}
+        for edge in edges:
+            target, labels = self._targets[edge], self._labels[edge]
+            is_new = self._word[target] != word
+            for rest, plans in said[target].items():
+                sentence = self._front(word, rest) if is_new else rest
+                own = moves.get(sentence)
+                if own is None:
+                    own = moves[sentence] = [defaultdict(list) for _ in robots]
+                for mine, label, part in zip(own, labels, plans, strict=True):
+                    mine[label].append(part)
+        self._check()
+        return {
+            sentence: tuple(self._sets.of_moves(mine) for mine in own)
+            for sentence, own in moves.items()
+        }
+
+    def _front(self, word: int, rest: int) -> int:
+        """The number of the sentence that says ``word`` and then ``rest`` (-1: nothing)."""
+        return self._sentences.setdefault((word, rest), len(self._sentences))
+
+    def _probability(self, start: int, said: Sequence[_Parts]) -> Fraction:
+        robots = self.space.robots
+        sizes = [self._size(plans) for plans in said]
+        found = Fraction(0)
+        for size, plans in zip(sizes, said, strict=True):
+            factors, chosen = zip(*plans, strict=True)
+            good = prod(factors) * self.good(chosen, start)
+            found += Fraction(size**robots - good, size ** (robots - 1))
+        return found / sum(sizes)
+
+    def _size(self, plans: _Parts) -> int:
+        times, number = plans[0]
+        return times * self._sets.totals[number]
+
+    def good(self, chosen: tuple[int, ...], node: int) -> int:
+        """How many choices of one sequence from each weighted set are an optimal plan from a node.
+
+        Each counts as often as its weights multiply to.
+        """
+        key = (*chosen, node)
+        known = self._good.get(key)
+        if known is None:
+            known = self._good[key] = self._count(chosen, node)
+        return known
+
+    def _count(self, chosen: tuple[int, ...], node: int) -> int:
+        sets, choices = self._sets, self.choices
+        supports = [sets.supports[number] for number in chosen]
+        if not choices.requires[node] and choices.sets.all_within(
+            supports, choices.of_node[:, node].tolist()
+        ):
+            return prod(sets.totals[number] for number in chosen)  # whatever they choose
+        moves = [sets.moves[number] for number in chosen]
+        total = 0
+        for edge in self.space.out_edges(node):
+            sets.work += 1
+            following = [
+                own.get(label) for own, label in zip(moves, self._labels[edge], strict=True)
+            ]
+            times, after = 1, []
+            for multiple in following:
+                if multiple is None:
+                    break
+                times *= multiple[0]
+                after.append(multiple[1])
+            else:
+                total += times * self.good(tuple(after), self._targets[edge])
+        self._check()
+        return total
+
+    def _check(self) -> None:
+        if self._sets.work > self._most:
+            raise TooManyToCount(
+                "how often robots miscoordinate is not counted: that takes more than "
+                f"{self._most:,} additions",
+                remedy="Give smaller or fewer tasks.",
+            )

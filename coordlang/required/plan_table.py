@@ -1,0 +1,274 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Plans of tasks as tables, by which the failures of many partitions are measured, one by one.
+
+All plans of a task are listed where they are few; of others some are drawn, and the measure is that
+of a task which has these plans only: near the true one, and a guide for a search.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+from random import Random
+
+import numpy as np
+
+from coordlang.language.flexibility import Floats
+from coordlang.required.choices import Choices
+from planners.joint.tables import Ints, ranges
+from planners.search.plan_space import PlanSpace
+from planners.search.plans import Plan, Plans, counts
+
+#: Plans of a task up to which all are listed.
+LISTED = 1_000
+#: Mixtures of drawn plans that are looked at in one task.
+_MIXTURES = 3_000
+#: Multiplier of sentence hashes, an odd number without a pattern in its bits.
+_ODD = np.uint64(0x9E37_79B9_7F4A_7C15)
+
+
+@dataclass(frozen=True, slots=True)
+class PlanTable:
+    """Plans of the tasks that require coordination, and the mixtures that are optimal plans.
+
+    Attributes
+    ----------
+    tasks
+        How many tasks there are in all, those that require no coordination included.
+    states
+        (plans, steps) The states that each plan passes through; shorter ones repeat their last.
+    plan_of_task, plans
+        (tasks) The first plan of each task, and how many it has.
+    parts
+        (plans, robots) What each robot does in a plan: its number among the task's own.
+    of_robot
+        (tasks, robots) How many different sequences each robot has.
+    cells
+        (cells, robots) What each robot does in a mixture that is optimal, sorted by task and by
+        what robot 1 does.
+    part_of_task, cell_of_part
+        (tasks) The number of the first sequence of robot 1 in each task, all tasks counted on, and
+        (sequences + 1) the first cell of each of them.
+    tasks_of_state
+        For each state the tasks with plans through it.
+    is_complete
+        Whether all plans of all tasks are listed: then the measure is exact but for rounding.
+    """
+
+    tasks: int
+    states: Ints
+    plan_of_task: Ints
+    plans: Ints
+    parts: Ints
+    of_robot: Ints
+    cells: Ints
+    part_of_task: Ints
+    cell_of_part: Ints
+    tasks_of_state: tuple[Ints, ...]
+    is_complete: bool
+
+    def __len__(self) -> int:
+        """Count the tasks that require coordination."""
+        return len(self.plans)
+
+    def failures(self, word: Ints, tasks: Ints) -> Floats:
+        """How often robots fail in some of the tasks, under the word of each state.
+
+        O(plans + sentences x cells) of these tasks.
+        """
+        if not len(tasks):
+            return np.zeros(0)
+        plans = ranges(self.plan_of_task[tasks], self.plans[tasks])
+        number = np.repeat(np.arange(len(tasks)), self.plans[tasks])
+        said = _sentences(word[self.states[plans]], number)
+        first, inverse, sizes = said
+        task = number[first]
+        robots = self.parts.shape[1]
+        # Robot 1 does something of the sentence in few cells: the others are not looked at.
+        width = self.of_robot[tasks, 0][task]
+        offset = np.cumsum(width) - width
+        weight = np.bincount(offset[inverse] + self.parts[plans, 0], minlength=int(width.sum()))
+        does = np.flatnonzero(weight)
+        sentence = np.repeat(np.arange(len(first)), width)[does]
+        part = does - offset[sentence] + self.part_of_task[tasks[task]][sentence]
+        cells = self.cell_of_part[part + 1] - self.cell_of_part[part]
+        cell = ranges(self.cell_of_part[part], cells)
+        sentence = np.repeat(sentence, cells)
+        good = np.repeat(weight[does], cells).astype(np.float64)
+        for robot in range(1, robots):
+            width = self.of_robot[tasks, robot][task]
+            offset = np.cumsum(width) - width
+            at = offset[inverse] + self.parts[plans, robot]
+            weight = np.bincount(at, minlength=int(width.sum()))
+            good *= weight[offset[sentence] + self.cells[cell, robot]]
+        well = np.bincount(sentence, good, minlength=len(first))
+        size = sizes.astype(np.float64)
+        bad = np.maximum(size**robots - well, 0) / size ** (robots - 1)
+        found: Floats = np.bincount(task, bad, minlength=len(tasks)) / self.plans[tasks]
+        return found
+
+
+def _sentences(words: Ints, task: Ints) -> tuple[Ints, Ints, Ints]:
+    """Sentences of plans, told apart within each task: (first plan, number of each plan, sizes).
+
+    They are compared by 64-bit hashes: a guide for a search, recounted by the definition.
+    """
+    value = (words[:, 0] + 1).astype(np.uint64) * _ODD
+    for step in range(1, words.shape[1]):
+        changes = words[:, step] != words[:, step - 1]
+        longer = (value ^ (value >> np.uint64(29))) * _ODD + (words[:, step] + 1).astype(np.uint64)
+        value = np.where(changes, longer, value)
+    value = (value ^ (value >> np.uint64(32))) * _ODD
+    # The upper bits are the task, so that the sentences come task by task.
+    bits = np.uint64(max(1, int(task.max(initial=0)).bit_length()))
+    code = (value >> bits) | (task.astype(np.uint64) << (np.uint64(64) - bits))
+    _, first, inverse, sizes = np.unique(
+        code, return_index=True, return_inverse=True, return_counts=True
+    )
+    return first, inverse.reshape(-1), sizes
+
+
+def plan_table(
+    spaces: Sequence[PlanSpace],
+    states: int,
+    *,
+    most_tasks: int,
+    seed: int,
+    listed: int = LISTED,
+) -> PlanTable:
+    """List or draw the plans of the tasks that require coordination.
+
+    Parameters
+    ----------
+    spaces
+        The plan spaces of all tasks, over one table of ``states`` states.
+    most_tasks
+        Of more tasks that require coordination so many are drawn.
+    seed
+        What is drawn depends on it.
+    listed
+        Plans of a task up to which all are listed.
+    """
+    random = Random(seed)
+    chosen = [(space, Choices(space)) for space in spaces]
+    asked = [
+        (space, choices, start)
+        for space, choices in chosen
+        for start in space.starts.tolist()
+        if choices.requires[start]
+    ]
+    is_complete = len(asked) <= most_tasks
+    if not is_complete:
+        kept = sorted(random.sample(range(len(asked)), most_tasks))
+        asked = [asked[number] for number in kept]
+    counted = {id(space): counts(space) for space, _ in chosen}
+    entries = []
+    for space, choices, start in asked:
+        plans = Plans(space, start, counted[id(space)])
+        is_complete &= plans.count <= listed
+        entries.append(_task(plans, choices, listed, random))
+    return _together(entries, sum(len(space.starts) for space in spaces), states, is_complete)
+
+
+@dataclass(frozen=True, slots=True)
+class _Task:
+    """One task's plans: states, what each robot does, how many ways it has, optimal mixtures."""
+
+    states: Ints
+    parts: Ints
+    of_robot: tuple[int, ...]
+    cells: Ints
+
+
+def _task(plans: Plans, choices: Choices, listed: int, random: Random) -> _Task:
+    space, robots = plans.space, plans.space.robots
+    if plans.count <= listed:
+        chosen = list(_paths(plans.start, choices))
+    else:
+        number = max(2, round(_MIXTURES ** (1 / robots)))
+        ranks: set[int] = set()
+        while len(ranks) < number:
+            ranks.add(random.randrange(plans.count))
+        drawn = [plans.unrank(rank) for rank in sorted(ranks)]
+        chosen = [(plan, _nodes(plan, plans.start, choices)) for plan in drawn]
+    own: list[dict[tuple[int, ...], int]] = [{} for _ in range(robots)]
+    parts = np.array(
+        [
+            [of.setdefault(labels, len(of)) for of, labels in zip(own, sequences, strict=True)]
+            for sequences in (zip(*plan, strict=True) for plan, _ in chosen)
+        ],
+        np.int64,
+    )
+    cells = parts if plans.count <= listed else _optimal(own, plans, choices)
+    states: Ints = space.state[np.array([nodes for _, nodes in chosen], np.int64)]
+    return _Task(states, parts, tuple(map(len, own)), cells)
+
+
+def _paths(node: int, choices: Choices) -> Iterator[tuple[Plan, tuple[int, ...]]]:
+    """All plans from a node, each with the nodes that it passes through."""
+    edges = choices.edges_of(node)
+    if not edges:
+        yield (), (node,)
+    for labels, target in edges.items():
+        for plan, nodes in _paths(target, choices):
+            yield (labels, *plan), (node, *nodes)
+
+
+def _optimal(own: Sequence[dict[tuple[int, ...], int]], plans: Plans, choices: Choices) -> Ints:
+    """The mixtures of sequences, one of each robot, that are optimal plans."""
+    found = [
+        [of[sequence] for of, sequence in zip(own, chosen, strict=True)]
+        for chosen in product(*own)
+        if len(_nodes(tuple(zip(*chosen, strict=True)), plans.start, choices)) > len(chosen[0])
+    ]
+    return np.array(found, np.int64)
+
+
+def _nodes(plan: Plan, node: int, choices: Choices) -> tuple[int, ...]:
+    """The nodes that a plan passes through, up to where it is none."""
+    nodes = [node]
+    for labels in plan:
+        target = choices.edges_of(nodes[-1]).get(labels)
+        if target is None:
+            break
+        nodes.append(target)
+    return tuple(nodes)
+
+
+def _together(entries: Sequence[_Task], tasks: int, states: int, is_complete: bool) -> PlanTable:
+    steps = max((entry.states.shape[1] for entry in entries), default=1)
+    padded = [
+        np.pad(entry.states, ((0, 0), (0, steps - entry.states.shape[1])), mode="edge")
+        for entry in entries
+    ]
+    plans = np.array([len(entry.states) for entry in entries], np.int64)
+    cells, cell_of_part = _sorted_cells(entries)
+    ways = np.array([entry.of_robot[0] for entry in entries], np.int64)
+    of_state: list[list[int]] = [[] for _ in range(states)]
+    for number, entry in enumerate(entries):
+        for state in np.unique(entry.states).tolist():
+            of_state[state].append(number)
+    return PlanTable(
+        tasks,
+        np.concatenate(padded) if padded else np.zeros((0, 1), np.int64),
+        np.cumsum(plans) - plans,
+        plans,
+        np.concatenate([entry.parts for entry in entries]) if entries else np.zeros((0, 1), int),
+        np.array([entry.of_robot for entry in entries], np.int64),
+        cells,
+        np.cumsum(ways) - ways,
+        cell_of_part,
+        tuple(np.array(numbers, np.int64) for numbers in of_state),
+        is_complete,
+    )
+
+
+def _sorted_cells(entries: Sequence[_Task]) -> tuple[Ints, Ints]:
+    """The cells of all tasks, sorted by what robot 1 does, and where those of each way begin."""
+    cells, counts = [np.zeros((0, 1), np.int64)], [np.zeros(0, np.int64)]
+    for entry in entries:
+        cells.append(entry.cells[np.argsort(entry.cells[:, 0], kind="stable")])
+        counts.append(np.bincount(entry.cells[:, 0], minlength=entry.of_robot[0]))
+    bounds = np.concatenate(([0], np.cumsum(np.concatenate(counts))))
+    return np.concatenate(cells[1:] or cells), bounds

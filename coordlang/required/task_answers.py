@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tasks of problems as jobs: whether each requires coordination, and how often robots fail."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from coordlang.language.tolerance import percent
+from coordlang.required.choices import Choices
+from coordlang.required.failures import NONE, Failures, failures
+from coordlang.required.fewest_actions import FEWEST, fewest_actions
+from coordlang.required.miscoordination import Miscoordination, miscoordination
+from coordlang.required.sampled import FailureEstimate
+from planners.joint.model import JointModel, PlanningTask
+from planners.loading import PlanningInstance
+from planners.parallel.batch import Batch, Table, digest
+from planners.parallel.store import Store
+from planners.parallel.workers import Workers
+from planners.search.kept_plans import keeping_plans, search, store_in_use
+from planners.search.plan_file import json_count
+from planners.search.plan_space import PlanSpace
+from planners.search.plans import counts
+from planners.system.notebook import counted
+
+#: Additions after which the failures of one task are estimated, some seconds of work.
+_ADDITIONS = 3_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class TaskAnswer:
+    """One task: its optimal makespan and plans, and plans that miscoordinate, if there are any.
+
+    ``failures`` says how often robots do that draw their plans without a word, ``fewest`` the same
+    of the plans with the fewest actions, if they fail less often.
+    """
+
+    makespan: int
+    plans: int
+    witness: Miscoordination | None
+    failures: Failures
+    fewest: FewestActions | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class FewestActions:
+    """The optimal plans of a task with the fewest actions, and how often robots fail with them."""
+
+    plans: int
+    required: bool
+    failure: float
+
+    def data(self) -> dict[str, Any]:
+        """Return it as JSON data."""
+        return {
+            "plans": json_count(self.plans),
+            "requires_coordination": self.required,
+            "failure": self.failure,
+        }
+
+    def text(self) -> str:
+        """Return it as a line."""
+        line = f"With --cost {FEWEST}, which leaves {counted(self.plans, 'plan')}, "
+        if not self.required:
+            return f"{line}coordination is not required."
+        return f"{line}they fail in {percent(self.failure)}."
+
+
+def answers(loaded: PlanningInstance, workers: Workers) -> list[TaskAnswer]:
+    """Search the task of each problem and decide whether it requires coordination, as jobs.
+
+    Raises
+    ------
+    ProvedImpossible
+        For the first task without a plan.
+    """
+    model, tasks = loaded.model, loaded.tasks
+    effort = float(len(model.codec.facts) * sum(map(len, model.labels)))  # a guess: no search yet
+    numbers = range(len(tasks))
+    hashes = (loaded.domain.source.sha256, *(p.source.sha256 for p in loaded.problems))
+    identity = digest(*hashes, repr(loaded.options))
+    shared = (model, tasks, store_in_use())
+    batch = Batch("coordination", _answer, shared, numbers, identity, [effort for _ in numbers])
+    return [_read_answer(table) for table in workers.tables(batch)]
+
+
+def _answer(shared: tuple[JointModel, Sequence[PlanningTask], Store | None], number: int) -> Table:
+    """One job: a task."""
+    model, tasks, folder = shared
+    with keeping_plans(folder):
+        space = search(model, tasks[number])
+    witness = miscoordination(space, 0)
+    found = NONE if witness is None else failures([space], [None], _ADDITIONS)
+    return {
+        "makespan": np.array(space.least_makespan(0)),
+        "plans": np.array(_plans(space)),
+        "fewest": np.frombuffer(b"null" if witness is None else _fewest(space, found), np.uint8),
+        "witness": np.frombuffer(msgspec.json.encode(witness), np.uint8),
+        "failures": np.frombuffer(_to_json(found), np.uint8),
+    }
+
+
+def _plans(space: PlanSpace) -> str:
+    return str(counts(space)[int(space.starts[0])])
+
+
+def _fewest(space: PlanSpace, found: Failures) -> bytes:
+    """What holds of the plans with the fewest actions as JSON, null if it is no better."""
+    fewer = fewest_actions(space)
+    if fewer is None:
+        return b"null"
+    required = bool(Choices(fewer).requires[fewer.starts[0]])
+    own = failures([fewer], [None], _ADDITIONS) if required else NONE
+    if required and (own.mean is None or found.mean is None or own.mean >= found.mean):
+        return b"null"
+    return msgspec.json.encode((_plans(fewer), required, float(own.mean or 0)))
+
+
+def _to_json(found: Failures) -> bytes:
+    """Exact numbers as text."""
+    mean = None if found.mean is None else str(found.mean)
+    estimate = found.estimate
+    drawn = None if estimate is None else (estimate.failures, estimate.runs)
+    return msgspec.json.encode((mean, drawn, found.why_not))
+
+
+def _from_json(data: bytes) -> Failures:
+    mean, drawn, why_not = msgspec.json.decode(data)
+    exact = None if mean is None else Fraction(mean)
+    return Failures(exact, exact, FailureEstimate(*drawn) if drawn else None, why_not)
+
+
+def _read_answer(table: Table) -> TaskAnswer:
+    witness = msgspec.json.decode(table["witness"].tobytes(), type=Miscoordination | None)
+    found = _from_json(table["failures"].tobytes())
+    fewest = msgspec.json.decode(table["fewest"].tobytes())
+    if fewest is not None:
+        plans, required, failure = fewest
+        fewest = FewestActions(int(plans), required, failure)
+    return TaskAnswer(int(table["makespan"]), int(str(table["plans"])), witness, found, fewest)

@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The record of simulated runs: its keys and types (docs/formats.md)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+from msgspec import Meta
+
+from coordlang.simulation.floor import Wall
+from planners.system.errors import BadInput, Position
+from planners.system.files import FileFormat, read_bytes
+
+FORMAT = "coordlang/simulation"
+VERSION = 1
+
+#: Places, walls and poses lie within so many metres.
+_LARGEST = 1e6
+
+_Seconds = Annotated[float, Meta(description="Seconds since the start of the run.", ge=0)]
+_Count = Annotated[int, Meta(ge=0)]
+#: x and y in metres, heading in radians.
+_Pose = tuple[float, float, float]
+
+
+class StepRecord(msgspec.Struct, frozen=True):
+    """A step of one robot."""
+
+    robot: Annotated[str, Meta(description="The robot.")]
+    step: Annotated[_Count, Meta(description="Its number, from 0; by the robot's own count.")]
+    subaction: Annotated[str | None, Meta(description="What the robot did; null: idle.")]
+    place: Annotated[str | None, Meta(description="Where it leads; null: the robot stays.")]
+    begin: _Seconds
+    end: Annotated[
+        float | None, Meta(description="Seconds since the start; null: it was never done.")
+    ]
+    words: Annotated[
+        int | None,
+        Meta(
+            description="How many words of the sentence the robot has passed then, at most; null "
+            "before that, and without a sentence."
+        ),
+    ] = None
+
+
+class EventRecord(msgspec.Struct, frozen=True, omit_defaults=True):
+    """What happened besides steps."""
+
+    time: _Seconds
+    kind: Annotated[
+        Literal["collision", "stopped", "missed", "word", "detour", "deadlock", "arrived"],
+        Meta(
+            description="collision: robots touch each other, a wall or the human; stopped: a robot "
+            "stands before what its lidar sees, told once in a step; missed: a robot was not there "
+            "when a step began by the clock; word: a robot told that it may have come to a word; "
+            "detour: a robot asked its choices whether it can visit an atom or keep out of a "
+            "place; deadlock: nobody moves any more; arrived: all steps of all robots are done."
+        ),
+    ]
+    robots: Annotated[list[str], Meta(description="The robots that it concerns.")]
+    touched: Annotated[
+        str | None, Meta(description="What a robot collided with that is no robot: wall, human.")
+    ] = None
+    visit: Annotated[str | None, Meta(description="The atom that a detour visits.")] = None
+    avoid: Annotated[str | None, Meta(description="The place that a detour avoids.")] = None
+    granted: Annotated[
+        bool | None, Meta(description="Whether the detour can be had; then the robot makes it.")
+    ] = None
+    steps: Annotated[
+        dict[str, int], Meta(description="How many steps each robot has done by then.")
+    ] = {}
+    words: Annotated[
+        dict[str, int],
+        Meta(description="How many words of the sentence each robot has passed, as it believes."),
+    ] = {}
+    places: Annotated[
+        dict[str, list[str]],
+        Meta(description="The place of each robot; under way the place left and the one ahead."),
+    ] = {}
+
+
+class WishRecord(msgspec.Struct, frozen=True):
+    """What a robot comes to want on the way: to visit an atom."""
+
+    robot: Annotated[str, Meta(description="The robot.")]
+    step: Annotated[_Count, Meta(description="How many steps it has done by then.")]
+    visit: Annotated[str, Meta(description="The atom.")]
+
+
+class RunRecord(msgspec.Struct, frozen=True):
+    """One run."""
+
+    seed: Annotated[int, Meta(description="It draws all that is random in this run.")]
+    collisions: Annotated[
+        _Count, Meta(description="How often a robot came to touch a robot, a wall or the human.")
+    ]
+    deadlock: Annotated[
+        bool, Meta(description="Nobody moved any more before all were there, without a collision.")
+    ]
+    late: Annotated[
+        _Count,
+        Meta(
+            description="Joint steps more than the plans have that it took until all were there; "
+            "0 where they never were."
+        ),
+    ]
+    messages: Annotated[
+        _Count, Meta(description="Messages in the run; one to all robots counts once.")
+    ]
+    seconds: Annotated[float, Meta(description="Seconds until the run ended, simulated.", ge=0)]
+    arrived: Annotated[bool, Meta(description="Whether all robots did all their steps.")]
+    mixes: Annotated[
+        bool,
+        Meta(
+            description="Whether the robots' own subplans, done in step, are an optimal plan: what "
+            "the joint model says."
+        ),
+    ]
+    subplans: Annotated[
+        dict[str, list[str | None]],
+        Meta(description="What each robot chose, step by step; what it did not come to, too."),
+    ]
+    steps: Annotated[list[StepRecord], Meta(description="All steps, by their beginnings.")]
+    events: Annotated[list[EventRecord], Meta(description="What else happened, by time.")]
+    poses: Annotated[
+        dict[str, list[_Pose]],
+        Meta(description="Robot -> its poses, one each ``interval``: x, y (metres), heading."),
+    ]
+    nearest: Annotated[
+        float | None,
+        Meta(description="The least distance of two robots' middles in metres; null: no two."),
+    ] = None
+    human: Annotated[
+        list[tuple[float, float]], Meta(description="Where the human was; empty without one.")
+    ] = []
+
+
+class SimulationRecord(msgspec.Struct, frozen=True):
+    """A record of simulated runs, version 1.  Keys that are not listed here are ignored."""
+
+    format: Annotated[str, Meta(description="What kind of file this is.")]
+    version: Annotated[int, Meta(description="Readers refuse a version that they do not know.")]
+    domain: Annotated[
+        dict[str, Any], Meta(description="The language's domain, as in a language file.")
+    ]
+    task: Annotated[str, Meta(description="The task; for information.")]
+    robots: Annotated[list[str], Meta(description="All robots, in the order of joint actions.")]
+    agreement: Annotated[
+        Literal["sentence", "plan", "nothing"],
+        Meta(description="What all robots know of: a sentence, a whole plan, or nothing."),
+    ]
+    sentence: Annotated[str | None, Meta(description="The sentence; null for another agreement.")]
+    covered: Annotated[bool, Meta(description="Whether it is a candidate task of the language.")]
+    step: Annotated[Literal["clock", "barrier", "word"], Meta(description="The way to keep step.")]
+    makespan: Annotated[_Count, Meta(description="The joint steps of each plan.")]
+    period: Annotated[
+        float, Meta(description="Seconds for a joint step where nothing comes in between.", gt=0)
+    ]
+    interval: Annotated[float, Meta(description="Seconds between two poses.", gt=0)]
+    cell: Annotated[float, Meta(description="Metres for one unit of coordinates.", gt=0)]
+    radius: Annotated[float, Meta(description="The radius of a robot in metres.", gt=0)]
+    noise: Annotated[float, Meta(description="The noise of wheels, as a share.", ge=0)]
+    lidar: Annotated[bool, Meta(description="Whether robots stop before what they see ahead.")]
+    human: Annotated[
+        str | None,
+        Meta(description="The place of a human, random or walking; null: there was none."),
+    ]
+    wishes: Annotated[list[WishRecord], Meta(description="What robots came to want on the way.")]
+    places: Annotated[
+        dict[str, tuple[float, float]],
+        Meta(description="Place -> the point of its middle in metres, x to the right and y up."),
+    ]
+    walls: Annotated[list[Wall], Meta(description="Walls: x, y of one end, x, y of the other.")]
+    goals: Annotated[
+        dict[str, str], Meta(description="Robot -> its last place on the plans, where it has one.")
+    ]
+    runs: Annotated[list[RunRecord], Meta(description="The runs.")]
+
+
+SIMULATION = FileFormat("simulation", "record of runs", SimulationRecord, FORMAT, VERSION)
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema of records of simulated runs."""
+    return SIMULATION.json_schema()
+
+
+def to_bytes(record: SimulationRecord) -> bytes:
+    """The text of a record: equal runs give equal bytes."""
+    return msgspec.json.encode(record) + b"\n"
+
+
+def read_simulation(path: str | Path) -> SimulationRecord:
+    """Read a record of simulated runs.
+
+    Raises
+    ------
+    BadInput
+        For a file that is none, or whose runs do not have a pose of every robot at every time.
+    """
+    position = Position(str(path))
+    record = SIMULATION.decode(read_bytes(path), position)
+    for run in record.runs:
+        if wrong := _wrong(record, run):
+            raise BadInput(
+                f"the run with seed {run.seed}: {wrong}",
+                position=position,
+                remedy="Write the record again: `coordlang simulate .. -o FILE.json`.",
+            )
+    return record
+
+
+def _wrong(record: SimulationRecord, run: RunRecord) -> str | None:
+    """Say why a run cannot be played, None if it can."""
+    lengths = {len(run.poses.get(name, ())) for name in record.robots}
+    if run.human:
+        lengths.add(len(run.human))
+    if len(lengths) != 1 or 0 in lengths:
+        return "there is not one pose of each robot at each time"
+    named = {step.robot for step in run.steps}.union(*(event.robots for event in run.events))
+    if not named <= {*record.robots}:
+        return "it speaks of robots that are not listed"
+    points = [(x, y) for poses in run.poses.values() for x, y, _ in poses] + run.human
+    if not all(abs(x) < _LARGEST and abs(y) < _LARGEST for x, y in points):
+        return f"poses lie between {-_LARGEST:g} and {_LARGEST:g}"
+    return None

@@ -1,0 +1,314 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A robot's own logic: which subaction it chooses, when it begins a step, how it drives.
+
+It knows the map, its own choices under the sentence (a monitor), where its own subactions lead,
+and what its sensors and the other robots' messages tell it.  It never sees the plan of another
+robot, nor the simulator: this module and those that it imports need the standard library and the
+monitor only, and numbers and texts are all that goes in and out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from random import Random
+
+from coordlang.execution.monitor import IDLE, Monitor
+from coordlang.simulation.pace import Message, OwnWords, Pace, Progress
+from coordlang.simulation.tracking import (
+    ALIGNED,
+    ARRIVED,
+    STANDING,
+    Drive,
+    Pose,
+    Velocity,
+    bearing,
+    distance,
+    driven,
+    turned,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """What a robot knows of itself and of the floor.
+
+    Attributes
+    ----------
+    drive
+        How fast it drives and turns.
+    points
+        Where each place is, (x, y) in metres.
+    leads
+        The place that each own subaction leads to; those that are not named here lead nowhere.
+    cell
+        The length that counts as one place, in metres.
+    clearance
+        It stands still where something is nearer straight ahead, in metres from its middle.
+    reaction
+        It drives so slowly that it would come as near as that in so many seconds.
+    """
+
+    drive: Drive
+    points: Mapping[str, tuple[float, float]]
+    leads: Mapping[str, str]
+    cell: float
+    clearance: float
+    reaction: float
+
+
+@dataclass(frozen=True, slots=True)
+class Sensed:
+    """What a robot is told in a tick.
+
+    Attributes
+    ----------
+    time
+        Seconds since the start.
+    pose
+        Where it believes to be.
+    ahead
+        How far from its middle the lidar sees the first thing in its way, in metres; infinite
+        where there is none, None where it did not look.
+    heard
+        The messages of the tick before.
+    strangers
+        What the lidar sees that is neither on the map nor a robot: (metres, radians from straight
+        ahead); looked for before a step is chosen.
+    wanted
+        Atoms that the robot is to visit, if it can, from now on.
+    """
+
+    time: float
+    pose: Pose
+    ahead: float | None
+    heard: tuple[Message, ...] = ()
+    strangers: tuple[tuple[float, float], ...] = ()
+    wanted: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Act:
+    """What a robot does in a tick.
+
+    Attributes
+    ----------
+    velocity
+        What its wheels are told.
+    messages
+        What it tells all robots.
+    is_stopped
+        Whether something is in its way.
+    """
+
+    velocity: Velocity = STANDING
+    messages: tuple[Message, ...] = ()
+    is_stopped: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class OwnStep:
+    """A step of a robot: its number from 0, the subaction (None: idle), its times in seconds.
+
+    ``place`` is where it leads, None for a step in which the robot stays; ``end`` is None while it
+    is under way.  ``words`` of the sentence are passed then, at most; None without a sentence.
+    """
+
+    number: int
+    subaction: str | None
+    place: str | None
+    begin: float
+    end: float | None = None
+    words: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Detour:
+    """What a robot asked of its choices on the way: to visit an atom, or to avoid a place.
+
+    ``granted`` says whether it could be had; then the robot has committed to it.
+    """
+
+    visit: str | None
+    avoid: str | None
+    granted: bool
+
+
+class Robot:
+    """One robot.
+
+    Parameters
+    ----------
+    name
+        Its name.
+    monitor
+        Its choices; it is followed and changed.
+    body
+        What it knows of itself and of the floor.
+    pace
+        How it keeps step with the others.
+    period
+        Seconds that a step takes at most where nothing comes in between.
+    random
+        Its own random numbers: it draws uniformly among its own subplans.
+    words
+        How far in the sentence own subactions may lead; None where no sentence is agreed.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        monitor: Monitor,
+        body: Body,
+        pace: Pace,
+        period: float,
+        random: Random,
+        words: OwnWords | None = None,
+    ) -> None:
+        self.name = name
+        self.steps: list[OwnStep] = []
+        self.detours: list[Detour] = []
+        self._monitor, self._body, self._pace, self._period = monitor, body, pace, period
+        self._random, self._words, self._word_state = random, words, 0
+        self._progress = Progress()
+        self._is_turning = False
+
+    @property
+    def finished(self) -> bool:
+        """Whether all own steps are done."""
+        return self._monitor.finished and not self._is_underway
+
+    @property
+    def done(self) -> int:
+        """How many own steps are done."""
+        return self._progress.steps
+
+    @property
+    def words(self) -> int:
+        """How many words of the sentence it has passed at most, by its own account."""
+        return self._progress.words
+
+    @property
+    def looks_around(self) -> bool:
+        """Whether it is about to choose a step, and has to be told what it sees."""
+        return not self._is_underway and not self._monitor.finished
+
+    @property
+    def looks_ahead(self) -> bool:
+        """Whether it drives, and has to be told what is in its way."""
+        return self._is_underway and self.steps[-1].place is not None and not self._is_turning
+
+    def subplan(self) -> list[str | None]:
+        """Return what it chose, and would choose in the steps that it has not begun."""
+        ahead, random = self._monitor.copy(), Random()
+        random.setstate(self._random.getstate())
+        chosen = [step.subaction for step in self.steps]
+        while not ahead.finished:
+            chosen.append(drawn(ahead, random))
+            ahead.did(chosen[-1])
+        return chosen
+
+    def act(self, sensed: Sensed) -> Act:
+        """Take a tick: hear, go on with the step under way or begin the next one, and drive."""
+        self._pace.hears(sensed.heard)
+        if not self._is_underway:
+            self._look_around(sensed)
+            if self._monitor.finished or not self._pace.may_begin(self._progress, sensed.time):
+                return Act()
+            self._begin(sensed)
+        step = self.steps[-1]
+        if self._is_done(step, sensed):
+            return Act(messages=self._finish(step, sensed))
+        if step.place is None:
+            return Act()
+        return self._drive(self._body.points[step.place], step, sensed)
+
+    def _look_around(self, sensed: Sensed) -> None:
+        """Commit to what is wanted, and to keep out of places that somebody stands in."""
+        for atom in sensed.wanted:
+            granted = bool(self._monitor.can(visit=atom))
+            if granted:
+                self._monitor.commit(visit=atom)
+            self.detours.append(Detour(atom, None, granted))
+        met = {self._place_of(stranger, sensed.pose) for stranger in sensed.strangers}
+        for place in sorted(met):
+            known = {detour.avoid for detour in self.detours}
+            ways = [text for text, led in sorted(self._body.leads.items()) if led == place]
+            if place in known or not ways:
+                continue
+            granted = bool(self._monitor.can(never=ways))
+            if granted:
+                self._monitor.commit(never=ways)
+            self.detours.append(Detour(None, place, granted))
+
+    def _place_of(self, stranger: tuple[float, float], pose: Pose) -> str:
+        """The place nearest to what the lidar sees, behind the surface that it sees."""
+        length = stranger[0] + self._body.cell / 10
+        angle = pose[2] + stranger[1]
+        at = pose[0] + length * math.cos(angle), pose[1] + length * math.sin(angle)
+        away = {name: math.dist(at, point) for name, point in self._body.points.items()}
+        return min(sorted(away), key=away.__getitem__)
+
+    @property
+    def _is_underway(self) -> bool:
+        return bool(self.steps) and self.steps[-1].end is None
+
+    def _begin(self, sensed: Sensed) -> None:
+        subaction = drawn(self._monitor, self._random)
+        place = self._body.leads.get(subaction) if subaction is not None else None
+        self._monitor.did(subaction)
+        self.steps.append(OwnStep(self._progress.steps, subaction, place, sensed.time))
+        self._progress = replace(self._progress, begun=sensed.time)
+        self._is_turning = place is not None
+
+    def _is_done(self, step: OwnStep, sensed: Sensed) -> bool:
+        if step.place is not None:
+            near = ARRIVED * self._body.cell
+            return distance(sensed.pose, self._body.points[step.place]) < near
+        return self._pace.is_common or sensed.time >= step.begin + self._period
+
+    def _finish(self, step: OwnStep, sensed: Sensed) -> tuple[Message, ...]:
+        before = self._progress
+        words = before.words
+        if self._words is not None:
+            self._word_state = self._words.moves[self._word_state][step.subaction or IDLE]
+            words = max(words, self._words.words[self._word_state])
+        known = None if self._words is None else words
+        self.steps[-1] = replace(step, end=sensed.time, words=known)
+        self._progress = replace(before, steps=before.steps + 1, words=words, done=sensed.time)
+        told = self._pace.told(before, self._progress)
+        return tuple(Message(self.name, kind, number) for kind, number in told)
+
+    def _drive(self, target: tuple[float, float], step: OwnStep, sensed: Sensed) -> Act:
+        """Turn on the spot, then drive: where all begin together, all drive off together."""
+        drive, elapsed = self._body.drive, sensed.time - step.begin
+        if self._is_turning:
+            aligned = abs(bearing(sensed.pose, target)) < ALIGNED
+            waits = self._pace.is_common and elapsed < drive.turning
+            if waits or not aligned:
+                return Act(turned(sensed.pose, target, drive))
+            self._is_turning = False
+        velocity = driven(sensed.pose, target, drive)
+        if sensed.ahead is None:
+            return Act()
+        room = (sensed.ahead - self._body.clearance) / self._body.reaction
+        if room <= 0:
+            return Act((0.0, velocity[1]), is_stopped=True)
+        return Act((min(velocity[0], room), velocity[1]))
+
+
+def drawn(monitor: Monitor, random: Random) -> str | None:
+    """Draw what to do next: each own subplan that is left has the same probability."""
+    allowed = monitor.allowed()
+    left = []
+    for subaction in allowed:
+        after = monitor.copy()
+        after.did(subaction)
+        left.append(after.remaining)
+    rank = random.randrange(sum(left))
+    for subaction, number in zip(allowed, left, strict=True):
+        if rank < number:
+            return subaction
+        rank -= number
+    raise AssertionError("a rank is below the number of subplans")

@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The simulator: discs with two driven wheels between walls, by ir-sim, without a window.
+
+ir-sim moves the robots, with noise on what their wheels are told, says which of them touch
+something, and casts the rays of their lidars.  Robots that touch something stand still for the rest
+of the run.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import tempfile
+from collections.abc import Mapping
+from contextlib import redirect_stdout
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from coordlang.simulation.floor import Floor, outlines
+from coordlang.simulation.settings import Settings
+from coordlang.simulation.tracking import Pose, Velocity
+from coordlang.sites.coordinates import Point
+from planners.system.errors import UsageError
+
+#: The names of the human and of walls: with a space, as no robot is called.
+HUMAN, WALL = "the human", "the wall"
+#: Beams of a lidar, and the angle that they cover, in radians.
+_BEAMS, _ANGLE = 61, 2 * math.pi
+#: What a lidar sees within this many metres of the human's surface is the human.
+_SURFACE = 0.05
+#: What a lidar sees beside its robot's way within this many metres counts as in its way.
+_BESIDE = 0.02
+
+
+def require_simulator() -> Any:
+    """Return the class of ir-sim's worlds.
+
+    Raises
+    ------
+    UsageError
+        If ir-sim is not installed.
+    """
+    import matplotlib
+
+    backend = matplotlib.get_backend()
+    try:
+        with redirect_stdout(StringIO()):  # it says there which windows it cannot open
+            from irsim.env.env_base import EnvBase
+    except ImportError:
+        raise UsageError(
+            "simulating needs the package ir-sim, which is not installed",
+            remedy="Install it: pip install 'coordlang[sim]'.",
+        ) from None
+    matplotlib.use(backend)  # importing it chooses another one
+    return EnvBase
+
+
+class Simulator:
+    """A world with robots, which time passes in tick by tick.
+
+    Parameters
+    ----------
+    floor
+        Its places and walls.
+    poses
+        Where each robot is at the start.
+    settings
+        Sizes, noise and the length of a tick.
+    seed
+        Of the noise on the wheels.
+    human
+        Where a human stands; None for nobody.
+    """
+
+    def __init__(
+        self,
+        floor: Floor,
+        poses: Mapping[str, Pose],
+        settings: Settings,
+        seed: int,
+        human: Point | None = None,
+    ) -> None:
+        self._settings = settings
+        self._environment = _environment(_world(floor, poses, settings, human), seed)
+        self._robots = {robot.name: robot for robot in self._environment.robot_list}
+        others = self._environment.obstacle_list
+        self._human = next((other for other in others if other.name == HUMAN), None)
+        for robot in self._robots.values():
+            robot.sensors = []  # lidars are asked for, not cast in every tick
+
+    def tick(self, velocities: Mapping[str, Velocity], walk: tuple[float, float]) -> None:
+        """Let a tick pass in which the wheels are told these velocities, and the human walks."""
+        told = {name: list(velocity) for name, velocity in velocities.items()}
+        if self._human is not None:
+            told[HUMAN] = list(walk)
+        self._environment.step(told)
+
+    def human(self) -> Point:
+        """Return where the human is."""
+        assert self._human is not None, "nobody is there"
+        x, y = self._human.state[:2, 0].tolist()
+        return x, y
+
+    def pose(self, robot: str) -> Pose:
+        """Return where a robot is, exactly."""
+        x, y, heading = self._robots[robot].state[:3, 0].tolist()
+        return x, y, heading
+
+    def ahead(self, robot: str) -> float:
+        """Return how far ahead of a robot's middle its lidar sees something in its way."""
+        found = math.inf
+        for length, angle in self._scan(robot):
+            beside = abs(length * math.sin(angle))
+            if beside < self._settings.radius + _BESIDE and math.cos(angle) > 0:
+                found = min(found, length * math.cos(angle))
+        return found
+
+    def strangers(self, robot: str) -> tuple[tuple[float, float], ...]:
+        """Return what a robot's lidar sees of the human: (metres, radians from straight ahead).
+
+        The map tells walls from it, and robots carry a mark.
+        """
+        x, y, heading = self.pose(robot)
+        surface = self._settings.radius + _SURFACE
+        found = []
+        for length, angle in self._scan(robot):
+            at = x + length * math.cos(heading + angle), y + length * math.sin(heading + angle)
+            if math.dist(at, self.human()) < surface:
+                found.append((length, angle))
+        return tuple(found)
+
+    def _scan(self, robot: str) -> list[tuple[float, float]]:
+        """Return the hits of a robot's lidar: (metres, radians from straight ahead)."""
+        own = self._robots[robot]
+        own.lidar.step(own.state[0:3])
+        scan = own.lidar.get_scan()
+        rays = zip(scan["ranges"].tolist(), own.lidar.angle_list.tolist(), strict=True)
+        return [ray for ray, is_hit in zip(rays, scan["valid"], strict=True) if is_hit]
+
+    def touching(self) -> set[tuple[str, str]]:
+        """Return the pairs that touch, in order: robots by name, `HUMAN` and ``the wall``."""
+        found = set()
+        for name, robot in self._robots.items():
+            for other in robot.collision_obj:
+                what = WALL if other.name.startswith(WALL) else other.name
+                found.add((min(name, what), max(name, what)))
+        return found
+
+
+def _environment(world: dict[str, Any], seed: int) -> Any:
+    """Return ir-sim's world; it reads one from a file only."""
+    simulator = require_simulator()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "world.yaml")
+        path.write_text(json.dumps(world))  # which is YAML, too
+        environment = simulator(str(path), headless=True, log_level="CRITICAL", seed=seed)
+    # It logs nothing from here on.  Left to the garbage collector, that may come while the next
+    # world begins to log, and both wait for the other's lock for ever.
+    environment.logger.close()
+    return environment
+
+
+def _world(
+    floor: Floor, poses: Mapping[str, Pose], settings: Settings, human: Point | None
+) -> dict[str, Any]:
+    spread = settings.noise**2
+    drive = settings.drive
+    lidar = {
+        "type": "lidar2d",
+        "range_max": 2 * settings.cell,
+        "angle_range": _ANGLE,
+        "number": _BEAMS,
+    }
+    robots = [
+        {
+            "name": name,
+            "kinematics": {
+                "name": "diff",
+                "noise": settings.noise > 0,
+                "alpha": [spread, 0, spread, spread],
+            },
+            "shape": {"name": "circle", "radius": settings.radius},
+            "state": list(pose),
+            "vel_max": [drive.speed, drive.turn],
+            "vel_min": [-drive.speed, -drive.turn],
+            "sensors": [lidar],
+        }
+        for name, pose in poses.items()
+    ]
+    walls: list[dict[str, Any]] = [
+        {
+            "name": f"{WALL} {number}",
+            "shape": {"name": "linestring", "vertices": [list(point) for point in outline]},
+            "state": [0, 0, 0],
+        }
+        for number, outline in enumerate(outlines(floor.walls))
+    ]
+    if human is not None:
+        walls.append(
+            {
+                "name": HUMAN,
+                "kinematics": {"name": "omni"},
+                "shape": {"name": "circle", "radius": settings.radius},
+                "state": [*human, 0],
+            }
+        )
+    world = {"step_time": settings.tick, "collision_mode": "stop"}
+    return {"world": world, "robot": robots, "obstacle": walls}

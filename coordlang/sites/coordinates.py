@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Coordinates of places: from a file, or read from their names."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+from msgspec import Meta
+
+from planners.system.errors import BadInput, Position
+from planners.system.files import FileFormat, read_bytes
+from planners.system.messages import echoed
+
+Point = tuple[float, float]
+
+#: Coordinates in files are smaller than this.
+_LARGEST = 1e6
+#: Names that hold two numbers, and the text before the first one that says it is the column.
+_PAIR = re.compile(
+    r"(?P<stem>.*?)(?P<first>\d+)(?P<between>[^0-9]+)(?P<second>\d+)(?P<end>[^0-9]*)"
+)
+_COLUMN = re.compile(r"(^|[^a-z])(x|col|column)[-_]?$")
+
+
+class CoordinatesFile(msgspec.Struct):
+    """A file of coordinates.  Keys that are not listed here are ignored by readers."""
+
+    coordinates: Annotated[
+        dict[str, tuple[float, float]],
+        Meta(description="Place -> [x, y], x to the right and y down; no two alike."),
+    ]
+
+
+COORDINATES = FileFormat("coordinates", "file of coordinates", CoordinatesFile)
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema of files of coordinates."""
+    return COORDINATES.json_schema()
+
+
+def read_coordinates(path: str | Path) -> dict[str, Point]:
+    """Read a file of coordinates, ``{"coordinates": {"depot": [0, 0], "town": [1, 0]}}``.
+
+    x to the right, y down.  Names are lower case in the result.
+
+    Raises
+    ------
+    BadInput
+        For anything else, and if two places have the same coordinates.
+    """
+    position = Position(str(path))
+    return checked(COORDINATES.decode(read_bytes(path), position).coordinates, position)
+
+
+def checked(entries: Mapping[str, Point], position: Position) -> dict[str, Point]:
+    """Coordinates by names in lower case.
+
+    Raises `BadInput` if some are too large or no numbers, and if places or points are not
+    different.
+    """
+    for name, point in entries.items():
+        if not all(abs(value) < _LARGEST for value in point):
+            raise BadInput(
+                f"{echoed(name)}: the coordinates must be between {-_LARGEST:g} and {_LARGEST:g}",
+                position=position,
+                remedy="Scale the coordinates: only their proportions are drawn.",
+            )
+    points = {name.lower(): point for name, point in entries.items()}
+    if len(points) < len(entries):
+        raise BadInput(
+            "a place occurs twice, in upper and in lower case",
+            position=position,
+            remedy="PDDL does not distinguish them: of two entries one would be lost.",
+        )
+    if len(set(points.values())) < len(points):
+        raise BadInput(
+            "two places have the same coordinates",
+            position=position,
+            remedy="Give each place coordinates of its own.",
+        )
+    return points
+
+
+def from_names(names: Sequence[str], links: Sequence[tuple[str, str]]) -> dict[str, Point] | None:
+    """Read coordinates from names: ``c2-3`` is row 2, column 3; ``loc-x2-y3`` is column 2, row 3.
+
+    None unless all names have one form with two numbers, all points differ, and most links join
+    neighbours on the grid.
+    """
+    matches = [match for match in map(_PAIR.fullmatch, names) if match is not None]
+    if len(names) < 2 or len(matches) < len(names):
+        return None
+    forms = {(m["stem"], m["between"], m["end"]) for m in matches}
+    if len(forms) > 1:
+        return None
+    pairs = [(float(m["first"]), float(m["second"])) for m in matches]
+    if not _COLUMN.search(matches[0]["stem"].lower()):
+        pairs = [(column, row) for row, column in pairs]
+    points = dict(zip(names, pairs, strict=True))
+    near = [math.dist(points[a], points[b]) < 1.5 for a, b in links]
+    if len(set(pairs)) < len(names) or sum(near) < 0.8 * len(near):
+        return None
+    return points

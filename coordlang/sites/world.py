@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What of a domain can be drawn: places, the things in them, and what each atom says about them.
+
+It is found from the actions and the static atoms of the model alone, see `find_locations`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+from coordlang.sites.locations import LocationPredicate, Locations, find_locations
+from planners.grounding import GroundAction
+from planners.joint.model import JointModel, show
+from planners.pddl.lifted import TRUE, Atom
+from planners.pddl.robots import natural
+
+#: What an atom says: ("at", thing, place), ("with", thing, thing), ("mark", place, text), ("about",
+#: thing, text), ("other",).
+Role = tuple[str, ...]
+
+_OTHER: Role = ("other",)
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """Two places that belong together; ``moves``: something moves from one to the other."""
+
+    ends: tuple[str, str]
+    moves: bool
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """The things, the places and their links, and the role of every atom.
+
+    Attributes
+    ----------
+    things
+        Robots first.
+    places, links
+        Links are what moves join, and what static atoms relate.
+    roles
+        By the text of the atom.
+    """
+
+    things: tuple[str, ...]
+    places: tuple[str, ...]
+    links: tuple[Link, ...]
+    roles: Mapping[str, Role]
+
+    def role(self, text: str) -> Role:
+        """Return the role of an atom; ``("other",)`` for what is no fact of the model."""
+        return self.roles.get(text, _OTHER)
+
+    def located(self, texts: Iterable[str]) -> dict[str, str]:
+        """Return the places of the things that some atoms locate, in the order of `things`."""
+        found = {role[1]: role[2] for role in map(self.role, texts) if role[0] == "at"}
+        return {thing: found[thing] for thing in self.things if thing in found}
+
+    def moves(self, model: JointModel, robot: int, label: int) -> tuple[tuple[str, str], ...]:
+        """Return where a robot's subaction always brings things: pairs (thing, place)."""
+        text = model.label_text(robot, label)
+        if text is None:
+            return ()
+        found = []
+        for action in model.actions:
+            if _own_label(action, robot) != text:
+                continue
+            brought = set(self._brought(action))
+            if action.parts:  # a joint action also moves the other robots
+                brought = {(t, place) for t, place in brought if t == model.robots[robot]}
+            found.append(brought)
+        return tuple(sorted(set.intersection(*found))) if found else ()
+
+    def _brought(self, action: GroundAction) -> Iterator[tuple[str, str]]:
+        """Yield the things and places of the unconditional additions of an action."""
+        for effect in action.effects:
+            if effect.adds and effect.condition == TRUE:
+                role = self.role(show(effect.atom))
+                if role[0] == "at":
+                    yield role[1], role[2]
+
+
+def _own_label(action: GroundAction, robot: int) -> str | None:
+    """The label that a robot chooses in a ground action."""
+    if action.parts:
+        return action.parts[robot]
+    return action.label if robot in action.owners else None
+
+
+def find_world(model: JointModel, states: Sequence[Sequence[str]]) -> World:
+    """Find what of a model can be drawn.
+
+    Parameters
+    ----------
+    states
+        Known states, as the texts of their true atoms: what puts a thing into two places in one of
+        them does not say where it is.
+    """
+    locations = find_locations(model)
+    roles = _without_ambiguous(_location_roles(model, locations), states)
+    located = {role[1] for _, role in roles.values()}
+    places = frozenset(role[2] for _, role in roles.values())
+    for atom in model.codec.facts.atoms:
+        text = show(atom)
+        if text not in roles:
+            roles[text] = atom, _other_role(atom, places, located | {*model.robots})
+    carried = {thing for _, role in roles.values() if role[0] == "with" for thing in role[1:]}
+    others = sorted((located | carried) - {*model.robots}, key=natural)
+    return World(
+        things=(*model.robots, *others),
+        places=tuple(sorted(places, key=natural)),
+        links=tuple(_links(model, locations.predicates, places)),
+        roles={text: role for text, (_, role) in roles.items()},
+    )
+
+
+def _location_roles(model: JointModel, locations: Locations) -> dict[str, tuple[Atom, Role]]:
+    """The atoms that say where a thing is, by their texts, with their roles."""
+    names = {p: _owner(p, model) for p in locations.predicates if p.thing is None}
+    roles: dict[str, tuple[Atom, Role]] = {}
+    for atom in model.codec.facts.atoms:
+        thing, place = locations.thing_and_place(atom, names)
+        if thing:
+            roles[show(atom)] = atom, ("at", thing, place)
+    return roles
+
+
+def _owner(predicate: LocationPredicate, model: JointModel) -> str:
+    """Name what moves without a name: the only robot that moves it, else a thing of its own."""
+    owners = {action.owners for action in model.actions if predicate.moves_in(action)}
+    if len(owners) == 1 and not model.is_joint_action:
+        (team,) = owners
+        if len(team) == 1:
+            return model.robots[team[0]]
+    return predicate.predicate.removesuffix("-at").removeprefix("at-")
+
+
+def _without_ambiguous(
+    roles: dict[str, tuple[Atom, Role]], states: Sequence[Sequence[str]]
+) -> dict[str, tuple[Atom, Role]]:
+    """Drop the atoms of a thing and predicate that put the thing into two places at once.
+
+    Of two predicates the one that locates more things is kept: ``(at plane1 city0)``, as said of
+    passengers, tells where a plane is, and ``(fuel-level plane1 fl3)`` does not.
+    """
+    located: dict[str, set[str]] = {}
+    for atom, (_, thing, _) in roles.values():
+        located.setdefault(atom.predicate, set()).add(thing)
+    ambiguous: set[tuple[str, str]] = set()
+    for state in states:
+        said: dict[str, list[str]] = {}
+        for text in state:
+            if text in roles:
+                atom, (_, thing, _) = roles[text]
+                said.setdefault(thing, []).append(atom.predicate)
+        for thing, predicates in said.items():
+            number = {predicate: len(located[predicate]) for predicate in predicates}
+            best = [one for one in predicates if number[one] == max(number.values())]
+            ambiguous |= {(thing, one) for one in predicates if len(best) > 1 or one != best[0]}
+    return {
+        text: (atom, role)
+        for text, (atom, role) in roles.items()
+        if (role[1], atom.predicate) not in ambiguous
+    }
+
+
+def _other_role(atom: Atom, places: frozenset[str], things: set[str]) -> Role:
+    """The role of an atom that does not say where a thing is."""
+    match atom.args:
+        case (one,):
+            return "mark" if one in places else "about", one, atom.predicate
+        case (one, two) if not places & {one, two} and things & {one, two}:
+            return "with", one, two
+        case (one, two) if one in things and two in places:
+            return "about", one, f"{atom.predicate} {two}"
+    return _OTHER
+
+
+def _links(
+    model: JointModel, predicates: Sequence[LocationPredicate], places: frozenset[str]
+) -> Iterator[Link]:
+    """What moves join, and what static atoms relate."""
+    moved = {
+        tuple(sorted(pair))
+        for predicate in predicates
+        for action in model.actions
+        for pair in predicate.changes(action)
+        if places.issuperset(pair)
+    }
+    related = {
+        tuple(sorted(pair))
+        for atom in model.statics
+        for pair in combinations([arg for arg in atom.args if arg in places], 2)
+        if pair[0] != pair[1]
+    }
+    for first, second in sorted(moved | related):
+        yield Link((first, second), (first, second) in moved)

@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
-"""A language in one task: saying plans, understanding sentences, planning under them."""

@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The check of a certificate, in code of its own.
+
+Every reason is checked against the model, and the rest is left to a SAT solver.
+
+Code of its own: it shares the joint model and the plan spaces with the builders, and the encoding,
+which is what the solver is asked about.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from coordlang.language.candidates import Candidates
+from coordlang.language.listed import goal_text
+from coordlang.language.warping import Clause, Pair, pair
+from coordlang.verification.certificate_clauses import Cnf, encode, states_of
+from coordlang.verification.certificate_file import Certificate, PlanTexts, Reason, WarpingPath
+from planners.joint.model import JointModel
+from planners.joint.states import split_atoms
+from planners.joint.tables import find_rows
+from planners.pddl.sexpr import Expression, Source, Token, parse
+from planners.search.plan_space import PlanSpace
+from planners.system.errors import BadInput, Refuted
+from planners.system.messages import echoed
+
+#: What to do about a certificate that proves nothing.
+_REBUILD = "Write it again: `coordlang build .. --method minimal --certificate FILE`."
+_ITS_FILES = "Give the domain, the problems and the tasks for which the certificate was written."
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """A certificate that holds.
+
+    Every partition that is a language for the tasks has at least ``lower_bound`` words.
+
+    ``cnf`` is the formula that was refuted, ``names`` are the keys of the states in it.
+    """
+
+    lower_bound: int
+    reasons: int
+    cnf: Cnf
+    names: dict[int, str]
+
+    def dimacs(self) -> str:
+        """The refuted formula as DIMACS text."""
+        return self.cnf.dimacs(self.names)
+
+
+def check(
+    certificate: Certificate,
+    candidates: Candidates,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Checked:
+    """Check a certificate for candidate tasks.
+
+    For every reason: its plans are optimal plans of one candidate task, their mixture is not, and
+    its cells are warping paths.  Then no partition of states into the refuted number of words
+    separates a pair on every reason's paths. Raises `Refuted` with the reason that is wrong, and
+    `OutOfMemory` before a formula is made that would not fit.
+    """
+    if tuple(certificate.robots) != candidates.model.robots:
+        raise Refuted(
+            f"the certificate is about other robots: {', '.join(certificate.robots)}",
+            remedy=_ITS_FILES,
+        )
+    domain = candidates.loaded.domain.name
+    if certificate.domain != domain:
+        raise Refuted(
+            f"the certificate is about the domain {echoed(certificate.domain)}, not {domain!r}",
+            remedy=_ITS_FILES,
+        )
+    if certificate.refuted < 0:
+        raise Refuted(f"the certificate speaks of {certificate.refuted} words", remedy=_REBUILD)
+    tasks = _Tasks(candidates)
+    clauses: list[Clause] = []
+    for number, reason in enumerate(certificate.reasons, 1):
+        progress(f"checking reason {number:,} of {len(certificate.reasons):,}")
+        try:
+            clauses.append(_clause(reason, tasks))
+        except (Refuted, BadInput) as error:
+            raise Refuted(
+                f"reason {number} of the certificate is wrong: {error.what}",
+                remedy=error.remedy or _REBUILD,
+            ) from None
+    progress(f"refuting {certificate.refuted} words")
+    # A word for each state of its own satisfies every reason: no solver is needed to see it, and
+    # no formula, which a number of a million words would make large.
+    states = len(states_of(clauses))
+    if certificate.refuted >= max(1, states) and all(clauses):
+        raise _leaves_languages(certificate)
+    cnf = encode(clauses, certificate.refuted)
+    if certificate.refuted and not cnf.refuted():
+        raise _leaves_languages(certificate)
+    names = {state: candidates.model.codec.key(candidates.rows[state]) for state in cnf.word}
+    return Checked(certificate.refuted + 1, len(clauses), cnf, names)
+
+
+def _leaves_languages(certificate: Certificate) -> Refuted:
+    return Refuted(
+        f"the certificate's {len(certificate.reasons):,} reasons leave languages "
+        f"with {certificate.refuted} words",
+        remedy=_REBUILD,
+    )
+
+
+def _clause(reason: Reason, tasks: _Tasks) -> Clause:
+    """The pairs of states one of which must be separated."""
+    space, start = tasks.find(reason)
+    robots = len(space.model.robots)
+    if len(reason.plans) != robots:
+        raise Refuted(f"expected a plan for each of {robots} robots", remedy=_REBUILD)
+    states = [_states(space, start, plan, f"plan {n}") for n, plan in enumerate(reason.plans)]
+    mixture = [
+        [own[robot] for robot, own in enumerate(step)] for step in zip(*reason.plans, strict=True)
+    ]
+    if _follow(space, start, mixture) is not None:
+        raise Refuted(
+            f"the mixture of its plans is one of the {space.model.kept_plans}: they need no "
+            "separation",
+            remedy=_REBUILD,
+        )
+    clause: set[Pair] = set()
+    for path in reason.paths:
+        clause |= _different_cells(path, states)
+    if not _joins_all([path.plans for path in reason.paths], robots):
+        raise Refuted("its warping paths do not join all of its plans", remedy=_REBUILD)
+    return frozenset(clause)
+
+
+def _different_cells(path: WarpingPath, states: Sequence[Sequence[int]]) -> set[Pair]:
+    """The pairs of different states on the cells of a path; ``states`` by plan."""
+    a, b = path.plans
+    if not (0 <= a < len(states) and 0 <= b < len(states)):
+        raise Refuted(f"there are no plans {a} and {b}", remedy=_REBUILD)
+    one, other = states[a], states[b]
+    _check_path(path.cells, len(one), len(other), f"the path of plans {a} and {b}")
+    return {pair(one[i], other[j]) for i, j in path.cells if one[i] != other[j]}
+
+
+def _joins_all(links: Sequence[tuple[int, int]], plans: int) -> bool:
+    """Whether links between plans lead from plan 0 to every other one."""
+    joined = {0}
+    for _ in range(plans):
+        joined |= {plan for link in links if joined & {*link} for plan in link}
+    return len(joined) == plans
+
+
+def _states(space: PlanSpace, start: int, plan: PlanTexts, name: str) -> list[int]:
+    states = _follow(space, start, plan)
+    if states is None:
+        raise Refuted(f"{name} is no {space.model.kept_plan} of the task", remedy=_REBUILD)
+    return states
+
+
+def _follow(space: PlanSpace, start: int, plan: PlanTexts) -> list[int] | None:
+    """The states that a plan passes through, or None if it is no optimal plan."""
+    steps: list[tuple[int, ...]] = []
+    for texts in plan:
+        labels = space.model.numbers(texts) if len(texts) == len(space.model.robots) else None
+        if labels is None:
+            return None
+        steps.append(labels)
+    path = space.path_with(start, steps)
+    if path is None or len(path) != space.layer[start]:
+        return None
+    states: list[int] = space.state[space.nodes_on(start, path)].tolist()
+    return states
+
+
+def _check_path(path: list[tuple[int, int]], rows: int, columns: int, name: str) -> None:
+    ends = [(0, 0), (rows - 1, columns - 1)]
+    steps = [(c - a, d - b) for (a, b), (c, d) in pairwise(path)]
+    if not path or [path[0], path[-1]] != ends or not set(steps) <= {(0, 1), (1, 0), (1, 1)}:
+        raise Refuted(f"{name} is no warping path from {ends[0]} to {ends[1]}", remedy=_REBUILD)
+
+
+class _Tasks:
+    """Finds the candidate task that a reason speaks of."""
+
+    def __init__(self, candidates: Candidates) -> None:
+        self._model: JointModel = candidates.model
+        self._rows = candidates.rows
+        self._tasks: dict[tuple[int, object], tuple[PlanSpace, int]] = {}
+        for space in candidates.spaces:
+            goals = [_canonical(split_atoms(goal_text(space.model, goal))) for goal in space.goals]
+            for node in space.starts.tolist():
+                self._tasks[int(space.state[node]), goals[space.goal[node]]] = (space, node)
+
+    def find(self, reason: Reason) -> tuple[PlanSpace, int]:
+        row = self._model.codec.encode(reason.init)
+        state = int(find_rows(self._rows, row[None, :])[0])
+        goal = _canonical(part for text in reason.goal for part in split_atoms(text))
+        if (state, goal) not in self._tasks:
+            raise Refuted(
+                f"{' '.join(reason.init)} -> {' '.join(reason.goal)} is no candidate task",
+                remedy=_ITS_FILES,
+            )
+        return self._tasks[state, goal]
+
+
+def _canonical(goal: Iterable[str]) -> object:
+    """Literals in a form in which their order does not count."""
+    return frozenset(_tree(parse(Source("goal", text)).root) for text in goal)
+
+
+def _tree(node: Expression) -> object:
+    if isinstance(node, Token):
+        return node.text
+    parts = [_tree(part) for part in node]
+    return (node.head, frozenset(parts[1:])) if node.head in ("and", "or") else tuple(parts)

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How PDDL files are understood: who the robots are, what optimal means, what states remember."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal, cast, get_args
+
+from planners.system.errors import UsageError
+from planners.system.messages import echoed
+from planners.system.options import option
+
+Cost = Literal["makespan", "makespan+actions", "makespan+cost"]
+Unowned = Literal["error", "environment", "shared"]
+
+#: The most slack that is taken: plans of so many joint steps fill any memory.
+MOST_SLACK = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class ModelOptions:
+    """How the files are to be understood; a language file records it.
+
+    ``robots`` may be given as one text, ``"r1,r2"``; the record holds the names.  ``recorded``: a
+    language file said who the robots are, not the user.
+
+    Raises
+    ------
+    UsageError
+        For a value that there is not, and for options that contradict each other.
+    """
+
+    robots: str | Sequence[str] = option((), "The robots, where the domain does not say.", "R1,R2")
+    robot_type: str | None = option(None, "The type (or unary predicate) of the robots.", "TYPE")
+    unowned: Unowned = option("error", "Who owns actions that name no robot.")
+    cost: Cost = option("makespan", "What optimal means.")
+    remember_actions: bool = option(False, "Add each robot's last subaction to the state.")
+    slack: int = option(
+        0, "Plans may take B joint steps more than the least makespan.", "B", least=0
+    )
+    words_see_slack: bool = option(
+        False, "States also say how many steps of the slack are left, and words may differ in that."
+    )
+    recorded: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "robots", names_in("--robots", self.robots))
+        if self.robot_type is not None:
+            if not isinstance(self.robot_type, str) or not self.robot_type.strip():
+                raise UsageError(
+                    "--robot-type: expected a name", remedy="As in --robot-type robot."
+                )
+            object.__setattr__(self, "robot_type", self.robot_type.lower())
+        if self.robots and self.robot_type:
+            raise UsageError(
+                "--robots and --robot-type both say who the robots are: give one of them",
+                remedy="--robots names them one by one.",
+            )
+        for name, values in (("cost", get_args(Cost)), ("unowned", get_args(Unowned))):
+            _require_one_of(name, getattr(self, name), values)
+        self._check_slack()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The robots that are named; none where they are to be found."""
+        return cast(tuple[str, ...], self.robots)
+
+    def data(self) -> dict[str, str | int]:
+        """The cost, and the other options that say what a plan or a state is, where one is used."""
+        options: dict[str, str | int] = {
+            "remember-actions": self.remember_actions,
+            "slack": self.slack,
+            "words-see-slack": self.words_see_slack,
+        }
+        if self.unowned != "error":
+            options["unowned"] = self.unowned
+        return {"cost": self.cost, **{name: value for name, value in options.items() if value}}
+
+    def __str__(self) -> str:
+        """These options as text: ``cost makespan, remember-actions``."""
+        return ", ".join(
+            name if value is True else f"{name} {value}" for name, value in self.data().items()
+        )
+
+    def _check_slack(self) -> None:
+        if isinstance(self.slack, bool) or not isinstance(self.slack, int) or self.slack < 0:
+            raise UsageError(
+                f"--slack {echoed(str(self.slack))}: expected a number of joint steps, 0 or more",
+                remedy="Say --slack 1.",
+            )
+        if self.slack > MOST_SLACK:
+            raise UsageError(
+                f"--slack {echoed(str(self.slack))}: more than {MOST_SLACK:,} joint steps",
+                remedy="Say --slack 1.",
+            )
+        if self.words_see_slack and not self.slack:
+            raise UsageError(
+                "--words-see-slack belongs to --slack, and there is none",
+                remedy="Add --slack 1, or leave out --words-see-slack.",
+            )
+
+
+def names_in(spelling: str, given: str | Sequence[str]) -> tuple[str, ...]:
+    """The names that an option is given, in one text or several, in lower case.
+
+    Raises `UsageError` for what is no text, and for a text without a name.
+    """
+    texts = given.split(",") if isinstance(given, str) else given
+    if not isinstance(texts, Iterable):
+        raise UsageError(f"{spelling}: expected names", remedy=f"As in {spelling} r1,r2.")
+    names = []
+    for text in texts:
+        if not isinstance(text, str):
+            raise UsageError(
+                f"{spelling}: {echoed(text)} is no name", remedy="Give texts, such as 'r1'."
+            )
+        names += [text.strip().lower()] * bool(text.strip())
+    if not names and given != ():
+        raise UsageError(f"{spelling}: expected names", remedy=f"As in {spelling} r1,r2.")
+    return tuple(names)
+
+
+def _require_one_of(name: str, value: str, values: Sequence[str]) -> None:
+    if value not in values:
+        raise UsageError(
+            f"{echoed(value)} is no value of the option {name}",
+            remedy=f"It is {' or '.join(values)}.",
+        )

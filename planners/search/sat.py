@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""SAT solvers of python-sat, made safe against signals."""
+
+from __future__ import annotations
+
+import threading
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
+from typing import Any, Literal
+
+import numpy as np
+
+from planners.joint.tables import Ints
+from planners.system.signals import postponed_signals
+
+#: Clauses that are lists of numbers at a time, for these take far more memory.
+_BLOCK = 1 << 16
+#: Rounds of elimination: what one leaves, the next one may eliminate.  Three take up to twice as
+#: long as one, and the questions that follow fewer conflicts (logistics 14-0: a sixth fewer).
+_ROUNDS = 3
+
+#: Has ``now``: whether this thread is in a solver.
+_SOLVING = threading.local()
+
+#: The solvers in use.  None of MapleChrono and MapleCM: they take SIGALRM for themselves, below
+#: Python, so that no time limit would be heard any more.
+SolverName = Literal["cadical153", "glucose4", "glucose42", "maplesat", "minisat22"]
+
+
+def sat_solver(name: SolverName, clauses: Iterable[Sequence[int]] = ()) -> Any:
+    """A solver of python-sat that a signal at any moment leaves whole.
+
+    Parameters
+    ----------
+    name
+        The name that python-sat has for it.
+    clauses
+        The first clauses.
+
+    Returns
+    -------
+    pysat.solvers.Solver
+        A context manager; it is given back by ``delete()``.
+    """
+    solver = _solver_class()(name=name)
+    for clause in clauses:
+        solver.add_clause(clause)
+    return solver
+
+
+def solve_slice(solver: Any, conflicts: int, assumptions: Sequence[int] = ()) -> bool | None:
+    """Whether the clauses can be satisfied; None if ``conflicts`` did not decide it.
+
+    Signals are heard before and after, and not while the solver works.  python-sat would leave it
+    at SIGINT by ``longjmp`` from wherever it is, the allocation of memory included, and would leave
+    its handler behind: then the process crashes or hangs.
+    """
+    solver.conf_budget(conflicts)
+    with _deaf():
+        answer = solver.solve_limited(assumptions=list(assumptions))
+    return None if answer is None else bool(answer)
+
+
+def propagates(solver: Any, assumptions: Sequence[int]) -> bool:
+    """Whether unit propagation meets no conflict; signals are heard as by `solve_slice`."""
+    with _deaf():
+        good, _ = solver.propagate(assumptions=list(assumptions))
+    return bool(good)
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Solvers of this thread take no signals inside, as they take none in another one."""
+    _hear_only_outside()
+    _SOLVING.now = True
+    try:
+        yield
+    finally:
+        _SOLVING.now = False
+
+
+@cache
+def _hear_only_outside() -> None:
+    """Let python-sat ask `_SOLVING`, too, whether it is in the main thread; for good."""
+    from pysat.solvers import MainThread
+
+    own = MainThread.check
+    MainThread.check = staticmethod(lambda: not getattr(_SOLVING, "now", False) and own())
+
+
+def simplified(clauses: array[int], kept: Sequence[int]) -> list[list[int]]:
+    """Clauses that allow the same values of the kept variables, mostly over far fewer variables.
+
+    Parameters
+    ----------
+    clauses
+        Each followed by 0; they can be satisfied.
+    kept
+        Variables; others may be eliminated, and every one of them may be left without a clause.
+    """
+    from pysat.solvers import Cadical153
+
+    # Not by pysat's Processor, which copies every number of the clauses that it found.
+    with postponed_signals(), Cadical153() as solver:
+        for clause in split_clauses(clauses):
+            solver.add_clause(clause)
+        _, found = solver.process(rounds=_ROUNDS, freeze=list(kept))
+    assert [] not in found, "clauses that a model was found of were refuted"
+    return list(found)
+
+
+def split_clauses(clauses: array[int] | Ints, block: int = _BLOCK) -> Iterator[list[int]]:
+    """The clauses of a formula in which 0 follows each; ``block`` are listed at a time."""
+    literals = np.asarray(clauses)
+    ends = np.flatnonzero(literals == 0)
+    begin = 0
+    for start in range(0, len(ends), block):
+        some = ends[start : start + block]
+        listed = literals[begin : some[-1]].tolist()
+        first = begin
+        for end in some.tolist():
+            yield listed[begin - first : end - first]
+            begin = end + 1
+
+
+@cache
+def _solver_class() -> Any:
+    from pysat.solvers import Solver
+
+    class Whole(Solver):  # type: ignore[misc]
+        """A solver that is freed once, though a signal arrives when it has just been freed."""
+
+        def delete(self) -> None:
+            with postponed_signals():
+                super().delete()
+
+    return Whole

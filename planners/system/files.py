@@ -1,0 +1,316 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files in: decompressed, and JSON read against the record of its format."""
+
+from __future__ import annotations
+
+import errno
+import gzip
+import re
+import sys
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from inspect import cleandoc
+from io import BytesIO
+from pathlib import Path
+from typing import IO, Any, Generic, TypeVar
+
+import msgspec
+
+from planners.system.errors import BadInput, OutOfMemory, Position
+from planners.system.limits import memory_left, more_memory
+from planners.system.messages import UNSEEN, echoed
+
+T = TypeVar("T")
+
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+
+#: Bytes of text that are read from one file, decompressed.
+MAX_TEXT = 2**30
+#: What JSON text takes in memory at least while it is read, in bytes per byte.
+_READING = 4
+#: Reading less text than this asks nothing of the memory that is left, in bytes.
+_SMALL = 2**16
+#: Deeper nesting of arrays and objects in a JSON text is refused: no format needs it.
+MAX_DEPTH = 200
+_CHUNK = 2**20
+_ESCAPED = re.compile(rb"\\.", re.DOTALL)
+_TEXT = re.compile(rb'"[^"]*"?')
+_ALIKE = bytes.maketrans(b"{}", b"[]")
+_NOT_NESTING = bytes(set(range(256)) - set(b'[]{}"'))
+
+
+class _Head(msgspec.Struct):
+    format: Any = None
+    version: Any = None
+
+
+@dataclass(frozen=True, slots=True)
+class FileFormat(Generic[T]):
+    """A JSON file format.
+
+    Attributes
+    ----------
+    name
+        Its name for ``coordlang schema``, "tasks".
+    title
+        What messages call such a file, "task file".
+    record
+        A msgspec struct: the keys and their types.  Keys that it does not have are ignored.
+    format
+        The value of the key ``format``, None for files without that key.
+    version
+        The value of the key ``version``: another one is refused.
+    """
+
+    name: str
+    title: str
+    record: type[T]
+    format: str | None = None
+    version: int = 1
+
+    def decode(self, data: bytes, position: Position) -> T:
+        """Read the text of a file.
+
+        Raises
+        ------
+        BadInput
+            For a text that is no JSON, of another format or version, or that does not fit the
+            record.
+        """
+        check_utf8(data, position)
+        data = data.removeprefix(_BYTE_ORDER_MARK)
+        _require_shallow(data, position)
+        try:
+            if self.format is not None:
+                self.check_head(data, position)
+            return msgspec.json.decode(data, type=self.record)
+        except msgspec.ValidationError as error:
+            raise self._refused(error, position) from None
+        except (msgspec.DecodeError, RecursionError) as error:
+            raise BadInput(
+                f"this is no JSON, or it is cut off: {error}",
+                position=position,
+                remedy="Write or copy the file again; an editor that checks JSON shows the place.",
+            ) from None
+
+    def convert(self, data: Any, position: Position) -> T:
+        """Read what a JSON reader made of such a file.  Raises `BadInput` as `decode` does."""
+        try:
+            if self.format is not None:
+                self._check_format(msgspec.convert(data, _Head), position)
+            return msgspec.convert(data, self.record)
+        except (msgspec.ValidationError, RecursionError) as error:
+            raise self._refused(error, position) from None
+
+    def check_head(self, data: bytes, position: Position) -> None:
+        """Raise `BadInput` for another format or version: such a file need not fit the record."""
+        self._check_format(msgspec.json.decode(data, type=_Head), position)
+
+    def _check_format(self, head: _Head, position: Position) -> None:
+        if head.format != self.format:
+            raise BadInput(
+                f"format {echoed(head.format)}, expected {self.format!r}",
+                position=position,
+                remedy=f"`coordlang schema {self.name}` prints what a {self.title} holds.",
+            )
+        if head.version != self.version or isinstance(head.version, bool):
+            raise BadInput(
+                f"{self.title} version {echoed(head.version)}; "
+                f"this program reads version {self.version}",
+                position=position,
+                remedy="Use the version of coordlang that wrote it, or write it again "
+                "with this one.",
+            )
+
+    def _refused(self, error: Exception, position: Position) -> BadInput:
+        return BadInput(
+            f"this is no {self.title}: {error}",
+            position=position,
+            remedy=f"`coordlang schema {self.name}` prints what a {self.title} holds.",
+        )
+
+    def json_schema(self) -> dict[str, Any]:
+        """The JSON Schema (draft 2020-12) of such files."""
+        schema: dict[str, Any] = msgspec.json.schema(self.record)
+        for entry in schema["$defs"].values():
+            if "description" in entry:  # a docstring: before Python 3.13 it keeps its indentation
+                entry["description"] = cleandoc(entry["description"])
+        record = schema["$defs"][schema["$ref"].rpartition("/")[2]]
+        if self.format is not None:
+            for key, value in (("format", self.format), ("version", self.version)):
+                entry = record["properties"][key]
+                record["properties"][key] = {"const": value, "description": entry["description"]}
+            record["required"] += [k for k in ("format", "version") if k not in record["required"]]
+        return {
+            "$schema": "https://json-schema.org/draft/2020-12/schema",
+            "title": f"coordlang {self.name}",
+            **schema,
+        }
+
+
+def read_bytes(path: str | Path, *, most: int = MAX_TEXT) -> bytes:
+    """Read a file, or standard input for ``-``; what gzip compressed is decompressed.
+
+    Raises
+    ------
+    BadInput
+        A file that is missing, cannot be read, or holds more than ``most`` bytes.
+    OutOfMemory
+        A file that would take more memory than is left.
+    """
+    data = read_stored_bytes(path, most=most)
+    if data[:2] != b"\x1f\x8b":
+        return data
+    position = Position(str(path))
+    try:
+        size = _decompressed_size(data, most)
+        _require_size(size, most, position)
+        return gzip.GzipFile(fileobj=BytesIO(data)).read(size)
+    except (OSError, EOFError, zlib.error) as error:
+        raise BadInput(
+            f"cannot be read: {error}",
+            position=position,
+            remedy="Its compression (gzip) is damaged: copy or write the file again.",
+        ) from None
+
+
+def read_stored_bytes(path: str | Path, *, most: int = MAX_TEXT) -> bytes:
+    """Read a file as it is, or standard input for ``-``; see `read_bytes`."""
+    position = Position(str(path))
+    try:
+        if str(path) == "-":
+            if sys.stdin is None:
+                raise OSError(errno.EBADF, "stdin is closed")
+            data = b"".join(_pieces(sys.stdin.buffer, most))
+        else:
+            with open(path, "rb") as file:
+                data = b"".join(_pieces(file, most))
+    except FileNotFoundError:
+        raise BadInput(
+            "there is no such file",
+            position=position,
+            remedy="Check the name and the folder; relative names start at the working directory.",
+        ) from None
+    except OSError as error:
+        raise BadInput(
+            f"cannot be read: {error.strerror or error}",
+            position=position,
+            remedy="Name a file that you may read.",
+        ) from None
+    _require_size(len(data), most, position)
+    return data
+
+
+def names_format(data: bytes, name: str) -> bool:
+    """Whether a JSON text says that it is of a format; what is no JSON says nothing."""
+    if name.encode() not in data:
+        return False
+    try:
+        check_utf8(data, Position("a file"))
+        _require_shallow(data, Position("a file"))
+        found = msgspec.json.decode(data.removeprefix(_BYTE_ORDER_MARK), type=_Head)
+    except (BadInput, msgspec.DecodeError, RecursionError):
+        return False
+    return bool(found.format == name)
+
+
+def read_text(path: str | Path) -> str:
+    """Read a text in UTF-8, or standard input for ``-``.
+
+    Raises
+    ------
+    BadInput
+        A file that is missing or cannot be read, or that is not UTF-8, with the byte that is not.
+    """
+    data = read_bytes(path)
+    check_utf8(data, Position(str(path)))
+    return data.decode("utf-8-sig")
+
+
+def check_utf8(data: bytes, position: Position) -> None:
+    """Raise `BadInput`, with the first byte that is wrong, for bytes that are not UTF-8."""
+    try:
+        if not data.isascii():
+            data.decode()
+    except UnicodeDecodeError as error:
+        raise not_utf8(data, error.start, position) from None
+
+
+def not_utf8(data: bytes, offset: int, position: Position) -> BadInput:
+    """The error for a byte that no UTF-8 text has there (the caller raises it)."""
+    return BadInput(
+        f"this is no UTF-8 text: byte 0x{data[offset]:02x} at offset {offset}",
+        position=position,
+        remedy="Save the file in UTF-8.",
+    )
+
+
+def require_seen(name: str, position: Position, what: str = "name") -> None:
+    """Raise `BadInput` for a name or a word with a character of `planners.system.messages.UNSEEN`.
+
+    Control characters could steer a terminal, and characters that nobody sees could make one name
+    look like another.
+    """
+    found = UNSEEN.search(name)
+    if found is not None:
+        raise BadInput(
+            f"the {what} {echoed(name)} holds the character U+{ord(found[0]):04X}",
+            position=position,
+            remedy="Names and words hold no control characters and none that cannot be seen.",
+        )
+
+
+def _decompressed_size(data: bytes, most: int) -> int:
+    """The size of what gzip compressed, counted to a little more than ``most``; nothing is kept."""
+    return sum(len(piece) for piece in _pieces(gzip.GzipFile(fileobj=BytesIO(data)), most))
+
+
+def _pieces(file: IO[bytes] | gzip.GzipFile, most: int) -> Iterator[bytes]:
+    """The bytes of a file, until there are more than ``most``."""
+    size = 0
+    while size <= most and (piece := file.read(_CHUNK)):
+        size += len(piece)
+        yield piece
+
+
+def _require_size(size: int, most: int, position: Position) -> None:
+    if size > most:
+        raise BadInput(
+            f"the file holds more than {most / 2**20:,.0f} MiB of text",
+            position=position,
+            remedy="No file of coordlang is as large: is it the right one?",
+        )
+    if size > _SMALL and size * _READING > (left := memory_left()):
+        raise OutOfMemory(
+            f"reading {size / 2**20:,.0f} MiB takes {size * _READING / 2**20:,.0f} MiB of memory "
+            f"or more, {left / 2**20:,.0f} MiB are left",
+            position=position,
+            remedy=f"Use {more_memory()}, or a smaller file.",
+        )
+
+
+def _require_shallow(data: bytes, position: Position) -> None:
+    """Raise `BadInput` for JSON that is nested more than `MAX_DEPTH` deep.
+
+    Readers recurse, and they would end wherever the stack is full.
+    """
+    if data.count(b"[") + data.count(b"{") <= MAX_DEPTH:
+        return
+    # Two quotation marks in a row end a text and begin the next, or are an empty one: with both
+    # gone, the same brackets stand outside of texts.
+    if b"\\" in data:
+        data = _ESCAPED.sub(b"", data)
+    marks = data.translate(_ALIKE, _NOT_NESTING).replace(b'""', b"")
+    marks = _TEXT.sub(b"", marks)
+    for _ in range(MAX_DEPTH):  # level by level, from inside
+        outer = marks.replace(b"[]", b"")
+        if len(outer) == len(marks):
+            break
+        marks = outer
+    if len(marks) > MAX_DEPTH or b"[]" in marks:
+        raise BadInput(
+            f"this JSON is nested more than {MAX_DEPTH} deep",
+            position=position,
+            remedy="No file of coordlang is nested as deep: is it the right one?",
+        )

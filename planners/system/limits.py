@@ -1,0 +1,408 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Time and memory limits of a process.
+
+Over the limit, work in progress ends with an error that the caller can catch.
+
+An alarm raises `OutOfTime` wherever the program is, so that algorithms need no clock of their own;
+anytime methods catch it and return what they have.  The memory limit is the operating system's
+(address space), met as `MemoryError`.
+"""
+
+from __future__ import annotations
+
+import errno
+import math
+import os
+import re
+import resource
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+
+from planners.system.errors import OutOfMemory, OutOfTime
+
+#: The alarm rings again, should nobody have caught it (libraries in C may lose an exception); not
+#: too soon, so that whoever caught it can save his work and stop the clock.
+_AGAIN = 5.0
+#: And very soon where Python itself lost it: an exception cannot leave a finalizer or the callback
+#: of a weak reference.
+_SOON = 0.01
+#: Seconds that no timer counts to the end (some cannot be set to more).
+_FOR_EVER = 1e9
+#: Seconds for what has to follow on work that a limit ended: the clock has been stopped by then.
+_LITTLE = 0.5
+#: What ends work early, so that an anytime method returns what it has.
+STOPPING = (OutOfTime, OutOfMemory, MemoryError, KeyboardInterrupt)
+#: How loaders and libraries say that there is no memory.
+_NO_MEMORY = (
+    "failed to map segment",
+    "cannot allocate memory",
+    "cannot create thread",
+    "can't start new thread",
+    "std::bad_alloc",
+)
+#: How Python says that C code has failed without a word.
+_NO_REASON = ("without exception set", "without setting an exception")
+#: Seconds of processor time in which numpy is loaded, on a slow machine, too.
+_LOADING = 20
+_LONGER = "Use a larger --time-limit."
+#: Of the memory that is free, what a process takes that is given no limit.
+_SHARE = 0.8
+#: Where Linux says what the machine has and what a process takes; elsewhere psutil knows, which
+#: takes as long to load as a small task to solve.
+_MEMORY_OF_MACHINE = Path("/proc/meminfo")
+_MEMORY_OF_PROCESS = Path("/proc/self/statm")
+_AVAILABLE = re.compile(r"^MemAvailable:\s*(\d+) kB$", re.MULTILINE)
+#: Where control groups are, and which of their memory is files that can be read again.
+_GROUPS = Path("/sys/fs/cgroup")
+_GIVEN_UP = ("inactive_file", "total_inactive_file")
+
+
+@contextmanager
+def time_limit(seconds: float | None) -> Iterator[None]:
+    """Raise `OutOfTime` in the block when ``seconds`` of wall time are over (main thread only).
+
+    Blocks may be nested; the limit that is over first rings, and it names its own seconds.
+    """
+    if seconds is None or seconds > _FOR_EVER or time_left() < seconds:
+        yield
+        return
+
+    def ring(_signal: int, _frame: FrameType | None) -> None:
+        raise OutOfTime(f"the time limit of {seconds:g} s is over", remedy=_LONGER)
+
+    def lost(unraisable: sys.UnraisableHookArgs) -> None:
+        if isinstance(unraisable.exc_value, OutOfTime):
+            signal.setitimer(signal.ITIMER_REAL, _SOON, _AGAIN)
+        else:
+            lost_before(unraisable)
+
+    before = signal.signal(signal.SIGALRM, ring)
+    lost_before, sys.unraisablehook = sys.unraisablehook, lost
+    begin = time.monotonic()
+    outer, again = signal.getitimer(signal.ITIMER_REAL)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, seconds, _AGAIN)  # inside: it may ring at once
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+        sys.unraisablehook = lost_before
+        if outer:  # the block around this one goes on with its own time
+            signal.setitimer(
+                signal.ITIMER_REAL, max(_SOON, outer - (time.monotonic() - begin)), again
+            )
+
+
+def stop_clock() -> None:
+    """Ring no more: for work that has met its time limit and still has to save what it has."""
+    signal.setitimer(signal.ITIMER_REAL, 0)
+
+
+def start_clock(seconds: float) -> None:
+    """Let the alarm of the `time_limit` around ring after so many seconds; infinite: as before."""
+    if seconds < math.inf:
+        signal.setitimer(signal.ITIMER_REAL, max(_SOON, seconds), _AGAIN)
+
+
+def run_until_stopped(
+    work: Callable[[], object],
+    *,
+    keep_time_after: type[BaseException] | tuple[type[BaseException], ...] = (),
+) -> BaseException | None:
+    """Do anytime work; return the error that ended it early (one of `STOPPING`), or None.
+
+    The clock is then stopped, so that what the work has left can be saved, except after errors of
+    the types ``keep_time_after``.  The error comes without its traceback, which would hold on to
+    all that the work had in memory.
+    """
+    try:
+        work()
+    except STOPPING as error:
+        if not isinstance(error, keep_time_after):
+            stop_clock()
+        return error.with_traceback(None)
+    return None
+
+
+@contextmanager
+def little_time_after(stopped: BaseException | None) -> Iterator[None]:
+    """Raise an error again where a block that follows on work which it ended takes long, too.
+
+    ``stopped`` is what `run_until_stopped` returned.  After work that was not stopped, and after an
+    error of memory, the block has the time that is left.
+    """
+    if not isinstance(stopped, OutOfTime | KeyboardInterrupt):
+        yield
+        return
+    try:
+        with time_limit(_LITTLE):
+            yield
+    except OutOfTime:
+        raise stopped from None
+
+
+def time_left() -> float:
+    """Seconds until the alarm of a `time_limit` rings; infinite without one."""
+    left, _ = signal.getitimer(signal.ITIMER_REAL)
+    return left if left > 0 else math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Underway:
+    """What a block does just now.
+
+    Attributes
+    ----------
+    so_far
+        How far it got, in numbers.
+    work
+        A count that grows with the work, None if there is none; ``unit`` is what it counts.
+    """
+
+    so_far: Callable[[], str]
+    work: Callable[[], int] | None = None
+    unit: str = ""
+
+
+#: The blocks of `reaching` that the program is in, the innermost last.
+_UNDERWAY: list[Underway] = []
+
+
+def underway() -> Underway | None:
+    """What the innermost block of `reaching` does; None outside of all.
+
+    Another thread may ask.  What it is told is then read while the work changes it.
+    """
+    blocks = _UNDERWAY[-1:]
+    return blocks[0] if blocks else None
+
+
+@contextmanager
+def reaching(
+    so_far: Callable[[], str],
+    instead: str,
+    work: Callable[[], int] | None = None,
+    unit: str = "",
+) -> Iterator[None]:
+    """Should a limit end the block, let the error say how far it got; meanwhile `underway` does.
+
+    ``so_far`` says it, in numbers; ``instead`` is what to try besides a larger limit ("fewer
+    objects").  ``work`` counts the work, in the ``unit`` ("joint steps").  Of nested blocks the
+    innermost speaks.  Memory that is used up (`MemoryError`) leaves the block as `OutOfMemory`.
+    """
+    depth = len(_UNDERWAY)
+    try:
+        _UNDERWAY.append(Underway(so_far, work, unit))
+        yield
+        return
+    except (OutOfTime, OutOfMemory) as error:
+        if error.reached is None:
+            error.reached = f"Reached: {so_far()}."
+            if error.remedy == _LONGER:
+                error.remedy = f"Use a larger --time-limit, or {instead}."
+        raise
+    except MemoryError:
+        pass  # what the frames below hold is free once this block is left
+    finally:
+        del _UNDERWAY[depth:]
+    full = OutOfMemory("the memory is used up", remedy=f"Use {more_memory()}, or {instead}.")
+    full.reached = f"Reached: {so_far()}."
+    raise full
+
+
+def limit_memory(size: int | None) -> None:
+    """Let this process and its children have at most ``size`` bytes of address space."""
+    if size is not None:
+        _, hard = resource.getrlimit(resource.RLIMIT_AS)
+        most = sys.maxsize if hard == resource.RLIM_INFINITY else hard
+        resource.setrlimit(resource.RLIMIT_AS, (min(size, most), hard))
+
+
+@contextmanager
+def limited_memory(size: int | None) -> Iterator[None]:
+    """`limit_memory` for the block; after it the limit is what it was."""
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    limit_memory(size)
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, before)
+
+
+def has_memory_limit() -> bool:
+    """Whether the address space of this process is limited."""
+    return resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
+
+
+def more_memory() -> str:
+    """What to use where the memory was too little, in words."""
+    return "a larger --memory-limit" if has_memory_limit() else "a machine with more memory"
+
+
+def default_memory_limit() -> int:
+    """What a process may have that is given no limit: 80 % of what is free, besides what it has.
+
+    What is free is that of the machine or of the process's control group, whichever is less.
+    """
+    return address_space() + int(_SHARE * _available())
+
+
+def require_memory(size: int) -> None:
+    """Raise `OutOfMemory` if the program alone already has more than ``size`` bytes.
+
+    Its libraries are loaded by then.
+
+    To be asked before `limit_memory`: numpy aborts the process when it is loaded under a limit that
+    is too small.
+    """
+    import numpy as np
+
+    np.zeros((8, 8)) @ np.zeros((8, 8))
+    if size < address_space():
+        raise OutOfMemory(
+            f"the program alone needs {address_space() / 2**20:.0f} MiB of address space",
+            remedy="Use a larger --memory-limit.",
+        )
+
+
+def require_libraries() -> None:
+    """Raise `OutOfMemory` if numpy does not load under the limit that the process started with.
+
+    BLAS ends the process then (``ulimit -v``), or asks for memory without end, so that a child
+    process tries it, for some seconds.
+    """
+    soft, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if soft == resource.RLIM_INFINITY or "numpy" in sys.modules:
+        return
+    child = os.fork()
+    if child == 0:
+        os._exit(_load_quietly())
+    _, status = os.waitpid(child, 0)
+    if status != 0:
+        raise OutOfMemory(
+            f"the libraries do not load in {soft / 2**20:.0f} MiB of address space",
+            remedy="Use a larger limit (ulimit -v).",
+        )
+
+
+def limit_processor_time(seconds: int) -> None:
+    """Let this process end after so many more seconds of its own, whatever it does."""
+    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    end = math.ceil(time.process_time()) + seconds
+    soft = end if hard == resource.RLIM_INFINITY else min(end, hard)
+    resource.setrlimit(resource.RLIMIT_CPU, (soft, hard))
+
+
+def _load_quietly() -> int:
+    """Load numpy, silently: the exit code of the process that tries it."""
+    try:
+        limit_processor_time(_LOADING)
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 1)
+        os.dup2(nowhere, 2)
+        import numpy as np
+
+        np.zeros((8, 8)) @ np.zeros((8, 8))
+    except (ImportError, MemoryError, OSError, RuntimeError, SystemError):
+        return 1
+    return 0
+
+
+def lacks_memory(error: BaseException) -> bool:
+    """Whether this error, of whatever library, means that the memory is used up."""
+    if isinstance(error, MemoryError):
+        return True
+    if isinstance(error, OSError) and error.errno == errno.ENOMEM:
+        return True
+    # C code that was refused memory and does not say so; without a limit it is a bug.
+    if isinstance(error, SystemError) and any(text in str(error) for text in _NO_REASON):
+        return has_memory_limit()
+    return any(text in str(error).lower() for text in _NO_MEMORY)
+
+
+def memory_left() -> int:
+    """Bytes that this process may still take: under its limit and as the machine has them free."""
+    return int(min(_available(), address_space_left()))
+
+
+def address_space_left() -> float:
+    """Bytes that the limit of this process leaves it; infinite without one."""
+    soft, _ = resource.getrlimit(resource.RLIMIT_AS)
+    return math.inf if soft == resource.RLIM_INFINITY else max(0, soft - address_space())
+
+
+def _available() -> int:
+    """Bytes that the machine, or the process's control group, has free or can free at once."""
+    return min(_machine_memory_left(), _group_memory_left())
+
+
+def _machine_memory_left() -> int:
+    """Bytes that the machine has free or can free at once."""
+    with suppress(OSError):
+        found = _AVAILABLE.search(_MEMORY_OF_MACHINE.read_text())
+        if found is not None:
+            return int(found[1]) * 2**10
+    import psutil
+
+    return int(psutil.virtual_memory().available)
+
+
+def _group_memory_left() -> int:
+    """Bytes that the control groups of this process leave it (jobs of a scheduler, containers)."""
+    left = sys.maxsize
+    for folder in _memory_groups():
+        most = _number(folder / "memory.max", folder / "memory.limit_in_bytes")
+        used = _number(folder / "memory.current", folder / "memory.usage_in_bytes")
+        if most is not None and used is not None:
+            left = min(left, max(0, most - used + _cached(folder)))
+    return left
+
+
+def _memory_groups() -> Iterator[Path]:
+    """The folders of the control groups that count this process's memory, versions 1 and 2."""
+    try:
+        lines = Path("/proc/self/cgroup").read_text().splitlines()
+    except OSError:
+        return
+    for line in lines:
+        _, controllers, path = line.split(":", 2)
+        if controllers not in ("", "memory"):
+            continue
+        root = _GROUPS / controllers
+        own = root / path.lstrip("/")
+        # In a container the path may be that of the machine, and the root is the own group.
+        for folder in (own, *own.parents):
+            if folder.is_relative_to(root):
+                yield folder
+
+
+def _cached(folder: Path) -> int:
+    """Bytes of a group that are files in memory, which are given up where memory is short."""
+    try:
+        lines = (folder / "memory.stat").read_text().splitlines()
+    except OSError:
+        return 0
+    return sum(int(line.split()[1]) for line in lines if line.split()[0] in _GIVEN_UP)
+
+
+def _number(*paths: Path) -> int | None:
+    """The number that the first of these files holds, None where there is none."""
+    for path in paths:
+        with suppress(OSError, ValueError):
+            return int(path.read_text())
+    return None
+
+
+def address_space() -> int:
+    """Bytes of address space that this process has."""
+    with suppress(OSError):
+        return int(_MEMORY_OF_PROCESS.read_text().split()[0]) * resource.getpagesize()
+    import psutil
+
+    return int(psutil.Process().memory_info().vms)

@@ -1,0 +1,256 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files out: written whole or not at all, and known before the work whether they can be."""
+
+from __future__ import annotations
+
+import errno
+import gzip
+import os
+import secrets
+import stat
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from planners.system.errors import UsageError
+from planners.system.signals import postponed_signals
+
+#: Characters of a file's name that its temporary file repeats: with what is added, at most 90
+#: bytes, which every file system takes.
+_REPEATED = 16
+
+
+def why_unwritable(path: str | Path, *, makes_folder: bool = False) -> str | None:
+    """Why no file can be written there, as far as that is known without writing; None if it can.
+
+    Parameters
+    ----------
+    path
+        The file.  A device or a pipe is one that is written to and never replaced.
+    makes_folder
+        Whether its folder is made where it is missing.
+    """
+    text = os.fspath(path)
+    if not text:
+        return "its name is empty"
+    try:
+        found = os.stat(text)
+    except (FileNotFoundError, NotADirectoryError):
+        found = None
+    except OSError as error:
+        return error.strerror
+    try:
+        return _why_not_replaced(text, found) if found else _why_not_made(text, makes_folder)
+    except FileNotFoundError:  # relative to no folder
+        return "the working directory has been removed"
+
+
+def is_device(path: str | Path) -> bool:
+    """Whether this is a device or a pipe: written to, and never replaced."""
+    return os.path.exists(path) and not os.path.isfile(path)
+
+
+def remove_file(path: str | Path | None) -> None:
+    """Remove a file; nothing for None, for what is missing, and for a device or a pipe."""
+    if path is not None and os.path.isfile(path):
+        os.unlink(os.path.realpath(path))
+
+
+def write_atomically(path: str | Path, data: bytes, *, outdated: str | Path | None = None) -> None:
+    """Write beside, flush to the disk, then rename: a file is whole or as it was before.
+
+    Signals wait until that is done; devices and pipes apart, which may block.
+
+    Parameters
+    ----------
+    path, data
+        The file and all that it shall hold.
+    outdated
+        A file that belongs to what ``path`` held before.  It is removed just before ``path`` is
+        replaced, so that it never stands beside the new one, and kept if the writing fails.
+
+    Raises
+    ------
+    UsageError
+        A file that cannot be written.
+    BrokenPipeError
+        A pipe whose reader has gone.
+    """
+    try:
+        if reason := why_unwritable(path):
+            raise _cannot(path, reason)
+        if is_device(path):
+            remove_file(outdated)
+            with open(path, "wb") as file:
+                file.write(data)
+            return
+        target = Path(os.path.realpath(path))
+        with postponed_signals(), _written_beside(target, data) as beside:
+            _replace(target, beside, outdated)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise _cannot(path, error.strerror or str(error)) from None
+
+
+def write_compressed(
+    path: str | Path, data: bytes, level: int = 9, *, outdated: str | Path | None = None
+) -> None:
+    """Write like `write_atomically`; compressed for a name that ends in ``.gz``."""
+    if str(path).endswith(".gz"):
+        data = gzip.compress(data, compresslevel=level, mtime=0)
+    write_atomically(path, data, outdated=outdated)
+
+
+def write_texts(folder: str | Path, texts: Mapping[str, str]) -> None:
+    """Write text files, by their names, into a folder, which is made if it is missing.
+
+    Raises
+    ------
+    UsageError
+        A folder that cannot be made, or a file that cannot be written.
+    """
+    try:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(
+            f"the folder {folder} cannot be made: {error.strerror}",
+            remedy="Name a folder in one that you may write to.",
+        ) from None
+    for name, text in texts.items():
+        write_atomically(Path(folder) / name, text.encode())
+
+
+def copy_folders(folders: Sequence[str | Path], target: str | Path) -> None:
+    """Copy folders with all files in them into one, which is made if it is missing.
+
+    They are copied beside, and then renamed: all of them are there, and whole, or none.  Signals
+    wait until that is done.
+
+    Raises
+    ------
+    UsageError
+        If one cannot be written, or is there already.
+    """
+    into = Path(target)
+    try:
+        with postponed_signals():
+            into.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(prefix=".coordlang.", dir=into) as beside:
+                for folder in map(Path, folders):
+                    _copy_folder(folder, Path(beside, folder.name))
+                done: list[Path] = []
+                try:
+                    for copy in sorted(Path(beside).iterdir()):
+                        os.rename(copy, into / copy.name)
+                        done.append(copy)
+                except OSError:
+                    for copy in done:
+                        os.rename(into / copy.name, copy)
+                    raise
+    except OSError as error:
+        raise _cannot(into, error.strerror or str(error)) from None
+
+
+def _copy_folder(source: Path, copy: Path) -> None:
+    """Write a folder and its files again, to the disk."""
+    copy.mkdir()
+    for path in sorted(source.iterdir()):
+        if path.is_dir():
+            _copy_folder(path, copy / path.name)
+            continue
+        with open(copy / path.name, "wb") as file:
+            file.write(path.read_bytes())
+            file.flush()
+            os.fsync(file.fileno())
+
+
+@contextmanager
+def _written_beside(target: Path, data: bytes) -> Iterator[str]:
+    """Write a temporary file beside a target, to the disk; it is gone after the block.
+
+    Its permissions are those of the target, or of any new file.
+    """
+    handle, beside = _temporary(target)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+            file.flush()
+            with suppress(FileNotFoundError):
+                os.fchmod(handle, stat.S_IMODE(target.stat().st_mode) & 0o777)
+            os.fsync(file.fileno())
+        yield beside
+    finally:
+        with suppress(FileNotFoundError):
+            os.unlink(beside)
+
+
+def _temporary(target: Path) -> tuple[int, str]:
+    """A new file beside a target, open; only the owner may read it if the target exists."""
+    beside = target.parent / f".{target.name[:_REPEATED]}.{secrets.token_hex(4)}"
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+    return os.open(beside, flags, 0o600 if target.exists() else 0o666), str(beside)
+
+
+def _replace(target: Path, beside: str, outdated: str | Path | None) -> None:
+    """Rename a file to its target; what is outdated by it goes first, and stays if that fails."""
+    if outdated is None or not os.path.isfile(outdated):
+        os.replace(beside, target)
+        return
+    old = Path(os.path.realpath(outdated))
+    handle, aside = _temporary(old)
+    os.close(handle)
+    try:
+        os.replace(old, aside)
+        os.replace(beside, target)
+    finally:
+        failed = os.path.exists(beside)
+        if failed and not old.exists():
+            os.replace(aside, old)
+        else:
+            os.unlink(aside)
+
+
+def _cannot(path: str | Path, reason: str) -> UsageError:
+    return UsageError(
+        f"{path} cannot be written: {reason}",
+        remedy="Name a file in a folder that you may write to.",
+    )
+
+
+def _why_not_replaced(text: str, found: os.stat_result) -> str | None:
+    """Why a file that exists is not replaced, or a device not written to; None if it can be."""
+    if stat.S_ISDIR(found.st_mode):
+        return os.strerror(errno.EISDIR)
+    if stat.S_ISSOCK(found.st_mode):
+        return os.strerror(errno.ENXIO)
+    if not stat.S_ISREG(found.st_mode):
+        return _denied(text, os.W_OK)
+    if not found.st_mode & 0o222:  # asked of the file itself: the superuser may write to any
+        return "the file is read-only"
+    return _denied(text, os.W_OK) or _denied(_folder(text), os.W_OK | os.X_OK)
+
+
+def _why_not_made(text: str, makes_folder: bool) -> str | None:
+    """Why no new file of this name can be made, or None."""
+    if os.path.basename(text) in ("", os.curdir, os.pardir):
+        return "this names a folder, and there is none"
+    folder = _folder(text)
+    while makes_folder and not folder.exists():
+        folder = folder.parent
+    if folder.is_dir():
+        return _denied(folder, os.W_OK | os.X_OK)
+    if makes_folder:
+        return f"the folder {Path(text).parent} cannot be made: {os.strerror(errno.ENOTDIR)}"
+    return f"there is no folder {Path(text).parent}"
+
+
+def _folder(text: str) -> Path:
+    return Path(os.path.realpath(text)).parent
+
+
+def _denied(path: str | Path, mode: int) -> str | None:
+    # Another process may have removed it since it was seen: that denies nothing.
+    allowed = os.access(path, mode) or not os.path.exists(path)
+    return None if allowed else os.strerror(errno.EACCES)

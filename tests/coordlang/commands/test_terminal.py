@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Progress is shown on a terminal only, on stderr, and leaves nothing behind."""
+
+from __future__ import annotations
+
+import io
+import os
+import pty
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from generate import problem_text, scenario
+from gridmap import open_grid
+
+from coordlang.commands import terminal
+from tests.support.domains import DOMAINS, ROOT
+
+CODE = """
+import sys, time
+import rich.console, rich.progress, rich.status, rich.text  # now, so that the pauses are enough
+from coordlang.commands import terminal
+terminal._DELAY = 0.0
+with terminal.working("first thing") as say:
+    time.sleep(1)
+    say("[second] thing")
+    time.sleep(1)
+print("answer")
+with terminal.bar() as show:
+    show(1, 3, "piece")
+    time.sleep(1)
+"""
+
+
+def on_a_terminal(code: str, **environment: str) -> tuple[str, str]:
+    """Run code with a terminal as stderr: (stdout, what the terminal got)."""
+    main, other = pty.openpty()
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm", **environment}
+    child = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=other, env=environment
+    )
+    os.close(other)
+    shown = b""
+    while True:
+        try:
+            part = os.read(main, 10_000)
+        except OSError:
+            break
+        if not part:
+            break
+        shown += part
+    out, _ = child.communicate()
+    os.close(main)
+    return out.decode(), shown.decode()
+
+
+def test_progress_on_a_terminal() -> None:
+    out, shown = on_a_terminal(CODE)
+    assert out == "answer\n"
+    assert "first thing .." in shown
+    assert "[second] thing .." in shown
+    assert "1/3" in shown
+    assert "piece" in shown
+
+
+def test_how_far_the_work_got() -> None:
+    """That of the innermost block, with its rate; what cannot be read just now is left out."""
+    code = CODE.split("with terminal.working")[0] + (
+        "from planners.system.limits import reaching\n"
+        "terminal._INTERVAL = 0.05\n"
+        "done, layers = 0, []\n"
+        "with terminal.working('searching'), reaching(lambda: 'the whole', 'less'):\n"
+        "    time.sleep(0.5)\n"
+        "    with reaching(lambda: f'{done} states', 'less', lambda: done, 'joint steps'):\n"
+        "        for done in range(50):\n"
+        "            time.sleep(0.02)\n"
+        "    with reaching(lambda: f'{layers[-1]} states', 'less'):\n"
+        "        time.sleep(0.5)\n"
+    )
+    _, shown = on_a_terminal(code)
+    assert "searching: the whole .. 0 s" in shown
+    rates = re.findall(r"searching: (\d+) states, (\d+) joint steps a second .. \d s", shown)
+    assert any(int(done) > 10 and 5 < int(rate) < 51 for done, rate in rates)
+    assert "searching .. 1 s" in shown or "searching .. 2 s" in shown
+
+
+def test_how_far_a_search_got(tmp_path: Path) -> None:
+    problem = tmp_path / "corners.pddl"  # a second of search, for there to be something to show
+    problem.write_text(problem_text(scenario("corners", open_grid(6, 6), robots=3), "grid"))
+    files = [str(DOMAINS / "grid" / "domain.pddl"), str(problem)]
+    arguments = ["plans", *files, "--count", "--no-cache", "--heuristic", "blind"]
+    code = CODE.split("with terminal.working")[0] + (
+        "from coordlang.__main__ import main\n"
+        "import planners.search.optimal_plans\n"
+        "terminal._INTERVAL = 0.01\n"
+        f"sys.argv[1:] = {arguments}\n"
+        "main()\n"
+    )
+    out, shown = on_a_terminal(code)
+    assert out.strip().isdigit()
+    assert re.search(r"finding all optimal plans: [\d,]+ states within \d+ steps", shown)
+    assert "joint steps a second" in shown
+
+
+@pytest.mark.thorough
+def test_no_colour() -> None:
+    _, shown = on_a_terminal(CODE, NO_COLOR="1")
+    assert "first thing .." in shown
+    assert "\x1b[3" not in shown  # cursor movements are no colours
+
+
+def test_short_work_shows_nothing() -> None:
+    code = "from coordlang.commands import terminal\nwith terminal.working('x') as say: say('y')\n"
+    code += "import sys; print('rich' in sys.modules)"
+    assert on_a_terminal(code) == ("False\n", "")
+
+
+def test_no_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    for stderr in (io.StringIO(), None):
+        monkeypatch.setattr(sys, "stderr", stderr)
+        with terminal.working("x") as say:
+            say("y")
+        with terminal.bar() as show:
+            show(1, 2, "z")
+        if stderr is not None:
+            assert stderr.getvalue() == ""
+
+
+def test_an_error_ends_the_spinner() -> None:
+    code = CODE.split("with terminal.working")[0] + (
+        "try:\n"
+        "    with terminal.working('work'):\n"
+        "        time.sleep(0.5)\n"
+        "        raise ValueError('broken')\n"
+        "except ValueError as error:\n"
+        "    print(error, file=sys.stderr)\n"
+    )
+    _, shown = on_a_terminal(code)
+    assert shown.rstrip().endswith("broken")

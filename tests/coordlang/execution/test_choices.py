@@ -1,0 +1,383 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A robot's choices against the definition: every combination is optimal, and no subplan is left
+out.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+
+from coordlang.commands.building import build_language
+from coordlang.execution.automaton import Automaton, determinise
+from coordlang.execution.choices import Choices, RobotChoices, choices
+from coordlang.execution.choices_file import monitor
+from coordlang.execution.own_facts import OwnFacts
+from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
+from coordlang.language.candidates import all_pairs, from_problems
+from coordlang.language.partition import Partition
+from coordlang.required.miscoordination import Inseparable
+from coordlang.verification.by_definition import verify
+from planners.pddl import parse_domain, parse_problem, read_domain, read_problem
+from planners.pddl.sexpr import Source
+from planners.search.plans import Plans
+from planners.system.errors import OutOfMemory
+from tests.support import naive
+from tests.support.domains import DOMAINS
+from tests.support.naive_choices import Listed, accepted, listed
+from tests.support.random_choices import (
+    RUNS,
+    in_built_languages,
+    in_random_words,
+    sentence_of,
+    with_twins,
+)
+from tests.support.random_chores import DOMAIN
+
+
+def moves(automaton: Automaton) -> list[dict[int, int]]:
+    return [dict(automaton.moves(state)) for state in range(len(automaton))]
+
+
+def check_automata(found: Choices, twin: Listed) -> None:
+    """Each automaton accepts exactly the robot's own parts, is deterministic, and the least that
+    knows what it knows.
+    """
+    facts = found.task_language.model.codec.facts.texts
+    for own, parts in zip(found.robots, twin.own, strict=True):
+        automaton = own.automaton
+        assert accepted(moves(automaton)) == parts
+        assert automaton.count == len(parts)
+        for state in range(len(automaton)):
+            labels = [label for label, _ in automaton.moves(state)]
+            assert labels == sorted(set(labels))
+        plain = determinise(found.fits, own.robot)
+        assert accepted(moves(plain)) == parts
+        assert len(plain) == twin.least(own.robot)
+        if own.atoms == "exact":
+            known = twin.knows(own.robot)
+            assert len(automaton) == twin.least(own.robot, known)
+        for part in parts:
+            state = 0
+            for step in range(len(part) + 1):
+                assert state in automaton.layers[step]
+                true, possible = automaton.known[state]
+                said = (
+                    frozenset(f for n, f in enumerate(facts) if true >> n & 1),
+                    frozenset(f for n, f in enumerate(facts) if not possible >> n & 1),
+                )
+                if own.atoms == "exact":
+                    assert said == known[part[:step]]
+                if step < len(part):
+                    state = dict(automaton.moves(state))[part[step]]
+
+
+def check_combinations(found: Choices, twin: Listed) -> None:
+    """Every combination of choices, stepped through all robots' monitors, is an optimal plan; they
+    allow no others.
+    """
+    labels = found.task_language.model.labels
+    robots = found.task_language.model.robots
+    for chosen in product(*(accepted(moves(own.automaton)) for own in found.robots)):
+        monitors = [monitor(found, robot) for robot in robots]
+        for step in zip(*chosen, strict=True):
+            for number, (at, label) in enumerate(zip(monitors, step, strict=True)):
+                text = labels[number][label] if label else None
+                assert text in at.allowed()
+                at.did(text)
+        assert all(at.finished and at.allowed() == () for at in monitors)
+        plan = tuple(zip(*chosen, strict=True))
+        assert plan in twin.optimal, "a combination of choices is no optimal plan"
+
+
+@pytest.mark.parametrize(("robots", "models"), RUNS)
+def test_every_combination_is_optimal(robots: int, models: int) -> None:
+    seen: Counter[str] = Counter()
+    stepped: Counter[int] = Counter()
+    for seed, task_language, words, twin in with_twins(in_built_languages, robots, models):
+        found = choices(task_language, words)
+        assert found.guaranteed
+        assert found.mixtures is not None
+        assert found.mixtures.space is not None
+        assert Plans.of(found.mixtures.space).count == twin.combinations
+        assert all(own.atoms == "exact" for own in found.robots)
+        check_automata(found, twin)
+        seen["several for two"] += sum(len(own) > 1 for own in twin.own) > 1
+        seen["several for all"] += all(len(own) > 1 for own in twin.own)
+        seen["another sentence"] += twin.combinations > len(twin.plans)
+        seen["knowledge splits"] += any(
+            len(own.automaton) > len(determinise(found.fits, own.robot)) for own in found.robots
+        )
+        if twin.combinations > 1 and stepped[seed] < 200:
+            check_combinations(found, twin)
+            stepped[seed] += twin.combinations
+            seen["stepped"] += twin.combinations
+    assert seen["several for two"] >= models / 4, seen
+    assert seen["several for all"] >= models // 20, seen
+    assert seen["another sentence"] >= models // 50, seen
+    assert seen["knowledge splits"] >= models / 10, seen
+
+
+@pytest.mark.parametrize(("robots", "models"), RUNS)
+def test_a_broken_language_is_found_out(robots: int, models: int) -> None:
+    """Under any partition the walk agrees with the list; where that says no, the property above
+    fails.
+    """
+    seen: Counter[bool] = Counter()
+    for _, task_language, words, twin in with_twins(in_random_words, robots, models):
+        found = choices(task_language, words)
+        assert found.mixtures is not None
+        assert found.mixtures.holds == found.guaranteed == twin.mixes
+        seen[twin.mixes] += 1
+        if not twin.mixes:
+            assert all(own.atoms == "own" for own in found.robots)
+            check_violation(found, twin)
+            check_automata(found, twin)
+            with pytest.raises(AssertionError, match="no optimal plan"):
+                check_combinations(found, twin)
+    assert min(seen[True], seen[False]) >= models / 4, seen
+
+
+def check_violation(found: Choices, twin: Listed) -> None:
+    """What is shown: plans with the sentence, whose mixture is no optimal plan, and breaks where it
+    says.
+    """
+    assert found.mixtures is not None
+    shown = found.mixtures.violation
+    assert shown is not None
+    model = found.task_language.model
+    followed = tuple(
+        tuple(naive.known(model.numbers(step)) for step in plan) for plan in shown.plans
+    )
+    assert set(followed) <= set(twin.plans)
+    mixed = naive.mixture(followed)
+    assert mixed not in twin.optimal
+    steps = tuple(naive.known(model.numbers(step)) for step in shown.mixture)
+    assert steps == mixed[: len(steps)]
+    assert not any(plan[: len(steps)] == steps for plan in twin.optimal)
+    assert any(plan[: len(steps) - 1] == steps[:-1] for plan in twin.optimal)
+
+
+@pytest.mark.parametrize(("robots", "models"), RUNS)
+def test_own_atoms_are_known(robots: int, models: int) -> None:
+    """Without all combinations: what the own subactions say is true in every mixture, and nothing
+    else is said.
+    """
+    seen: Counter[str] = Counter()
+    for _, task_language, words, twin in with_twins(in_random_words, robots, models):
+        if not twin.mixes:
+            continue
+        found = choices(task_language, words, most=0)
+        if len(found.robots[0].automaton.layers) > 1:
+            assert found.mixtures is None
+            check_automata(found, twin)
+            for own in found.robots:
+                assert own.atoms == "own"
+                check_own_atoms(task_language, own, twin, seen)
+    assert min(seen["true"], seen["false"], seen["unknown"]) >= 100, seen
+
+
+def check_own_atoms(
+    task_language: TaskLanguage, own: RobotChoices, twin: Listed, seen: Counter[str]
+) -> None:
+    known = twin.knows(own.robot)
+    mask = OwnFacts.of(task_language.model, own.robot).mask
+    facts = task_language.model.codec.facts.texts
+    for part in twin.own[own.robot]:
+        state = 0
+        for step, label in enumerate((*part, None)):
+            true, possible = own.automaton.known[state]
+            for number, fact in enumerate(facts):
+                says = (
+                    "true"
+                    if true >> number & 1
+                    else "unknown"
+                    if possible >> number & 1
+                    else "false"
+                )
+                seen[says] += 1
+                assert (says == "unknown") == (not mask >> number & 1)
+                assert says == "unknown" or fact in known[part[:step]][says == "false"]
+            if label is not None:
+                state = dict(own.automaton.moves(state))[label]
+
+
+#: Every shipped domain; with three robots where there are some.
+SHIPPED = [
+    ("three-cells", "problem"),
+    ("t-map", "problem"),
+    ("corridor", "problem"),
+    ("grid", "corners-3x3"),
+    ("grid", "three-robots-3x3"),
+    ("grid-joint", "corners-3x3"),
+    ("grid-joint", "t-map"),
+    ("handover", "exchange"),
+    ("handover", "three-rooms"),
+    ("two-arms", "*"),
+    ("push-box", "around"),
+    ("push-box", "three-robots"),
+    ("tray", "*"),
+    ("vans", "*"),
+    ("lock", "let-in"),
+    ("lock", "three-robots"),
+    ("charger", "queue"),
+    ("charger", "three-robots"),
+    ("elevator", "two-calls"),
+    ("elevator", "same-floor"),
+]
+
+
+def shipped(folder: str, name: str) -> Iterator[TaskLanguage]:
+    domain = read_domain(DOMAINS / folder / "domain.pddl")
+    for path in sorted((DOMAINS / folder).glob(f"{name}.pddl")):
+        if path.name == "domain.pddl":
+            continue
+        problem = read_problem(path, domain)
+        candidates = from_problems(domain, [problem])
+        try:
+            language = build_language(candidates).language
+        except Inseparable:
+            from planners.pddl.model_options import ModelOptions
+
+            candidates = from_problems(domain, [problem], ModelOptions(remember_actions=True))
+            language = build_language(candidates).language
+        yield from languages_in_tasks(language, candidates)
+
+
+@pytest.mark.parametrize(("folder", "name"), SHIPPED)
+def test_shipped_domains(folder: str, name: str) -> None:
+    robots = 0
+    for task_language in shipped(folder, name):
+        robots = max(robots, len(task_language.model.robots))
+        try:
+            twins = list(listed(task_language, 2000, 3000))
+        except naive.TooLarge:
+            twins = []
+        for words, twin in twins[:12]:
+            found = choices(task_language, words)
+            assert found.guaranteed
+            assert found.mixtures is not None
+            check_automata(found, twin)
+            if twin.combinations <= 200:
+                check_combinations(found, twin)
+        if not twins:
+            plan = next(iter(Plans.of(task_language.space, task_language.task)))
+            states = Plans(task_language.space, task_language.start, []).states(plan)
+            words = naive.sentence(
+                [
+                    int(task_language.partition.word_of(task_language.space.rows[[s]])[0])
+                    for s in states
+                ]
+            )
+            assert choices(task_language, words).guaranteed
+    assert robots == 3 or not name.startswith("three-robots")
+
+
+@pytest.mark.parametrize(
+    ("folder", "name"),
+    [("elevator", "*"), ("tray", "*"), ("grid-joint", "gw1-2x2"), ("handover", "exchange")],
+)
+def test_own_atoms_of_shipped_domains(folder: str, name: str) -> None:
+    """Conditional effects, whole joint actions and shared subactions: what is said to be known is
+    known.
+    """
+    seen: Counter[str] = Counter()
+    for task_language in shipped(folder, name):
+        with suppress(naive.TooLarge):
+            for words, twin in list(listed(task_language, 2000, 3000))[:6]:
+                for own in choices(task_language, words, most=0).robots:
+                    assert own.atoms == "own"
+                    check_own_atoms(task_language, own, twin, seen)
+    assert seen["unknown"] >= 10
+
+
+def test_all_tasks_of_the_t_map() -> None:
+    """Every sentence of all 132 tasks, with the smallest language."""
+    domain = read_domain(DOMAINS / "t-map" / "domain.pddl")
+    candidates = all_pairs(domain, [read_problem(DOMAINS / "t-map" / "problem.pddl", domain)])
+    language = build_language(candidates, "minimal").language
+    assert len(language.words) == 3
+    tasks = 0
+    for task_language in languages_in_tasks(language, candidates):
+        for words, twin in listed(task_language, 1000, 1000):
+            found = choices(task_language, words)
+            check_automata(found, twin)
+            check_combinations(found, twin)
+        tasks += 1
+    assert tasks == 132
+
+
+@pytest.mark.parametrize("robots", [2, 3])
+def test_choices_may_leave_the_sentence(robots: int) -> None:
+    """Each robot has two things to do, in any order, and the word says whether an even number of
+    robots began with the second.  The sentence leaves half of the plans open, and yet each robot
+    both orders: every combination is optimal, and half of them have the other sentence.
+    """
+    names = [f"r{n}" for n in range(robots)]
+    items = [(r, f"{r}{x}") for r in names for x in "ab"]
+    text = (
+        f"(define (problem p) (:domain chores) (:objects {' '.join(names)} - robot {' '.join(f'c{i}' for _, i in items)} - chore "
+        f"{' '.join(f't{i}' for _, i in items)} - thing)\n"
+        f"(:init {' '.join(f'(mine {r} c{i}) (gets c{i} t{i})' for r, i in items)})"
+        f"(:goal (and {' '.join(f'(got t{i})' for _, i in items)})))"
+    )
+    domain = parse_domain(Source("d", DOMAIN))
+    candidates = from_problems(domain, [parse_problem(Source("p", text), domain)])
+    space, codec = candidates.spaces[0], candidates.model.codec
+    begun = [
+        {fact for fact in codec.decode(row) if fact.startswith("(done") and fact.endswith("b)")}
+        for row in space.rows
+    ]
+    layer = dict(zip(space.state.tolist(), space.layer.tolist(), strict=True))
+    word = np.array([1 + len(begun[s]) % 2 if layer[s] == 1 else 0 for s in range(len(space.rows))])
+    table = Partition(("start", "even", "odd"), space.rows, word, 0)
+    assert verify(table, candidates.spaces).holds
+    task_language = TaskLanguage(None, table, space, 0, word[space.state], True)  # type: ignore[arg-type]
+    for words, twin in listed(task_language, 100, 100):
+        found = choices(task_language, words)
+        check_automata(found, twin)
+        check_combinations(found, twin)
+        assert [own.automaton.count for own in found.robots] == [2] * robots
+        assert twin.combinations == 2**robots == 2 * len(twin.plans) == len(twin.optimal)
+
+
+def test_too_many_are_refused_with_an_estimate(monkeypatch: pytest.MonkeyPatch) -> None:
+    task_language = next(shipped("grid", "corners-4x4"))
+    words = task_language.words_of(sentence_of(task_language))
+    fits = task_language.plans_with(words)
+    with pytest.raises(
+        OutOfMemory, match=r"after 1 of 6 steps their subsets have 1 members, at this rate about"
+    ):
+        determinise(fits, 0, most=0)
+    monkeypatch.setattr("coordlang.execution.mixtures.SMALL", 0)
+    monkeypatch.setattr("coordlang.execution.mixtures.memory_left", lambda: 0)
+    with pytest.raises(
+        OutOfMemory, match=r"step 1 has \d+ combinations of what the robots may do"
+    ) as caught:
+        choices(task_language, words, most=None)
+    assert caught.value.exit_code == 22
+    assert choices(task_language, words).mixtures is None
+    assert choices(task_language, words).guaranteed
+
+
+def test_a_task_that_starts_at_its_goal() -> None:
+    domain = read_domain(DOMAINS / "t-map" / "domain.pddl")
+    problem = read_problem(DOMAINS / "t-map" / "problem.pddl", domain)
+    from planners.pddl.lifted import TRUE
+
+    candidates = from_problems(domain, [replace(problem, goal=TRUE)])
+    (task_language,) = languages_in_tasks(build_language(candidates).language, candidates)
+    found = choices(task_language, (int(task_language.word[task_language.start]),))
+    for own, robot in zip(found.robots, task_language.model.robots, strict=True):
+        assert len(own.automaton) == own.automaton.count == 1
+        at = monitor(found, robot)
+        assert at.finished
+        assert (at.step, at.remaining, at.allowed()) == (0, 1, ())
+        assert at.can(never="(move *)")
+        assert not at.can(do="(move *)")

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A* under a sentence: optimal, with the sentence, and valid by the independent checker."""
+
+from __future__ import annotations
+
+import json
+from itertools import chain, pairwise, product
+from pathlib import Path
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from coordlang.execution.fitting_plans import NoPlanFits
+from coordlang.execution.guided_search import ExpandedStates, a_star, plan_under_sentence
+from coordlang.execution.task_language import TaskLanguage
+from coordlang.language.candidates import Candidates
+from coordlang.language.listed import ground_task
+from planners.check.validate import validate
+from planners.search.heuristics import heuristic
+from planners.search.plan_file import read_plans, texts
+from planners.system.errors import UsageError
+from tests.support.command import Command
+from tests.support.domains import DOMAINS
+from tests.support.naive_sentences import by_sentence
+from tests.support.task_languages import SHIPPED, random_task_language, shipped
+
+
+def check(candidates: Candidates, task_language: TaskLanguage, names: tuple[str, ...]) -> int:
+    """The searches made; every sentence of the task with every heuristic."""
+    loaded, groups = candidates.loaded, by_sentence(task_language)
+    problem = loaded.problems[0]
+    init, goal = ground_task(loaded.domain, problem, candidates.listed[0])
+    terrain, searches = ExpandedStates(task_language.model, task_language.partition), 0
+    for name in names:
+        without = plan_under_sentence(task_language, None, name, terrain)
+        assert without.cost == task_language.space.cost_of(0)
+        assert any(without.plan in plans for plans in groups.values())
+        for words, plans in list(groups.items())[:25]:
+            for count_words in (True, False):
+                found = plan_under_sentence(
+                    task_language,
+                    task_language.words_of(words),
+                    name,
+                    terrain,
+                    count_words=count_words,
+                )
+                assert found.plan in plans
+                assert found.words == task_language.words_of(words)
+                assert found.cost == without.cost
+                assert found.states <= found.expanded < found.generated + 1
+                searches += 1
+            said = texts(task_language.model, found.plan)
+            verdict = validate(loaded.domain, problem, loaded.team, said, init=init, goal=goal)
+            assert verdict.valid, verdict.reason
+    return searches
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_domains(name: str) -> None:
+    candidates, task_language = shipped(name)
+    space = task_language.space
+    init = space.rows[space.state[task_language.start]]
+    try:
+        heuristic("manhattan", task_language.model, space.goals[0], init)
+        names = ["blind", "relaxed", "manhattan"]
+    except UsageError:
+        names = ["blind", "relaxed"]
+    assert check(candidates, task_language, tuple(names)) > 1
+
+
+@pytest.mark.parametrize("robots", [2, 3])
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 10**6))
+def test_random_models(robots: int, seed: int) -> None:
+    check(*random_task_language(seed, robots), ("blind", "relaxed"))
+
+
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 10**6), robots=st.sampled_from([2, 3]))
+def test_a_state_is_looked_at_once(seed: int, robots: int) -> None:
+    """By breadth every state is expanded once, whatever the sentence, and none that is farther than
+    the goal.
+    """
+    _, task_language = random_task_language(seed, robots)
+    space, model = task_language.space, task_language.model
+    assume(model.cost == "makespan")
+    terrain = ExpandedStates(model, task_language.partition)
+    most = _expandable(terrain, space.rows[space.state[task_language.start]], space.cost_of(0)[0])
+    for words in list(by_sentence(task_language))[:10]:
+        found = plan_under_sentence(
+            task_language, task_language.words_of(words), "blind", terrain, count_words=False
+        )
+        assert found.states == found.expanded <= most
+
+
+def _expandable(terrain: ExpandedStates, init: object, makespan: int) -> int:
+    """How many states are nearer to the start than the goal is."""
+    layer = set(terrain.numbers(init[None, :]))  # type: ignore[index]
+    seen = set(layer)
+    for _ in range(makespan - 1):
+        layer = {target for state in layer for target, _, _ in terrain.steps(state)} - seen
+        seen |= layer
+    return len(seen) if makespan else 0
+
+
+def test_a_sentence_of_longer_plans_only_is_no_sentence() -> None:
+    """A* alone may find a longer plan with the sentence; `plan_under_sentence` knows that it is not optimal."""
+    task_language = shipped("t-map/problem")[1]
+    space = task_language.space
+    sentences = [task_language.words_of(words) for words in by_sentence(task_language)]
+    terrain = ExpandedStates(task_language.model, task_language.partition)
+    goal, init = space.goals[0], space.rows[space.state[task_language.start]]
+    bound = heuristic("relaxed", task_language.model, goal, init)
+    found = {}
+    for words in chain.from_iterable(product(range(3), repeat=length) for length in range(1, 6)):
+        if words not in sentences and all(a != b for a, b in pairwise(words)):
+            result = a_star(terrain, init, goal, bound, words)
+            if result is not None:
+                found[words] = result
+    assert found
+    for words, result in found.items():
+        assert result.cost > space.cost_of(0)
+        assert result.words == words
+        with pytest.raises(NoPlanFits):
+            plan_under_sentence(task_language, words)
+
+
+# -- the command
+# ---------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def files(language: Path, t_map: tuple[Path, Path]) -> tuple[Path, Path, Path]:
+    return language, *t_map
+
+
+def test_prints_a_plan_with_its_sentence(
+    coordlang: Command, files: tuple[Path, ...], tmp_path: Path
+) -> None:
+    path = tmp_path / "plan.txt"
+    for sentence in ("w0 w1 w3 w2 w0", "w0 w2 w3 w1 w0"):
+        for heuristic_name in ("relaxed", "manhattan", "blind"):
+            outcome = coordlang("plan", *files, sentence, "--heuristic", heuristic_name)
+            assert outcome.code == 0
+            assert outcome.out.endswith(f"; makespan = 4\n; sentence = {sentence}\n")
+            assert f"A* ({heuristic_name}) expanded" in outcome.err
+            path.write_text(outcome.out)
+            assert coordlang("say", *files, path).out == sentence + "\n"
+
+
+def test_json(coordlang: Command, files: tuple[Path, ...], tmp_path: Path) -> None:
+    outcome = coordlang("plan", *files, "w0 w1 w3 w2 w0", "--json")
+    data = json.loads(outcome.out)
+    assert outcome.err == ""
+    assert (data["sentence"], data["count"], data["optimal_cost"], len(data["plans"])) == (
+        "w0 w1 w3 w2 w0",
+        1,
+        4,
+        1,
+    )
+    search = data["search"]
+    assert search["expanded"] == 4 < search["without_sentence"]["expanded"]
+    path = tmp_path / "plan.json"
+    path.write_text(outcome.out)
+    task_language = shipped("t-map/problem")[1]
+    assert len(read_plans(path, task_language.model)) == 1
+
+
+def test_usage(coordlang: Command, files: tuple[Path, ...]) -> None:
+    assert coordlang("plan", *files).code == 2
+    assert coordlang("plan", *files, "w0", "--prefer", "shortest").code == 2
+    assert coordlang("plan", *files, "w0", "--heuristic", "best").code == 2
+
+
+def test_manhattan_needs_coordinates(coordlang: Command, tmp_path: Path) -> None:
+    files = DOMAINS / "three-cells" / "domain.pddl", DOMAINS / "three-cells" / "problem.pddl"
+    language = tmp_path / "language.json"
+    assert coordlang("build", *files, "-o", language).code == 0
+    outcome = coordlang(
+        "plan", language, *files, "--prefer", "shortest", "--heuristic", "manhattan"
+    )
+    assert (outcome.code, "needs a goal with places such as c2-3" in outcome.err) == (2, True)

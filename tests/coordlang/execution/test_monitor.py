@@ -1,0 +1,402 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The run-time monitor: its answers against the definition, over all own subplans and all mixtures;
+its files.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+import shutil
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import pytest
+
+from coordlang.commands.building import build_language
+from coordlang.execution import monitor as monitor_module
+from coordlang.execution.choices import Choices, choices
+from coordlang.execution.choices_file import monitor, to_bytes, to_data
+from coordlang.execution.monitor import Detour, Monitor, MonitorError, NotAllowed, NotPossible
+from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
+from coordlang.language.candidates import from_problems
+from planners.pddl import read_domain, read_problem
+from tests.support.domains import DOMAINS
+from tests.support.naive_choices import Known, Listed, Own
+from tests.support.random_choices import RUNS, in_built_languages, sentence_of, with_twins
+
+
+def spoken_of(folder: str, name: str) -> TaskLanguage:
+    domain = read_domain(DOMAINS / folder / "domain.pddl")
+    candidates = from_problems(domain, [read_problem(DOMAINS / folder / f"{name}.pddl", domain)])
+    return next(languages_in_tasks(build_language(candidates).language, candidates))
+
+
+@pytest.fixture(scope="module")
+def three_cells() -> Choices:
+    task_language = spoken_of("three-cells", "problem")
+    return choices(task_language, task_language.words_of("w1 w0"))
+
+
+@pytest.fixture(scope="module")
+def corridor() -> Choices:
+    task_language = spoken_of("corridor", "problem")
+    return choices(task_language, task_language.words_of(sentence_of(task_language)))
+
+
+def texts(task_language: TaskLanguage, robot: int, own: Own) -> list[str | None]:
+    return [task_language.model.labels[robot][label] if label else None for label in own]
+
+
+def random_detour(
+    random: Random, task_language: TaskLanguage, robot: int, left: set[Own], known: dict[Own, Known]
+) -> Detour:
+    """What tells two of the subplans that are left apart, or anything else; each kind not at all,
+    once or twice.
+    """
+    one, other = random.choice(sorted(left)), random.choice(sorted(left))
+
+    def some(of: set[str], elsewhere: set[str]) -> tuple[str, ...]:
+        telling = sorted(of - elsewhere if random.random() < 0.7 else of | elsewhere)
+        return tuple(random.sample(telling, min(len(telling), random.choice([0, 0, 0, 1, 1, 2]))))
+
+    def done(own: Own) -> set[str]:
+        found = {text or "idle" for text in texts(task_language, robot, own)}
+        return found | (
+            {f"{text.rsplit(' ', 1)[0]} *)" for text in found if " " in text}
+            if random.random() < 0.3
+            else set()
+        )
+
+    def along(own: Own, value: int) -> list[frozenset[str]]:
+        return [known[own[:step]][value] for step in range(len(own) + 1)]
+
+    def visited(own: Own) -> set[str]:
+        return set().union(*along(own, 0))
+
+    def avoided(own: Own) -> set[str]:
+        return set(task_language.model.codec.facts.texts).intersection(*along(own, 1))
+
+    anything = set(task_language.model.codec.facts.texts)
+    if random.random() < 0.3:  # also what is never known
+        return Detour(some(anything, set()), some(anything, set()))
+    return Detour(
+        some(visited(one), visited(other)),
+        some(avoided(one), avoided(other)),
+        some(done(one), done(other)),
+        some(done(other), done(one)),
+    )
+
+
+def subplans(at: Monitor) -> set[tuple[str | None, ...]]:
+    """All that a monitor allows from where it is, found by stepping copies of it through."""
+    if at.finished:
+        return {at.history}
+    found = set()
+    for text in at.allowed():
+        found |= subplans(stepped(at, text))
+    return found
+
+
+def stepped(at: Monitor, text: str | None) -> Monitor:
+    after = at.copy()
+    after.did(text)
+    return after
+
+
+@pytest.mark.parametrize(("robots", "models"), RUNS)
+def test_detours_against_the_definition(robots: int, models: int) -> None:
+    """After a random beginning, two random detours one after the other: asked, then promised, then
+    walked.
+    """
+    seen: Counter[str] = Counter()
+    for seed, task_language, words, twin in with_twins(in_built_languages, robots, models):
+        random = Random(seed)
+        data = json.loads(to_bytes(choices(task_language, words)))
+        for robot, name in enumerate(task_language.model.robots):
+            known = twin.knows(robot)
+            for _ in range(8 if len(twin.own[robot]) > 1 else 1):
+                check_detours(random, task_language, twin, Monitor(data, name), robot, known, seen)
+    assert min(seen["possible"], seen["impossible"], seen["less is left"]) >= models, seen
+
+
+def check_detours(
+    random: Random,
+    task_language: TaskLanguage,
+    twin: Listed,
+    at: Monitor,
+    robot: int,
+    known: dict[Own, Known],
+    seen: Counter[str],
+) -> None:
+    """Promise, step, promise again: the answer, its witness, its count, and what is allowed then
+    are by definition.
+    """
+    left = set(twin.own[robot])
+    here = 0
+    for _ in range(2):
+        chosen = random.choice(sorted(left))
+        stop = random.choice([here, random.randint(here, len(chosen))])
+        for label in chosen[here:stop]:
+            at.did(task_language.model.labels[robot][label] if label else None)
+        here = stop
+        left = {own for own in left if own[:here] == chosen[:here]}
+        for number, fact in enumerate(task_language.model.codec.facts.texts):
+            true, false = known[chosen[:here]]
+            assert at.known(fact) == (True if fact in true else False if fact in false else None), (
+                number
+            )
+        detour = random_detour(random, task_language, robot, left, known)
+        expected = twin.fulfilling(robot, chosen[:here], detour, known) & left
+        answer = at.can(detour)
+        assert bool(answer) == bool(expected)
+        assert answer.subplans == len(expected)
+        seen["possible" if expected else "impossible"] += 1
+        before = (at.allowed(), at.remaining, at.step, at.promised)
+        if not expected:
+            assert answer.subplan is None
+            with pytest.raises(NotPossible):
+                at.commit(detour)
+            assert (at.allowed(), at.remaining, at.step, at.promised) == before
+            continue
+        assert answer.subplan in {
+            tuple(texts(task_language, robot, own[here:])) for own in expected
+        }
+        at.commit(detour)
+        assert at.remaining == len(expected)
+        assert subplans(at) == {tuple(texts(task_language, robot, own)) for own in expected}
+        seen["less is left"] += len(expected) < len(left)
+        left = expected
+
+
+def test_monitor_by_hand(three_cells: Choices) -> None:
+    at = monitor(three_cells, "r2")
+    assert (at.robot, at.sentence, at.atoms) == ("r2", "w1 w0", "exact")
+    assert (at.step, at.remaining, at.finished) == (0, 2, False)
+    assert at.allowed() == (None, "(move r2 b a)")
+    assert at.known("(at r2 b)") is True
+    assert at.can(visit="(at r2 b)", avoid="(at r2 c)")
+    assert not at.can(never=None)
+    assert at.can(never="(move r2 * c)", visit=["(at r2 a)", "(at r2 b)"]).subplan == (
+        None,
+        "(move r2 b a)",
+    )
+    assert not at.can(do="(move r2 b c)")
+    assert at.can(do=["idle", "(move r2 * a)"]).subplans == 2
+    with pytest.raises(
+        NotAllowed,
+        match=r"step 1: r2 may not do \(move r2 b c\); it may do idle or \(move r2 b a\)",
+    ) as caught:
+        at.did("(move r2 b c)")
+    assert (caught.value.step, caught.value.allowed) == (0, (None, "(move r2 b a)"))
+    assert (at.step, at.remaining, at.history) == (0, 2, ())
+    at.did(" ( MOVE r2  b a )")
+    assert at.history == ("(move r2 b a)",)
+    assert at.known("(at r2 a)") is True
+    assert at.known("(at r1 c)") is True
+    assert at.allowed() == (None,)
+    with pytest.raises(NotAllowed, match=r"step 2: r2 may not do \(move r2 a b\); it may do idle"):
+        at.did("(move r2 a b)")
+    at.did("idle")
+    assert at.finished
+    assert at.allowed() == ()
+    with pytest.raises(NotAllowed, match="step 3: r2 may not do idle; all its steps are done"):
+        at.did(None)
+
+
+def test_a_promise_is_kept(corridor: Choices) -> None:
+    """In the corridor somebody has a detour to choose; a promise narrows what is allowed, step by
+    step.
+    """
+    for robot in corridor.task_language.model.robots:
+        at = monitor(corridor, robot)
+        if at.remaining > 1:
+            break
+    whole = at.remaining
+    target = at.can().subplan
+    assert target is not None
+    at.commit(do=[text for text in target if text])
+    assert 1 <= at.remaining <= whole
+    for _ in target:
+        kept = at.can()
+        assert kept.subplans == at.remaining
+        at.did(at.allowed()[-1])
+    assert at.finished
+    assert at.remaining == 1
+    assert set(filter(None, target)) <= set(at.history)
+
+
+def test_messages(three_cells: Choices) -> None:
+    at = monitor(three_cells, "r1")
+    with pytest.raises(
+        MonitorError, match=r"\(at r9 a\) is no atom that can change: there are \(at r1 a\), "
+    ):
+        at.can(visit="(at r9 a)")
+    with pytest.raises(
+        MonitorError, match=r"\(free a\) is no atom that can change: none is \(free \.\.\)"
+    ):
+        at.known("(free a)")
+    with pytest.raises(MonitorError, match=r"'at r1 a' is no PDDL text"):
+        at.can(avoid="at r1 a")
+    with pytest.raises(TypeError, match="seen"):
+        at.can(seen="(at r1 a)")
+    with pytest.raises(NotPossible, match="step 1: r1 has no subplan left for this"):
+        at.commit(never="(move r1 a c)")
+    at.commit(do="(move r1 a c)")
+    with pytest.raises(NotPossible, match="together with what was promised before"):
+        at.commit(never="(move *)")
+    with pytest.raises(MonitorError, match="no choices of r7; it has those of r1, r2"):
+        Monitor(to_data(three_cells), "r7")
+    with pytest.raises(MonitorError, match="whose choices"):
+        Monitor(to_data(three_cells))
+
+
+def test_a_robot_can_carry_it(three_cells: Choices, tmp_path: Path) -> None:
+    """One file of Python and one of JSON, in an interpreter without any package: it does the same."""
+    shutil.copy(monitor_module.__file__, tmp_path / "monitor.py")
+    (tmp_path / "choices.json.gz").write_bytes(gzip.compress(to_bytes(three_cells)))
+    program = (
+        "import sys; sys.path[:] = [p for p in sys.path if 'site-packages' not in p]; sys.path.insert(0, sys.argv[1])\n"
+        "from monitor import Monitor\n"
+        "at = Monitor.read(sys.argv[1] + '/choices.json.gz', 'r2')\n"
+        "print(at.allowed(), at.can(visit='(at r2 a)').subplan); at.did('(move r2 b a)'); print(at.allowed(), at.remaining)\n"
+        "third = [m for m in sys.modules if m.split('.')[0] in ('numpy', 'planners', 'coordlang', 'msgspec')]; print(third)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-I", "-S", "-c", program, str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.splitlines() == [
+        "(None, '(move r2 b a)') (None, '(move r2 b a)')",
+        "(None,) 1",
+        "[]",
+    ]
+
+
+def test_from_the_file_as_from_the_object(corridor: Choices, tmp_path: Path) -> None:
+    path = tmp_path / "choices.json"
+    path.write_bytes(to_bytes(corridor))
+    for robot in corridor.task_language.model.robots:
+        pairs = [(monitor(corridor, robot), Monitor.read(str(path), robot))]
+        while pairs:
+            one, other = pairs.pop()
+            assert one.allowed() == other.allowed()
+            assert (one.remaining, one.step, one.finished) == (
+                other.remaining,
+                other.step,
+                other.finished,
+            )
+            pairs += [(stepped(one, text), stepped(other, text)) for text in one.allowed()]
+
+
+def test_large_counts_survive_the_file() -> None:
+    """Above 2^53 the numbers are texts; a monitor counts for itself and agrees."""
+    states: list[dict[str, Any]] = [
+        {
+            "step": n,
+            "left": 0,
+            "next": {f"(go {k})": 2 * n + 1 + k % 2 for k in range(4)},
+            "true": [],
+            "unknown": [],
+        }
+        for n in range(1)
+    ]
+    depth = 30
+    for step in range(1, depth + 1):
+        for half in range(2):
+            after = {f"(go {k})": 2 * step + 1 + k % 2 for k in range(4)} if step < depth else {}
+            states.append(
+                {"step": step, "left": 0, "next": after, "true": [], "unknown": [], "half": half}
+            )
+    for state in states:
+        count = 4 ** (depth - state["step"])
+        state["left"] = count if count <= 2**53 else str(count)
+    entry = {"robot": "r", "atoms": "own", "facts": [], "others": [], "states": states}
+    data = {"format": "coordlang/choices", "version": 1, "sentence": "w0", "choices": [entry]}
+    at = Monitor(json.loads(json.dumps(data)))
+    assert at.remaining == 4**depth
+    assert at.can(do="(go 1)").subplans == 4**depth - 3**depth
+    states[3]["left"] = 7
+    with pytest.raises(MonitorError, match="state 3 says 7 subplans are left, but there are"):
+        Monitor(data)
+
+
+def test_corrupted_files(three_cells: Choices, tmp_path: Path) -> None:
+    """Whatever is wrong with a file: a `MonitorError`, or a file that is as good as the first."""
+    text = json.loads(to_bytes(three_cells))
+    random = Random(5)
+    refused = 0
+    for _ in range(400):
+        data = json.loads(json.dumps(text))
+        spoil(random, data)
+        try:
+            at = Monitor(data, "r2")
+            while not at.finished:
+                at.did(at.allowed()[0])
+        except MonitorError:
+            refused += 1
+    assert refused >= 80
+    path = tmp_path / "cut.json"
+    path.write_bytes(to_bytes(three_cells)[:-40])
+    with pytest.raises(MonitorError, match="cut off"):
+        Monitor.read(str(path), "r1")
+    with pytest.raises(MonitorError, match="version 2"):
+        Monitor({**text, "version": 2}, "r1")
+    with pytest.raises(MonitorError, match="expected a choices file"):
+        Monitor({**text, "format": "coordlang/language"}, "r1")
+
+
+def spoil(random: Random, data: Any) -> None:
+    """Change, drop or exchange one thing somewhere inside."""
+    while isinstance(data, dict | list) and data:
+        keys = list(data) if isinstance(data, dict) else list(range(len(data)))
+        key = random.choice(keys)
+        if isinstance(data[key], dict | list) and data[key] and random.random() < 0.8:
+            data = data[key]
+            continue
+        if random.random() < 0.3:
+            del data[key]
+        else:
+            data[key] = random.choice([None, -1, 0, 1, 2, 3, 99, "idle", "(x)", [], {}, True, 1.5])
+        return
+
+
+def crossings(number: int) -> Monitor:
+    """So many steps, in each of which the robot goes left or right; atoms say where it went."""
+    facts = [f"(at{step} {side})" for step in range(number) for side in ("left", "right")]
+    states: list[dict[str, Any]] = [{"step": 0, "left": 2**number, "true": [], "unknown": []}]
+    for step in range(number):
+        states += [
+            {"step": step + 1, "left": 2 ** (number - step - 1), "true": [fact], "unknown": []}
+            for fact in (2 * step, 2 * step + 1)
+        ]
+    for state in states:
+        first = 2 * state["step"] + 1
+        sides = enumerate(("(go left)", "(go right)"), first)
+        state["next"] = {text: to for to, text in sides if to < len(states)}
+    entry = {"robot": "r", "atoms": "exact", "facts": facts, "others": [], "states": states}
+    data = {"format": "coordlang/choices", "version": 1, "sentence": "w0", "choices": [entry]}
+    return Monitor(data)
+
+
+def test_detours_with_too_many_visits_are_refused_and_change_nothing() -> None:
+    """Every set of the visits may be made at a time: twice as many with each further visit."""
+    few = [f"(at{step} left)" for step in range(12)]
+    assert crossings(12).can(visit=few).subplans == 1
+    robot = crossings(40)
+    for visits in (few, 20 * few):
+        assert robot.can(visit=visits).subplans == 2**28
+    many = [f"(at{step} left)" for step in range(40)]
+    for ask in (robot.can, robot.commit):
+        with pytest.raises(MonitorError, match=r"40 visits and dos at once .* more than 262,144"):
+            ask(visit=many)
+    assert robot.remaining == 2**40
+    for atom in many:  # one after the other they are kept
+        robot.commit(visit=atom)
+    assert robot.remaining == 1

@@ -1,0 +1,326 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The plans that a sentence leaves open, counted, listed and drawn, against the list of all plans."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import Counter
+from pathlib import Path
+from random import Random
+from xml.etree import ElementTree
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coordlang.execution.drawing import COLOURS, cut_note, inks, to_dot
+from coordlang.execution.fitting_plans import NoPlanFits
+from coordlang.execution.open_plans import OpenPlans, open_plans_data
+from coordlang.execution.plan_dag import PlanDag, plan_dag
+from coordlang.execution.task_language import TaskLanguage
+from planners.search.plan_file import texts
+from planners.search.plans import Plan
+from tests.support.command import Command
+from tests.support.domains import DOMAINS
+from tests.support.naive_sentences import by_sentence
+from tests.support.task_languages import SHIPPED, random_task_language, shipped
+
+
+def check(task_language: TaskLanguage, seed: int) -> None:
+    """Every sentence of the task, and sentences near them."""
+    groups = by_sentence(task_language)
+    for words, plans in list(groups.items())[:40]:
+        understood = OpenPlans.of(task_language, task_language.words_of(words))
+        assert understood.count == len(plans)
+        assert set(understood.plans) == plans
+        check_dag(task_language, plan_dag(understood), plans)
+    random = Random(seed)
+    for _ in range(8):
+        check_broken(task_language, near(task_language, random, list(groups)), groups)
+
+
+def check_dag(task_language: TaskLanguage, graph: PlanDag, plans: set[Plan]) -> None:
+    """Its paths are the plans, its nodes have the right words and counts."""
+    check_paths(task_language, graph, plans)
+    assert all(graph.sentence[node.words - 1] == node.word for node in graph.nodes)
+
+
+def check_paths(task_language: TaskLanguage, graph: PlanDag, plans: set[Plan]) -> None:
+    assert graph.count == len(plans)
+    assert not graph.cut
+    through: Counter[int] = Counter()
+    found = set()
+    out: dict[int, list[tuple[int, tuple[str | None, ...]]]] = {}
+    for edge in graph.edges:
+        out.setdefault(edge.source, []).extend((edge.target, action) for action in edge.actions)
+    stack: list[tuple[list[int], list[tuple[str | None, ...]]]] = [([0], [])]
+    while stack:
+        path, actions = stack.pop()
+        if path[-1] not in out:
+            found.add(tuple(actions))
+            through.update(path)
+        stack += [([*path, target], [*actions, action]) for target, action in out.get(path[-1], [])]
+    assert found == {texts(task_language.model, plan) for plan in plans}
+    for number, node in enumerate(graph.nodes):
+        assert node.word == task_language.language.states.get(
+            node.key, task_language.language.default
+        )
+        assert node.plans == through[number]
+
+
+def near(
+    task_language: TaskLanguage, random: Random, sentences: list[tuple[str, ...]]
+) -> tuple[str, ...]:
+    """A sentence with a word changed, left out or put in."""
+    words = list(random.choice(sentences))
+    at = random.randrange(len(words) + 1)
+    words[at : at + random.randint(0, 1)] = random.choices(
+        task_language.language.words, k=random.randint(0, 1)
+    )
+    return tuple(w for n, w in enumerate(words) if n == 0 or w != words[n - 1])
+
+
+def check_broken(
+    task_language: TaskLanguage, words: tuple[str, ...], groups: dict[tuple[str, ...], set[Plan]]
+) -> None:
+    if not words or words in groups:
+        return
+    with pytest.raises(NoPlanFits) as refused:
+        OpenPlans.of(task_language, task_language.words_of(words))
+    longest = max(k for k in range(len(words) + 1) if any(said[:k] == words[:k] for said in groups))
+    assert refused.value.fitting == task_language.words_of(words)[:longest]
+    following = {
+        said[longest] if len(said) > longest else None
+        for said in groups
+        if said[:longest] == words[:longest]
+    }
+    assert {
+        task_language.language.words[w] if w is not None else None for w in refused.value.next_words
+    } == following
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_every_sentence_of_a_shipped_domain(name: str) -> None:
+    check(shipped(name)[1], 0)
+
+
+@pytest.mark.parametrize("robots", [2, 3])
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 10**6))
+def test_every_sentence_of_a_random_model(robots: int, seed: int) -> None:
+    check(random_task_language(seed, robots)[1], seed)
+
+
+# -- drawing
+# -------------------------------------------------------------------------------------------------------
+
+
+def largest(name: str) -> PlanDag:
+    """The DAG of the sentence that leaves most plans open."""
+    task_language = shipped(name)[1]
+    words = max(by_sentence(task_language).items(), key=lambda item: len(item[1]))[0]
+    return plan_dag(OpenPlans.of(task_language, task_language.words_of(words)))
+
+
+@pytest.mark.parametrize("most", [1, 7, 12, 20, 10_000])
+@pytest.mark.parametrize("name", ["grid/corners-4x4", "two-arms/pass-on", "grid/three-robots-3x3"])
+def test_a_cut_dag_says_what_is_missing(name: str, most: int) -> None:
+    task_language = shipped(name)[1]
+    words = max(by_sentence(task_language).items(), key=lambda item: len(item[1]))[0]
+    whole = largest(name)
+    small = plan_dag(OpenPlans.of(task_language, task_language.words_of(words)), most)
+    per_step = Counter(node.step for node in small.nodes)
+    assert len(small.nodes) <= max(most, 2 * len(per_step))
+    assert (
+        small.cut
+        == sum(node.merged for node in small.nodes)
+        == len(whole.nodes) - sum(not n.merged for n in small.nodes)
+    )
+    for step in per_step:
+        assert sum(node.plans for node in small.nodes if node.step == step) == whole.count
+        kept = [node.plans for node in small.nodes if node.step == step and not node.merged]
+        assert (
+            kept
+            == sorted((node.plans for node in whole.nodes if node.step == step), reverse=True)[
+                : len(kept)
+            ]
+        )
+    assert (cut_note(small) is None) == (small.cut == 0)
+    if small.cut:
+        assert f"cut: {small.cut} nodes" in to_dot(small)
+        assert "dashed" in to_dot(small)
+    else:
+        assert small == whole
+
+
+DRAWN = [
+    "grid/corners-4x4",
+    "three-cells/problem",
+    "handover/three-rooms",
+    "lock/three-robots",
+    "elevator/two-calls",
+    "grid-joint/corners-4x4",
+]
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_dot_has_every_node_and_edge(name: str) -> None:
+    graph = largest(name)
+    text = to_dot(graph)
+    assert len(re.findall(r"^    n\d+ \[", text, re.M)) == len(graph.nodes)
+    assert len(re.findall(r"^  n\d+ -> n\d+ \[", text, re.M)) == len(graph.edges)
+    assert text.count("{") == text.count("}")
+    assert all(line.count('"') % 2 == 0 for line in text.replace('\\"', "").splitlines())
+
+
+def test_words_have_colours_that_differ() -> None:
+    graph = largest("grid/three-robots-3x3")
+    found = inks(graph)
+    assert set(found) == set(graph.sentence)
+    assert len({ink.fill for ink in found.values()}) == min(len(found), len(COLOURS))
+    for ink in found.values():  # legible: a contrast of 3 at least (WCAG, large or bold text)
+        light, dark = sorted((luminance(ink.fill), luminance(ink.text)), reverse=True)
+        assert (light + 0.05) / (dark + 0.05) >= 3
+
+
+def luminance(colour: str) -> float:
+    parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    red, green, blue = (p / 12.92 if p <= 0.03928 else ((p + 0.055) / 1.055) ** 2.4 for p in parts)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+def test_a_task_without_steps_is_drawn(
+    coordlang: Command, tmp_path: Path, t_map: tuple[Path, Path]
+) -> None:
+    domain, problem = t_map
+    done, language = tmp_path / "done.pddl", tmp_path / "language.json"
+    done.write_text(re.sub(r"\(:goal.*", "(:goal (and)))", problem.read_text(), flags=re.S))
+    assert coordlang("build", domain, done, "-o", language).code == 0
+    for form in ("dot", "json", "ipc"):
+        outcome = coordlang("understand", language, domain, done, "w0", "--format", form)
+        assert outcome.code == 0, outcome.err
+        assert outcome.out
+
+
+# -- the command
+# ---------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def files(language: Path, t_map: tuple[Path, Path]) -> tuple[Path, Path, Path]:
+    return language, *t_map
+
+
+def test_lists_what_say_says(
+    coordlang: Command, files: tuple[Path, ...], t_map: tuple[Path, Path], tmp_path: Path
+) -> None:
+    path = tmp_path / "plans.json"
+    path.write_text(coordlang("plans", *t_map, "--json").out)
+    for sentence in coordlang("say", *files, path).out.splitlines():
+        path.write_text(coordlang("understand", *files, sentence).out)
+        assert coordlang("say", *files, path).out.strip() == sentence
+        assert coordlang("understand", *files, sentence, "--count").out == "1\n"
+        data = json.loads(coordlang("understand", *files, sentence, "--json").out)
+        assert (data["count"], data["complete"], data["covered"], data["sentence"]) == (
+            1,
+            True,
+            True,
+            sentence,
+        )
+        assert len(data["plans"]) == 1
+        assert [edge["from"] for edge in data["edges"]] == list(range(len(data["nodes"]) - 1))
+        only = json.loads(coordlang("understand", *files, sentence, "--json", "--count").out)
+        assert (only["count"], only["plans"], "nodes" in only) == (1, [], False)
+
+
+def test_samples_are_seeded(coordlang: Command, tmp_path: Path) -> None:
+    files = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "corners-4x4.pddl"
+    language = tmp_path / "language.json"
+    assert coordlang("build", *files, "-o", language).code == 0
+    sentence = (
+        coordlang("plan", language, *files, "--prefer", "most-plans")
+        .out.splitlines()[-1]
+        .partition("= ")[2]
+    )
+    first, again, other = (
+        coordlang("understand", language, *files, sentence, "--sample", 6, "--seed", seed).out
+        for seed in (1, 1, 2)
+    )
+    assert first == again != other
+    assert first.count("; makespan = 6") == 6
+    some = coordlang("understand", language, *files, sentence, "--max", 3)
+    assert some.out.count("; makespan") == 3
+    assert "3 of 16 plans listed" in some.err
+    cut = coordlang(
+        "understand",
+        language,
+        *files,
+        sentence,
+        "--format",
+        "dot",
+        "--nodes",
+        10,
+        "-o",
+        tmp_path / "x.dot",
+    )
+    assert (cut.code, cut.out) == (0, "")
+    assert "are drawn as" in cut.err
+    assert (tmp_path / "x.dot").read_text().startswith("digraph plans {")
+
+
+@pytest.mark.parametrize(
+    ("sentence", "code", "message"),
+    [
+        ("", 31, "the sentence is empty"),
+        ("w0 w9", 31, "word 2 of the sentence, 'w9', is no word of this language"),
+        ("w0 w0", 31, "twice in a row"),
+        ("w1 w0", 1, "at the beginning no plan says 'w1'"),
+        ("w0 w1 w0", 1, "after \"w0 w1\" no plan says 'w0'\n  There plans say 'w3'."),
+        ("w0 w1 w3", 1, "after \"w0 w1 w3\" no plan ends\n  There plans say 'w2'."),
+        ("w0 w1 w3 w2 w0 w1", 1, "after \"w0 w1 w3 w2 w0\" no plan says 'w1'\n  There plans end."),
+    ],
+)
+def test_sentences_that_cannot_be_understood(
+    sentence: str, code: int, message: str, coordlang: Command, files: tuple[Path, ...]
+) -> None:
+    for command in ("understand", "plan"):
+        outcome = coordlang(command, *files, sentence)
+        assert (outcome.code, outcome.out) == (code, "")
+        assert message in outcome.err
+
+
+def test_options_that_do_not_go_together(coordlang: Command, files: tuple[Path, ...]) -> None:
+    for options in (
+        ["--count", "--max", 3],
+        ["--format", "dot", "--sample", 2],
+        ["--format", "dot", "--count"],
+    ):
+        assert coordlang("understand", *files, "w0", *options).code == 2
+
+
+def test_json_of_a_plan_file_and_more() -> None:
+    """The JSON form is a plan file; a cut DAG says so node by node."""
+    task_language = shipped("grid/corners-4x4")[1]
+    words = max(by_sentence(task_language).items(), key=lambda item: len(item[1]))[0]
+    understood = OpenPlans.of(task_language, task_language.words_of(words))
+    data = open_plans_data(understood, [], plan_dag(understood, 10))
+    assert data["count"] == 16
+    assert sum(node.get("merged", 0) for node in data["nodes"]) == plan_dag(understood, 10).cut > 0
+    assert all(("state" in node) != ("merged" in node) for node in data["nodes"])
+
+
+# -- in a notebook
+
+
+def test_a_plan_space_shows_its_layers() -> None:
+    space = shipped("t-map/problem")[1].space
+    rows = ElementTree.fromstring(space._repr_html_()).findall("tr")
+    cells = [[cell.text for cell in row] for row in rows]
+    assert cells[0] == ["steps left", "nodes", "states", "edges"]
+    expected = [
+        [str(layer), str(span.stop - span.start), None, str(len(space.layer_edges(layer).edges))]
+        for layer, span in enumerate(space.layers)
+    ]
+    assert [[*row[:2], None, row[3]] for row in cells[1:]] == expected[::-1]
+    assert f"nodes={len(space)}" in repr(space)

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Varied tasks: the pairs that the patterns describe, and no others."""
+
+from __future__ import annotations
+
+import json
+import re
+from itertools import product
+from pathlib import Path
+
+import pytest
+
+from coordlang.commands.main import run
+from coordlang.language.candidates import from_listed
+from coordlang.language.listed import ListedTask
+from coordlang.language.patterns import varied_tasks
+from coordlang.language.task_file import read_task_file
+from planners.loading import PlanningInstance, load
+from planners.system.errors import ProvedImpossible, UsageError
+from tests.support.domains import DOMAINS
+from tests.support.naive_joint_steps import Twin
+
+
+def matches(atom: str, pattern: str) -> bool:
+    """Word by word, a ``?`` for any one."""
+    mine, theirs = (text.strip("()").split() for text in (atom, pattern))
+    return len(mine) == len(theirs) and all(
+        b in ("?", a) for a, b in zip(mine, theirs, strict=True)
+    )
+
+
+def naive(
+    loaded: PlanningInstance, starts: list[str], goals: list[str]
+) -> set[tuple[frozenset[str], frozenset[str]]]:
+    """The definition, with sets of atoms."""
+    twin = Twin(loaded.domain, loaded.problems[0], loaded.team)
+    states, todo = {twin.init}, [twin.init]
+    while todo:
+        new = {after for _, after in twin.successors(todo.pop())} - states
+        states |= new
+        todo += new
+    text = {
+        state: frozenset(f"({' '.join((a.predicate, *a.args))})" for a in state) for state in states
+    }
+    own = text[twin.init]
+    chosen = {s for s in states if all(any(matches(a, p) for p in starts) for a in text[s] ^ own)}
+    wanted = {
+        frozenset(atoms)
+        for state in states
+        for atoms in product(*([a for a in text[state] if matches(a, goal)] for goal in goals))
+    }
+    found = set()
+    for start in chosen:
+        reached, todo = {start}, [start]
+        while todo:
+            new = {after for _, after in twin.successors(todo.pop())} - reached
+            reached |= new
+            todo += new
+        for goal in wanted:
+            if not goal <= text[start] and any(goal <= text[state] for state in reached):
+                found.add((text[start], goal))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("folder", "problem", "starts", "goals", "number"),
+    [
+        ("three-cells", "problem", [], ["(at r1 ?)"], 2),
+        ("three-cells", "problem", ["(at ? ?)"], ["(at r1 ?)", "(at r2 ?)"], 30),
+        ("three-cells", "problem", ["(at r1 ?)"], ["(at r2 c)"], 2),
+        ("handover", "two-doors", ["(at r1 ?)", "(at r2 ?)"], ["(lies box ?)"], 9),
+        ("vans", "one-van", ["(at d1 ?)"], ["(at v1 ?)", "(vacant ?)"], None),
+        ("lock", "both-in", ["(at r1 ?)"], ["(at r1 ?)"], None),
+        ("elevator", "two-calls", ["(stops ?)"], ["(on ? second)", "(outside ?)"], None),
+        ("charger", "three-robots", ["(charged ?)"], ["(charged ?)", "(charged ?)"], None),
+    ],
+)
+def test_the_tasks_are_those_of_the_definition(
+    folder: str, problem: str, starts: list[str], goals: list[str], number: int | None
+) -> None:
+    loaded = load(DOMAINS / folder / "domain.pddl", [DOMAINS / folder / f"{problem}.pddl"])
+    tasks = varied_tasks(loaded, starts, goals)
+    assert len(set(tasks)) == len(tasks)
+    assert {(frozenset(t.init), frozenset(t.goal)) for t in tasks} == naive(loaded, starts, goals)
+    assert number is None or len(tasks) == number
+    assert from_listed(loaded.domain, loaded.problems, tasks).count == len(tasks)
+
+
+def test_without_goals_it_is_the_problems_own() -> None:
+    loaded = load(DOMAINS / "lock" / "domain.pddl", [DOMAINS / "lock" / "both-in.pddl"])
+    assert varied_tasks(loaded, [], []) == (
+        ListedTask(("(at r1 yard)", "(at r2 yard)"), ("(at r1 lab)", "(at r2 lab)")),
+    )
+    assert {task.goal for task in varied_tasks(loaded, ["(at ? ?)"], [])} == {
+        ("(at r1 lab)", "(at r2 lab)")
+    }
+
+
+def test_a_pattern_that_matches_nothing() -> None:
+    loaded = load(DOMAINS / "lock" / "domain.pddl", [DOMAINS / "lock" / "both-in.pddl"])
+    for wrong in ("(on r1 ?)", "(at r1)", "at r1 ?", "(at r1 ? ?)", "(switch outer yard)", ""):
+        with pytest.raises(
+            UsageError, match=re.escape(f"no fluent of this problem matches {wrong}")
+        ):
+            varied_tasks(loaded, [], [wrong])
+
+
+def test_goals_that_cannot_be_together() -> None:
+    loaded = load(
+        DOMAINS / "three-cells" / "domain.pddl", [DOMAINS / "three-cells" / "problem.pddl"]
+    )
+    with pytest.raises(ProvedImpossible, match="there is no such task"):
+        varied_tasks(loaded, [], ["(at r1 a)", "(at r2 a)"])
+
+
+def test_the_command_writes_what_build_reads(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    files = (
+        str(DOMAINS / "three-cells" / "domain.pddl"),
+        str(DOMAINS / "three-cells" / "problem.pddl"),
+    )
+    output = tmp_path / "tasks.json"
+    assert (
+        run(
+            [
+                "tasks",
+                *files,
+                "--start",
+                "(AT  r1 ?)",
+                "--goal",
+                "( at r2 ? )",
+                "-o",
+                str(output),
+                "--json",
+            ]
+        )
+        == 0
+    )
+    assert json.loads(capfd.readouterr().out) == {"tasks": 4, "starts": 2, "goals": 2}
+    assert len(read_task_file(output)) == 4
+    assert run(["tasks", *files, "--start", "(at r1 ?)", "--goal", "(at r2 ?)", "-o", "-"]) == 0
+    shown = capfd.readouterr()
+    assert shown.out == output.read_text()
+    assert shown.err == "4 tasks: 2 starts, 2 goals\n"
+    assert (
+        run(["build", *files, "--tasks", str(output), "-o", str(tmp_path / "language.json")]) == 0
+    )
+    assert run(["tasks", *files, "--goal", "(on r2 ?)", "-o", str(output)]) == 2
+    assert (
+        run(["tasks", *files, "--goal", "(at r1 a)", "--goal", "(at r2 a)", "-o", str(output)])
+        == 11
+    )

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The plans with the fewest actions are cut out of the plan space of the least makespan; what is
+said of them is what a search under that cost finds.
+"""
+
+from __future__ import annotations
+
+import json
+from itertools import product
+from pathlib import Path
+
+import pytest
+
+from coordlang.required.fewest_actions import fewest_actions, requiring
+from planners.loading import PlanningInstance, build
+from planners.pddl import parse_problem, read_domain
+from planners.pddl.model_options import ModelOptions
+from planners.pddl.sexpr import Source
+from planners.search.optimal_plans import search
+from planners.search.plans import Plans, counts
+from planners.system.errors import ProvedImpossible
+from tests.support.command import Command
+from tests.support.domains import DOMAINS
+from tests.support.joint_twin import built
+from tests.support.random_pddl import Kind, random_model
+
+_MOST = 400
+Plan = tuple[tuple[str | None, ...], ...]
+
+
+def plans(loaded: PlanningInstance) -> set[Plan]:
+    space = search(loaded.model, loaded.tasks[0])
+    start, counted = int(space.starts[0]), counts(space)
+    if counted[start] > _MOST:
+        return set()
+    return {
+        tuple(loaded.model.texts(labels) for labels in plan)
+        for plan in Plans(space, start, counted)
+    }
+
+
+def mixes(found: set[Plan], robots: int) -> bool:
+    """The definition: every mixture is a plan."""
+    return all(
+        tuple(tuple(step[i] for i, step in enumerate(steps)) for steps in zip(*chosen, strict=True))
+        in found
+        for chosen in product(found, repeat=robots)
+    )
+
+
+@pytest.mark.parametrize("kind", ["agent", "plain"])
+def test_they_are_the_plans_of_the_other_cost(kind: Kind) -> None:
+    cut = mixed = 0
+    for seed in range(100):
+        text = random_model(seed, kind)
+        try:
+            least, cheap = built(text), built(text, "makespan+actions")
+            space = search(least.model, least.tasks[0])
+        except ProvedImpossible:
+            continue
+        expected = plans(cheap)
+        if not expected or not plans(least):
+            continue
+        fewer = fewest_actions(space)
+        if fewer is None:
+            assert expected == plans(least)
+            assert requiring([space]) is None
+            continue
+        cut += 1
+        found = {
+            tuple(least.model.texts(labels) for labels in plan)
+            for plan in Plans(fewer, int(fewer.starts[0]), counts(fewer))
+        }
+        assert found == expected
+        if len(expected) ** len(least.model.robots) <= 20_000:
+            mixed += 1
+            assert requiring([space]) == int(not mixes(expected, len(least.model.robots)))
+        assert fewest_actions(search(cheap.model, cheap.tasks[0])) is None
+    assert min(cut, mixed) >= 5
+
+
+def test_of_joint_actions_the_parts_count() -> None:
+    folder = DOMAINS / "grid-joint"
+    domain = read_domain(folder / "domain.pddl")
+    text = (folder / "gw1-2x2.pddl").read_text()
+    text = text[: text.index("(:goal")] + "(:goal (at r1 c1-1)))"
+    problem = parse_problem(Source("p", text), domain)
+    least, cheap = (
+        build(domain, [problem], ModelOptions(cost=cost))
+        for cost in ("makespan", "makespan+actions")
+    )
+    fewer = fewest_actions(search(least.model, least.tasks[0]))
+    assert fewer is not None
+    found = {
+        tuple(least.model.texts(labels) for labels in plan)
+        for plan in Plans(fewer, int(fewer.starts[0]), counts(fewer))
+    }
+    assert found == plans(cheap) < plans(least)
+
+
+#: r1 goes from a to d by b or c; r2 has nothing to do, and may stand in its way at either.
+WANDER = """(define (problem wander) (:domain three-cells)
+ (:objects r1 r2 - robot a b c d p - cell)
+ (:init (at r1 a) (at r2 p) (adjacent a b) (adjacent b a) (adjacent a c) (adjacent c a)
+  (adjacent b d) (adjacent d b) (adjacent c d) (adjacent d c)
+  (adjacent p b) (adjacent b p) (adjacent p c) (adjacent c p))
+ (:goal (at r1 d)))"""
+
+
+def test_coordination_says_so_in_one_line(coordlang: Command) -> None:
+    domain, problem = (DOMAINS / "grid" / f"{n}.pddl" for n in ("domain", "three-robots-3x3"))
+    outcome = coordlang("coordination", domain, problem)
+    line = "With --cost makespan+actions, which leaves 112 plans, they fail in 19.7 %.\n"
+    assert outcome.out.count(line) == 1
+    data = json.loads(coordlang("coordination", domain, problem, "--json").out)["tasks"][0]
+    assert data["fewest_actions"]["plans"] == 112
+    other = json.loads(
+        coordlang("coordination", domain, problem, "--json", "--cost", "makespan+actions").out
+    )["tasks"][0]
+    assert data["fewest_actions"] == {
+        key: other[key] for key in ("plans", "requires_coordination", "failure")
+    }
+    assert "fewest_actions" not in other
+    assert (
+        "With --cost"
+        not in coordlang(
+            "coordination",
+            DOMAINS / "three-cells" / "domain.pddl",
+            DOMAINS / "three-cells" / "problem.pddl",
+        ).out
+    )
+
+
+def test_build_says_so_in_one_line(coordlang: Command, tmp_path: Path) -> None:
+    domain, problem = DOMAINS / "three-cells" / "domain.pddl", tmp_path / "wander.pddl"
+    problem.write_text(WANDER)
+    files = domain, problem, "-o", tmp_path / "l.json"
+    key = "tasks_requiring_coordination_with_fewest_actions"
+    line = (
+        "with --cost makespan+actions 0 tasks would require coordination, not 1: one word would do"
+    )
+    assert line in coordlang("build", *files).out.splitlines()
+    assert json.loads(coordlang("build", *files, "--json").out)[key] == 0
+    said = coordlang("build", *files, "--json", "--cost", "makespan+actions")
+    figures = json.loads(said.out)
+    assert (figures["tasks_requiring_coordination"], figures["words"]) == (0, 1)
+    assert key not in figures
+    assert "With --cost makespan+actions, which leaves 2 plans, coordination is not required." in (
+        coordlang("coordination", domain, problem).out.splitlines()
+    )
+    both = coordlang("build", domain, DOMAINS / "three-cells" / "problem.pddl", *files[2:])
+    assert "with --cost" not in both.out

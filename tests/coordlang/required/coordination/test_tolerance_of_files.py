@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Language files that claim how often robots fail: verified by counting, and used with a warning."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import coordlang as library
+from coordlang.language.tolerance import percent
+from coordlang.required.failures import failures_under
+from tests.support.command import Command
+from tests.support.domains import DOMAINS
+
+SQUARE = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "gw1-2x2.pddl"
+#: The open 2x2 grid in silence, all pairs of states.
+SILENCE = {"failure_mean": 5 / 66, "failure_worst": 0.5}
+
+
+def silent(path: Path, tolerance: dict[str, float] | None) -> Path:
+    """One word for all states."""
+    language = library.build(*SQUARE, tasks="all").language
+    language.save(path)
+    data: dict[str, Any] = json.loads(path.read_text())
+    data |= {"words": ["w0"], "states": dict.fromkeys(data["states"], "w0"), "default": "w0"}
+    data["guarantee"] = {
+        "method": "by hand",
+        "size": 1,
+        "lower_bound": 1,
+        "proved_minimal": False,
+        "coordination_language": False,
+    }
+    if tolerance is not None:
+        data["tolerance"] = tolerance
+    path.write_text(json.dumps(data))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("claimed", "code"),
+    [
+        (SILENCE, 0),
+        ({"failure_mean": 0.08, "failure_worst": 0.6}, 0),  # robots fail less often
+        ({"failure_mean": 0.0757, "failure_worst": 0.5}, 1),
+        ({"failure_mean": 0.0758, "failure_worst": 0.49}, 1),
+        (None, 1),
+    ],
+)
+def test_verify_counts_what_a_file_claims(
+    claimed: dict[str, float] | None, code: int, coordlang: Command, tmp_path: Path
+) -> None:
+    path = silent(tmp_path / "l.json", claimed)
+    found = coordlang("verify", path, *SQUARE)
+    assert found.code == code
+    assert "fail in 7.58 % of all runs, and in 50 % in the worst task" in found.out
+    assert ("as claimed" in found.out) == (code == 0)
+    assert ("The file claims less" in found.out) == (code == 1 and claimed is not None)
+    answer = json.loads(coordlang("verify", path, *SQUARE, "--json").out)
+    assert answer["holds"] is False
+    assert {key: answer[key] for key in SILENCE} == SILENCE
+    assert answer.get("tolerance") == claimed
+    assert bool(library.verify(path, *SQUARE)) == (code == 0)
+
+
+def test_what_cannot_be_counted_cannot_be_claimed(
+    coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = silent(tmp_path / "l.json", SILENCE)
+    few = partial(failures_under, most=100)
+    monkeypatch.setattr("coordlang.commands.languages.failures_under", few)
+    found = coordlang("verify", path, *SQUARE)
+    assert found.code == 22
+    assert "what the language tolerates cannot be checked" in found.err
+    unclaimed = coordlang("verify", silent(path, None), *SQUARE)
+    assert unclaimed.code == 1
+    assert "(estimated from 1,000 draws" in unclaimed.out
+
+
+def test_a_refuted_language_is_refuted_when_time_is_over(
+    coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Counting is a service: without it the answer is the same."""
+
+    def over(*_: object) -> None:
+        raise library.OutOfTime("the time limit of 1 s is over")
+
+    monkeypatch.setattr("coordlang.required.failures.failure_probability", over)
+    found = coordlang("verify", silent(tmp_path / "l.json", None), *SQUARE)
+    assert found.code == 1
+    assert "fail in an unknown share of all runs (the time limit of 1 s is over)" in found.out
+
+
+def test_a_verified_language_never_fails(coordlang: Command, tmp_path: Path) -> None:
+    path = tmp_path / "l.json"
+    built = json.loads(coordlang("build", *SQUARE, "--tasks", "all", "-o", path, "--json").out)
+    answer = json.loads(coordlang("verify", path, *SQUARE, "--json").out)
+    for figures in (built, answer):
+        assert figures["failure_mean"] == figures["failure_worst"] == 0
+
+
+def test_commands_warn_of_words_that_are_too_few(coordlang: Command, tmp_path: Path) -> None:
+    path = silent(tmp_path / "l.json", SILENCE)
+    plan = tmp_path / "plan"
+    plan.write_text(coordlang("plans", *SQUARE, "--max", 1).out)
+    page = tmp_path / "page.html"
+    for command in (
+        ["say", path, *SQUARE, plan],
+        ["understand", path, *SQUARE, "w0"],
+        ["plan", path, *SQUARE, "w0"],
+        ["choices", path, *SQUARE, "w0"],
+        ["explain", path, *SQUARE],
+        ["explain", path, *SQUARE, "--task"],
+        ["export", path, *SQUARE, "w0", "--to", "bt"],
+        ["export", path, *SQUARE, "w0", "--to", "ltlf"],
+        ["report", path, *SQUARE, "-o", page],
+    ):
+        found = coordlang(*command)
+        assert found.code == 0, command
+        assert "fail in 7.58 % of all runs" in found.err, command
+        assert "fail in 7.58 % of all runs" not in found.out or command[0] == "explain"
+    assert "fail in 7.58 % of all runs" in page.read_text()
+    assert "whatever the others choose" not in page.read_text()
+    said = json.loads(coordlang("say", path, *SQUARE, plan, "--json").out)
+    assert said["tolerance"] == SILENCE
+    assert library.say(path, *SQUARE, plan).tolerance == library.load_language(path).tolerance
+
+
+@pytest.mark.parametrize("tolerance", [None, {}])
+def test_a_file_that_does_not_say_how_often_robots_fail_warns_as_well(
+    tolerance: dict[str, float] | None, coordlang: Command, tmp_path: Path
+) -> None:
+    path, page = silent(tmp_path / "l.json", tolerance), tmp_path / "page.html"
+    plan = tmp_path / "plan"
+    plan.write_text(coordlang("plans", *SQUARE, "--max", 1).out)
+    for command in (
+        ["say", path, *SQUARE, plan],
+        ["understand", path, *SQUARE, "w0"],
+        ["plan", path, *SQUARE, "w0"],
+        ["explain", path, *SQUARE],
+        ["export", path, *SQUARE, "w0", "--to", "bt"],
+        ["report", path, *SQUARE, "-o", page],
+    ):
+        found = coordlang(*command)
+        assert found.code == 0, command
+        assert "may fail, and its file does not say how often" in found.err, command
+    assert "does not say how often" in page.read_text()
+    assert coordlang("choices", path, *SQUARE, "w0").code == 1  # it miscoordinates
+    assert "tolerance" not in library.say(path, *SQUARE, plan).data()
+    library.load_language(path).save(path)
+    assert library.load_language(path).may_fail
+
+
+def test_choices_under_wrong_words_within_slack_are_refuted(
+    coordlang: Command, tmp_path: Path
+) -> None:
+    """The file says that plans may be longer, and not that robots may fail."""
+    path = silent(tmp_path / "l.json", {"slack": 1})
+    data = json.loads(path.read_text())
+    del data["guarantee"]["coordination_language"]
+    data["guarantee"]["proved_minimal"] = True
+    path.write_text(json.dumps(data))
+    found = coordlang("choices", path, *SQUARE, "w0")
+    assert found.code == 1
+    assert "the language does not cover it" in found.err
+
+
+def test_choices_under_words_that_are_too_few_are_not_guaranteed(
+    coordlang: Command, tmp_path: Path
+) -> None:
+    path = silent(tmp_path / "l.json", SILENCE)
+    found = library.choices(path, *SQUARE, "w0")
+    assert found.covered
+    assert not found.guaranteed
+    assert found.data()["tolerance"] == SILENCE
+    shown = coordlang("choices", path, *SQUARE, "w0")
+    assert "choices of this task miscoordinate in 50 % of all runs, for example:" in shown.err
+    assert found.failure == Fraction(1, 2)
+    assert coordlang("choices", path, *SQUARE, "w0", "--check").code == 1
+    assert "no coordination language" in coordlang("export", path, *SQUARE, "w0", "--to", "bt").out
+
+
+def test_coordination_says_how_often_silence_fails(coordlang: Command, tmp_path: Path) -> None:
+    near = tmp_path / "near.pddl"
+    text = SQUARE[1].read_text()
+    near.write_text(text[: text.index("(:goal")] + "(:goal (at r1 c0-1))\n)")
+    files = [*SQUARE, near]
+    found = json.loads(coordlang("coordination", *files, "--json").out)
+    assert [task["requires_coordination"] for task in found["tasks"]] == [True, False]
+    for task in found["tasks"]:
+        assert (task["failure"] > 0) == task["requires_coordination"]
+    assert found["failure_worst"] == max(task["failure"] for task in found["tasks"])
+    assert found["failure_mean"] == sum(task["failure"] for task in found["tasks"]) / 2
+    shown = coordlang("coordination", *files).out
+    assert "robots that choose by themselves fail in 50 % of all runs." in shown
+    assert "Over all tasks, without a word, robots fail in 25 % of all runs" in shown
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [
+        (0.0, "0 %"),
+        (1.0, "100 %"),
+        (5 / 66, "7.58 %"),
+        (1e-9, "less than 0.01 %"),
+        (0.9996, "more than 99.9 %"),
+        (0.5, "50 %"),
+    ],
+)
+def test_percent_never_rounds_to_certainty(share: float, text: str) -> None:
+    assert percent(share) == text

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the simulator leaves out is said, and where robots are is found among other atoms."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import coordlang
+from coordlang.simulation.recording import recorded
+from planners.system.errors import Note
+from planners.system.signals import Interrupted
+from tests.support.domains import DOMAINS
+from tests.support.simulation import language_of_task
+
+_PLANES = """
+(define (domain planes) (:requirements :strips :typing)
+  (:types city level thing - object plane person - thing)
+  (:predicates (at ?t - thing ?c - city) (in ?p - person ?a - plane)
+    (fuel ?a - plane ?l - level) (next ?l ?m - level) (road ?c ?d - city))
+  (:action fly :parameters (?a - plane ?c ?d - city ?l ?m - level)
+    :precondition (and (at ?a ?c) (road ?c ?d) (fuel ?a ?m) (next ?l ?m))
+    :effect (and (not (at ?a ?c)) (at ?a ?d) (not (fuel ?a ?m)) (fuel ?a ?l)))
+  (:action board :parameters (?a - plane ?p - person ?c - city)
+    :precondition (and (at ?a ?c) (at ?p ?c)) :effect (and (not (at ?p ?c)) (in ?p ?a)))
+  (:action debark :parameters (?a - plane ?p - person ?c - city)
+    :precondition (and (at ?a ?c) (in ?p ?a)) :effect (and (not (in ?p ?a)) (at ?p ?c))))
+"""
+_FLIGHT = """
+(define (problem flight) (:domain planes)
+  (:objects c0-0 c0-1 c1-0 - city l0 l1 - level plane1 plane2 - plane anna - person)
+  (:init (at plane1 c0-0) (at plane2 c1-0) (at anna c0-0) (fuel plane1 l1) (fuel plane2 l1)
+    (next l0 l1) (road c0-0 c0-1) (road c1-0 c0-0))
+  (:goal (at anna c0-1)))
+"""
+
+
+def test_a_plane_is_in_a_city_and_not_in_its_fuel(tmp_path: Path) -> None:
+    domain, problem, words = (tmp_path / name for name in ("d.pddl", "p.pddl", "w.json"))
+    domain.write_text(_PLANES)
+    problem.write_text(_FLIGHT)
+    coordlang.build(domain, problem, robot_type="plane", words=1).language.save(words)
+    with pytest.warns(Note, match="plane1 and plane2 to c0-0 at once") as given:
+        found = coordlang.simulate(words, domain, problem)
+    assert any("nothing collides with it: anna" in str(one.message) for one in given)
+    assert set(found.record.places) == {"c0-0", "c0-1", "c1-0"}
+    assert found.runs[0].arrived
+
+
+def test_a_robot_may_be_called_human(tmp_path: Path) -> None:
+    problem, words = tmp_path / "problem.pddl", tmp_path / "words.json"
+    domain = DOMAINS / "corridor" / "domain.pddl"
+    text = (DOMAINS / "corridor" / "problem.pddl").read_text()
+    problem.write_text(text.replace("r1", "human").replace("r2", "wall"))
+    coordlang.build(domain, problem).language.save(words)
+    found = coordlang.simulate(words, domain, problem, human="random", seed=1)
+    run = found.runs[0]
+    assert set(run.poses) == {"human", "wall"}
+    assert len(run.human) == len(run.poses["human"])
+    assert len({(x, y) for x, y, _ in run.poses["human"]}) > len(set(run.human)) == 1
+    assert recorded(found.record, run, ".gif").startswith(b"GIF89a")
+
+
+def test_nothing_is_said_where_all_is_simulated(recwarn: pytest.WarningsRecorder) -> None:
+    language = language_of_task("t-map").language
+    t_map = DOMAINS / "t-map"
+    coordlang.simulate(language, t_map / "domain.pddl", t_map / "problem.pddl")
+    assert not [one for one in recwarn if issubclass(one.category, Note)]
+
+
+def test_a_signal_ends_a_recording_without_a_word_of_others(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    from PIL import GifImagePlugin
+
+    language = language_of_task("t-map").language
+    t_map = DOMAINS / "t-map"
+    found = coordlang.simulate(language, t_map / "domain.pddl", t_map / "problem.pddl")
+
+    def write(*_: object) -> None:
+        raise Interrupted(2)
+
+    monkeypatch.setattr(GifImagePlugin, "_write_frame_data", write)
+    with pytest.raises(Interrupted):
+        recorded(found.record, found.runs[0], ".gif")
+    assert capfd.readouterr().err == ""

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs: what is promised of joint steps against robots with wheels."""
+
+from __future__ import annotations
+
+import gc
+import math
+from threading import Thread
+
+import msgspec
+import pytest
+
+from coordlang.simulation.record import RunRecord
+from coordlang.simulation.run import run
+from coordlang.simulation.settings import Settings
+from coordlang.simulation.team import Agreement
+from tests.support.simulation import floor_for, mission_of
+
+
+def runs(
+    folder: str, agreement: Agreement, settings: Settings, number: int, seed: int = 0
+) -> list[RunRecord]:
+    mission = mission_of(folder, agreement=agreement)
+    floor = floor_for(mission, settings)
+    return [run(mission, floor, settings, seed + further) for further in range(number)]
+
+
+def nearest(found: RunRecord) -> float:
+    """The least distance of two robots over all poses: the twin of what ir-sim sees as touching."""
+    return min(
+        math.dist(one[:2], other[:2])
+        for one, other in zip(found.poses["r1"], found.poses["r2"], strict=True)
+    )
+
+
+@pytest.mark.parametrize("step", ["clock", "barrier"])
+def test_under_a_sentence_nobody_collides_waits_in_vain_or_comes_late(step: str) -> None:
+    for found in runs("t-map", "sentence", Settings(step=step), 3):
+        assert found.arrived
+        assert found.mixes
+        assert (found.collisions, found.deadlock, found.late) == (0, False, 0)
+        assert found.nearest is not None
+        assert 2 * 0.2 < found.nearest <= nearest(found) + 0.001
+
+
+def test_messages_say_that_steps_are_done_and_nothing_is_said_by_the_clock() -> None:
+    (by_clock,) = runs("t-map", "sentence", Settings(), 1)
+    (by_barrier,) = runs("t-map", "sentence", Settings(step="barrier"), 1)
+    assert by_clock.messages == 0
+    assert by_barrier.messages == 2 * 4, "each of two robots tells that it has done each of 4 steps"
+    assert by_barrier.seconds < by_clock.seconds, "a barrier opens before the period is over"
+
+
+def test_the_same_seed_gives_the_same_run() -> None:
+    one, other, further = (
+        msgspec.json.encode(runs("t-map", "sentence", Settings(), 1, seed)[0]) for seed in (7, 7, 8)
+    )
+    assert one == other
+    assert one != further
+
+
+def test_without_a_sentence_what_the_model_says_breaks_does_break() -> None:
+    found = runs("t-map", "nothing", Settings(), 6)
+    assert {run.mixes for run in found} == {True, False}
+    for run_ in found:
+        assert run_.arrived == (run_.mixes or run_.late > 0)
+        assert run_.mixes == (run_.arrived and run_.late == 0)
+
+
+def test_one_plan_for_all_always_mixes() -> None:
+    found = runs("t-map", "plan", Settings(), 3)
+    assert all(run.mixes and run.arrived and not run.collisions for run in found)
+
+
+def test_robots_without_lidar_collide_where_others_stop() -> None:
+    blind = runs("t-map", "nothing", Settings(lidar=False, noise=0.0), 6)
+    crashed = [run for run in blind if run.collisions]
+    assert crashed
+    for run_ in blind:
+        assert run_.nearest is not None
+        assert (run_.nearest < 2 * 0.2) == (run_.collisions > 0), "by the discs' distance, too"
+    for run_ in crashed:
+        (event, *_) = [event for event in run_.events if event.kind == "collision"]
+        assert event.robots == ["r1", "r2"]
+        assert not run_.deadlock
+        assert not run_.arrived
+
+
+def test_a_world_that_is_garbage_does_not_hold_up_the_next_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What ends with a world is not left to the collector, which may come while one begins."""
+    formatter = pytest.importorskip("loguru._better_exceptions").ExceptionFormatter
+    begin = formatter.__init__
+
+    def begins(self: object, *args: object, **options: object) -> None:
+        gc.collect()
+        begin(self, *args, **options)
+
+    monkeypatch.setattr(formatter, "__init__", begins)
+    again = Thread(target=lambda: runs("t-map", "plan", Settings(), 2), daemon=True)
+    again.start()
+    again.join(60)
+    assert not again.is_alive()
+
+
+def test_within_a_word_robots_get_out_of_step() -> None:
+    """Why a barrier for each word is not enough: the same choices, done in step, are a plan."""
+    mission = mission_of("t-map", method="minimal")
+    assert len(mission.sentence) == 1, "there is no barrier at all"
+    found = [run(mission, floor_for(mission), Settings(step="word"), seed) for seed in range(6)]
+    broken = [run_ for run_ in found if not run_.arrived]
+    assert broken
+    for run_ in broken:
+        assert run_.mixes
+        (event, *_) = [event for event in run_.events if event.kind in ("stopped", "collision")]
+        assert len(set(event.steps.values())) > 1, "one robot is ahead of the other"
+        stopped = [event for event in run_.events if event.kind == "stopped"]
+        assert len(stopped) == len({(*e.robots, e.steps[e.robots[0]]) for e in stopped})

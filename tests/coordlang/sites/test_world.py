@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is found to draw in the shipped domains: places, links, things, and what each atom says."""
+
+from __future__ import annotations
+
+import pytest
+
+from coordlang.sites.world import World, find_world
+from planners.loading import PlanningInstance, load
+from planners.search.reachable import explore
+from tests.support.domains import DOMAINS
+
+
+def world_of(domain: str, problem: str) -> tuple[World, PlanningInstance]:
+    loaded = load(DOMAINS / domain / "domain.pddl", [DOMAINS / domain / f"{problem}.pddl"])
+    space = explore(loaded.model, loaded.tasks[0].init[None, :])
+    return find_world(loaded.model, [loaded.model.codec.decode(row) for row in space.rows]), loaded
+
+
+@pytest.mark.parametrize(
+    ("domain", "problem", "things", "places", "roles"),
+    [
+        ("t-map", "problem", ("r1", "r2"), 4, {"(at r1 c0-1)": ("at", "r1", "c0-1")}),
+        ("grid-joint", "t-map", ("r1", "r2"), 4, {"(at r1 c0-1)": ("at", "r1", "c0-1")}),
+        (
+            "handover",
+            "three-rooms",
+            ("r1", "r2", "r3", "box"),
+            7,
+            {
+                "(lies box west)": ("at", "box", "west"),
+                "(holds r1 box)": ("with", "r1", "box"),
+                "(free r1)": ("about", "r1", "free"),
+            },
+        ),
+        (
+            "elevator",
+            "two-calls",
+            ("lift", "r1", "r2"),
+            3,
+            {
+                "(stops first)": ("at", "lift", "first"),
+                "(on r1 first)": ("at", "r1", "first"),
+                "(inside r1)": ("about", "r1", "inside"),
+            },
+        ),
+        ("vans", "two-each", ("d1", "d2", "v1", "v2"), 4, {"(aboard d1 v2)": ("with", "d1", "v2")}),
+        (
+            "tray",
+            "serve",
+            ("r1", "r2", "back", "front", "tray"),
+            2,
+            {"(tray-at kitchen)": ("at", "tray", "kitchen"), "(spilled)": ("other",)},
+        ),
+        (
+            "charger",
+            "three-robots",
+            ("r1", "r2", "r3"),
+            2,
+            {"(clean bath)": ("mark", "bath", "clean")},
+        ),
+        (
+            "two-arms",
+            "exchange",
+            ("arm1", "arm2", "blue", "red"),
+            4,
+            {"(on red right)": ("at", "red", "right")},
+        ),
+        (
+            "push-box",
+            "around",
+            ("r1", "r2", "box"),
+            4,
+            {"(stands box yard)": ("at", "box", "yard")},
+        ),
+    ],
+)
+def test_worlds(
+    domain: str,
+    problem: str,
+    things: tuple[str, ...],
+    places: int,
+    roles: dict[str, tuple[str, ...]],
+) -> None:
+    world, _ = world_of(domain, problem)
+    assert world.things == things
+    assert len(world.places) == places
+    assert {atom: world.roles[atom] for atom in roles} == roles
+
+
+def test_links_are_ways_and_what_statics_relate() -> None:
+    world, _ = world_of("handover", "two-doors")
+    moves = {link.ends for link in world.links if link.moves}
+    assert ("west", "west-north") in moves
+    doors = {link.ends for link in world.links if not link.moves}
+    assert doors == {("east-north", "west-north"), ("east-south", "west-south")}
+
+
+@pytest.mark.parametrize(
+    ("domain", "problem"), [("t-map", "problem"), ("grid-joint", "t-map"), ("push-box", "around")]
+)
+def test_moves_are_what_happens(domain: str, problem: str) -> None:
+    """Where a subaction is said to bring a thing, there it is after every joint step with this
+    subaction.
+    """
+    world, loaded = world_of(domain, problem)
+    model = loaded.model
+    space = explore(model, loaded.tasks[0].init[None, :])
+    steps = model.successors(space.rows)
+    checked = 0
+    for number in range(len(steps)):
+        after = {
+            world.roles[a][1:]
+            for a in model.codec.decode(steps.result[number])
+            if world.roles[a][0] == "at"
+        }
+        for robot, label in enumerate(steps.labels[number].tolist()):
+            brought = world.moves(model, robot, label)
+            assert after.issuperset(brought)
+            checked += len(brought)
+    assert checked > 20
+
+
+@pytest.mark.parametrize(
+    "domain",
+    ["t-map", "lock", "handover", "elevator", "vans", "tray", "charger", "two-arms", "push-box"],
+)
+def test_no_thing_is_in_two_places(domain: str) -> None:
+    problem = sorted(p for p in (DOMAINS / domain).glob("*.pddl") if p.name != "domain.pddl")[
+        0
+    ].stem
+    world, loaded = world_of(domain, problem)
+    space = explore(loaded.model, loaded.tasks[0].init[None, :])
+    for row in space.rows:
+        where = [
+            world.roles[a][1] for a in loaded.model.codec.decode(row) if world.roles[a][0] == "at"
+        ]
+        assert len(where) == len(set(where))

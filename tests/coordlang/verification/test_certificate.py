@@ -1,0 +1,493 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Certificates of lower bounds: what is written holds, and what was tampered with does not."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+from collections.abc import Callable
+from itertools import count
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import msgspec
+import pytest
+
+from coordlang.commands.building import Built, build_language, certificate_of
+from coordlang.commands.languages import verify
+from coordlang.language.candidates import all_pairs, from_listed, from_problems
+from coordlang.language.task_file import read_task_file
+from coordlang.required.miscoordination import inseparable
+from coordlang.verification.certificate_clauses import core, encode
+from coordlang.verification.certificate_file import (
+    Certificate,
+    Reason,
+    WarpingPath,
+    read_certificate,
+    write_certificate,
+)
+from coordlang.verification.check_certificate import Checked, check
+from coordlang.vocabulary.minimal import _Search as Search
+from coordlang.vocabulary.minimal import refuting_clauses
+from coordlang.vocabulary.problems_by_size import SolverBudget
+from planners.pddl import read_domain, read_problem
+from planners.pddl.model_options import ModelOptions
+from planners.system.errors import BadInput, OutOfTime, ProvedImpossible, Refuted
+from planners.system.limits import time_left
+from tests.support.candidates import states_of
+from tests.support.command import Command
+from tests.support.domains import DOMAINS, all_tasks
+from tests.support.random_models import random_model
+
+
+@pytest.fixture(scope="module")
+def built() -> Built:
+    return build_language(all_tasks("grid", "gw1-2x2"), "minimal")
+
+
+@pytest.fixture(scope="module")
+def certificate(built: Built) -> Certificate:
+    return certificate_of(built)
+
+
+def test_proves_the_minimum(built: Built, certificate: Certificate, tmp_path: Path) -> None:
+    write_certificate(certificate, tmp_path / "c.json.gz")
+    again = read_certificate(tmp_path / "c.json.gz")
+    assert again == certificate
+    checked = check(again, built.job.candidates)
+    assert checked.lower_bound == built.language.guarantee.size == 3
+    assert checked.reasons == len(certificate.reasons) > 1
+
+
+def test_any_solver_refutes_the_dimacs(built: Built, certificate: Certificate) -> None:
+    from pysat.formula import CNF
+    from pysat.solvers import Solver
+
+    text = check(certificate, built.job.candidates).dimacs()
+    assert "c 1: word 0 holds (at r1 c" in text
+    formula = CNF(from_string=text)
+    assert len(formula.clauses) > 20
+    for name in ("minisat22", "lingeling"):
+        with Solver(name=name, bootstrap_with=formula) as solver:
+            assert solver.solve() is False
+
+
+Meaning = Callable[[dict[str, int]], bool]
+
+
+def meaning_of(comment: str, states: list[str]) -> tuple[int, Meaning]:
+    """A variable, and what it says of a partition (state -> word), by its comment."""
+    number, _, text = comment.removeprefix("c ").partition(": ")
+    if found := re.fullmatch(r"word (\d+) holds one of the first (\d+) states", text):
+        word, first = int(found[1]), states[: int(found[2])]
+        return int(number), lambda words: any(words[s] == word for s in first)
+    if found := re.fullmatch(r"word (\d+) holds (.*)", text):
+        word, state = int(found[1]), found[2]
+        return int(number), lambda words: words[state] == word
+    one, other = text.removesuffix(" have different words").split(" and ")
+    return int(number), lambda words: words[one] != words[other]
+
+
+def passed(reason: Reason, plan: int) -> list[str]:
+    """The states that a plan of the grid passes through."""
+    cells = {atom.split()[1]: atom.split()[2][:-1] for atom in reason.init}
+    states = [f"(at r1 {cells['r1']}) (at r2 {cells['r2']})"]
+    for step in reason.plans[plan]:
+        for subaction in filter(None, step):
+            _, robot, _, to = subaction[1:-1].split()
+            cells[robot] = to
+        states.append(f"(at r1 {cells['r1']}) (at r2 {cells['r2']})")
+    return states
+
+
+def separated(reason: Reason, words: dict[str, int]) -> bool:
+    """Whether two states on a cell of the reason's paths have different words."""
+    cells = [(path.plans, cell) for path in reason.paths for cell in path.cells]
+    pairs = [(passed(reason, a)[i], passed(reason, b)[j]) for (a, b), (i, j) in cells]
+    return any(words[one] != words[other] for one, other in pairs if one != other)
+
+
+def test_comments_say_what_variables_and_clauses_mean(
+    built: Built, certificate: Certificate
+) -> None:
+    lines = check(certificate, built.job.candidates).dimacs().splitlines()
+    header = next(number for number, line in enumerate(lines) if line.startswith("p cnf"))
+    comments = lines[1:header]
+    states = [m[1] for line in comments if (m := re.fullmatch(r"c \d+: word 0 holds (\(.*)", line))]
+    meaning = dict(meaning_of(line, states) for line in comments if re.match(r"c \d+: ", line))
+    clauses = [[int(literal) for literal in line.split()[:-1]] for line in lines[header + 1 :]]
+    assert lines[header] == f"p cnf {len(meaning)} {len(clauses)}"
+    assert sorted(meaning) == [*range(1, len(meaning) + 1)]
+    kinds = [m for line in comments if (m := re.match(r"c clauses (\d+) to (\d+): ", line))]
+    reasons = [m for line in comments if (m := re.match(r"c clause (\d+): reason (\d+)$", line))]
+    numbers = [n for m in kinds for n in range(int(m[1]), int(m[2]) + 1)]
+    assert numbers + [int(m[1]) for m in reasons] == [*range(1, len(clauses) + 1)]
+    assert [int(m[2]) for m in reasons] == [*range(1, len(certificate.reasons) + 1)]
+    random = Random(0)
+    for _ in range(50):  # partitions whose words are named in the order of the states
+        words = {state: random.randrange(2) if n else 0 for n, state in enumerate(states)}
+        true = {v if says(words) else -v for v, says in meaning.items()}
+        holds = [not true.isdisjoint(clause) for clause in clauses]
+        assert all(holds[: len(numbers)])
+        assert holds[len(numbers) :] == [separated(r, words) for r in certificate.reasons]
+
+
+def test_a_language_satisfies_the_clauses_of_more_words(
+    built: Built, certificate: Certificate
+) -> None:
+    """The same reasons with one word more must be satisfiable: otherwise the encoding refutes
+    anything.
+    """
+    more = msgspec.structs.replace(certificate, refuted=3)
+    with pytest.raises(Refuted, match="leave languages with 3 words"):
+        check(more, built.job.candidates)
+
+
+def changed(certificate: Certificate, number: int, **fields: object) -> Certificate:
+    reasons = list(certificate.reasons)
+    reasons[number] = msgspec.structs.replace(reasons[number], **fields)
+    return msgspec.structs.replace(certificate, reasons=reasons)
+
+
+def _same_plan(reason: Reason) -> dict[str, object]:
+    return {
+        "plans": [reason.plans[0], reason.plans[0]],
+        "paths": [WarpingPath((0, 1), [(k, k) for k in range(len(reason.plans[0]) + 1)])],
+    }
+
+
+TAMPERED: list[tuple[str, Callable[[Reason], dict[str, object]]]] = [
+    ("is no optimal plan", lambda r: {"plans": [r.plans[0][:-1], r.plans[1]]}),
+    (
+        "is no optimal plan",
+        lambda r: {"plans": [r.plans[0], [["(move r1 c9 c9)", None], *r.plans[1][1:]]]},
+    ),
+    ("is no optimal plan", lambda r: {"plans": [r.plans[0], [step[:1] for step in r.plans[1]]]}),
+    ("the mixture of its plans is one of the optimal plans", _same_plan),
+    ("expected a plan for each of 2 robots", lambda r: {"plans": [*r.plans, r.plans[0]]}),
+    ("do not join all of its plans", lambda r: {"paths": []}),
+    ("is no warping path", lambda r: {"paths": [WarpingPath((0, 1), r.paths[0].cells[1:])]}),
+    ("is no warping path", lambda r: {"paths": [WarpingPath((0, 1), r.paths[0].cells[:-1])]}),
+    (
+        "is no warping path",
+        lambda r: {"paths": [WarpingPath((0, 1), [r.paths[0].cells[0], r.paths[0].cells[-1]])]},
+    ),
+    ("there are no plans", lambda r: {"paths": [WarpingPath((0, 2), r.paths[0].cells)]}),
+    ("is no candidate task", lambda r: {"goal": r.init}),
+    ("is no candidate task", lambda r: {"goal": r.goal[:1]}),
+    ("can never be true", lambda r: {"init": ["(at r1 nowhere)"]}),
+]
+
+
+@pytest.mark.parametrize(("what", "change"), TAMPERED)
+def test_tampered(
+    built: Built, certificate: Certificate, what: str, change: Callable[[Reason], dict[str, object]]
+) -> None:
+    number = next(n for n, r in enumerate(certificate.reasons) if len(r.paths[0].cells) > 2)
+    bad = changed(certificate, number, **change(certificate.reasons[number]))
+    with pytest.raises(Refuted, match=f"reason {number + 1} of the certificate is wrong.*{what}"):
+        check(bad, built.job.candidates)
+
+
+def test_missing_reasons_prove_nothing(built: Built, certificate: Certificate) -> None:
+    with pytest.raises(Refuted, match="leave languages with 2 words"):
+        check(
+            msgspec.structs.replace(certificate, reasons=certificate.reasons[:1]),
+            built.job.candidates,
+        )
+    with pytest.raises(Refuted, match="other robots"):
+        check(msgspec.structs.replace(certificate, robots=["a", "b"]), built.job.candidates)
+
+
+@pytest.mark.parametrize("method", ["greedy", "separating", "exhaustive"])
+def test_other_methods(method: str) -> None:
+    """A certificate for what the method proves, also where it met no counterexamples itself."""
+    built = build_language(all_tasks("three-cells"), method)
+    checked = check(certificate_of(built), built.job.candidates)
+    assert (
+        checked.lower_bound
+        == built.language.guarantee.lower_bound
+        == (3 if method == "exhaustive" else 2)
+    )
+
+
+def test_nothing_to_refute() -> None:
+    built = build_language(all_tasks("grid", "gw1-2x2"), "greedy")
+    with pytest.raises(ValueError, match="there is a language with 3 words"):
+        refuting_clauses(built.job, 3)
+    with pytest.raises(ValueError, match="leave a partition into 1 words"):
+        core([], 1)
+    assert encode([frozenset({(0, 1)})], 1).refuted()
+    assert not encode([frozenset({(0, 1)})], 2).refuted()
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(
+    ("folder", "remember"),
+    [
+        ("tray", False),
+        ("lock", True),
+        ("charger", False),
+        # Minutes, nearly all of them in the search for the language; lock remembers actions, too.
+        pytest.param("push-box", True, marks=pytest.mark.slow),
+    ],
+)
+def test_three_robots(folder: str, remember: bool) -> None:
+    domain = read_domain(DOMAINS / folder / "domain.pddl")
+    problem = read_problem(DOMAINS / folder / "three-robots.pddl", domain)
+    built = build_language(
+        from_problems(domain, [problem], ModelOptions(remember_actions=remember)), "minimal"
+    )
+    assert (
+        check(certificate_of(built), built.job.candidates).lower_bound
+        == built.language.guarantee.size
+    )
+
+
+def test_task_file_with_symmetries() -> None:
+    """Images under symmetries, robot swaps among them, become plans of other candidate tasks."""
+    domain = read_domain(DOMAINS / "grid" / "domain.pddl")
+    problem = read_problem(DOMAINS / "grid" / "gwb5-3x3.pddl", domain)
+    tasks = read_task_file(DOMAINS / "grid" / "gwb5-3x3.tasks.json")
+    built = build_language(from_listed(domain, [problem], tasks), "minimal")
+    assert built.figures["symmetries"] > 0
+    certificate = certificate_of(built)
+    assert check(certificate, built.job.candidates).lower_bound == 3
+    fewer = from_listed(domain, [problem], tasks[:5])
+    with pytest.raises(Refuted, match="is no candidate task"):
+        check(certificate, fewer)
+
+
+@pytest.mark.parametrize(("robots", "number"), [(2, 12), (3, 5)])
+def test_random_models(robots: int, number: int) -> None:
+    """Every minimum of random models is proved by its certificate, and of none a larger one."""
+    bounds = []
+    for seed in count():
+        domain, problem, options = random_model(seed, robots)
+        try:
+            candidates = (all_pairs if seed % 3 else from_problems)(domain, [problem], options)
+        except ProvedImpossible:
+            continue
+        if not 0 < candidates.count <= 100 or states_of(candidates.spaces) > 12:
+            continue
+        if any(inseparable(space) is not None for space in candidates.spaces):
+            continue
+        built = build_language(candidates, "minimal")
+        if built.language.guarantee.size == 1 and seed % 50:
+            continue
+        certificate = certificate_of(built)
+        assert check(certificate, candidates).lower_bound == built.language.guarantee.size
+        with pytest.raises(Refuted, match="leave languages"):
+            check(msgspec.structs.replace(certificate, refuted=certificate.refuted + 1), candidates)
+        bounds.append(built.language.guarantee.size)
+        if len(bounds) == number:
+            break
+    assert max(bounds) > 2
+
+
+def test_command_line(coordlang: Command, tmp_path: Path) -> None:
+    files = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
+    language, proof, dimacs = tmp_path / "l.json", tmp_path / "c.json", tmp_path / "c.cnf"
+    made = coordlang(
+        "build",
+        *files,
+        "--tasks",
+        "all",
+        "--method",
+        "minimal",
+        "-o",
+        language,
+        "--certificate",
+        proof,
+    )
+    assert made.code == 0
+    good = coordlang("verify", language, *files, "--certificate", proof, "--dimacs", dimacs)
+    assert (good.code, good.out.splitlines()[-1].split(":")[0]) == (0, "lower bound 3")
+    assert "p cnf" in dimacs.read_text()
+    data = msgspec.json.decode(proof.read_bytes())
+    data["reasons"] = data["reasons"][1:2]
+    proof.write_bytes(msgspec.json.encode(data))
+    bad = coordlang("verify", language, *files, "--certificate", proof)
+    assert bad.code == 1
+    assert "leave languages with 2 words" in bad.err
+    data |= {"refuted": 1}
+    proof.write_bytes(msgspec.json.encode(data))
+    weak = coordlang("verify", language, *files, "--certificate", proof)
+    assert weak.code == 1
+    assert "claims that 3 words are needed; the certificate proves 2 only" in weak.err
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{}",
+        '{"format": "coordlang/certificate", "version": 2}',
+        "[1]",
+        '{"format": "coordlang/certificate", "version": 1, "reasons": 3}',
+    ],
+)
+def test_what_is_no_certificate(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "c.json"
+    path.write_text(text)
+    with pytest.raises(BadInput, match=r"c\.json"):
+        read_certificate(path)
+    with pytest.raises(BadInput, match="no such file"):
+        read_certificate(tmp_path / "none.json")
+
+
+# A search that is stopped proves a bound
+
+
+#: The search is stopped when it comes to this number of words; fewer are refuted.
+STOPPED_AT = 4
+GW2 = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "gw2-2x3.pddl"
+MINIMAL = ("--tasks", "all", "--method", "minimal")
+
+
+@pytest.fixture
+def late(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Searches are stopped at `STOPPED_AT` words; the seconds that were left then."""
+    decide, left = Search._decide, list[float]()
+
+    def decide_few(search: Search, size: int, budget: SolverBudget) -> bool:
+        if size == STOPPED_AT:
+            left.append(time_left())
+            raise OutOfTime("late")
+        return decide(search, size, budget)
+
+    monkeypatch.setattr(Search, "_decide", decide_few)
+    return left
+
+
+@pytest.fixture
+def pair(coordlang: Command, late: list[float], tmp_path: Path) -> tuple[Path, Path]:
+    """The language and the certificate of a search that was stopped."""
+    language, proof = tmp_path / "l.json", tmp_path / "c.json"
+    made = coordlang("build", *GW2, *MINIMAL, "-o", language, "--certificate", proof)
+    assert made.code == 3
+    assert "the certificate proves a lower bound of 4 words, not that 7 are the fewest" in made.err
+    return language, proof
+
+
+def test_the_bound_of_a_search_that_was_stopped(
+    pair: tuple[Path, Path], coordlang: Command
+) -> None:
+    """It is verified as a bound, and not as a proof that the language is minimal."""
+    language, proof = pair
+    assert read_certificate(proof).refuted == STOPPED_AT - 1
+    found = coordlang("verify", language, *GW2, "--certificate", proof)
+    assert found.code == 0
+    bound, minimal = found.out.splitlines()[-2:]
+    assert bound.startswith("lower bound 4: ")
+    assert minimal == ("not proved minimal: the least number of words is at least 4 and at most 7")
+    data = json.loads(coordlang("verify", language, *GW2, "--certificate", proof, "--json").out)
+    assert (data["lower_bound"], data["words"], data["proved_minimal"]) == (4, 7, False)
+    assert json.loads(coordlang("verify", language, *GW2, "--json").out)["proved_minimal"] is None
+
+
+Data = dict[str, Any]
+
+
+def _claim_minimal(language: Data, _: Data) -> None:
+    language["guarantee"] |= {"lower_bound": 7, "proved_minimal": True}
+
+
+def _claim_one_more(language: Data, proof: Data) -> None:
+    language["guarantee"]["lower_bound"] += 1
+    proof["refuted"] += 1
+
+
+def _claim_minimality_of_both(language: Data, proof: Data) -> None:
+    _claim_minimal(language, proof)
+    proof["refuted"] = 6
+
+
+def _drop_reasons(_: Data, proof: Data) -> None:
+    del proof["reasons"][1::2]
+
+
+def _repeat_a_reason(_: Data, proof: Data) -> None:
+    proof["reasons"] = proof["reasons"][:1] * len(proof["reasons"])
+
+
+def _refute_less(_: Data, proof: Data) -> None:
+    proof["refuted"] -= 1
+
+
+def _flag_without_bound(language: Data, _: Data) -> None:
+    language["guarantee"]["proved_minimal"] = True
+
+
+FORGED: list[tuple[Callable[[Data, Data], None], int, str]] = [
+    (_claim_minimal, 1, "claims that 7 words are needed; the certificate proves 4 only"),
+    (_claim_one_more, 1, "reasons leave languages with 4 words"),
+    (_claim_minimality_of_both, 1, "reasons leave languages with 6 words"),
+    (_drop_reasons, 1, "reasons leave languages with 3 words"),
+    (_repeat_a_reason, 1, "reasons leave languages with 3 words"),
+    (_refute_less, 1, "claims that 4 words are needed; the certificate proves 3 only"),
+    (_flag_without_bound, 31, "'proved_minimal' contradicts the lower bound"),
+]
+
+
+def test_forged_bounds(pair: tuple[Path, Path], coordlang: Command, tmp_path: Path) -> None:
+    """A bound is never taken for more than its reasons prove."""
+    for forge, code, said in FORGED:
+        texts = [json.loads(path.read_bytes()) for path in pair]
+        forge(*texts)
+        files = [tmp_path / "forged.json", tmp_path / "forged-proof.json"]
+        for path, text in zip(files, texts, strict=True):
+            path.write_text(json.dumps(text))
+        found = coordlang("verify", files[0], *GW2, "--certificate", files[1])
+        assert found.code == code, (forge, found)
+        assert said in found.err
+
+
+def test_a_bound_above_a_verified_language_is_no_answer(
+    pair: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A language of 7 words and a proof that 8 are needed: one of the two is wrong."""
+    wrong = Checked(8, 1, encode([], 1), {})
+    monkeypatch.setattr("coordlang.commands.languages.check_certificate", lambda *_: wrong)
+    with pytest.raises(AssertionError, match="one of the two is wrong"):
+        verify(pair[0], *GW2, certificate=pair[1])
+
+
+def test_a_part_of_the_time_is_left_for_the_certificate(
+    late: list[float], coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left: list[float] = []
+
+    def noted(built: Built) -> Certificate:
+        left.append(time_left())
+        return certificate_of(built)
+
+    monkeypatch.setattr("coordlang.commands.languages.certificate_of", noted)
+    output = "-o", tmp_path / "l.json", "--time-limit", "1000"
+    made = coordlang("build", *GW2, *MINIMAL, *output, "--certificate", tmp_path / "c.json")
+    assert made.code == 3
+    assert "late, a part of it kept for the certificate; the best language so far is" in made.err
+    assert 600 < late[0] <= 750  # of the search
+    assert 850 < left[0] <= 1000  # the search came to an end long before
+    assert coordlang("build", *GW2, *MINIMAL, *output).code == 3
+    assert 850 < late[1] <= 1000
+
+
+def test_no_time_is_left_for_the_certificate(
+    late: list[float], coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The clock of the whole command rings while the certificate is made."""
+
+    def endless(_: Built) -> Certificate:
+        os.kill(os.getpid(), signal.SIGALRM)
+        raise AssertionError
+
+    monkeypatch.setattr("coordlang.commands.languages.certificate_of", endless)
+    output = "-o", tmp_path / "l.json", "--time-limit", "1000"
+    made = coordlang("build", *GW2, *MINIMAL, *output, "--certificate", tmp_path / "c.json")
+    assert (made.code, [p.name for p in tmp_path.iterdir()]) == (3, ["l.json"])
+    assert "no certificate is written: there was no time or memory left for it" in made.err
+    assert "the time limit of 1000 s is over; the best language so far is written" in made.err
