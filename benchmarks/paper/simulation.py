@@ -235,9 +235,9 @@ A human stands in a cell that is no corner, drawn uniformly, and only lidars see
 cells away. The tasks are the legs of deliveries, as in the section on navigation, drawn uniformly,
 with the same plan for *plan* and *sentence*, by the clock. *Floor*: runs that end well, of robots
 with wheels; a robot that sees the human asks its choices (`coordlang.execution` monitor) for a way
-that avoids the cell. *Joint model*: the same tasks, plans and cells in joint steps, where all know of
-the human before they start. In brackets 95 % intervals (Wilson). *Only there*: runs that end well
-in the joint model and not on the floor; *only here*: the other way round."""
+that avoids the cell. *Joint model*: the same tasks, plans and cells in joint steps, where all know
+of the human before they start. In brackets 95 % intervals (Wilson). *Only there*: runs that end
+well in the joint model and not on the floor; *only here*: the other way round."""
 
 
 def _floor_table(floors: Sequence[Record]) -> str:
