@@ -12,7 +12,8 @@ from typing import Any, get_origin
 import click
 
 from coordlang.commands.files import FILE, FOLDER, check_outputs, never_stdout
-from coordlang.commands.shared import Kept, Limits, limited
+from coordlang.commands.shared import Kept, Limits, keeping, limited
+from coordlang.commands.shared_options import was_given
 from coordlang.commands.terminal import working
 from planners.system.options import Given, options_of, record_from
 
@@ -56,14 +57,14 @@ def command(
     named = {each.name: each for kind in groups for each in options_of(kind)}
 
     def called(arguments: tuple[str, ...], **values: object) -> int | None:
-        given = {key: value for key, value in values.items() if _was_given(key)}
+        given = {key: value for key, value in values.items() if was_given(key)}
         own, kept, limits = (
             {each.name: given[each.name] for each in options_of(kind) if each.name in given}
             for kind in groups
         )
         read = arguments_by_name(takes, arguments, is_factored="factored" in own)
         _check_outputs(named.values(), own, arguments)
-        with limited(record_from(Limits, limits, name), record_from(Kept, kept, name)):
+        with limited(record_from(Limits, limits, name)), keeping(record_from(Kept, kept, name)):
             with working(doing) as progress:
                 if "progress" in named:
                     own["progress"] = progress
@@ -100,12 +101,6 @@ def arguments_by_name(
         }
     texts = zip(names, arguments, strict=False)
     return {name.strip("[]").lower(): text for name, text in texts}
-
-
-def _was_given(name: str) -> bool:
-    """Whether a parameter of the command stands on the command line."""
-    source = click.get_current_context().get_parameter_source(name)
-    return source is not click.core.ParameterSource.DEFAULT
 
 
 def _check_outputs(

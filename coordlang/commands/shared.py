@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import click
@@ -53,8 +53,8 @@ class Kept:
 
 
 @contextmanager
-def limited(limits: Limits, kept: Kept) -> Iterator[None]:
-    """Run a block under limits, with plans kept unless the user says otherwise."""
+def limited(limits: Limits) -> Iterator[None]:
+    """Run a block under limits."""
     from planners.system.limits import limited_memory, require_libraries, require_memory, time_limit
 
     if limits.time_limit is not None and math.isnan(limits.time_limit):
@@ -63,12 +63,21 @@ def limited(limits: Limits, kept: Kept) -> Iterator[None]:
     require_libraries()
     if limits.memory_limit is not None and most is not None:
         require_memory(most)
-    with ExitStack() as stack:
-        stack.enter_context(limited_memory(most))
-        stack.enter_context(time_limit(limits.time_limit))
-        if not kept.no_cache:
-            from planners.search.kept_plans import default_folder, keeping_plans, plan_store
+    with limited_memory(most), time_limit(limits.time_limit):
+        yield
 
-            place = default_folder()
-            stack.enter_context(keeping_plans(None if place is None else plan_store(place)))
+
+@contextmanager
+def keeping(kept: Kept) -> Iterator[None]:
+    """Run a block that searches no task again that it finds in the user's cache."""
+    from planners.system.limits import require_libraries
+
+    require_libraries()  # before what imports them
+    if kept.no_cache:
+        yield
+        return
+    from planners.search.kept_plans import default_folder, keeping_plans, plan_store
+
+    place = default_folder()
+    with keeping_plans(None if place is None else plan_store(place)):
         yield

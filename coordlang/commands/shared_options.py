@@ -4,15 +4,14 @@
 from __future__ import annotations
 
 import functools
-import math
 import os
-import re
 from collections.abc import Callable
 from typing import Any, get_args
 
 import click
 
 from coordlang.commands.echo import echo
+from coordlang.commands.shared import Kept, Limits, keeping, limited
 from planners.pddl.model_options import Cost, Unowned
 from planners.system.errors import OutOfTime
 
@@ -34,7 +33,6 @@ def limits(function: CommandFunction) -> CommandFunction:
     )
     @click.option(
         "--memory-limit",
-        callback=_size,
         metavar="SIZE",
         help="Stop before using more, e.g. 4G (exit 22); none: no limit.  Default: 80 % of what is "
         "free.",
@@ -42,17 +40,9 @@ def limits(function: CommandFunction) -> CommandFunction:
     @click.option("--debug", is_flag=True, help="Show tracebacks.")
     @functools.wraps(function)
     def wrapped(
-        time_limit: float | None, memory_limit: int | str | None, debug: bool, **arguments: object
+        time_limit: float | None, memory_limit: str | None, debug: bool, **arguments: object
     ) -> int | None:
-        from planners.system.limits import limited_memory, require_libraries, require_memory
-        from planners.system.limits import time_limit as limit_time
-
-        if time_limit is not None and math.isnan(time_limit):
-            raise click.UsageError("--time-limit: expected a number of seconds")
-        require_libraries()
-        if isinstance(memory_limit, int):
-            require_memory(memory_limit)
-        with limited_memory(_bytes(memory_limit)), limit_time(time_limit):
+        with limited(Limits(time_limit, memory_limit, debug)):
             return function(**arguments)
 
     return wrapped
@@ -121,15 +111,7 @@ def kept_plans(function: CommandFunction) -> CommandFunction:
     )
     @functools.wraps(function)
     def wrapped(no_cache: bool, **arguments: object) -> int | None:
-        from planners.system.limits import require_libraries
-
-        require_libraries()  # before what imports them
-        if no_cache:
-            return function(**arguments)
-        from planners.search.kept_plans import default_folder, keeping_plans, plan_store
-
-        place = default_folder()
-        with keeping_plans(None if place is None else plan_store(place)):
+        with keeping(Kept(no_cache)):
             return function(**arguments)
 
     return wrapped
@@ -188,26 +170,6 @@ def was_given(name: str) -> bool:
         click.get_current_context().get_parameter_source(name)
         is click.core.ParameterSource.COMMANDLINE
     )
-
-
-def _bytes(memory_limit: int | str | None) -> int | None:
-    """Return the limit on the address space; None for "none"."""
-    from planners.system.limits import default_memory_limit
-
-    if memory_limit is None:
-        return default_memory_limit()
-    return memory_limit if isinstance(memory_limit, int) else None
-
-
-def _size(
-    _context: click.Context, _parameter: click.Parameter, value: str | None
-) -> int | str | None:
-    if value is None or value.strip().lower() == "none":
-        return value and "none"
-    match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([kmgt]?)i?b?", value.strip().lower())
-    if not match:
-        raise click.BadParameter("expected a size such as 500M or 4G, or none")
-    return int(float(match[1]) * 1024 ** " kmgt".index(match[2] or " "))
 
 
 __all__ = [
