@@ -22,6 +22,7 @@ from coordlang.simulation.settings import Settings
 from coordlang.simulation.tracking import Pose, Velocity
 from coordlang.sites.coordinates import Point
 from planners.system.errors import UsageError
+from planners.system.signals import postponed_signals
 
 #: The names of the human and of walls: with a space, as no robot is called.
 HUMAN, WALL = "the human", "the wall"
@@ -154,7 +155,8 @@ def _environment(world: dict[str, Any], seed: int) -> Any:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "world.yaml")
         path.write_text(json.dumps(world))  # which is YAML, too
-        environment = simulator(str(path), headless=True, log_level="CRITICAL", seed=seed)
+        with postponed_signals():  # it would print a limit's error as one of its own
+            environment = simulator(str(path), headless=True, log_level="CRITICAL", seed=seed)
     # It logs nothing from here on.  Left to the garbage collector, that may come while the next
     # world begins to log, and both wait for the other's lock for ever.
     environment.logger.close()

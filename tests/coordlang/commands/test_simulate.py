@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import sys
 from pathlib import Path
 from typing import Any
@@ -88,6 +90,30 @@ def test_a_time_limit_keeps_the_runs_that_are_done(language: Path, coordlang: Co
     assert outcome.code == 3
     assert 0 < len(json.loads(outcome.out)["runs"]) < 1000
     assert "of 1000 done" in outcome.err
+
+
+def test_a_limit_while_the_world_is_made_is_no_line_on_stdout(
+    language: Path, coordlang: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from irsim.env import env_base
+
+    class Ringing(env_base.EnvConfig):  # type: ignore[misc]
+        """The alarm rings while the file is read, where ir-sim prints what is raised."""
+
+        worlds = 0
+
+        def __init__(self, *arguments: object, **keywords: object) -> None:
+            Ringing.worlds += 1
+            if Ringing.worlds == 3:
+                os.kill(os.getpid(), signal.SIGALRM)
+            super().__init__(*arguments, **keywords)
+
+    monkeypatch.setattr(env_base, "EnvConfig", Ringing)
+    outcome = coordlang(
+        "simulate", language, *T_MAP, "--runs", "9", "--time-limit", "600", "--json"
+    )
+    assert outcome.code == 3
+    assert len(json.loads(outcome.out)["runs"]) == 2
 
 
 def test_an_interrupt_keeps_the_runs_that_are_done(
