@@ -25,19 +25,19 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from coordlang.commands.choices import choices as choices
     from coordlang.commands.coordination_tasks import coordination as coordination
     from coordlang.commands.cross_check import check as check
     from coordlang.commands.explaining import explain as explain
     from coordlang.commands.exporting import export as export
+    from coordlang.commands.inputs import load as load
+    from coordlang.commands.inspect import inspect as inspect
     from coordlang.commands.languages import build as build
     from coordlang.commands.languages import load_language as load_language
     from coordlang.commands.languages import verify as verify
     from coordlang.commands.lifting import ground as ground
     from coordlang.commands.lifting import lift as lift
-    from coordlang.commands.planning import inspect as inspect
-    from coordlang.commands.planning import load as load
-    from coordlang.commands.planning import plans as plans
-    from coordlang.commands.robot_choices import choices as choices
+    from coordlang.commands.plans import plans as plans
     from coordlang.commands.simulating import simulate as simulate
     from coordlang.commands.speaking import plan as plan
     from coordlang.commands.speaking import say as say
@@ -65,13 +65,15 @@ __version__ = "0.1.0"
 
 #: Module -> the public names that it defines.
 _DEFINED_IN = {
-    "coordlang.commands.planning": ("load", "inspect", "plans"),
+    "coordlang.commands.inputs": ("load",),
+    "coordlang.commands.inspect": ("inspect",),
+    "coordlang.commands.plans": ("plans",),
     "coordlang.commands.cross_check": ("check",),
     "coordlang.commands.coordination_tasks": ("coordination",),
     "coordlang.commands.languages": ("build", "verify", "load_language"),
     "coordlang.commands.lifting": ("lift", "ground"),
     "coordlang.commands.speaking": ("say", "understand", "plan"),
-    "coordlang.commands.robot_choices": ("choices",),
+    "coordlang.commands.choices": ("choices",),
     "coordlang.commands.simulating": ("simulate",),
     "coordlang.commands.explaining": ("explain",),
     "coordlang.commands.exporting": ("export",),

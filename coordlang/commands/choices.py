@@ -4,105 +4,235 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import zip_longest
-from typing import TYPE_CHECKING, Any
+from fractions import Fraction
+from math import prod
+from os import fspath
+from typing import Any, Literal
 
 import click
 
-import coordlang
-from coordlang.commands.echo import echo
+from coordlang.commands.choices_text import choices_text
+from coordlang.commands.command import command_of
+from coordlang.commands.echo import echo, note
 from coordlang.commands.exit_codes import REFUTED
-from coordlang.commands.files import (
-    FILE,
-    PlanningFiles,
-    check_outputs,
-    language_argument,
-    planning_files,
-    write,
-)
+from coordlang.commands.files import write
+from coordlang.commands.inputs import DomainSource, File, ProblemSource
+from coordlang.commands.keywords import with_options
+from coordlang.commands.language_inputs import LanguageSource, read_task_language
 from coordlang.commands.listing import form_of
-from coordlang.commands.shared_options import ModelKeywords, kept_plans, limits, model_options
-from coordlang.commands.terminal import covered_code, line_width, working
-from planners.system.notebook import counted
+from coordlang.commands.options import NO_SLACK, Source, json_option, output_option
+from coordlang.commands.speaking import SentenceSource, given_sentence
+from coordlang.commands.terminal import covered_code, line_width
+from coordlang.commands.witness import witness_text
+from coordlang.execution.choices import MOST, Choices
+from coordlang.execution.choices import choices as choices_under
+from coordlang.execution.choices_file import monitor, to_bytes, to_data
+from coordlang.execution.dot import to_dot
+from coordlang.execution.monitor import Answer, Monitor, MonitorError, NotAllowed
+from coordlang.language.tolerance import Tolerance, percent
+from coordlang.required.failure import TooManyToCount, failure_of_sentence
+from coordlang.required.miscoordination import Miscoordination
+from planners.pddl.model_options import names_in
+from planners.search.plan_file import json_count
+from planners.search.plans import Plans
+from planners.system.errors import Refuted, UsageError
+from planners.system.notebook import Presented, counted, html_table
+from planners.system.options import group, option
+from planners.system.writing import write_atomically
 
-if TYPE_CHECKING:
-    from coordlang.commands.robot_choices import RobotsChoices
-    from coordlang.execution.choices import RobotChoices
-    from coordlang.execution.monitor import Answer, Monitor
-
-#: States of an automaton beyond which a table is cut.
-STATES_SHOWN = 40
-_MAY_DO = "may do"
-#: Characters that what is known has at least beside what may be done.
-_LEAST_ROOM = 30
+#: Additions that are made to count how often choices fail, some seconds of work.
+_ADDITIONS = 1_000_000
 
 
-@click.command(name="choices")
-@language_argument
-@planning_files("DOMAIN PROBLEM SENTENCE", most=1, then="sentence")
-@click.option(
-    "--robot",
-    "whose",
-    multiple=True,
-    metavar="R",
-    help="Whose choices; may be repeated (default: all).",
-)
-@click.option(
-    "--check",
-    is_flag=True,
-    help="Walk every combination of all robots' choices: is each an optimal plan?",
-)
-@click.option(
-    "--history",
-    multiple=True,
-    metavar="SUBACTION",
-    help="What the robot did so far, one step each; or idle.",
-)
-@click.option(
-    "--visit", multiple=True, metavar="ATOM", help="A detour: this becomes true, now or later."
-)
-@click.option("--avoid", multiple=True, metavar="ATOM", help="A detour: this is false from now on.")
-@click.option(
-    "--do",
-    multiple=True,
-    metavar="PATTERN",
-    help="A detour: it does this at least once; * is any text.",
-)
-@click.option(
-    "--never", multiple=True, metavar="PATTERN", help="A detour: it never does this any more."
-)
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["text", "json", "dot"]),
-    default="text",
-    show_default=True,
-)
-@click.option("--json", "as_json", is_flag=True, help="Short for --format json.")
-@click.option(
-    "-o", "--output", type=FILE, metavar="FILE", help="Write to this file instead of stdout."
-)
-@model_options
-@kept_plans
-@limits
-def command(
-    language: str,
-    pddl: PlanningFiles,
-    sentence: str,
-    whose: tuple[str, ...],
-    check: bool,
-    history: tuple[str, ...],
-    visit: tuple[str, ...],
-    avoid: tuple[str, ...],
-    do: tuple[str, ...],
-    never: tuple[str, ...],
-    form: str,
-    as_json: bool,
-    output: str | None,
-    model: ModelKeywords,
-) -> int:
+@dataclass(frozen=True, slots=True, repr=False)
+class RobotsChoices(Presented):
+    """The subplans that each robot may follow under a sentence, whatever the others choose.
+
+    ``chosen`` are the numbers of the robots that are shown and saved.
+    """
+
+    found: Choices
+    chosen: tuple[int, ...]
+    shown = ("sentence", "subplans", "guaranteed", "covered")
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The robots that are shown and saved."""
+        names = self.found.task_language.model.robots
+        return tuple(names[number] for number in self.chosen)
+
+    @property
+    def sentence(self) -> str:
+        """The sentence."""
+        return self.found.task_language.text(self.found.words)
+
+    @property
+    def covered(self) -> bool:
+        """Whether the task is one that the language guarantees."""
+        return self.found.task_language.covered
+
+    @property
+    def tolerance(self) -> Tolerance | None:
+        """What may go wrong, or be longer, under the language; None: nothing."""
+        return self.found.task_language.tolerance
+
+    @property
+    def guaranteed(self) -> bool:
+        """Whether every combination of choices is an optimal plan."""
+        return self.found.guaranteed
+
+    @property
+    def failure(self) -> Fraction | None:
+        """How often robots that choose by themselves under the sentence miscoordinate.
+
+        Each draws one of the plans with the sentence, uniformly.  None where it is too much to
+        count.
+        """
+        if self.guaranteed:
+            return Fraction(0)
+        used = self.found.task_language
+        try:
+            return failure_of_sentence(used.space, used.start, self.found.fits, _ADDITIONS)
+        except TooManyToCount:
+            return None
+
+    @property
+    def witness(self) -> Miscoordination | None:
+        """A combination that is no optimal plan, or None."""
+        return self.found.mixtures.violation if self.found.mixtures else None
+
+    @property
+    def subplans(self) -> dict[str, int]:
+        """Robot -> the exact number of its subplans."""
+        counts = (self.found.robots[number].automaton.count for number in self.chosen)
+        return dict(zip(self.robots, counts, strict=True))
+
+    @property
+    def plans(self) -> int:
+        """The exact number of plans that the sentence leaves open."""
+        return Plans.of(self.found.fits).count
+
+    @property
+    def combinations(self) -> int:
+        """The exact number of combinations of one subplan of every robot."""
+        return prod(own.automaton.count for own in self.found.robots)
+
+    @property
+    def combinations_walked(self) -> int | None:
+        """The number of nodes walked to check every combination, None where that was left out."""
+        return self.found.mixtures.nodes if self.found.mixtures else None
+
+    def monitor(self, robot: str) -> Monitor:
+        """A run-time monitor of one robot.
+
+        Raises
+        ------
+        UsageError
+            For a robot that there is none of.
+        """
+        (number,) = _numbers(self.found.task_language.model.robots, robot)
+        return monitor(self.found, self.found.task_language.model.robots[number])
+
+    def data(self) -> dict[str, Any]:
+        """The data of a choices file (docs/formats.md)."""
+        return to_data(self.found, self.chosen)
+
+    def text(self) -> str:
+        """The text of a choices file."""
+        return to_bytes(self.found, self.chosen).decode()
+
+    def save(self, path: File) -> None:
+        """Write a choices file, for `Monitor.read` on the robot; complete or not at all."""
+        write_atomically(fspath(path), to_bytes(self.found, self.chosen))
+
+    def dot(self) -> str:
+        """The automata in the language of Graphviz."""
+        return to_dot(self.found, self.chosen)
+
+    def _repr_html_(self) -> str:
+        rows = [(robot, f"{number:,}") for robot, number in self.subplans.items()]
+        return html_table(("robot", "subplans"), rows, f'under "{self.sentence}"')
+
+
+@dataclass(frozen=True, slots=True)
+class ChoicesOptions:
+    """What `choices` can be asked for."""
+
+    robot: str | Sequence[str] = option((), "Whose choices; may be repeated (default: all).", "R")
+    check: bool = option(
+        False, "Walk every combination of all robots' choices: is each an optimal plan?"
+    )
+    history: tuple[str, ...] = option(
+        (), "What the robot did so far, one step each; or idle.", "SUBACTION", only="cli"
+    )
+    visit: tuple[str, ...] = option(
+        (), "A detour: this becomes true, now or later.", "ATOM", only="cli"
+    )
+    avoid: tuple[str, ...] = option((), "A detour: this is false from now on.", "ATOM", only="cli")
+    do: tuple[str, ...] = option(
+        (), "A detour: it does this at least once; * is any text.", "PATTERN", only="cli"
+    )
+    never: tuple[str, ...] = option(
+        (), "A detour: it never does this any more.", "PATTERN", only="cli"
+    )
+    form: Literal["text", "json", "dot"] = option(
+        "text", "How they are shown.", names=("--format",), only="cli"
+    )
+    as_json: bool = json_option("Short for --format json.")
+    output: str | None = output_option()
+    source: Source = group(Source, without=NO_SLACK)
+    given: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "form", form_of(self.form, self.as_json, self.given))
+
+    @property
+    def detours(self) -> dict[str, tuple[str, ...]]:
+        """What the robot is asked for, by kind."""
+        return {"visit": self.visit, "avoid": self.avoid, "do": self.do, "never": self.never}
+
+
+@with_options(ChoicesOptions)
+def choices(
+    language: LanguageSource,
+    domain: DomainSource | None = None,
+    problem: ProblemSource | None = None,
+    sentence: SentenceSource | None = None,
+    *,
+    options: ChoicesOptions,
+) -> RobotsChoices:
+    """Find the subplans that each robot may follow under a sentence, whatever the others choose.
+
+    Raises
+    ------
+    NoPlanFits
+        If no optimal plan has the sentence.
+    UsageError
+        For a robot that there is none of.
+    OutOfMemory
+        If the automata, or with ``check`` the combinations, do not fit into the memory.
+    """
+    said = given_sentence(sentence)
+    used = read_task_language(language, domain, problem, options.source)
+    chosen = _numbers(used.model.robots, options.robot) or tuple(range(len(used.model.robots)))
+    found = choices_under(used, used.words_of(said), most=None if options.check else MOST)
+    return RobotsChoices(found, chosen)
+
+
+def _numbers(known: tuple[str, ...], whose: str | Sequence[str]) -> tuple[int, ...]:
+    for name in (names := names_in("--robot", whose)):
+        if name not in known:
+            raise UsageError(
+                f"--robot {name}: there is no such robot",
+                remedy=f"The robots are {', '.join(known)}.",
+            )
+    return tuple(dict.fromkeys(known.index(name) for name in names))
+
+
+@command_of(choices, "LANGUAGE DOMAIN PROBLEM SENTENCE", doing="finding the robots' choices")
+def command(found: RobotsChoices, options: ChoicesOptions) -> int:
     """Show which subplans each robot may follow under SENTENCE ("w1 w0").
 
     Whatever the others choose from theirs, together they follow an optimal plan.
@@ -110,43 +240,26 @@ def command(
     With --history and the detours: what one robot may do next, and whether the detours are still
     possible, all at once.
     """
-    form = form_of(form, as_json)
-    check_outputs([("-o", output)], [language, *pddl.paths])
-    with working("finding the robots' choices"):
-        found = coordlang.choices(
-            language,
-            pddl.domain,
-            pddl.problem,
-            sentence,
-            factored=pddl.factored,
-            robot=whose,
-            check=check,
-            **model,
-        )
-    detours = {"visit": visit, "avoid": avoid, "do": do, "never": never}
-    code = 0
-    if history or any(detours.values()):
+    form, code = options.form, 0
+    if options.history or any(options.detours.values()):
         if len(found.robots) != 1 or form == "dot":
             raise click.UsageError(
                 "--history, --visit, --avoid, --do and --never ask about one --robot, "
                 "as text or JSON"
             )
-        at, answer = _followed(found, history, detours)
+        at, answer = _followed(found, options)
         text = _monitor_text(at, answer) if form == "text" else _monitor_json(at, answer)
         code = REFUTED if answer is not None and not answer else 0
     elif form == "text":
-        text = _text(found, check)
+        text = choices_text(found, line_width(), is_checked=options.check)
     else:
         text = found.dot() if form == "dot" else found.text()
-    write(text, output)
-    return max(code, _guarantee_code(found, check))
+    write(text, options.output)
+    return max(code, _guarantee_code(found, options.check))
 
 
 def _guarantee_code(found: RobotsChoices, check: bool) -> int:
-    """Return the exit code of what is guaranteed, and write to stderr what is not."""
-    from coordlang.commands.witness import witness_text
-    from coordlang.language.tolerance import percent
-
+    """The exit code of what is guaranteed; writes to stderr what is not."""
     claimed = found.tolerance is not None and found.tolerance.may_fail
     tolerated = found.covered and not check and claimed
     if found.witness is not None and tolerated:
@@ -161,126 +274,22 @@ def _guarantee_code(found: RobotsChoices, check: bool) -> int:
         echo(witness_text(found.witness, line_width(err=True)), err=True)
         return REFUTED
     if check and not found.covered:
-        echo(
-            "coordlang: note: the language does not cover this task; --check proved this sentence",
-            err=True,
-        )
+        note("the language does not cover this task; --check proved this sentence")
         return 0
     return covered_code(found.covered, found.tolerance)
 
 
-def _text(found: RobotsChoices, check: bool) -> str:
-    from coordlang.commands.layout import alike, named, wrapped
-    from coordlang.language.candidates import describe
-
-    width = line_width()
-    used, mixtures = found.found.task_language, found.found.mixtures
-    lines = [
-        *wrapped(f"The task {describe(used.space, used.task)}", width, "", "  "),
-        f'"{found.sentence}" leaves {counted(found.plans, "plan")} open.',
-    ]
-    if check and mixtures is not None and mixtures.holds:
-        number = counted(found.combinations, "combination")
-        nodes = counted(mixtures.nodes, "node")
-        lines.append(
-            f"checked: {number} of own subplans, all {used.model.kept_plans} ({nodes} walked)"
-        )
-    tables = [_table(found, found.found.robots[robot], width) for robot in found.chosen]
-    for group in alike(tables):
-        robots = named([used.model.robots[found.chosen[number]] for number in group])
-        may, table = "may" if len(group) == 1 else "may each", tables[group[0]]
-        lines += ["", *wrapped(f"{robots} {may} {table[0]}", width, "", "  "), *table[1:]]
-    return "\n".join(lines) + "\n"
-
-
-def _table(found: RobotsChoices, own: RobotChoices, width: int) -> list[str]:
-    """The automaton state by state: what may be done there, where it leads, what is known there."""
-    automaton = own.automaton
-    subplans = counted(automaton.count, "subplan")
-    states = counted(len(automaton), "state")
-    rows = _rows(found, own)[:STATES_SHOWN]
-    lines = [f"follow {subplans} ({states}):", *(_row_lines(rows, width) if rows else ())]
-    rest = automaton.layers[-1].start - len(rows)
-    if rest > 0:
-        lines.append(f"  .. and {counted(rest, 'state')} more; --format json has all of them")
-    return lines
-
-
-def _row_lines(rows: Sequence[_Row], width: int) -> Iterator[str]:
-    """Columns as wide as they need be; broken into lines where they do not fit.
-
-    Then each alternative has a line of its own, and so many atoms as fit stand beside it.
-    """
-    from coordlang.commands.layout import packed
-
-    head = ("step", "state", "left")
-    numbers = [
-        max(map(len, column)) for column in zip(head, *(row.numbers for row in rows), strict=True)
-    ]
-    indent = sum(numbers) + 2 * len(numbers) + 2
-    whole = [(" | ".join(row.moves), " ".join(row.knows)) for row in rows]
-    broken = indent + max(len(m) for m, _ in whole) + 2 + max(len(k) for _, k in whole) > width
-    shown = [
-        (row.moves[:1] + tuple(f"| {move}" for move in row.moves[1:]) if broken else (moves,), row)
-        for row, (moves, _) in zip(rows, whole, strict=True)
-    ]
-    may_do = max(len(_MAY_DO), *(len(line) for lines, _ in shown for line in lines))
-    room = max(_LEAST_ROOM, width - indent - may_do - 2) if broken else width
-
-    def line(left: Sequence[str], move: str, atoms: str) -> str:
-        cells = [cell.rjust(size) for cell, size in zip(left, numbers, strict=True)]
-        return "  ".join(["", *cells, move.ljust(may_do), atoms]).rstrip()
-
-    yield line(head, _MAY_DO, "knows")
-    for moves, row in shown:
-        atoms = packed(row.knows, room, "", "") if broken else [" ".join(row.knows)]
-        for number, (move, known) in enumerate(zip_longest(moves, atoms, fillvalue="")):
-            yield line(row.numbers if number == 0 else ("",) * len(head), move, known)
-
-
-@dataclass(frozen=True, slots=True)
-class _Row:
-    """One state of an automaton: its step, number and subplans left, moves, and what is known."""
-
-    numbers: tuple[str, str, str]
-    moves: tuple[str, ...]
-    knows: tuple[str, ...]
-
-
-def _rows(found: RobotsChoices, own: RobotChoices) -> list[_Row]:
-    """A row for each state in which something may be done, of the first steps."""
-    from coordlang.execution.dot import distinguishing
-
-    model, automaton = found.found.task_language.model, own.automaton
-    rows = []
-    for step, states in enumerate(automaton.layers[:-1], 1):
-        if states.start >= STATES_SHOWN:
-            break
-        for state, atoms in zip(states, distinguishing(found.found, own, states), strict=True):
-            moves = tuple(
-                f"{model.label_text(own.robot, label) or 'idle'} -> {to}"
-                for label, to in automaton.moves(state)
-            )
-            numbers = str(step), str(state), f"{automaton.left[state]:,}"
-            rows.append(_Row(numbers, moves, tuple(atoms)))
-    return rows
-
-
-def _followed(
-    found: RobotsChoices, history: tuple[str, ...], detours: dict[str, tuple[str, ...]]
-) -> tuple[Monitor, Answer | None]:
-    """Return a monitor that followed what the robot did, and its answer to the detours, if any."""
+def _followed(found: RobotsChoices, options: ChoicesOptions) -> tuple[Monitor, Answer | None]:
+    """A monitor that followed what the robot did, and its answer to the detours, if any."""
     try:
         at = found.monitor(found.robots[0])
-        for subaction in history:
+        for subaction in options.history:
             at.did(subaction)
-        return at, at.can(**detours) if any(detours.values()) else None
-    except coordlang.NotAllowed as error:
-        raise coordlang.Refuted(
-            str(error), remedy="After that nothing is guaranteed any more."
-        ) from None
-    except coordlang.MonitorError as error:
-        raise coordlang.UsageError(str(error)) from None
+        return at, at.can(**options.detours) if any(options.detours.values()) else None
+    except NotAllowed as error:
+        raise Refuted(str(error), remedy="After that nothing is guaranteed any more.") from None
+    except MonitorError as error:
+        raise UsageError(str(error)) from None
 
 
 def _monitor_text(at: Monitor, answer: Answer | None) -> str:
@@ -303,8 +312,6 @@ def _monitor_text(at: Monitor, answer: Answer | None) -> str:
 
 
 def _monitor_json(at: Monitor, answer: Answer | None) -> str:
-    from planners.search.plan_file import json_count
-
     data: dict[str, Any] = {
         "robot": at.robot,
         "step": at.step,

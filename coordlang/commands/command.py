@@ -1,20 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A command of the command line: an options record, a Python function, and how to show its result.
+"""A command of the command line: a Python function, its options record, and how to show its result.
 
 A command calls the Python function of its name; nothing else is computed here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import Any, get_origin
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import Any, get_args, get_origin
 
 import click
 
-from coordlang.commands.files import FILE, FOLDER, check_outputs, never_stdout
+from coordlang.commands.echo import echo, note
+from coordlang.commands.files import FILE, FOLDER, beside, check_outputs, never_stdout
 from coordlang.commands.shared import Kept, Limits, keeping, limited
-from coordlang.commands.shared_options import was_given
-from coordlang.commands.terminal import working
+from coordlang.commands.terminal import line_width, working
+from planners.system.errors import CoordlangError, OutOfTime
 from planners.system.options import Given, options_of, record_from
 
 #: Shows a result: gets it and the options, writes, and returns the exit code, None for 0.
@@ -22,123 +26,170 @@ Show = Callable[[Any, Any], int | None]
 
 #: Arguments that --factored stands for.
 _PDDL = ("DOMAIN", "PROBLEM", "PROBLEMS...")
-#: Values that name a file.
-_FILE_METAVARS = ("FILE", "all|FILE", "LANGUAGE", "PROBLEM")
+#: Options whose metavar has one of these name a file that is read or written.
+_FILES = ("FILE", "LANGUAGE", "PROBLEM")
 
 
-def command(
-    function: Callable[..., Any],
-    record: type[object],
-    takes: str,
-    show: Show,
-    *,
-    doing: str,
-    help: str,
-) -> click.Command:
-    """A command that calls a function and shows what it returns.
+def command_of(
+    function: Callable[..., Any], takes: str, *, doing: str, keeps_plans: bool = True
+) -> Callable[[Show], click.Command]:
+    """Make a command of a Python function and of what shows its result, which this decorates.
+
+    Its help is the docstring of what shows the result.
 
     Parameters
     ----------
     function
         Made by `coordlang.commands.keywords.with_options`; its name is the command's.
-    record
-        The function's options record.
     takes
-        The arguments, as the usage line shows them: ``LANGUAGE DOMAIN PROBLEM [SENTENCE]``.
-    show
-        Shows the result.
+        The arguments, as the usage line shows them, in the order of the function's parameters:
+        ``LANGUAGE DOMAIN PROBLEM [SENTENCE]``, ``DOMAIN PROBLEMS...``.
     doing
         What a terminal shows while the function works.
-    help
-        The text of ``--help``.
+    keeps_plans
+        Whether it searches no task again that was searched before, unless ``--no-cache`` is given.
     """
     name = function.__name__
-    groups = record, Kept, Limits
-    named = {each.name: each for kind in groups for each in options_of(kind)}
+    record = function.record  # type: ignore[attr-defined]
+    records = [record, Kept, Limits] if keeps_plans else [record, Limits]
+    named = {each.name: each for kind in records for each in options_of(kind)}
+    on_cli = [each for each in named.values() if each.option.only != "python"]
 
-    def called(arguments: tuple[str, ...], **values: object) -> int | None:
-        given = {key: value for key, value in values.items() if was_given(key)}
-        own, kept, limits = (
-            {each.name: given[each.name] for each in options_of(kind) if each.name in given}
-            for kind in groups
+    def decorate(show: Show) -> click.Command:
+        def called(arguments: tuple[str, ...], **values: object) -> int | None:
+            given = {key: value for key, value in values.items() if _was_given(key)}
+            factored = given.get("factored")
+            read = positional(takes, arguments, is_factored=factored is not None)
+            _check_outputs(on_cli, given, _read_files(arguments, factored))
+            own, kept, limits = (
+                {each.name: given[each.name] for each in options_of(kind) if each.name in given}
+                for kind in (record, Kept, Limits)
+            )
+            cache = keeping(record_from(Kept, kept, name)) if keeps_plans else nullcontext()
+            with limited(record_from(Limits, limits, name)), cache, _said(own.get("resume")):
+                with working(doing) as progress:
+                    own |= {
+                        key: value
+                        for key, value in (("progress", progress), ("note", note))
+                        if key in named
+                    }
+                    options = record_from(record, own, name, on_cli=True)
+                    result = function.with_record(*read, options=options)  # type: ignore[attr-defined]
+                return show(result, options)
+
+        argument = click.Argument(["arguments"], nargs=-1, type=FILE, metavar=takes)
+        parameters = [argument] if takes else []
+        return click.Command(
+            name,
+            params=[*parameters, *map(_click_option, on_cli)],
+            callback=called if takes else lambda **values: called((), **values),
+            help=show.__doc__,
         )
-        read = arguments_by_name(takes, arguments, is_factored="factored" in own)
-        _check_outputs(named.values(), own, arguments)
-        with limited(record_from(Limits, limits, name)), keeping(record_from(Kept, kept, name)):
-            with working(doing) as progress:
-                if "progress" in named:
-                    own["progress"] = progress
-                options = record_from(record, own, name)
-                domain = [read.pop("domain")] if "domain" in read else []
-                problems = read.pop("problems", ())
-                result = function.with_record(*domain, *problems, options=options, **read)  # type: ignore[attr-defined]
-            return show(result, options)
 
-    argument = click.Argument(["arguments"], nargs=-1, type=FILE, metavar=takes)
-    options = [_click_option(each) for each in named.values() if each.option.only != "python"]
-    return click.Command(name, params=[argument, *options], callback=called, help=help)
+    return decorate
 
 
-def arguments_by_name(
-    takes: str, arguments: tuple[str, ...], *, is_factored: bool
-) -> dict[str, Any]:
-    """The arguments of a command by the name of the function's parameter.
+def positional(takes: str, given: tuple[str, ...], *, is_factored: bool) -> list[str | None]:
+    """The arguments in the order of the function's parameters; None for those that are not given.
 
-    ``PROBLEMS...`` is a tuple; one in brackets may be left out.  ``--factored`` stands for DOMAIN
-    and PROBLEM.  Raises `click.UsageError` for too few or too many.
+    One in brackets may be left out, and ``PROBLEMS...`` are any number.  ``--factored`` stands for
+    DOMAIN and PROBLEM.  Raises `click.UsageError` for too few or too many.
     """
-    names = [name for name in takes.split() if not (is_factored and name in _PDDL)]
-    least = sum(not name.startswith("[") for name in names)
-    is_open = "PROBLEMS..." in names
-    if len(arguments) < least or (len(arguments) > len(names) and not is_open):
-        without = "DOMAIN PROBLEM" if takes.split() != [*_PDDL[:2]] else "them"
-        raise click.UsageError(f"expected {takes}, or --factored DIR without {without}")
-    if is_open:
-        first = names.index("PROBLEMS...")
-        return {
-            **{name.lower(): text for name, text in zip(names[:first], arguments, strict=False)},
-            "problems": arguments[first:],
-        }
-    texts = zip(names, arguments, strict=False)
-    return {name.strip("[]").lower(): text for name, text in texts}
+    names = takes.split()
+    asked = [name for name in names if not (is_factored and name in _PDDL)]
+    least = sum(not name.startswith("[") for name in asked)
+    is_open = "PROBLEMS..." in asked
+    if len(given) < least or (len(given) > len(asked) and not is_open):
+        instead = ""
+        if "DOMAIN" in names:
+            without = "them" if all(name in _PDDL for name in names) else "DOMAIN PROBLEM"
+            instead = f", or --factored DIR without {without}"
+        raise click.UsageError(f"expected {takes}{instead}")
+    rest = iter(given)
+    values = [next(rest, None) if name in asked else None for name in names]
+    return [*values, *rest]
 
 
-def _check_outputs(
-    named: Iterable[Given], own: dict[str, object], arguments: tuple[str, ...]
-) -> None:
+def _was_given(name: str) -> bool:
+    """Whether this parameter of the command stands on the command line."""
+    source = click.get_current_context().get_parameter_source(name)
+    return source is click.core.ParameterSource.COMMANDLINE
+
+
+def _read_files(arguments: tuple[str, ...], factored: object) -> list[str]:
+    """Files that no output may overwrite: the arguments, and what is read beside them."""
+    folder = [] if factored is None else map(str, Path(str(factored)).glob("*.pddl"))
+    return [*arguments, *map(beside, arguments), *folder]
+
+
+def _check_outputs(named: Iterable[Given], given: dict[str, object], inputs: list[str]) -> None:
     """Refuse files that cannot be written, or that would overwrite one that is read."""
-    outputs, inputs = [], [*arguments]
-    for each in named:
-        value = own.get(each.name)
-        if value is None or not isinstance(value, str):
+    options = [(each, given[each.name]) for each in named if given.get(each.name) is not None]
+    for each, value in options:
+        if (
+            any(part in (each.option.metavar or "") for part in _FILES)
+            and not each.option.is_output
+        ):
+            inputs += value if isinstance(value, tuple) else [str(value)]
+    outputs = []
+    for each, value in options:
+        path = str(value)
+        if not each.option.is_output:
             continue
-        if each.option.is_output:
-            if each.name != "output":
-                never_stdout(each.spelling, value)
-            outputs.append((each.spelling, value))
-        elif each.option.metavar in _FILE_METAVARS and value != "all":
-            inputs.append(value)
+        if each.option.metavar == "DIR":
+            inside = [os.path.join(path, file) if path else "" for file in each.option.files]
+            check_outputs([(each.spelling, file) for file in inside], inputs, makes_folder=True)
+            continue
+        if each.name != "output":
+            never_stdout(each.spelling, path)
+        outputs.append((each.spelling, path))
     check_outputs(outputs, inputs)
+
+
+@contextmanager
+def _said(resume: object) -> Iterator[None]:
+    """Say what a block that ends early keeps, and show the plans that an error is about."""
+    try:
+        yield
+    except (KeyboardInterrupt, OutOfTime):
+        if resume is not None:
+            note(f"finished jobs are kept in {resume}: the same command goes on from there")
+        raise
+    except CoordlangError as error:
+        if (witness := getattr(error, "witness", None)) is not None:
+            from coordlang.commands.witness import witness_text
+
+            echo(witness_text(witness, line_width(err=True)), err=True)
+        raise
+
+
+def _names_file(given: Given) -> bool:
+    return any(part in (given.option.metavar or "") for part in _FILES)
 
 
 def _click_option(given: Given) -> click.Option:
     """The option of click's: what it takes comes from the type of the record's field."""
     option = given.option
-    keywords: dict[str, Any] = {"help": option.help, "metavar": option.metavar}
+    keywords: dict[str, Any] = {
+        "help": option.help,
+        "metavar": option.metavar,
+        "required": option.required,
+        "multiple": given.default == (),
+    }
     if given.kind is bool:
         keywords["is_flag"] = True
     elif given.values:
         keywords["type"] = click.Choice(given.values)
     elif given.kind is int:
-        keywords["type"] = click.IntRange(min=option.least)
+        keywords["type"] = int if option.least is None else click.IntRange(min=option.least)
     elif given.kind is float:
-        keywords["type"] = click.FloatRange(min=0, min_open=True)
+        keywords["type"] = click.FloatRange(min=option.least or 0, min_open=option.least is None)
+    elif get_origin(given.kind) is tuple and Ellipsis not in get_args(given.kind):
+        keywords["nargs"] = len(get_args(given.kind))
     elif option.metavar == "DIR":
         keywords["type"] = FOLDER
-    elif option.is_output or option.metavar in _FILE_METAVARS:
+    elif _names_file(given):
         keywords["type"] = FILE
-    if get_origin(given.kind) is tuple:
-        keywords["multiple"] = True
-    elif given.default not in (None, False, ()):
+    if given.default not in (None, ()) and given.default is not False and not option.required:
         keywords |= {"default": given.default, "show_default": True}
     return click.Option([*given.spellings, given.name], **keywords)

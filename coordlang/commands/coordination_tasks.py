@@ -12,7 +12,6 @@ from coordlang.commands.inputs import DomainSource, ProblemSource, read_planning
 from coordlang.commands.keywords import with_options
 from coordlang.commands.layout import WIDTH
 from coordlang.commands.options import Jobs, Source
-from coordlang.commands.presenting import Presented
 from coordlang.commands.witness import witness_data, witness_text
 from coordlang.commands.workers import opened_workers
 from coordlang.language.tolerance import percent
@@ -22,7 +21,7 @@ from coordlang.required.miscoordination import Miscoordination
 from coordlang.required.sampled import FailureEstimate
 from coordlang.required.task_answers import FewestActions, answers
 from planners.search.plan_file import json_count
-from planners.system.notebook import counted, html_table
+from planners.system.notebook import Presented, counted, html_table
 from planners.system.options import group
 
 

@@ -10,10 +10,10 @@ from typing import Any
 from coordlang.commands.inputs import DomainSource, ProblemSource, read_instance
 from coordlang.commands.keywords import with_options
 from coordlang.commands.options import Source
-from coordlang.commands.presenting import Presented
 from planners.classical.fast_downward import optimal_cost
 from planners.search.optimal_plans import search
 from planners.system.errors import ProvedImpossible
+from planners.system.notebook import Presented
 from planners.system.options import group
 
 

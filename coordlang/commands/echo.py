@@ -26,3 +26,8 @@ def echo(text: object, *, err: bool = False, nl: bool = True) -> None:
     if not err and context is not None and isinstance(context.obj, Output):
         context.obj.written = True
     click.echo(visible(str(text), keep="\n\t"), err=err, nl=nl)
+
+
+def note(text: str) -> None:
+    """Write what a person should read to stderr."""
+    echo(f"coordlang: note: {text}", err=True)

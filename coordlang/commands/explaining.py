@@ -13,7 +13,6 @@ from coordlang.commands.inputs import DomainSource, ProblemSource, read_planning
 from coordlang.commands.keywords import with_options
 from coordlang.commands.language_inputs import LanguageSource, language_for
 from coordlang.commands.options import Source
-from coordlang.commands.presenting import Presented
 from coordlang.commands.speaking import SentenceSource
 from coordlang.execution.task_language import TaskLanguage, language_in_task
 from coordlang.explanation.cover import Cover
@@ -35,7 +34,7 @@ from coordlang.language.tolerance import Tolerance, tolerance_data
 from planners.search.plan_file import json_count
 from planners.search.plans import Plans
 from planners.system.errors import UsageError
-from planners.system.notebook import counted, html_table
+from planners.system.notebook import Presented, counted, html_table
 from planners.system.options import group, option
 
 #: Sentences of a task that the text lists.

@@ -11,9 +11,8 @@ from typing import Any, Literal
 from coordlang.commands.inputs import DomainSource, File, ProblemSource
 from coordlang.commands.keywords import with_options
 from coordlang.commands.language_inputs import LanguageSource, read_task_language
-from coordlang.commands.optimal_plans import PlanSteps
 from coordlang.commands.options import Source
-from coordlang.commands.presenting import Presented
+from coordlang.commands.plans import PlanSteps
 from coordlang.commands.speaking import SentencePlans, SentenceSource, given_sentence
 from coordlang.execution.choices import choices as choices_under
 from coordlang.execution.open_plans import OpenPlans
@@ -25,6 +24,7 @@ from coordlang.language.tolerance import Tolerance, tolerance_data
 from planners.joint.model import JointModel
 from planners.search.plan_file import json_count, only_one_plan
 from planners.system.errors import BadInput, Position, Refuted
+from planners.system.notebook import Presented
 from planners.system.options import group, option
 from planners.system.writing import write_texts
 

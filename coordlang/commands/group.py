@@ -43,6 +43,9 @@ class _LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
+        from planners.system.limits import require_libraries
+
+        require_libraries()  # before what imports them
         module = importlib.import_module(f"coordlang.commands.{cmd_name}")
         command: click.Command = module.command
         return command

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
+from coordlang.commands.keywords import with_options
 from coordlang.commands.options import Source
 from coordlang.language.listed import ListedTask
 from coordlang.language.task_file import TASKS, read_task_file, tasks_from_data
@@ -106,6 +107,26 @@ def read_planning(
         )
     lifted = domain if isinstance(domain, Domain) else read_domain(fspath(domain))
     return PlanningInput(lifted, [_problem(p, lifted) for p in found], source)
+
+
+@with_options(Source)
+def load(
+    domain: DomainSource | None = None, *problems: ProblemSource, options: Source
+) -> PlanningInstance:
+    """Read a domain and problems, and build their joint model.
+
+    The result stands for the domain and its problems in every other function, which then read and
+    ground nothing again where they can help it.  Problems of one model have the same objects and
+    static facts.
+
+    Raises
+    ------
+    BadInput, Unsupported
+        With file, line and column.
+    UsageError
+        For options that contradict each other or the files.
+    """
+    return read_planning(domain, problems, options).instance()
 
 
 def read_instance(

@@ -18,7 +18,8 @@ def with_options(
 ) -> Callable[[Callable[..., Result]], Callable[..., Result]]:
     """Let a function with a parameter ``options``, a record, be called with keywords in its place.
 
-    ``with_record`` of the result is the function itself.  The keywords are in its signature.
+    ``with_record`` of the result is the function itself, and ``record`` the record.  The keywords
+    are in its signature.
     """
 
     def decorate(function: Callable[..., Result]) -> Callable[..., Result]:
@@ -38,6 +39,7 @@ def with_options(
         ]
         called.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
         called.with_record = function  # type: ignore[attr-defined]
+        called.record = record  # type: ignore[attr-defined]
         return called
 
     return decorate

@@ -23,7 +23,6 @@ from coordlang.commands.inputs import (
 from coordlang.commands.keywords import with_options
 from coordlang.commands.language_inputs import LanguageSource, language_for, read_language_source
 from coordlang.commands.options import Jobs, Source
-from coordlang.commands.presenting import Presented
 from coordlang.commands.repair import repair_data
 from coordlang.commands.repairing import Repaired, repair_language
 from coordlang.commands.tolerating import WordLimit, build_few_words
@@ -51,6 +50,7 @@ from coordlang.verification.check_certificate import check as check_certificate
 from coordlang.vocabulary.fewest_failures import FewWords
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import ProvedImpossible, Refuted, UsageError
+from planners.system.notebook import Presented
 from planners.system.options import group, option
 
 #: Called with what is being done, now and then.

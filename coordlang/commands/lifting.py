@@ -20,7 +20,6 @@ from coordlang.commands.inputs import DomainSource, File, ProblemSource, TasksSo
 from coordlang.commands.keywords import with_options
 from coordlang.commands.languages import Progress
 from coordlang.commands.options import Jobs, Source
-from coordlang.commands.presenting import Presented
 from coordlang.commands.workers import opened_workers
 from coordlang.language.candidates import require_solvable
 from coordlang.language.provenance import Guarantee, provenance_of, world_sha256
@@ -32,6 +31,7 @@ from coordlang.lifted.learning import Learned, learn
 from coordlang.lifted.wording import english, formula
 from planners.loading import PlanningInstance
 from planners.system.errors import BadInput, Position, ProvedImpossible, Refuted, UsageError
+from planners.system.notebook import Presented
 from planners.system.options import group, option
 
 #: What a lifted language should have few of first, features or words.

@@ -11,9 +11,10 @@ import click
 
 from coordlang.commands.echo import echo
 from coordlang.commands.shared_options import CommandFunction, was_given
+from planners.system.options import option
 
 if TYPE_CHECKING:
-    from coordlang.commands.optimal_plans import OptimalPlans, PlanSteps
+    from coordlang.commands.plans import OptimalPlans, PlanSteps
 
 #: Plans that are listed where no number is given.
 DEFAULT_MAX = 10
@@ -23,21 +24,30 @@ DEFAULT_MAX = 10
 class Listing:
     """Which plans are listed: the first ``most`` ones, or ``sample`` drawn ones."""
 
-    only_count: bool
-    most: int | None
-    sample: int | None
-    seed: int
+    only_count: bool = option(
+        False, "Print the exact number of plans only.", names=("--count",), only="cli"
+    )
+    most: int | None = option(
+        None,
+        f"List at most so many plans (default: {DEFAULT_MAX}).",
+        "N",
+        names=("--max",),
+        least=0,
+        only="cli",
+    )
+    sample: int | None = option(
+        None, "Draw N plans uniformly instead of the first ones.", "N", least=1, only="cli"
+    )
+    seed: int = option(0, "Seed of --sample.", only="cli")
+    given: frozenset[str] = frozenset()
 
-    @classmethod
-    def of(cls, only_count: bool, most: int | None, sample: int | None, seed: int) -> Listing:
-        """Check that the options do not contradict each other."""
-        if only_count and (most is not None or sample is not None):
+    def __post_init__(self) -> None:
+        if self.only_count and (self.most is not None or self.sample is not None):
             raise click.UsageError("--count prints a number only: leave out --max and --sample")
-        if most is not None and sample is not None:
+        if self.most is not None and self.sample is not None:
             raise click.UsageError("--sample N draws N plans: leave out --max")
-        if sample is None and was_given("seed"):
+        if self.sample is None and "seed" in self.given:
             raise click.UsageError("--seed belongs to --sample")
-        return cls(only_count, most, sample, seed)
 
     @property
     def is_default(self) -> bool:
@@ -69,7 +79,7 @@ class Listing:
 
 def listing_options(function: CommandFunction) -> CommandFunction:
     """``--count``, ``--max``, ``--sample`` and ``--seed``."""
-    for option in (
+    for each in (
         click.option("--seed", type=int, default=0, show_default=True, help="Seed of --sample."),
         click.option(
             "--sample",
@@ -90,12 +100,13 @@ def listing_options(function: CommandFunction) -> CommandFunction:
             help="Print the exact number of plans only.",
         ),
     ):
-        function = option(function)
+        function = each(function)
     return function
 
 
-def form_of(form: str, as_json: bool) -> str:
+def form_of(form: str, as_json: bool, given: frozenset[str] | None = None) -> str:
     """``--format``, for which ``--json`` may stand."""
-    if as_json and form != "json" and was_given("form"):
+    was = was_given("form") if given is None else "form" in given
+    if as_json and form != "json" and was:
         raise click.UsageError(f"--json is short for --format json: leave out --format {form}")
     return "json" if as_json else form

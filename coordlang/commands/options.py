@@ -6,13 +6,35 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike, fspath
-from typing import Literal
+from typing import Any, Literal
 
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import UsageError
 from planners.system.options import group, option
 
 Unsolvable = Literal["fail", "skip"]
+
+#: What the command line has not where plans take no slack, or a language file says how much.
+NO_SLACK = ("slack", "words_see_slack")
+
+
+def json_option(help: str = "One JSON object.") -> Any:
+    """The field of an options record for ``--json``."""
+    return option(False, help, names=("--json",), only="cli")
+
+
+def output_option(
+    help: str = "Write to this file instead of stdout.",
+    metavar: str = "FILE",
+    *,
+    required: bool = False,
+) -> Any:
+    """The field ``output`` of an options record for ``-o``; ``-`` is stdout."""
+    names = ("-o", "--output")
+    default = "" if required else None
+    return option(
+        default, help, metavar, names=names, only="cli", is_output=True, required=required
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +65,11 @@ class Jobs:
         None, "Do the work on this running Dask cluster instead.", "ADDRESS|FILE"
     )
     resume: str | PathLike[str] | None = option(
-        None, "Keep finished parts here, and go on with those that are kept.", "DIR"
+        None,
+        "Keep finished jobs here, and go on with those that are kept.",
+        "DIR",
+        is_output=True,
+        files=(".table",),
     )
     note: Callable[[str], None] | None = option(
         None, "Called with what a person should read; else it is a warning.", only="python"

@@ -1,74 +1,206 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``coordlang plans``: all optimal plans of a task."""
+"""``coordlang plans``: all optimal plans of a task, counted, listed lazily, drawn at random."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any, Literal
 
-import click
-
-import coordlang
+from coordlang.commands.command import command_of
 from coordlang.commands.echo import echo
-from coordlang.commands.files import PlanningFiles, planning_files
-from coordlang.commands.listing import Listing, form_of, listing_options
-from coordlang.commands.shared_options import (
-    ModelKeywords,
-    kept_plans,
-    limits,
-    model_options,
-    slack_option,
-)
-from coordlang.commands.terminal import note_single_robot, working
-from planners.search.heuristics import CHOICES
+from coordlang.commands.inputs import DomainSource, ProblemSource, read_instance
+from coordlang.commands.keywords import with_options
+from coordlang.commands.listing import Listing, form_of
+from coordlang.commands.options import Source, json_option
+from coordlang.commands.terminal import note_single_robot
+from planners.search.heuristics import SearchHeuristic
+from planners.search.kept_plans import search
+from planners.search.optimal_plans import search as bounded_search
+from planners.search.plan_file import Texts, texts, to_ipc, to_json, to_plansys2
+from planners.search.plans import Plan, Plans
+from planners.system.notebook import Presented, html_table
+from planners.system.options import group, option
+
+#: One plan: for each joint step, each robot's subaction as text, None where it idles.
+PlanSteps = tuple[Texts, ...]
 
 
-@click.command(name="plans")
-@listing_options
-@click.option(
-    "--format", "form", type=click.Choice(["ipc", "json"]), default="ipc", show_default=True
-)
-@click.option(
-    "--heuristic",
-    type=click.Choice(CHOICES),
-    default="auto",
-    show_default=True,
-    help="What the search is bounded by; the plans are the same.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Short for --format json.")
-@model_options
-@slack_option
-@planning_files("DOMAIN PROBLEM", most=1)
-@kept_plans
-@limits
-def command(
-    only_count: bool,
-    most: int | None,
-    sample: int | None,
-    seed: int,
-    form: str,
-    heuristic: str,
-    as_json: bool,
-    pddl: PlanningFiles,
-    model: ModelKeywords,
-) -> None:
+class OptimalPlans(Presented):
+    """All optimal plans of one task (``Pi(I, G)``), in a stable order.
+
+    Iteration is lazy: nothing is listed until it is asked for, and the number of plans is known
+    without listing them.  A plan is a tuple of joint steps, and a joint step has one text for each
+    robot, None where it idles.
+
+    Examples
+    --------
+    >>> plans = coordlang.plans("domain.pddl", "problem.pddl")         # doctest: +SKIP
+    >>> plans.count, plans.makespan                                    # doctest: +SKIP
+    (2, 4)
+    >>> next(iter(plans))[0]                                           # doctest: +SKIP
+    (None, '(move r2 c1-0 c1-1)')
+    """
+
+    __slots__ = ("_plans",)
+    shown = ("count", "makespan", "robots")
+
+    def __init__(self, plans: Plans) -> None:
+        self._plans = plans
+
+    @property
+    def count(self) -> int:
+        """The exact number of plans: different sequences of joint actions.
+
+        With slack of those with all steps that are allowed, the last ones at rest.
+        """
+        return self._plans.count
+
+    @property
+    def makespan(self) -> int:
+        """The number of joint steps of every optimal plan; with slack some take more."""
+        return self.cost[0]
+
+    @property
+    def slack(self) -> int:
+        """How many joint steps more than ``makespan`` plans may take."""
+        return self._plans.space.model.slack
+
+    @property
+    def cost(self) -> tuple[int, int]:
+        """The optimal cost: joint steps, and the second component (0 where the cost has none)."""
+        space = self._plans.space
+        return space.least_makespan(0), space.cost_of(0)[1]
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The robots, in the order in which a joint step lists them."""
+        return self._plans.space.model.robots
+
+    def __iter__(self) -> Iterator[PlanSteps]:
+        return map(self._texts, self._plans)
+
+    def __getitem__(self, rank: int) -> PlanSteps:
+        """Return the plan at a position, 0 to ``count - 1``; raises `IndexError` outside."""
+        return self._texts(self._plans.unrank(rank))
+
+    def rank(self, plan: Sequence[Texts]) -> int | None:
+        """Return the position of a plan, None if it is no optimal plan of the task."""
+        numbers = self._numbers(plan)
+        return None if numbers is None else self._plans.rank(numbers)
+
+    def sample(self, number: int, seed: int = 0) -> list[PlanSteps]:
+        """Draw plans uniformly and independently; the same seed draws the same plans."""
+        return [self._texts(plan) for plan in self._plans.sample(number, seed)]
+
+    def ipc(self, plan: Sequence[Texts]) -> str:
+        """Return a plan as an IPC plan file (docs/formats.md).
+
+        Raises
+        ------
+        ValueError
+            If it is no optimal plan of the task.
+        """
+        return to_ipc(self._plans, self._known(plan))
+
+    def plansys2(self, plan: Sequence[Texts]) -> str:
+        """Return a plan as PlanSys2 reads it (docs/formats.md); raises as `ipc`."""
+        return to_plansys2(self._plans, self._known(plan))
+
+    def data(self, listed: Sequence[Sequence[Texts]]) -> dict[str, Any]:
+        """Return the data of a JSON plan file with these plans in it (docs/formats.md)."""
+        return to_json(self._plans, [self._known(plan) for plan in listed])
+
+    def _repr_html_(self) -> str:
+        first = next(iter(self))
+        rows = [(str(n), *(text or "" for text in step)) for n, step in enumerate(first, 1)]
+        title = f"plan 1 of {self.count:,}, {self.makespan} steps"
+        return html_table(("step", *self.robots), rows, title)
+
+    def first(self, most: int) -> list[PlanSteps]:
+        """Return the first plans of the order, at most so many."""
+        return list(islice(self, most))
+
+    def _texts(self, plan: Plan) -> PlanSteps:
+        return texts(self._plans.space.model, self._plans.without_rest(plan))
+
+    def _numbers(self, plan: Sequence[Texts]) -> Plan | None:
+        model = self._plans.space.model
+        steps = [model.numbers(step) for step in plan]
+        if None in steps:
+            return None
+        return self._plans.padded(tuple(step for step in steps if step is not None))
+
+    def _known(self, plan: Sequence[Texts]) -> Plan:
+        numbers = self._numbers(plan)
+        if numbers is None or self._plans.rank(numbers) is None:
+            raise ValueError(f"this is no {self._plans.space.model.kept_plan} of the task")
+        return numbers
+
+
+@dataclass(frozen=True, slots=True)
+class PlansOptions:
+    """What `plans` can be asked for."""
+
+    heuristic: SearchHeuristic = option(
+        "auto", "What the search is bounded by; the plans are the same."
+    )
+    form: Literal["ipc", "json"] = option(
+        "ipc", "How plans are written.", names=("--format",), only="cli"
+    )
+    as_json: bool = json_option("Short for --format json.")
+    listing: Listing = group(Listing)
+    source: Source = group(Source, without=("words_see_slack",))
+    given: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "form", form_of(self.form, self.as_json, self.given))
+
+
+@with_options(PlansOptions)
+def plans(
+    domain: DomainSource | None = None,
+    problem: ProblemSource | None = None,
+    *,
+    options: PlansOptions,
+) -> OptimalPlans:
+    """Find all optimal plans of a task.
+
+    With another heuristic than ``auto`` plans that are kept are not used.
+
+    Raises
+    ------
+    ProvedImpossible
+        If there is no plan.
+    OutOfMemory
+        Before the reachable part of the joint model uses up the memory.
+    """
+    loaded = read_instance(domain, problem, options.source)
+    if options.heuristic == "auto":
+        return OptimalPlans(Plans.of(search(loaded.model, loaded.tasks[0])))
+    space = bounded_search(loaded.model, loaded.tasks[0], heuristic=options.heuristic)
+    return OptimalPlans(Plans.of(space))
+
+
+@command_of(plans, "DOMAIN PROBLEM", doing="finding all optimal plans")
+def command(found: OptimalPlans, options: PlansOptions) -> None:
     """Count, list or sample all optimal plans of a task.
 
     A plan is a sequence of joint actions; plans are listed in a stable order.  With --slack B those
     that take at most B steps more, too; a rest at the end of a plan is left out.
     """
-    listing = Listing.of(only_count, most, sample, seed)
-    form = form_of(form, as_json)
-    with working("finding all optimal plans"):
-        plans = coordlang.plans(*pddl.files, factored=pddl.factored, heuristic=heuristic, **model)
-    note_single_robot(plans.robots)
-    listed = listing.chosen(plans)
-    if form == "json":
-        data = plans.data(listed)
-        if sample:
+    note_single_robot(found.robots)
+    listing = options.listing
+    listed = listing.chosen(found)
+    if options.form == "json":
+        data = found.data(listed)
+        if listing.sample:
             data["complete"] = False
         echo(json.dumps(data))
-    elif only_count:
-        echo(plans.count)
+    elif listing.only_count:
+        echo(found.count)
     else:
-        echo(listing.text(plans, listed), nl=False)
-        listing.note_more(plans, listed, "plans" if plans.slack else "optimal plans")
+        echo(listing.text(found, listed), nl=False)
+        listing.note_more(found, listed, "plans" if found.slack else "optimal plans")

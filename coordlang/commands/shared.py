@@ -55,12 +55,11 @@ class Kept:
 @contextmanager
 def limited(limits: Limits) -> Iterator[None]:
     """Run a block under limits."""
-    from planners.system.limits import limited_memory, require_libraries, require_memory, time_limit
+    from planners.system.limits import limited_memory, require_memory, time_limit
 
     if limits.time_limit is not None and math.isnan(limits.time_limit):
         raise click.UsageError("--time-limit: expected a number of seconds")
     most = limits.bytes
-    require_libraries()
     if limits.memory_limit is not None and most is not None:
         require_memory(most)
     with limited_memory(most), time_limit(limits.time_limit):
@@ -70,9 +69,6 @@ def limited(limits: Limits) -> Iterator[None]:
 @contextmanager
 def keeping(kept: Kept) -> Iterator[None]:
     """Run a block that searches no task again that it finds in the user's cache."""
-    from planners.system.limits import require_libraries
-
-    require_libraries()  # before what imports them
     if kept.no_cache:
         yield
         return

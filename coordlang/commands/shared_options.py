@@ -10,7 +10,7 @@ from typing import Any, get_args
 
 import click
 
-from coordlang.commands.echo import echo
+from coordlang.commands.echo import note
 from coordlang.commands.shared import Kept, Limits, keeping, limited
 from planners.pddl.model_options import Cost, Unowned
 from planners.system.errors import OutOfTime
@@ -157,11 +157,6 @@ def jobs_options(function: CommandFunction) -> CommandFunction:
             raise
 
     return wrapped
-
-
-def note(text: str) -> None:
-    """Write what a person should read to stderr."""
-    echo(f"coordlang: note: {text}", err=True)
 
 
 def was_given(name: str) -> bool:

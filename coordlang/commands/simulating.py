@@ -17,7 +17,6 @@ from coordlang.commands.inputs import DomainSource, File, ProblemSource, read_pl
 from coordlang.commands.keywords import with_options
 from coordlang.commands.language_inputs import LanguageSource, language_for
 from coordlang.commands.options import Source
-from coordlang.commands.presenting import Presented
 from coordlang.commands.speaking import SentenceSource
 from coordlang.execution.best_sentence import best_sentence
 from coordlang.execution.task_language import TaskLanguage, language_in_task
@@ -32,6 +31,7 @@ from coordlang.simulation.team import Agreement, Mission, mission
 from planners.system.errors import UsageError
 from planners.system.limits import run_until_stopped
 from planners.system.messages import echoed
+from planners.system.notebook import Presented
 from planners.system.options import group, option
 from planners.system.writing import write_atomically
 

@@ -11,9 +11,8 @@ from typing import Any
 from coordlang.commands.inputs import DomainSource, File, ProblemSource
 from coordlang.commands.keywords import with_options
 from coordlang.commands.language_inputs import LanguageSource, read_task_language
-from coordlang.commands.optimal_plans import OptimalPlans, PlanSteps
 from coordlang.commands.options import Source
-from coordlang.commands.presenting import Presented
+from coordlang.commands.plans import OptimalPlans, PlanSteps
 from coordlang.execution.best_sentence import BestSentence, best_sentence
 from coordlang.execution.drawing import cut_note, to_dot
 from coordlang.execution.guided_search import ExpandedStates, GuidedPlan, plan_under_sentence
@@ -26,6 +25,7 @@ from coordlang.language.tolerance import Tolerance, tolerance_data
 from planners.search.heuristics import HeuristicName
 from planners.search.plan_file import Texts, json_count
 from planners.system.errors import CoordlangError, UsageError
+from planners.system.notebook import Presented
 from planners.system.options import group, option
 
 #: A sentence: ``"w1 w0"``, its words ``("w1", "w0")``, or one of `explain`.

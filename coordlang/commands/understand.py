@@ -19,7 +19,13 @@ from coordlang.commands.files import (
     write,
 )
 from coordlang.commands.listing import Listing, form_of, listing_options
-from coordlang.commands.shared_options import ModelKeywords, kept_plans, limits, model_options
+from coordlang.commands.shared_options import (
+    ModelKeywords,
+    kept_plans,
+    limits,
+    model_options,
+    was_given,
+)
 from coordlang.commands.terminal import covered_code, working
 
 if TYPE_CHECKING:
@@ -74,7 +80,9 @@ def command(
     the DAG.
     """
     form = form_of(form, as_json)
-    listing = Listing.of(only_count, most, sample, seed)
+    listing = Listing(
+        only_count, most, sample, seed, frozenset(["seed"] if was_given("seed") else [])
+    )
     _check_form(form, listing, nodes)
     check_outputs([("-o", output)], [language, *pddl.paths])
     with working("finding the plans with the sentence"):

@@ -102,11 +102,11 @@ class ModelOptions:
 
 
 def names_in(spelling: str, given: str | Sequence[str]) -> tuple[str, ...]:
-    """The names that an option is given, in one text or several, in lower case.
+    """The names that an option is given, in texts with commas, in lower case.
 
     Raises `UsageError` for what is no text, and for a text without a name.
     """
-    texts = given.split(",") if isinstance(given, str) else given
+    texts = [given] if isinstance(given, str) else given
     if not isinstance(texts, Iterable):
         raise UsageError(f"{spelling}: expected names", remedy=f"As in {spelling} r1,r2.")
     names = []
@@ -115,7 +115,7 @@ def names_in(spelling: str, given: str | Sequence[str]) -> tuple[str, ...]:
             raise UsageError(
                 f"{spelling}: {echoed(text)} is no name", remedy="Give texts, such as 'r1'."
             )
-        names += [text.strip().lower()] * bool(text.strip())
+        names += [name.strip().lower() for name in text.split(",") if name.strip()]
     if not names and given != ():
         raise UsageError(f"{spelling}: expected names", remedy=f"As in {spelling} r1,r2.")
     return tuple(names)

@@ -1,13 +1,32 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small HTML tables, by which results show themselves in a notebook."""
+"""How results show themselves: one line at the prompt, a table in a notebook."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
+from typing import ClassVar
 
 #: Rows of a table in a notebook.
 ROWS_SHOWN = 20
+
+
+class Presented:
+    """A result that shows itself by its main facts: those of its attributes that `shown` names."""
+
+    __slots__ = ()
+    shown: ClassVar[tuple[str, ...]] = ()
+
+    def facts(self) -> Mapping[str, object]:
+        """Name -> value, in the order in which they are shown."""
+        return {name: getattr(self, name) for name in self.shown}
+
+    def __repr__(self) -> str:
+        shown = ", ".join(f"{name}={value!r}" for name, value in self.facts().items())
+        return f"{type(self).__name__}({shown})"
+
+    def _repr_html_(self) -> str:
+        return html_table((), [(name, _plain(value)) for name, value in self.facts().items()])
 
 
 def html_table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:
@@ -31,3 +50,7 @@ def counted(number: int, noun: str) -> str:
 
 def _row(cell: str, texts: Sequence[str]) -> str:
     return f"<tr>{''.join(f'<{cell}>{escape(text)}</{cell}>' for text in texts)}</tr>"
+
+
+def _plain(value: object) -> str:
+    return ", ".join(map(str, value)) if isinstance(value, tuple | list) else str(value)

@@ -2,7 +2,8 @@
 """Options records: what a command or function can be asked for, said once.
 
 A record is a frozen dataclass whose fields are made by `option` and `group`. The keyword arguments
-of the Python function and the checks of their values come from it.
+of the Python function, the options of the command line, the checks of their values and the tables
+of docs/cli.md come from it.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import difflib
 import sys
 import types
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
 from planners.system.errors import UsageError
@@ -36,7 +37,11 @@ class Option:
     only
         ``"cli"`` or ``"python"``: where it can be given; None: in both.
     is_output
-        Whether it names a file that the command writes.
+        Whether it names a file that the command writes, or a folder.
+    files
+        What is written in that folder.
+    required
+        Whether the command line must have it.
     """
 
     help: str
@@ -45,11 +50,16 @@ class Option:
     least: int | None = None
     only: Literal["cli", "python"] | None = None
     is_output: bool = False
+    files: tuple[str, ...] = ()
+    required: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """An option of a record: its name, default and kind beside what `Option` says."""
+    """An option of a record: its name, default and kind beside what `Option` says.
+
+    One whose default is ``()`` may be repeated on the command line.
+    """
 
     name: str
     default: object
@@ -59,8 +69,8 @@ class Given:
 
     @property
     def spelling(self) -> str:
-        """The longest spelling on the command line."""
-        return max(self.spellings, key=len)
+        """The first spelling on the command line."""
+        return self.spellings[0]
 
     @property
     def spellings(self) -> tuple[str, ...]:
@@ -82,15 +92,20 @@ def option(
     least: int | None = None,
     only: Literal["cli", "python"] | None = None,
     is_output: bool = False,
+    files: tuple[str, ...] = (),
+    required: bool = False,
 ) -> Any:
     """A field of an options record; the arguments are those of `Option`."""
-    described = Option(help, metavar, names, least, only, is_output)
+    described = Option(help, metavar, names, least, only, is_output, files, required)
     return field(default=default, metadata={"option": described})
 
 
-def group(record: type[object]) -> Any:
-    """A field of an options record that holds another one, whose options are given like its own."""
-    return field(default_factory=record, metadata={"group": record})
+def group(record: type[object], without: tuple[str, ...] = ()) -> Any:
+    """A field of an options record that holds another one, whose options are given like its own.
+
+    The command line has no options ``without``.
+    """
+    return field(default_factory=record, metadata={"group": record, "without": without})
 
 
 def options_of(record: type[object]) -> Iterator[Given]:
@@ -98,7 +113,10 @@ def options_of(record: type[object]) -> Iterator[Given]:
     names = vars(sys.modules[record.__module__])
     for each in fields(record):  # type: ignore[arg-type]
         if "group" in each.metadata:
-            yield from options_of(each.metadata["group"])
+            for inner in options_of(each.metadata["group"]):
+                if inner.name in each.metadata["without"]:
+                    inner = replace(inner, option=replace(inner.option, only="python"))
+                yield inner
         elif "option" in each.metadata:
             # Annotations are texts; what a Union names in quotes need not be imported.
             kind = eval(each.type, names) if isinstance(each.type, str) else each.type
@@ -108,11 +126,14 @@ def options_of(record: type[object]) -> Iterator[Given]:
             )
 
 
-def record_from(record: type[Record], given: Mapping[str, object], caller: str) -> Record:
+def record_from(
+    record: type[Record], given: Mapping[str, object], caller: str, *, on_cli: bool = False
+) -> Record:
     """The record in which the options have the values given.
 
     None is not given, but for an option that takes it and has another default.  A field ``given``
-    of a record gets the names of its options that were.
+    of a record gets the names of its options that were.  Options that only the command line has
+    are refused elsewhere.
 
     Raises
     ------
@@ -121,7 +142,7 @@ def record_from(record: type[Record], given: Mapping[str, object], caller: str) 
     UsageError
         For a value that the option does not have.
     """
-    known = {each.name: each for each in options_of(record)}
+    known = {o.name: o for o in options_of(record) if on_cli or o.option.only != "cli"}
     for name in given:
         if name not in known:
             alike = difflib.get_close_matches(name, known, 1)
@@ -168,9 +189,14 @@ def _check(given: Given, value: object) -> None:
     if given.kind is not int:
         return
     least = given.option.least
-    if isinstance(value, bool) or not isinstance(value, int) or (least or 0) > value:
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, int)
+        or (least is not None and value < least)
+    ):
+        what = "a whole number" if least is None else f"{least} or more"
         raise UsageError(
-            f"{given.spelling} {value}: expected {least or 0} or more",
+            f"{given.spelling} {value}: expected {what}",
             remedy=f"Say {given.spelling} {max(least or 0, 1)}.",
         )
 

@@ -73,28 +73,26 @@ def test_refuted_and_impossible(
 def test_a_limit(
     coordlang: Command, t_map: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import coordlang as door
-
     def late(*_: object, **__: object) -> None:
         ended = OutOfTime("the time is over", remedy="Use a larger --time-limit.")
         ended.reached = "reading 3 lines"
         raise ended
 
-    monkeypatch.setattr(door, "inspect", late)
+    monkeypatch.setattr("coordlang.commands.inspect.read_instance", late)
     found = error(coordlang("inspect", *t_map, "--json"))
     assert (found["exit_code"], found["reached"]) == (23, "reading 3 lines")
 
     def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("here")
 
-    monkeypatch.setattr(door, "inspect", broken)
+    monkeypatch.setattr("coordlang.commands.inspect.read_instance", broken)
     found = error(coordlang("inspect", *t_map, "--json"))
     assert found["message"] == "internal error: ZeroDivisionError: here"
 
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(door, "inspect", interrupted)
+    monkeypatch.setattr("coordlang.commands.inspect.read_instance", interrupted)
     assert error(coordlang("inspect", *t_map, "--json"))["exit_code"] == 130
 
 

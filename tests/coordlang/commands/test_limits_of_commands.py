@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import resource
+from dataclasses import dataclass
 from pathlib import Path
 
-import click
 import pytest
 from click.testing import CliRunner
 
-from coordlang.commands.shared_options import limits
+from coordlang.commands.command import command_of
+from coordlang.commands.keywords import with_options
 from planners.search import portions
 from planners.search.portions import estimate, require_room
 from planners.system.errors import OutOfMemory
@@ -22,10 +23,19 @@ from tests.support.domains import all_tasks
 FREE = resource.RLIM_INFINITY
 
 
-@click.command()
-@limits
-def probe() -> None:
-    print(resource.getrlimit(resource.RLIMIT_AS)[0])
+@dataclass(frozen=True)
+class Nothing:
+    """No options."""
+
+
+@with_options(Nothing)
+def soft_limit(*, options: Nothing) -> int:
+    return resource.getrlimit(resource.RLIMIT_AS)[0]
+
+
+@command_of(soft_limit, "", doing="looking", keeps_plans=False)
+def probe(found: int, options: Nothing) -> None:
+    print(found)
 
 
 def limit_of(*arguments: str) -> int:

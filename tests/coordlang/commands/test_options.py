@@ -5,15 +5,16 @@ from __future__ import annotations
 
 import inspect
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal
 
 import click
 import pytest
 from click.testing import CliRunner
 
-from coordlang.commands.command import arguments_by_name, command
+from coordlang.commands.command import command_of, positional
 from coordlang.commands.keywords import with_options
-from coordlang.commands.options import Source
+from coordlang.commands.options import NO_SLACK, Source
 from planners.system.errors import UsageError
 from planners.system.options import group, option
 
@@ -28,7 +29,8 @@ class Greeting:
     shout: bool = option(False, "In capitals.")
     as_json: bool = option(False, "JSON.", names=("--json",), only="cli")
     progress: Any = option(None, "Called now and then.", only="python")
-    source: Source = group(Source)
+    output: str | None = option(None, "Where to.", "FILE", names=("-o",), is_output=True)
+    source: Source = group(Source, without=NO_SLACK)
 
     def __post_init__(self) -> None:
         if self.shout and self.tone == "cold":
@@ -43,16 +45,15 @@ def greet(
     return domain, problem, options
 
 
-def show(result: tuple[str, str, Greeting], options: Greeting) -> int:
+@command_of(greet, "DOMAIN PROBLEM", doing="greeting")
+def cli(result: tuple[str, str, Greeting], options: Greeting) -> int:
+    """Greet."""
     domain, problem, greeting = result
     assert greeting is options
     model = greeting.source.model
     click.echo(f"{domain} {problem} {greeting.tone} {greeting.times} {greeting.names}")
     click.echo(f"{model.cost} {model.robots} {sorted(greeting.source.given)}")
     return 3 if greeting.shout else 0
-
-
-cli = command(greet, Greeting, "DOMAIN PROBLEM", show, doing="greeting", help="Greet.")
 
 
 def run(*arguments: str) -> tuple[int, str]:
@@ -114,11 +115,41 @@ def test_too_few_and_too_many_arguments(arguments: tuple[str, ...]) -> None:
         run(*arguments)
 
 
-def test_arguments_by_name() -> None:
-    read = arguments_by_name("LANGUAGE DOMAIN PROBLEMS...", ("l", "d", "p", "q"), is_factored=False)
-    assert read == {"language": "l", "domain": "d", "problems": ("p", "q")}
-    read = arguments_by_name("LANGUAGE DOMAIN PROBLEM [SENTENCE]", ("l", "w1"), is_factored=True)
-    assert read == {"language": "l", "sentence": "w1"}
+@pytest.mark.parametrize(
+    ("takes", "given", "is_factored", "read"),
+    [
+        ("LANGUAGE DOMAIN PROBLEMS...", "l d p q", False, ["l", "d", "p", "q"]),
+        ("LANGUAGE DOMAIN PROBLEMS...", "l", True, ["l", None, None]),
+        ("LANGUAGE DOMAIN PROBLEM [SENTENCE]", "l w1", True, ["l", None, None, "w1"]),
+        ("LANGUAGE DOMAIN PROBLEM [SENTENCE]", "l d p", False, ["l", "d", "p", None]),
+        ("LANGUAGE DOMAIN PROBLEM PLAN", "l p", True, ["l", None, None, "p"]),
+        ("[NAME]", "", False, [None]),
+    ],
+)
+def test_positional(takes: str, given: str, is_factored: bool, read: list[str | None]) -> None:
+    assert positional(takes, tuple(given.split()), is_factored=is_factored) == read
+
+
+def test_an_output_is_no_input_file(tmp_path: Path) -> None:
+    for name in ("d", "p", "coordinates.json", "x.pddl"):
+        (tmp_path / name).write_text("")
+    files = str(tmp_path / "d"), str(tmp_path / "p")
+    for arguments, output in (
+        (files, "p"),
+        (files, "coordinates.json"),
+        (("--factored", str(tmp_path)), "x.pddl"),
+    ):
+        with pytest.raises(UsageError, match=r"-o .* would overwrite an input file"):
+            run(*arguments, "-o", str(tmp_path / output))
+    assert run(*files, "-o", str(tmp_path / "new"))[0] == 0
+
+
+def test_options_of_the_command_line_alone() -> None:
+    with pytest.raises(TypeError, match="unexpected keyword argument 'as_json'"):
+        greet("d", "p", as_json=True)
+    assert greet("d", "p", slack=1)[2].source.model.slack == 1
+    with pytest.raises(click.NoSuchOption, match="--slack"):
+        run("d", "p", "--slack", "1")
 
 
 def test_the_signature_names_what_python_takes() -> None:
