@@ -68,7 +68,7 @@ def _refused() -> int:
 
 def _run(interruptions: Interruptions) -> int:
     from coordlang.commands.main import run
-    from coordlang.commands.standard_error import flush_stdout, whatever_stderr
+    from coordlang.commands.terminal import flush_stdout, whatever_stderr
 
     sys.stderr = whatever_stderr()
     code = run(sys.argv[1:], interruptions)

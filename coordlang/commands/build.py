@@ -13,9 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import coordlang
-from coordlang.commands.echo import echo
-from coordlang.commands.exit_codes import UNPROVED, code_of_interrupt
-from coordlang.commands.failure import why_stopped
+from coordlang.commands.failure import UNPROVED, code_of_interrupt, why_stopped
 from coordlang.commands.files import (
     FILE,
     PlanningFiles,
@@ -33,7 +31,7 @@ from coordlang.commands.shared_options import (
     slack_option,
     was_given,
 )
-from coordlang.commands.terminal import line_width, note_single_robot, working
+from coordlang.commands.terminal import echo, line_width, note_single_robot, working
 from planners.system.messages import visible
 from planners.system.notebook import counted
 

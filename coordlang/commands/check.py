@@ -8,11 +8,10 @@ import json
 import click
 
 import coordlang
-from coordlang.commands.echo import echo
-from coordlang.commands.exit_codes import IMPOSSIBLE, REFUTED
+from coordlang.commands.failure import IMPOSSIBLE, REFUTED
 from coordlang.commands.files import PlanningFiles, planning_files
 from coordlang.commands.shared_options import ModelKeywords, limits, model_options
-from coordlang.commands.terminal import working
+from coordlang.commands.terminal import echo, working
 
 
 @click.command(name="check")

@@ -15,8 +15,7 @@ import click
 
 from coordlang.commands.choices_text import choices_text
 from coordlang.commands.command import command_of
-from coordlang.commands.echo import echo, note
-from coordlang.commands.exit_codes import REFUTED
+from coordlang.commands.failure import REFUTED
 from coordlang.commands.files import write
 from coordlang.commands.inputs import DomainSource, File, ProblemSource
 from coordlang.commands.keywords import with_options
@@ -24,7 +23,7 @@ from coordlang.commands.language_inputs import LanguageSource, read_task_languag
 from coordlang.commands.listing import form_of
 from coordlang.commands.options import NO_SLACK, Source, json_option, output_option
 from coordlang.commands.speaking import SentenceSource, given_sentence
-from coordlang.commands.terminal import covered_code, line_width
+from coordlang.commands.terminal import covered_code, echo, line_width, note
 from coordlang.commands.witness import witness_text
 from coordlang.execution.choices import MOST, Choices
 from coordlang.execution.choices import choices as choices_under

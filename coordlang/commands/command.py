@@ -14,10 +14,9 @@ from typing import Any, get_args, get_origin
 
 import click
 
-from coordlang.commands.echo import echo, note
 from coordlang.commands.files import FILE, FOLDER, beside, check_outputs, never_stdout
 from coordlang.commands.shared import Kept, Limits, keeping, limited
-from coordlang.commands.terminal import line_width, working
+from coordlang.commands.terminal import echo, line_width, note, working
 from planners.system.errors import CoordlangError, OutOfTime
 from planners.system.options import Given, options_of, record_from
 

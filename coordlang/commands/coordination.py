@@ -8,7 +8,6 @@ import json
 import click
 
 import coordlang
-from coordlang.commands.echo import echo
 from coordlang.commands.files import PlanningFiles, planning_files
 from coordlang.commands.shared_options import (
     JobsKeywords,
@@ -19,7 +18,7 @@ from coordlang.commands.shared_options import (
     model_options,
     slack_option,
 )
-from coordlang.commands.terminal import line_width, note_single_robot, working
+from coordlang.commands.terminal import echo, line_width, note_single_robot, working
 
 
 @click.command(name="coordination")

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import click
 
-from coordlang.commands.echo import echo
 from coordlang.commands.files import FILE, FOLDER, check_outputs
 from coordlang.commands.shared_options import limits
+from coordlang.commands.terminal import echo
 from planners.system.messages import visible
 from planners.system.notebook import counted
 

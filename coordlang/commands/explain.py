@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 import click
 
 import coordlang
-from coordlang.commands.echo import echo
 from coordlang.commands.files import PlanningFiles, language_argument, planning_files
 from coordlang.commands.shared_options import ModelKeywords, kept_plans, limits, model_options
-from coordlang.commands.terminal import covered_code, line_width, warn_of_failures, working
+from coordlang.commands.terminal import covered_code, echo, line_width, warn_of_failures, working
 from planners.system.errors import OutOfMemory
 
 if TYPE_CHECKING:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import click
 
 import coordlang
-from coordlang.commands.echo import echo
 from coordlang.commands.files import (
     FILE,
     PlanningFiles,
@@ -26,7 +25,7 @@ from coordlang.commands.shared_options import (
     model_options,
     was_given,
 )
-from coordlang.commands.terminal import covered_code, working
+from coordlang.commands.terminal import covered_code, echo, working
 from planners.system.messages import visible
 from planners.system.notebook import counted
 

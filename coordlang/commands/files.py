@@ -12,8 +12,8 @@ from pathlib import Path
 import click
 from click.shell_completion import CompletionItem
 
-from coordlang.commands.echo import echo
 from coordlang.commands.shared_options import CommandFunction
+from coordlang.commands.terminal import echo
 
 
 class _Named(click.ParamType):  # type: ignore[type-arg]  # generic in newer versions only

@@ -6,11 +6,10 @@ from __future__ import annotations
 import click
 
 import coordlang
-from coordlang.commands.echo import echo
-from coordlang.commands.exit_codes import UNPROVED
+from coordlang.commands.failure import UNPROVED
 from coordlang.commands.files import FILE, PlanningFiles, beside, check_outputs, planning_files
 from coordlang.commands.shared_options import ModelKeywords, kept_plans, limits, model_options
-from coordlang.commands.terminal import working
+from coordlang.commands.terminal import echo, working
 from planners.system.notebook import counted
 
 

@@ -9,13 +9,12 @@ from os import fspath
 from typing import TYPE_CHECKING, Any
 
 from coordlang.commands.command import command_of
-from coordlang.commands.echo import echo, note
 from coordlang.commands.feasibility import feasibility
 from coordlang.commands.inputs import DomainSource, File, ProblemSource, read_instance
 from coordlang.commands.keywords import with_options
 from coordlang.commands.layout import WIDTH, wrapped
 from coordlang.commands.options import NO_SLACK, Source, json_option
-from coordlang.commands.terminal import line_width, note_single_robot
+from coordlang.commands.terminal import echo, line_width, note, note_single_robot
 from planners.system.notebook import Presented, counted, html_table
 from planners.system.options import group, option
 

@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 import coordlang
-from coordlang.commands.echo import echo
-from coordlang.commands.exit_codes import UNPROVED, code_of_interrupt
-from coordlang.commands.failure import why_stopped
+from coordlang.commands.failure import UNPROVED, code_of_interrupt, why_stopped
 from coordlang.commands.files import FILE, PlanningFiles, beside, check_outputs, planning_files
 from coordlang.commands.shared_options import ModelKeywords, kept_plans, limits, model_options
-from coordlang.commands.terminal import working
+from coordlang.commands.terminal import echo, working
 from planners.system.notebook import counted
 
 if TYPE_CHECKING:

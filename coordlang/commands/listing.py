@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from coordlang.commands.echo import echo
 from coordlang.commands.shared_options import CommandFunction, was_given
+from coordlang.commands.terminal import echo
 from planners.system.options import option
 
 if TYPE_CHECKING:

@@ -1,35 +1,84 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command line: arguments and rendering only.
+"""The command line: the group of commands, and how one is run.
 
 Data goes to stdout, logs and progress to stderr.  Exit codes are an interface (docs/cli.md).
 """
 
 from __future__ import annotations
 
-import errno
+import importlib
 import os
-import signal
 import sys
 import traceback
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import TextIO
+from typing import Any
 
 import click
 
-from coordlang.commands.echo import Output, echo
-from coordlang.commands.exit_codes import BROKEN_PIPE, INTERRUPTED, interrupted_by
-from coordlang.commands.failure import Failure, usage_failure, wants_json
-from coordlang.commands.group import cli
-from coordlang.commands.standard_error import drop_stdout
-from planners.system.errors import CoordlangError, Note, OutOfMemory, UsageError
-from planners.system.limits import lacks_memory
-from planners.system.messages import sentence, visible
+import coordlang
+from coordlang.commands.failure import BROKEN_PIPE, failure_of, wants_json
+from coordlang.commands.terminal import Output, echo
+from planners.system.errors import Note, UsageError
+from planners.system.limits import require_libraries
+from planners.system.messages import visible
 from planners.system.signals import Interruptions
 
-#: The output cannot be written: what stdout is connected to is full, or of limited size.
-_UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO, errno.EBADF)
+#: Command -> one line about it, so that ``--help`` need not import them all.  A command is the
+#: module of this name in `coordlang.commands`, imported when it is called.
+COMMANDS = {
+    "inspect": "Show what was understood of a domain: robots, subactions, constraints.",
+    "plans": "Count, list or sample all optimal plans of a task.",
+    "check": "Compare our optimal cost with Fast Downward's.",
+    "coordination": "Decide which tasks require coordination, with a miscoordination shown.",
+    "tasks": "Write a task file: a problem with other starts and goals.",
+    "build": "Build a coordination language and verify it.",
+    "verify": "Check by definition that a file holds a coordination language.",
+    "lift": "Learn words as functions of features, for all problems of a domain.",
+    "ground": "Write the language file of one problem from a lifted language.",
+    "say": "Print the sentence of an optimal plan.",
+    "understand": "Count, list, sample or draw the plans that a sentence leaves open.",
+    "plan": "Find one optimal plan under a sentence, or under the best sentence.",
+    "choices": "Show what each robot may do under a sentence, whatever the others choose.",
+    "simulate": "Let robots with wheels do a task in a simulator.",
+    "export": "Write a task under a sentence as PDDL or LTLf, for other programs.",
+    "explain": "Show a language: words as formulas, sentences of a task.",
+    "report": "Write a page that shows a language: words, sentences, plans played.",
+    "domains": "List or copy the domains that come with coordlang.",
+    "schema": "Print the JSON Schema of a file format.",
+}
+
+
+class _LazyGroup(click.Group):
+    """Imports a command's module only when the command is called or its help is asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        require_libraries()  # before what imports them
+        module = importlib.import_module(f"coordlang.commands.{cmd_name}")
+        command: click.Command = module.command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.group(
+    cls=_LazyGroup,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)
+@click.version_option(coordlang.__version__)
+def cli() -> None:
+    """Coordination languages for robots that plan on their own and act together.
+
+    DOMAIN and PROBLEM are PDDL files, in that order.
+    """
 
 
 def run(arguments: list[str], interruptions: Interruptions | None = None) -> int:
@@ -43,20 +92,17 @@ def run(arguments: list[str], interruptions: Interruptions | None = None) -> int
     output = Output()
     try:
         return _run(arguments, output)
-    except (KeyboardInterrupt, click.Abort):
-        failure = _interrupted(interruptions)
-    except Exception as error:
-        if interruptions is not None and interruptions.first is not None:
-            failure = _interrupted(interruptions)  # that is what a library made of the interrupt
-        else:
-            failure = _failed(error, "--debug" in arguments)
-    with suppress(OSError):  # the terminal may be gone
-        _show(failure.text)
-        if wants_json(arguments) and not output.written:
-            echo(failure.json())
-            if sys.stdout is not None:
-                sys.stdout.flush()
-    return failure.exit_code
+    except (Exception, KeyboardInterrupt) as error:
+        failure = failure_of(error, None if interruptions is None else interruptions.first)
+        with suppress(OSError):  # the terminal may be gone
+            if "--debug" in arguments and not isinstance(error, click.ClickException):
+                _show("".join(traceback.format_exception(error)))
+            _show(failure.text)
+            if wants_json(arguments) and not output.written:
+                echo(failure.json())
+                if sys.stdout is not None:
+                    sys.stdout.flush()
+        return failure.exit_code
 
 
 def _run(arguments: list[str], output: Output) -> int:
@@ -91,63 +137,15 @@ def _notes_on_stderr() -> Iterator[None]:
         warnings.simplefilter("always", Note)
         python_shows, written = warnings.showwarning, set[str]()
 
-        def show(
-            message: Warning | str,
-            category: type[Warning],
-            filename: str,
-            lineno: int,
-            file: TextIO | None = None,
-            line: str | None = None,
-        ) -> None:
+        def show(message: Warning | str, category: type[Warning], *more: Any, **named: Any) -> None:
             if not issubclass(category, Note):
-                python_shows(message, category, filename, lineno, file, line)
+                python_shows(message, category, *more, **named)
             elif str(message) not in written:
                 written.add(str(message))
                 _show(f"coordlang: note: {message}\n")
 
         warnings.showwarning = show
         yield
-
-
-def _interrupted(interruptions: Interruptions | None) -> Failure:
-    """Say what has ended the work."""
-    number = None if interruptions is None else interruptions.first
-    by = "" if number in (None, signal.SIGINT) else f" by {signal.Signals(number).name}"
-    code = INTERRUPTED if number is None else interrupted_by(number)
-    return Failure.of(f"interrupted{by}", code, "Start it again.")
-
-
-def _failed(error: Exception, debug: bool) -> Failure:
-    """Say what is wrong and what to do."""
-    match error:
-        case click.ClickException():
-            return usage_failure(error)
-        case OSError() if error.errno in _UNWRITABLE:
-            drop_stdout()
-            what = f"the output cannot be written: {error.strerror}"
-            return Failure.of(what, 2, "Make room, or name another file.")
-        case CoordlangError():
-            if debug:
-                _show("".join(traceback.format_exception(error)))
-            return Failure.of_error(error)
-    return _internal(error, debug)
-
-
-def _internal(error: Exception, debug: bool) -> Failure:
-    """A bug: reported as one, with an exit code of its own, and never hidden.
-
-    Memory that is used up is none, whatever the error that a library makes of it.
-    """
-    if lacks_memory(error):
-        return Failure.of(
-            "out of memory",
-            OutOfMemory.exit_code,
-            "Use a smaller task, or a larger --memory-limit.",
-        )
-    if debug:
-        _show("".join(traceback.format_exception(error)))
-    what = f"internal error: {type(error).__name__}: {sentence(str(error))}"
-    return Failure.of(what, CoordlangError.exit_code, "This is a bug; --debug shows where.")
 
 
 def _show(text: str) -> None:

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 import click
 
 import coordlang
-from coordlang.commands.echo import echo
 from coordlang.commands.files import PlanningFiles, language_argument, planning_files
 from coordlang.commands.listing import form_of
 from coordlang.commands.shared_options import ModelKeywords, kept_plans, limits, model_options
-from coordlang.commands.terminal import covered_code, working
+from coordlang.commands.terminal import covered_code, echo, working
 from planners.search.heuristics import HEURISTICS
 from planners.system.notebook import counted
 

@@ -10,12 +10,11 @@ from itertools import islice
 from typing import Any, Literal
 
 from coordlang.commands.command import command_of
-from coordlang.commands.echo import echo
 from coordlang.commands.inputs import DomainSource, ProblemSource, read_instance
 from coordlang.commands.keywords import with_options
 from coordlang.commands.listing import Listing, form_of
 from coordlang.commands.options import Source, json_option
-from coordlang.commands.terminal import note_single_robot
+from coordlang.commands.terminal import echo, note_single_robot
 from planners.search.heuristics import SearchHeuristic
 from planners.search.kept_plans import search
 from planners.search.optimal_plans import search as bounded_search

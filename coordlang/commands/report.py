@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from coordlang.commands.echo import echo
 from coordlang.commands.files import (
     FILE,
     PlanningFiles,
@@ -17,7 +16,7 @@ from coordlang.commands.files import (
     planning_files,
 )
 from coordlang.commands.shared_options import ModelKeywords, kept_plans, limits, model_options
-from coordlang.commands.terminal import warn_of_failures, working
+from coordlang.commands.terminal import echo, warn_of_failures, working
 from planners.system.messages import visible
 from planners.system.notebook import counted
 

@@ -8,10 +8,9 @@ import json
 import click
 
 import coordlang
-from coordlang.commands.echo import echo
 from coordlang.commands.files import PlanningFiles, language_argument, planning_files
 from coordlang.commands.shared_options import ModelKeywords, kept_plans, limits, model_options
-from coordlang.commands.terminal import covered_code, working
+from coordlang.commands.terminal import covered_code, echo, working
 
 
 @click.command(name="say")

@@ -8,7 +8,7 @@ from importlib import import_module
 
 import click
 
-from coordlang.commands.echo import echo
+from coordlang.commands.terminal import echo
 
 #: The modules whose ``json_schema`` describes a file format.
 SCHEMAS = {

@@ -10,8 +10,8 @@ from typing import Any, get_args
 
 import click
 
-from coordlang.commands.echo import note
 from coordlang.commands.shared import Kept, Limits, keeping, limited
+from coordlang.commands.terminal import note
 from planners.pddl.model_options import Cost, Unowned
 from planners.system.errors import OutOfTime
 

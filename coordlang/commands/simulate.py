@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import coordlang
-from coordlang.commands.echo import echo
-from coordlang.commands.exit_codes import UNPROVED, code_of_interrupt
-from coordlang.commands.failure import why_stopped
+from coordlang.commands.failure import UNPROVED, code_of_interrupt, why_stopped
 from coordlang.commands.files import (
     FILE,
     FOLDER,
@@ -19,7 +17,7 @@ from coordlang.commands.files import (
     check_outputs,
 )
 from coordlang.commands.shared_options import kept_plans, limits, model_options
-from coordlang.commands.terminal import bar, covered_code, working
+from coordlang.commands.terminal import bar, covered_code, echo, working
 from planners.system.notebook import counted
 
 if TYPE_CHECKING:

@@ -8,10 +8,9 @@ import json
 import click
 
 import coordlang
-from coordlang.commands.echo import echo
 from coordlang.commands.files import FILE, PlanningFiles, check_outputs, planning_files, write
 from coordlang.commands.shared_options import ModelKeywords, limits, model_options
-from coordlang.commands.terminal import working
+from coordlang.commands.terminal import echo, working
 from planners.system.notebook import counted
 
 

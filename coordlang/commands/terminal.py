@@ -1,24 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What goes to stderr besides errors: progress on a terminal, notes and warnings."""
+"""What commands write to stdout and stderr, and the progress that a terminal shows meanwhile."""
 
 from __future__ import annotations
 
+import io
+import os
 import shutil
 import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from time import monotonic
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
-from coordlang.commands.echo import echo
-from coordlang.commands.exit_codes import REFUTED
+import click
+
+from coordlang.commands.failure import REFUTED
+from coordlang.commands.layout import WIDTH
+from planners.system.limits import Underway, underway
 from planners.system.messages import visible
 
 if TYPE_CHECKING:
-    from coordlang.commands.languages import Progress
     from coordlang.language.tolerance import Tolerance
-    from planners.system.limits import Underway
 
 #: Seconds of work before progress is shown: short commands neither flicker nor load rich.
 _DELAY = 0.4
@@ -26,12 +30,60 @@ _DELAY = 0.4
 _INTERVAL = 0.5
 #: Narrower terminals break lines themselves.
 _LEAST_WIDTH = 60
+#: The file number of stderr.
+_STDERR = 2
+
+
+@dataclass(slots=True)
+class Output:
+    """What a command has done to stdout: whether something is written there already."""
+
+    written: bool = False
+
+
+def echo(text: object, *, err: bool = False, nl: bool = True) -> None:
+    """Write text like `click.echo`, with control characters escaped.
+
+    Names of files and arguments may hold any character, and escapes of a terminal among them.
+    """
+    context = click.get_current_context(silent=True)
+    if not err and context is not None and isinstance(context.obj, Output):
+        context.obj.written = True
+    click.echo(visible(str(text), keep="\n\t"), err=err, nl=nl)
+
+
+def note(text: str) -> None:
+    """Write what a person should read to stderr."""
+    echo(f"coordlang: note: {text}", err=True)
+
+
+def note_single_robot(robots: tuple[str, ...]) -> None:
+    """Write a note where there is one robot: it is no error, but there is nothing to coordinate."""
+    if len(robots) == 1:
+        note(f"{robots[0]} is the only robot: there is nothing to coordinate")
+
+
+def warn_of_failures(tolerance: Tolerance | None) -> None:
+    """Write a warning where words are in use under which robots may miscoordinate."""
+    if tolerance is not None and tolerance.warning is not None:
+        echo(f"coordlang: warning: {tolerance.warning}", err=True)
+
+
+def covered_code(is_covered: bool, tolerance: Tolerance | None) -> int:
+    """Return the exit code of an answer: 1, with a warning, for a task that is not covered.
+
+    What the language tolerates is a warning, too.
+    """
+    warn_of_failures(tolerance)
+    if is_covered:
+        return 0
+    what = "the language does not cover this task: it guarantees nothing here"
+    echo(f"coordlang: warning: {what}", err=True)
+    return REFUTED
 
 
 def line_width(*, err: bool = False) -> int:
     """The width of the terminal that stdout or stderr is, `WIDTH` where it is none."""
-    from coordlang.commands.layout import WIDTH
-
     stream = sys.stderr if err else sys.stdout
     if stream is None or not stream.isatty():
         return WIDTH
@@ -39,7 +91,7 @@ def line_width(*, err: bool = False) -> int:
 
 
 @contextmanager
-def working(message: str) -> Iterator[Progress]:
+def working(message: str) -> Iterator[Callable[[str], None]]:
     """Show on a terminal what is being done, until the block ends.
 
     Yields a function that changes the message.
@@ -48,76 +100,55 @@ def working(message: str) -> Iterator[Progress]:
         yield lambda _: None
         return
     spinner = _Spinner(message)
+    spinner.start()
     try:
         yield spinner.say
     finally:
-        spinner.stop()
+        spinner.ended.set()
+        spinner.join()
 
 
-class _Spinner:
+class _Spinner(threading.Thread):
     """A spinner with a message and how far the work got, which appears after a while."""
 
     def __init__(self, message: str) -> None:
+        super().__init__(daemon=True)
+        self.ended = threading.Event()
         self._message = message
         self._begin = monotonic()
-        self._rate = _Rate()
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
+        #: What was under way at the last look, when that was, and its work so far.
+        self._seen: tuple[Underway | None, float, int] = None, 0.0, 0
 
     def say(self, message: str) -> None:
         self._message = message
 
-    def stop(self) -> None:
-        self._ended.set()
-        self._thread.join()
-
-    def _run(self) -> None:
-        if self._ended.wait(_DELAY):
+    def run(self) -> None:
+        if self.ended.wait(_DELAY):
             return
         from rich.console import Console
         from rich.text import Text
 
         with Console(stderr=True).status(Text(self._text())) as status:
-            while not self._ended.wait(_INTERVAL):
+            while not self.ended.wait(_INTERVAL):
                 status.update(Text(self._text()))
 
     def _text(self) -> str:
-        parts = [self._message, *self._so_far()]
-        seconds = monotonic() - self._begin
-        return f"{visible(': '.join(parts))} .. {seconds:.0f} s"
-
-    def _so_far(self) -> list[str]:
-        """How far the work got, and how fast it goes; nothing if it changed while it was read."""
-        from planners.system.limits import underway
-
-        part = underway()
-        if part is None:
-            return []
+        parts, part = [self._message], underway()
+        # The work goes on while it is asked: what cannot be read just now is left out.
         with suppress(ValueError, IndexError, KeyError, RuntimeError, StopIteration):
-            text = part.so_far()
-            if text not in self._message:
-                return [text + self._rate.of(part)]
-        return []
+            if part is not None and (so_far := part.so_far()) not in self._message:
+                parts.append(so_far + self._rate(part))
+        return f"{visible(': '.join(parts))} .. {monotonic() - self._begin:.0f} s"
 
-
-class _Rate:
-    """How fast the work of a block goes, from one look to the next."""
-
-    def __init__(self) -> None:
-        self._part: Underway | None = None
-        self._seen = (0.0, 0)
-
-    def of(self, part: Underway) -> str:
+    def _rate(self, part: Underway) -> str:
         """Its work in a second since the last look; empty at the first one."""
         if part.work is None:
             return ""
-        before, self._seen = self._seen, (monotonic(), part.work())
-        known, self._part = self._part is part, part
-        if not known or self._seen[0] <= before[0]:
+        (known, begin, before), now, work = self._seen, monotonic(), part.work()
+        self._seen = part, now, work
+        if known is not part or now <= begin:
             return ""
-        rate = (self._seen[1] - before[1]) / (self._seen[0] - before[0])
-        return f", {rate:,.0f} {part.unit} a second"
+        return f", {(work - before) / (now - begin):,.0f} {part.unit} a second"
 
 
 @contextmanager
@@ -140,31 +171,36 @@ def bar() -> Iterator[Callable[[int, int, str], None]]:
         )
 
 
-def note_single_robot(robots: tuple[str, ...]) -> None:
-    """Write a note where there is one robot: it is no error, but there is nothing to coordinate."""
-    if len(robots) == 1:
-        echo(
-            f"coordlang: note: {robots[0]} is the only robot: there is nothing to coordinate",
-            err=True,
-        )
+def whatever_stderr() -> TextIO:
+    """Return a stream for stderr on which nothing fails, be it closed or on a full disk.
 
-
-def warn_of_failures(tolerance: Tolerance | None) -> None:
-    """Write a warning where words are in use under which robots may miscoordinate."""
-    if tolerance is not None and tolerance.warning is not None:
-        echo(f"coordlang: warning: {tolerance.warning}", err=True)
-
-
-def covered_code(is_covered: bool, tolerance: Tolerance | None) -> int:
-    """Return the exit code of an answer: 1, with a warning, for a task that is not covered.
-
-    What the language tolerates is a warning, too.
+    Of the first three file numbers those that are closed are reserved: else the next file that is
+    opened would get one, and messages of libraries with it.
     """
-    warn_of_failures(tolerance)
-    if is_covered:
-        return 0
-    echo(
-        "coordlang: warning: the language does not cover this task: it guarantees nothing here",
-        err=True,
-    )
-    return REFUTED
+    for number in range(_STDERR + 1):
+        try:
+            os.fstat(number)
+        except OSError:  # closed
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
+    encoding = sys.stderr.encoding if sys.stderr is not None else "utf-8"
+    lossy = _Lossy(_STDERR, "w", closefd=False)
+    buffer = io.BufferedWriter(lossy)  # type: ignore[type-var]
+    return io.TextIOWrapper(buffer, encoding, errors="backslashreplace", line_buffering=True)
+
+
+class _Lossy(io.FileIO):
+    """A file; what cannot be written to it is lost."""
+
+    def write(self, data: bytes) -> int:  # type: ignore[override]
+        with suppress(OSError):
+            return super().write(data) or len(data)
+        return len(data)
+
+
+def flush_stdout() -> None:
+    """Write what stdout still holds; the exit code says already if that failed before."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError:
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - open to the end

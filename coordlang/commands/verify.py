@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 import coordlang
-from coordlang.commands.echo import echo
-from coordlang.commands.exit_codes import REFUTED
+from coordlang.commands.failure import REFUTED
 from coordlang.commands.files import (
     FILE,
     PlanningFiles,
@@ -27,7 +26,7 @@ from coordlang.commands.shared_options import (
     limits,
     model_options,
 )
-from coordlang.commands.terminal import line_width, working
+from coordlang.commands.terminal import echo, line_width, working
 from planners.system.notebook import counted
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from pathlib import Path
 import click
 import pytest
 
-from coordlang.commands.exit_codes import BROKEN_PIPE, INTERRUPTED
-from coordlang.commands.group import COMMANDS, cli
+from coordlang.commands.failure import BROKEN_PIPE, INTERRUPTED
+from coordlang.commands.main import COMMANDS, cli
 from planners.system.errors import CoordlangError
 from tests.support.domains import ROOT
 from tests.support.pages import DOCS, PAGES, anchor, blocks, code, links, prose, rows, sections

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import coordlang
-from coordlang.commands.group import COMMANDS
+from coordlang.commands.main import COMMANDS
 from coordlang.sites.movingai import planning_files
 from tests.support.command import own_process
 from tests.support.domains import DOMAINS

@@ -51,7 +51,7 @@ main()
 _MODULES = (
     "1",
     "click",
-    "coordlang.commands.group",
+    "coordlang.commands.main",
     "coordlang.commands.plans",
     "msgspec",
     "numpy",

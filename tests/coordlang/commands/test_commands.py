@@ -268,7 +268,7 @@ def test_plans_of_small_tasks_load_little() -> None:
 
 
 def test_commands_are_all_listed(coordlang: Command) -> None:
-    from coordlang.commands.group import COMMANDS
+    from coordlang.commands.main import COMMANDS
 
     for name in COMMANDS:
         assert coordlang(name, "--help").code == 0

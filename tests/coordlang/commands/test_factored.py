@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 import coordlang as door
-from coordlang.commands.group import COMMANDS
+from coordlang.commands.main import COMMANDS
 from tests.support.command import Command
 from tests.support.domains import SHARED
 from tests.support.hall import factored
