@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from math import prod
 
 import numpy as np
 
@@ -153,6 +154,8 @@ class Choices:
     def moves_fail(self, moves: Sequence[Moves], node: int) -> bool:
         """`fails` for sets given by their moves: each first label with the set of what follows."""
         edges = self.edges_of(node)
+        if prod(map(len, moves)) > len(edges):
+            return True  # different edges have different labels, so some choice is none of them
         for labels in product(*moves):
             target = edges.get(labels)
             if target is None or self.fails(

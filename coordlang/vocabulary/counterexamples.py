@@ -1,32 +1,34 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tuples of plans that refute a candidate partition: many at a time, those that differ least first.
+"""Tuples of plans that refute a partition, found over sets: never by a walk over n plans.
 
-The same walk as verification makes, written for the builders: it keeps, for every node, the way to
-a violation with the fewest steps at which the plans are in different states.  Such pairs give short
-clauses.  It is cut off where no mixture can fail, whatever the words are, and where what the plans
-can say next does not meet (Proposition 14 of docs/concepts.md).
+From a node that all plans share, the mixture is followed step by step, with what each robot can do
+and say after its own steps (`coordlang.vocabulary.spoken_choices`).  It is given up where no choice
+of label sequences can fail, whatever is said, and where the robots have no sentence in common.
+Once a step of the mixture fails labels do not matter any more: it refutes the partition iff the
+robots' sets of sentences have one in common (Proposition 14 of docs/concepts.md).  Plans are made
+of what was found only then.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from random import Random
+from typing import Any
 
 import numpy as np
 
 from coordlang.required.choices import Choices
-from coordlang.required.composition_walk import FAILED, Moves, can_fail, moves
-from coordlang.vocabulary.leads import NO_LEAD, NO_WORD, PARTED, Leads
-from coordlang.vocabulary.next_words import NextWords
-from planners.joint.tables import Bools, Ints, unique_tuples
-from planners.search.edge_index import EdgeIndex
-from planners.search.plan_space import PlanSpace
+from coordlang.vocabulary.sentence_sets import NOTHING, Words
+from coordlang.vocabulary.spoken_choices import SpokenChoices
+from planners.joint.tables import Ints
 
-#: Where no way leads to a violation; some steps may be added to it.
-_FAR = np.iinfo(np.int64).max // 4
-#: Random ways to a violation that are taken from one start at most.
-_RANDOM_WAYS = 40
+#: Ways to a failing step that are taken from one node at most, beside the first.
+_RANDOM_WAYS = 12
+#: What each robot can still do and say: words that others have not said yet, and a set.
+_Ahead = tuple[tuple[Words, int], ...]
+#: A mixture that fails: each robot's steps (codes) so far, and a sentence that all can say.
+_Failing = tuple[list[list[int]], Words]
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,233 +85,212 @@ class Counterexamples:
         return Counterexamples(self.start[rows], self.edges[rows], self.states[rows])
 
 
-@dataclass(frozen=True, slots=True)
-class _OpenMoves:
-    """The moves of a layer that lead to a violation; ``first`` (nodes + 1) delimits each node's."""
-
-    moves: Ints
-    first: Ints
-
-    @classmethod
-    def of_layer(cls, layer: _Layer, leads: Bools) -> _OpenMoves:
-        moves = np.flatnonzero(leads)
-        return cls(moves, np.searchsorted(layer.source[moves], np.arange(len(layer.nodes) + 1)))
-
-    def drawn(self, rows: Ints, random: np.random.Generator) -> Ints:
-        """One of those of each of these nodes."""
-        low, high = self.first[rows], self.first[rows + 1]
-        drawn: Ints = self.moves[random.integers(low, high)]
-        return drawn
+def counterexamples(choices: Choices, word: Ints, most: int) -> Iterator[Counterexample]:
+    """`many_counterexamples` one by one."""
+    for found in many_counterexamples(choices, word, most):
+        yield from map(found.one, range(len(found)))
 
 
-@dataclass(slots=True)
-class _Layer:
-    """Nodes of the walk with equally many steps to go.
+def many_counterexamples(
+    choices: Choices, word: Ints, most: int, ways: int = 1
+) -> list[Counterexamples]:
+    """Failing tuples of plans with one sentence, one table for each number of steps.
 
-    A node is ``(x_1 .. x_n, y or failed, leads)``, failed as the number of nodes of the plan space.
-    Each move has the row of its node in ``source``, the plans' ``edges``, and in ``child`` the row
-    of the node that it leads to, one layer below.  Each node has in ``best`` the fewest steps at
-    which the plans are in different states on a way to a violation, in ``choice`` the move that
-    begins it, in ``open_moves`` all that do.
-    """
-
-    nodes: Ints
-    source: Ints
-    edges: Ints
-    child: Ints
-    best: Ints
-    choice: Ints
-    open_moves: _OpenMoves
-
-
-def counterexamples(
-    choices: Choices, index: EdgeIndex, word: Ints, most: int
-) -> Iterator[Counterexample]:
-    """Failing tuples of plans with one sentence.
-
-    For each node that all plans and their mixture share, the rest of plans that begin alike: those
-    that differ at the fewest steps, and others; those with fewer steps to go first.
+    For each node that requires coordination, the rest of plans that begin alike; those with fewer
+    steps to go first.
 
     Parameters
     ----------
-    choices, index
-        Of the plan space: the robots' choices, and what finds its edges.
+    choices
+        The robots' choices in the plan space.
     word
         (nodes) the word of each node of the plan space.
     most
         About how many are wanted.  If there is none at all, ``word`` is a language for the tasks.
+    ways
+        So many times as many are wanted from each node: it stands for so many images.
     """
-    for found in many_counterexamples(choices, index, word, most):
-        for row in range(len(found)):
-            yield found.one(row)
-
-
-def many_counterexamples(
-    choices: Choices, index: EdgeIndex, word: Ints, most: int, ways: int = 1
-) -> list[Counterexamples]:
-    """`counterexamples` as tables, one for each number of steps and way of drawing.
-
-    ``ways`` times as many random ones are wanted from each start: it stands for so many images.
-    """
-    if not choices.requires[choices.space.starts].any():
+    space = choices.space
+    if not choices.requires[space.starts].any():
         return []
-    layers = _Walk(choices, index, word).layers()
-    _backward(choices.space, layers)
-    return _retrace(choices.space, layers, most, ways * _RANDOM_WAYS)
-
-
-class _Walk:
-    """The nodes from which some mixture can fail and the plans' sentences can agree."""
-
-    def __init__(self, choices: Choices, index: EdgeIndex, word: Ints) -> None:
-        self._choices, self._index = choices, index
-        self._space = choices.space
-        before, after = word[self._space.sources], word[self._space.targets()]
-        #: (edges): the word that a plan enters, `NO_WORD` where it goes on in its word.
-        self._entered = np.where(before == after, NO_WORD, after)
-        self._leads = Leads()
-        self._next = NextWords(self._space, word)
-
-    def layers(self) -> list[_Layer]:
-        """The nodes: ``layers[k]`` has k joint steps to go."""
-        space, robots = self._space, self._space.robots
-        starts = np.unique(space.starts)
-        starts = starts[self._choices.requires[starts]]
-        layers: list[_Layer] = []
-        arriving = np.zeros((0, 2 * robots), np.int64)
-        for number in reversed(range(len(space.layers))):
-            here = starts[space.layer[starts] == number]
-            fresh = np.zeros((len(here), 2 * robots), np.int64)
-            fresh[:, : robots + 1] = here[:, None]
-            both = np.concatenate((fresh, arriving))
-            bounds = (
-                [len(space)] * robots
-                + [len(space) + 1]
-                + [int(both[:, k].max(initial=0)) + 1 for k in range(robots + 1, 2 * robots)]
-            )
-            nodes, place = unique_tuples(both, bounds)
-            if layers:
-                layers[-1].child = place[len(fresh) :]
-            if number == 0:
-                layers.append(_layer(nodes, np.zeros(0, np.int64), np.zeros((0, robots), np.int64)))
+    mixtures = _Mixtures(choices, word)
+    nodes = np.flatnonzero(choices.requires & space.descendants(space.starts)).tolist()
+    random = Random(0)  # always the same ones
+    found: dict[int, list[list[list[int]]]] = {}
+    for node in nodes:
+        failing = mixtures.failing(node, random)
+        if failing is not None:
+            found[node] = [mixtures.plans(node, failing)]
+            if len(found) >= most:
                 break
-            layer, arriving = self._expand(nodes)
-            layers.append(layer)
-        layers.reverse()
-        return layers
-
-    def _expand(self, nodes: Ints) -> tuple[_Layer, Ints]:
-        """A layer with the moves out of its nodes, and the nodes that they lead to."""
-        robots, failed = self._space.robots, len(self._space)
-        sources: list[Ints] = [np.zeros(0, np.int64)]
-        edges: list[Ints] = [np.zeros((0, robots), np.int64)]
-        children: list[Ints] = [np.zeros((0, 2 * robots), np.int64)]
-        # A failed mixture has no edges: -1 as prefix finds none.
-        y = nodes[:, robots]
-        walking = np.column_stack((nodes[:, :robots], np.where(y == failed, FAILED, y)))
-        for move in moves(self._space, self._index, walking):
-            kept, target, lead = self._in_agreement(nodes, move)
-            mixed = move.mixed[kept]
-            fails = can_fail(self._choices, target, mixed)
-            kept, mixed = kept[fails], np.where(mixed == FAILED, failed, mixed)[fails]
-            sources.append(move.source[kept])
-            edges.append(move.edges[kept])
-            children.append(np.column_stack((target[fails], mixed, lead[fails])))
-        layer = _layer(nodes, np.concatenate(sources), np.concatenate(edges))
-        return layer, np.concatenate(children)
-
-    def _in_agreement(self, nodes: Ints, move: Moves) -> tuple[Ints, Ints, Ints]:
-        """The moves after which the sentences can agree, with the nodes reached and the leads."""
-        robots = self._space.robots
-        kept = np.arange(len(move.source))
-        first = self._entered[move.edges[:, 0]]
-        leads: list[Ints] = []
-        for other in range(1, robots):
-            before = nodes[move.source[kept], robots + other]
-            lead = self._leads.after(before, first, self._entered[move.edges[kept, other]])
-            agree = lead != PARTED
-            kept, first = kept[agree], first[agree]
-            leads = [known[agree] for known in (*leads, lead)]
-        target = self._space.targets(move.edges[kept])
-        lead = np.column_stack(leads)
-        agree = self._next.can_agree(target, lead, self._leads)
-        return kept[agree], target[agree], lead[agree]
+    for node, plans in found.items():
+        for _ in range(min(ways * _RANDOM_WAYS, most // len(found) - 1)):
+            failing = mixtures.failing(node, random)
+            assert failing is not None, "it was found once"
+            plans.append(mixtures.plans(node, failing))
+    by_steps: dict[int, list[tuple[int, list[list[int]]]]] = {}
+    for node, listed in found.items():
+        by_steps.setdefault(int(space.layer[node]), []).extend((node, own) for own in listed)
+    return [_table(choices, by_steps[steps]) for steps in sorted(by_steps)]
 
 
-def _layer(nodes: Ints, source: Ints, edges: Ints) -> _Layer:
-    """A layer of which only the nodes and the moves out of them are known."""
-    none = np.zeros(0, np.int64)
-    return _Layer(nodes, source, edges, none, none, none, _OpenMoves(none, none))
-
-
-def _backward(space: PlanSpace, layers: list[_Layer]) -> None:
-    """Set ``best`` and ``choice`` of each node, goals first."""
-    robots = space.robots
-    goal = layers[0]
-    bad = (goal.nodes[:, robots] == len(space)) & (goal.nodes[:, robots + 1 :] == NO_LEAD).all(
-        axis=1
-    )
-    goal.best = np.where(bad, 0, _FAR)
-    for below, layer in pairwise(layers):
-        x = layer.nodes[:, :robots]
-        differs = (x[:, 1:] != x[:, :1]).sum(axis=1)
-        value = below.best[layer.child] if len(layer.child) else np.zeros(0, np.int64)
-        best = np.full(len(layer.nodes), _FAR)
-        np.minimum.at(best, layer.source, value)
-        choice = np.full(len(layer.nodes), -1)
-        tight = np.flatnonzero((value == best[layer.source]) & (value < _FAR))
-        choice[layer.source[tight][::-1]] = tight[::-1]
-        layer.choice = choice
-        layer.open_moves = _OpenMoves.of_layer(layer, value < _FAR)
-        layer.best = np.where(best < _FAR, best + differs, _FAR)
-
-
-def _retrace(
-    space: PlanSpace, layers: list[_Layer], most: int, ways: int = _RANDOM_WAYS
-) -> list[Counterexamples]:
-    """Ways from the nodes at which the plans and their mixture are one, and no sentence leads."""
-    robots = space.robots
-    # Columns: fewest steps at which the plans differ, layer, row of the layer.
-    starts = [np.zeros((0, 3), np.int64)]
-    for number, layer in enumerate(layers[1:], 1):
-        x = layer.nodes[:, : robots + 1]
-        diagonal = (x == x[:, :1]).all(axis=1) & (layer.nodes[:, robots + 1 :] == NO_LEAD).all(
-            axis=1
-        )
-        hit = np.flatnonzero(diagonal & (layer.best < _FAR))
-        starts.append(np.column_stack((layer.best[hit], np.full(len(hit), number), hit)))
-    table = np.concatenate(starts)
-    table = table[np.lexsort(table.T[::-1])][:most]
-    if not len(table):
-        return []
-    # Few starts: more ways to a violation from each, drawn at random (always the same ones).
-    random = np.random.default_rng(0)
-    repeated = min(ways, most // len(table) - 1)
-    found = []
-    for number in np.unique(table[:, 1]).tolist():
-        rows = table[table[:, 1] == number, 2]
-        found.append(_follow(space, layers, number, rows, None))
-        if repeated > 0:
-            rows = np.repeat(rows, repeated)
-            found.append(_follow(space, layers, number, rows, random))
-    return found
-
-
-def _follow(
-    space: PlanSpace,
-    layers: list[_Layer],
-    number: int,
-    rows: Ints,
-    random: np.random.Generator | None,
-) -> Counterexamples:
-    """Ways from nodes of a layer to violations: the best, or at each node any that leads to one."""
-    start = layers[number].nodes[rows, 0]
-    edges = np.empty((len(rows), number, space.robots), np.int64)
-    for step, layer in enumerate(layers[number:0:-1]):
-        move = layer.choice[rows] if random is None else layer.open_moves.drawn(rows, random)
-        edges[:, step] = layer.edges[move]
-        rows = layer.child[move]
-    states = np.empty((len(start), space.robots, number + 1), np.int64)
+def _table(choices: Choices, found: Sequence[tuple[int, list[list[int]]]]) -> Counterexamples:
+    """Tuples as a table: the node of each, and the edges of its plans."""
+    space = choices.space
+    start = np.array([node for node, _ in found], np.int64)
+    edges = np.array([plans for _, plans in found], np.int64)  # tuples, robots, steps
+    states = np.empty((*edges.shape[:2], edges.shape[2] + 1), np.int64)
     states[:, :, 0] = space.state[start][:, None]
-    states[:, :, 1:] = space.state[space.targets(edges)].transpose(0, 2, 1)
-    return Counterexamples(start, edges, states)
+    states[:, :, 1:] = space.state[space.targets(edges)]
+    return Counterexamples(start, edges.transpose(0, 2, 1), states)
+
+
+class _Mixtures:
+    """Mixtures of plans that fail and have one sentence, by node of a plan space."""
+
+    def __init__(self, choices: Choices, word: Ints) -> None:
+        self._choices, self._space = choices, choices.space
+        self._spoken = SpokenChoices(choices, word)
+        self._prefixes: dict[int, dict[int, Any]] = {}
+        self._safe: set[tuple[int, _Ahead]] = set()
+
+    def failing(self, node: int, random: Random) -> _Failing | None:
+        """A mixture of plans from a node that fails while all of them have one sentence."""
+        return self._failing(node, tuple(((), own) for own in self._spoken.of_node[node]), random)
+
+    def _failing(self, node: int, ahead: _Ahead, random: Random) -> _Failing | None:
+        """The same where the robots are ahead of each other in what they say."""
+        key = (node, ahead)
+        if key in self._safe:
+            return None
+        chosen = tuple(self._spoken.label_set(own) for _, own in ahead)
+        if self._choices.fails(chosen, node):
+            for codes, following, target in self._moves(node, ahead, random):
+                if target is None:
+                    return [[*own] for own in codes], self._one_sentence(following, random)
+                said = len(_begin([words for words, _ in following]))
+                below = tuple((words[said:], own) for words, own in following)
+                found = self._failing(target, below, random)
+                if found is not None:
+                    steps, sentence = found
+                    steps = [[*first, *rest] for first, rest in zip(codes, steps, strict=True)]
+                    return steps, following[0][0][:said] + sentence
+        self._safe.add(key)
+        return None
+
+    def _moves(
+        self, node: int, ahead: _Ahead, random: Random
+    ) -> Iterator[tuple[list[Words], _Ahead, int | None]]:
+        """Steps of the mixture after which the robots have a sentence in common.
+
+        Each robot's code, where they are then, and the node that the mixture reaches: None where it
+        fails, whatever robots do that have no code yet.
+        """
+        spoken, robots = self._spoken, len(ahead)
+        none: list[Words] = [()] * robots
+        waiting: list[tuple[int, list[Words], _Ahead, Any]] = [
+            (0, none, ahead, self._prefixes_of(node))
+        ]
+        while waiting:
+            robot, codes, reached, prefixes = waiting.pop()
+            if robot == robots:
+                yield codes, reached, prefixes
+                continue
+            words, own = reached[robot]
+            steps = spoken.steps(own)
+            for step in random.sample(steps, len(steps)):
+                label, entered, after = step
+                moved = (*reached[:robot], (words + entered, after), *reached[robot + 1 :])
+                if self._common(moved)[1] == NOTHING:
+                    continue
+                chosen = [*codes[:robot], (spoken.code_of(step),), *codes[robot + 1 :]]
+                if label in prefixes:
+                    waiting.append((robot + 1, chosen, moved, prefixes[label]))
+                else:
+                    yield chosen, moved, None
+
+    def _common(self, ahead: _Ahead) -> tuple[Words, int]:
+        """What the robot that is ahead of all has said, and what all can say after it."""
+        said = max((words for words, _ in ahead), key=len)
+        sets, common = self._spoken.words, -1
+        for words, own in ahead:
+            if said[: len(words)] != words:
+                return said, NOTHING
+            rest = sets.after(said[len(words) :], self._spoken.sentences(own))
+            common = rest if common < 0 else sets.common(common, rest)
+        return said, common
+
+    def _one_sentence(self, ahead: _Ahead, random: Random) -> Words:
+        said, common = self._common(ahead)
+        return said + self._spoken.words.drawn(common, random)
+
+    def _prefixes_of(self, node: int) -> dict[int, Any]:
+        """The edges of a node by the robots' labels, one after another, with their targets."""
+        found = self._prefixes.get(node)
+        if found is None:
+            found = self._prefixes[node] = {}
+            for edge in self._space.out_edges(node):
+                *first, last = self._spoken.labels[edge]
+                at = found
+                for label in first:
+                    at = at.setdefault(label, {})
+                at[last] = self._spoken.targets[edge]
+        return found
+
+    # ---- plans of a mixture
+
+    def plans(self, node: int, failing: _Failing) -> list[list[int]]:
+        """Plans, as edges, of which a failing mixture is made, near to each other.
+
+        Each is made to follow the one before where it can, and then the first one the last.
+        """
+        codes, sentence = failing
+        near: list[int] = []
+        plans: list[list[int]] = []
+        for own in codes:
+            near = self._plan(node, (len(plans), own), sentence, near)
+            plans.append(near)
+        plans[0] = self._plan(node, (0, codes[0]), sentence, near)
+        return plans
+
+    def _plan(
+        self, node: int, part: tuple[int, list[int]], sentence: Words, near: Sequence[int]
+    ) -> list[int]:
+        """A plan with a robot's first steps and a sentence, that goes to where another one does."""
+        robot, codes = part
+        spoken, path = self._spoken, []
+        for step in range(int(self._space.layer[node])):
+            options = []
+            for edge in self._space.out_edges(node):
+                if step < len(codes) and spoken.code(robot, edge, node) != codes[step]:
+                    continue
+                entered, target = spoken.entered(edge, node), spoken.targets[edge]
+                if sentence[: len(entered)] == entered and self._can_say(
+                    target, robot, codes[step + 1 :], sentence[len(entered) :]
+                ):
+                    options.append(edge)
+                    if near and target == spoken.targets[near[step]]:
+                        break
+            edge = options[-1] if near else options[0]
+            sentence = sentence[len(spoken.entered(edge, node)) :]
+            path.append(edge)
+            node = spoken.targets[edge]
+        return path
+
+    def _can_say(self, node: int, robot: int, codes: list[int], sentence: Words) -> bool:
+        """Whether some plan from a node has a robot's first steps and a sentence."""
+        spoken = self._spoken
+        after = spoken.after(spoken.of_node[node][robot], codes)
+        if after is None:
+            return False
+        said = tuple(word for code in codes for word in spoken.entered_by(code))
+        rest = sentence[len(said) :]
+        return sentence[: len(said)] == said and spoken.words.has(spoken.sentences(after), rest)
+
+
+def _begin(said: Sequence[Words]) -> Words:
+    """The words with which all of them begin."""
+    shared = min(said, key=len)
+    while any(words[: len(shared)] != shared for words in said):
+        shared = shared[:-1]
+    return shared

@@ -20,7 +20,6 @@ from coordlang.vocabulary.counterexamples import (
 )
 from coordlang.vocabulary.job import Evidence
 from planners.joint.tables import Bools, Ints
-from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 
 #: Counterexamples taken at a time.
@@ -37,18 +36,15 @@ class TaskPart:
     ----------
     choices
         The robots' choices in the plan space of just these tasks.
-    index
-        Finds its edges.
     """
 
     choices: Choices
-    index: EdgeIndex
 
     @classmethod
     def of(cls, space: PlanSpace, tasks: Bools) -> TaskPart:
         """These tasks of a plan space."""
         part = space.with_tasks(space.starts[tasks], space.second[tasks])
-        return cls(Choices(part), EdgeIndex.of(part))
+        return cls(Choices(part))
 
     @property
     def space(self) -> PlanSpace:
@@ -69,7 +65,7 @@ class TaskPart:
         ways
             For how many images each task stands.
         """
-        return many_counterexamples(self.choices, self.index, word[self.space.state], most, ways)
+        return many_counterexamples(self.choices, word[self.space.state], most, ways)
 
     def violated(self, word: Ints) -> dict[Clause, Counterexample]:
         """Clauses that a partition violates, each with the plans that it comes from.
@@ -87,7 +83,7 @@ class TaskPart:
         words = word.tolist()
         found: dict[Clause, Counterexample] = {}
         nodes = word[self.space.state]
-        for example in counterexamples(self.choices, self.index, nodes, _AT_A_TIME):
+        for example in counterexamples(self.choices, nodes, _AT_A_TIME):
             clause = separation_clause(example.states, words)
             assert clause, "the plans have one sentence, and none of them is the other"
             found.setdefault(clause, example)

@@ -1,101 +1,110 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Counterexamples from a walk that is cut off, against the walk that only words cut off."""
+"""Partitions refuted over sets, against plans that are listed and every mixture of them."""
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
 from random import Random
 
 import numpy as np
 import pytest
 
+from coordlang.language.candidates import from_problems
 from coordlang.required.choices import Choices
-from coordlang.vocabulary.counterexamples import counterexamples
-from coordlang.vocabulary.leads import NO_LEAD, NO_WORD, PARTED, Leads
-from coordlang.vocabulary.next_words import NextWords
-from planners.search.edge_index import EdgeIndex
+from coordlang.vocabulary.counterexamples import Counterexample, counterexamples
+from coordlang.vocabulary.sentence_sets import NOTHING, SILENCE, SentenceSets
 from planners.search.plan_space import PlanSpace
-from tests.support.counterexample_walk import walked
-from tests.support.random_spaces import runs, separable_spaces
+from planners.system.errors import BadInput, ProvedImpossible, UsageError
+from tests.support import naive
+from tests.support.random_models import random_model
+from tests.support.random_spaces import random_spaces, runs
+
+#: Plans of a task up to which every mixture is made, by the number of robots.
+MOST = {2: 40, 3: 14, 4: 7}
 
 
-@pytest.mark.parametrize(("robots", "seeds"), runs(60, 30, 20))
-def test_what_is_cut_off_refutes_nothing(robots: int | None, seeds: range) -> None:
-    """The same counterexamples in the same order, for random words."""
-    random = Random(seeds.start)
+def with_slack(seeds: range) -> Iterator[PlanSpace]:
+    """The plans within one or two steps of the optimum, whether words see what is left or not."""
+    for seed in seeds:
+        robots = 2 + seed % 3
+        domain, problem, options = random_model(seed, robots)
+        options = replace(options, slack=1 + seed % 2, words_see_slack=seed % 4 < 2)
+        try:
+            yield from from_problems(domain, [problem], options).spaces
+        except (ProvedImpossible, BadInput, UsageError):
+            continue
+
+
+def compared(spaces: Iterator[PlanSpace], random: Random) -> Counter[bool]:
+    """What is found under random words is there, and nothing is missed; how often was there any."""
     answers: Counter[bool] = Counter()
-    for space in separable_spaces(seeds, robots):
-        choices, index = Choices(space), EdgeIndex.of(space)
+    for space in spaces:
+        choices = Choices(space)
         for words in (1, 2, 3, 5):
-            of_state = np.array([random.randrange(words) for _ in space.rows], np.int64)
-            word = of_state[space.state]
-            found = list(counterexamples(choices, index, word, 20))
-            assert found == list(walked(space, word, 20))
-            answers[bool(found)] += 1
-    print(f"{robots or 'any'} robots: {dict(answers)}")
-    assert answers[True] >= 5
-    assert answers[False] >= 5
-
-
-def sentences(space: PlanSpace, word: list[int], node: int) -> set[tuple[int, ...]]:
-    """What plans from a node say after the node's own word."""
-    found: set[tuple[int, ...]] = set() if len(space.out_edges(node)) else {()}
-    for target in space.successors(node):
-        said = (word[target],) if word[target] != word[node] else ()
-        found |= {(*said, *rest) for rest in sentences(space, word, target)}
-    return found
-
-
-def beginning(sentence: tuple[int, ...]) -> tuple[int, ...]:
-    """Its first two words; -1 where it ends."""
-    return (*sentence, -1)[:2]
-
-
-def test_plans_that_can_go_on_with_the_same_words() -> None:
-    """Against lists of sentences, where one plan is ahead of the other by none to two words."""
-    random = Random(1)
-    answers: Counter[bool] = Counter()
-    for space in separable_spaces(range(40), 2):
-        word = np.array([random.randrange(2) for _ in space.rows], np.int64)[space.state]
-        words = NextWords(space, word)
-        listed = {node: sentences(space, word.tolist(), node) for node in range(len(space))}
-        for _ in range(20):
-            span = random.choice(space.layers)
-            nodes = [random.randrange(span.start, span.stop) for _ in range(2)]
-            leads, lead = Leads(), np.zeros(1, np.int64)
-            ahead = tuple(random.randrange(2) for _ in range(random.randrange(3)))
-            none, behind = np.array([NO_WORD]), random.random() < 0.5
-            for said in ahead:
-                entered = [none, np.array([said])]
-                lead = leads.after(lead, entered[not behind], entered[behind])
-            first, second = nodes if not behind else nodes[::-1]
-            mine = {beginning((*ahead, *rest)) for rest in listed[first]}
-            expected = bool(mine & {beginning(rest) for rest in listed[second]})
-            agree = words.can_agree(np.array([nodes]), lead[:, None], leads)
-            assert agree.tolist() == [expected]
-            answers[expected] += 1
-    assert min(answers[True], answers[False]) >= 20
-
-
-@pytest.mark.parametrize("largest", [0, 4_000_000])
-def test_leads_are_those_of_sentences(largest: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """By tables and by sorting: what one sentence has said in addition."""
-    monkeypatch.setattr("coordlang.vocabulary.leads._LARGEST_TABLE", largest)
-    random = Random(2)
-    leads, kept = Leads(), 0
-    for _ in range(300):
-        number = np.zeros(1, np.int64)
-        said: list[list[int]] = [[], []]
-        for _ in range(4):
-            step = [random.randrange(-1, 2) for _ in range(2)]
-            number = leads.after(number, np.array(step[:1]), np.array(step[1:]))
-            for mine, word in zip(said, step, strict=True):
-                mine += [word] * (word != NO_WORD)
-            shared = min(map(len, said))
-            parted = said[0][:shared] != said[1][:shared]
-            assert (number[0] == PARTED) == parted
-            if parted:
+            word = [random.randrange(words) for _ in space.rows]
+            try:
+                holds = naive.is_language(space, dict(enumerate(word)), MOST[space.robots])
+            except naive.TooLarge:
                 break
-            assert (number[0] == NO_LEAD) == (said[0] == said[1])
-            kept += 1
-    assert kept > 100
+            found = list(counterexamples(choices, np.array(word)[space.state], 20))
+            assert bool(found) != holds
+            for example in found:
+                check(space, example, word)
+            answers[holds] += 1
+    return answers
+
+
+def check(space: PlanSpace, example: Counterexample, word: list[int]) -> None:
+    """They are plans from one node with one sentence, and their mixture is none."""
+    sentences = set()
+    for edges, states in zip(zip(*example.edges, strict=True), example.states, strict=True):
+        nodes = space.nodes_on(example.start, edges)
+        assert all(edge in space.out_edges(node) for node, edge in zip(nodes, edges, strict=False))
+        assert space.layer[nodes[-1]] == 0
+        assert tuple(space.state[nodes].tolist()) == states
+        sentences.add(naive.sentence([word[state] for state in states]))
+    assert len(sentences) == 1
+    mixed = [[space.labels_of(e)[r] for r, e in enumerate(step)] for step in example.edges]
+    assert space.path_with(example.start, mixed) is None
+
+
+@pytest.mark.parametrize(("robots", "seeds"), runs(120, 60, 40))
+def test_what_sets_refute_is_what_listing_refutes(robots: int | None, seeds: range) -> None:
+    spaces = (space for _, space in random_spaces(seeds, robots, 3_000))
+    answers = compared(spaces, Random(seeds.start))
+    print(f"{robots or 'any'} robots: {dict(answers)}")
+    assert min(answers[True], answers[False]) >= 5
+
+
+def test_plans_within_slack_are_refuted_like_optimal_ones() -> None:
+    answers = compared(with_slack(range(60)), Random(1))
+    print(dict(answers))
+    assert min(answers[True], answers[False]) >= 5
+
+
+def test_sets_of_sentences_are_those_of_lists() -> None:
+    """Unions, intersections, what comes before and after; one number for each set."""
+    random = Random(3)
+    sets = SentenceSets()
+    numbers: dict[frozenset[tuple[int, ...]], int] = {}
+    every = [(a, b)[:n] for a in range(2) for b in range(2) for n in range(3)]
+
+    def number_of(listed: frozenset[tuple[int, ...]]) -> int:
+        number = NOTHING
+        for sentence in sorted(listed):
+            number = sets.union(number, sets.before(sentence, SILENCE))
+        assert numbers.setdefault(listed, number) == number
+        return number
+
+    for _ in range(300):
+        one, other = (frozenset(random.sample(every, random.randrange(5))) for _ in range(2))
+        first, second = number_of(one), number_of(other)
+        assert sets.union(first, second) == number_of(one | other)
+        assert sets.common(first, second) == number_of(one & other)
+        assert sets.after((1,), first) == number_of(frozenset(s[1:] for s in one if s[:1] == (1,)))
+        assert [s for s in set(every) if sets.has(first, s)] == [s for s in set(every) if s in one]
+        if one:
+            assert sets.drawn(first, random) in one
+    assert len(set(numbers.values())) == len(numbers)

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What each robot can do from a node, together with what is said meanwhile: sets, not plans.
+
+Step by step a robot has its label, and the plan enters a word or stays in one: a sequence of pairs
+(label, word).  Of plan i a mixture and its sentences depend on these of robot i alone, and far
+fewer of them differ than plans.
+"""
+
+from __future__ import annotations
+
+from functools import reduce
+
+from coordlang.required.choices import Choices
+from coordlang.required.label_sets import END, LabelSets
+from coordlang.vocabulary.sentence_sets import NOTHING, SILENCE, SentenceSets, Words
+from planners.joint.tables import Ints
+
+#: One step of a robot: its label, the word that is entered, if one is, and the set of what follows.
+Step = tuple[int, Words, int]
+
+
+class SpokenChoices:
+    """The sets of robots' (label, word) sequences over the optimal plans from each node.
+
+    O(edges) set operations, each on a different pair of sets once.
+
+    Parameters
+    ----------
+    choices
+        The robots' choices without words.
+    word
+        (nodes) the word of each node.
+
+    Attributes
+    ----------
+    of_node
+        For each node the number of each robot's set.
+    words
+        The sets of sentences.
+    """
+
+    def __init__(self, choices: Choices, word: Ints) -> None:
+        self.space, self.words = choices.space, SentenceSets()
+        self.of_node: list[tuple[int, ...]] = []
+        self.word: list[int] = word.tolist()
+        self.labels: list[list[int]] = self.space.labels.tolist()
+        self.targets: list[int] = self.space.targets().tolist()
+        self._choices, self._sets = choices, LabelSets()
+        self._spoken = max(self.word, default=0) + 2
+        self._sentences = {END: SILENCE}
+        self._projection = {END: END}
+        self._steps: dict[int, list[Step]] = {}
+        self._fill()
+
+    def __len__(self) -> int:
+        """Count the different sets."""
+        return len(self._sets)
+
+    def _fill(self) -> None:
+        """From the goals up."""
+        robots = range(self.space.robots)
+        for node in range(len(self.space)):
+            moves: list[dict[int, set[int]]] = [{} for _ in robots]
+            for edge in self.space.out_edges(node):
+                below = self.of_node[self.targets[edge]]
+                for robot in robots:
+                    code = self.code(robot, edge, node)
+                    moves[robot].setdefault(code, set()).add(below[robot])
+            self.of_node.append(
+                tuple(
+                    self._sets.of_moves(
+                        {code: reduce(self._sets.union, sorted(sets)) for code, sets in own.items()}
+                    )
+                    for own in moves
+                )
+            )
+
+    def entered(self, edge: int, node: int) -> Words:
+        """The word that a plan enters by an edge out of a node, if it does."""
+        word = self.word[self.targets[edge]]
+        return () if word == self.word[node] else (word,)
+
+    def code(self, robot: int, edge: int, node: int) -> int:
+        """A robot's label on an edge out of a node and the word entered, as one number."""
+        entered = self.entered(edge, node)
+        return self.labels[edge][robot] * self._spoken + (entered[0] + 1 if entered else 0)
+
+    def steps(self, number: int) -> list[Step]:
+        """The first steps of a set."""
+        found = self._steps.get(number)
+        if found is None:
+            found = self._steps[number] = []
+            for code, after in self._sets.moves(number).items():
+                found.append((code // self._spoken, self.entered_by(code), after))
+        return found
+
+    def after(self, number: int, codes: list[int]) -> int | None:
+        """What may follow some steps of a set; None if it has no sequence that begins so."""
+        for code in codes:
+            following = self._sets.moves(number).get(code)
+            if following is None:
+                return None
+            number = following
+        return number
+
+    def entered_by(self, code: int) -> Words:
+        """The word that is entered by a step, if one is."""
+        entered = code % self._spoken
+        return (entered - 1,) if entered else ()
+
+    def code_of(self, step: Step) -> int:
+        """`code` of a step."""
+        label, entered, _ = step
+        return label * self._spoken + (entered[0] + 1 if entered else 0)
+
+    def label_set(self, number: int) -> int:
+        """The label sequences of a set, without what is said, in the sets of the choices."""
+        known = self._projection.get(number)
+        if known is None:
+            moves: dict[int, int] = {}
+            for label, _, after in self.steps(number):
+                below = self.label_set(after)
+                moves[label] = self._choices.sets.union(moves.get(label, below), below)
+            known = self._projection[number] = self._choices.sets.of_moves(moves)
+        return known
+
+    def sentences(self, number: int) -> int:
+        """What can be said along a set, in ``words``."""
+        known = self._sentences.get(number)
+        if known is None:
+            known = NOTHING
+            for _, entered, after in self.steps(number):
+                said = self.words.before(entered, self.sentences(after))
+                known = self.words.union(known, said)
+            self._sentences[number] = known
+        return known
