@@ -28,7 +28,7 @@ from coordlang.commands.witness import witness_text
 from coordlang.execution.choices import MOST, Choices
 from coordlang.execution.choices import choices as choices_under
 from coordlang.execution.choices_file import monitor, to_bytes, to_data
-from coordlang.execution.dot import to_dot
+from coordlang.execution.drawing import choices_dot
 from coordlang.execution.monitor import Answer, Monitor, MonitorError, NotAllowed
 from coordlang.language.tolerance import Tolerance, percent
 from coordlang.required.failure import TooManyToCount, failure_of_sentence
@@ -148,7 +148,7 @@ class RobotsChoices(Presented):
 
     def dot(self) -> str:
         """The automata in the language of Graphviz."""
-        return to_dot(self.found, self.chosen)
+        return choices_dot(self.found, self.chosen)
 
     def _repr_html_(self) -> str:
         rows = [(robot, f"{number:,}") for robot, number in self.subplans.items()]

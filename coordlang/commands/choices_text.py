@@ -9,7 +9,7 @@ from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 from coordlang.commands.layout import alike, named, packed, wrapped
-from coordlang.execution.dot import distinguishing
+from coordlang.execution.drawing import distinguishing
 from coordlang.language.candidates import describe
 from planners.system.notebook import counted
 

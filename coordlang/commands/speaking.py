@@ -14,10 +14,9 @@ from coordlang.commands.language_inputs import LanguageSource, read_task_languag
 from coordlang.commands.options import Source
 from coordlang.commands.plans import OptimalPlans, PlanSteps
 from coordlang.execution.best_sentence import BestSentence, best_sentence
-from coordlang.execution.drawing import cut_note, to_dot
+from coordlang.execution.drawing import cut_note, plans_dot
 from coordlang.execution.guided_search import ExpandedStates, GuidedPlan, plan_under_sentence
-from coordlang.execution.open_plans import OpenPlans, open_plans_data
-from coordlang.execution.plan_dag import PlanDag, plan_dag
+from coordlang.execution.open_plans import OpenPlans, PlanDag, open_plans_data, plan_dag
 from coordlang.execution.plan_sentence import read_plan_file, sentence_of_plan
 from coordlang.execution.preferences import Preference, read_preference
 from coordlang.execution.task_language import TaskLanguage
@@ -151,7 +150,7 @@ class SentencePlans(OptimalPlans):
 
     def dot(self, nodes: int = NODES_DRAWN) -> str:
         """Return the DAG in the language of Graphviz."""
-        return to_dot(self.dag(nodes))
+        return plans_dot(self.dag(nodes))
 
     def cut_note(self, nodes: int = NODES_DRAWN) -> str | None:
         """Return what a picture with so many nodes leaves out, or None."""

@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The plans that a sentence leaves open in Graphviz' language: texts and colours."""
+"""The plans that a sentence leaves open, and robots' choices, in Graphviz' language."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import and_
 
-from coordlang.execution.plan_dag import DagEdge, DagNode, PlanDag
-from planners.joint.model import NO_FACT, own_text
+from coordlang.execution.choices import Choices, RobotChoices
+from coordlang.execution.open_plans import DagEdge, DagNode, PlanDag
+from planners.joint.model import IDLE, NO_FACT, own_text
 from planners.joint.states import split_atoms
 
 #: Colours that people of every colour vision tell apart (Okabe and Ito 2008).  Words carry their
@@ -31,44 +34,40 @@ class Ink:
     again: bool
 
 
+def plans_dot(dag: PlanDag) -> str:
+    """A DAG of plans, layers from left to right.  The same DAG gives the same text."""
+    ink, note = inks(dag), cut_note(dag)
+    headline = f'"{" ".join(dag.sentence)}" leaves {_plans_text(dag.count)} open'
+    title = "\n".join([headline, dag.task, *([note] if note else [])])
+    out = [
+        "digraph plans {",
+        "  rankdir=LR;",
+        '  node [shape=box, style="filled,rounded", fontname="monospace", fontsize=10];',
+        '  edge [fontname="monospace", fontsize=9];',
+        f"  labelloc=t; label={_quoted(title)};",
+    ]
+    states = [set(split_atoms(node.key)) for node in dag.nodes if not node.merged]
+    always = set.intersection(*states) if len(states) > 1 else set()
+    for layer in dag.layers:
+        out.append(f"  subgraph step{dag.nodes[layer.start].step} {{ rank=same;")
+        out += [f"    n{n} [{_node(dag.nodes[n], always, ink)}];" for n in layer]
+        out.append("  }")
+    for edge in dag.edges:
+        merged = dag.nodes[edge.source].merged or dag.nodes[edge.target].merged
+        look = "style=dashed" if merged else f"label={_quoted(_edge_text(dag, edge))}"
+        out.append(f"  n{edge.source} -> n{edge.target} [{look}];")
+    return "\n".join([*out, "}"]) + "\n"
+
+
 def inks(dag: PlanDag) -> dict[str, Ink]:
     """A colour for each word, in the order in which plans come to them."""
     result = {}
-    for number, word in enumerate(dag.words):
+    for number, word in enumerate(dict.fromkeys(dag.sentence)):
         fill = COLOURS[number % len(COLOURS)]
         red, green, blue = (int(fill[k : k + 2], 16) / 255 for k in (1, 3, 5))
         dark = 0.299 * red + 0.587 * green + 0.114 * blue < 0.5
         result[word] = Ink(fill, "#ffffff" if dark else "#000000", number >= len(COLOURS))
     return result
-
-
-def node_lines(dag: PlanDag) -> list[list[str]]:
-    """What is written in each node: its atoms, without those that are true in all nodes."""
-    atoms = [split_atoms(node.key) for node in dag.nodes]
-    states = [set(a) for a, node in zip(atoms, dag.nodes, strict=True) if not node.merged]
-    always = set.intersection(*states) if len(states) > 1 else set()
-    return [_state_lines(node, own, always) for node, own in zip(dag.nodes, atoms, strict=True)]
-
-
-def _state_lines(node: DagNode, atoms: Sequence[str], always: Collection[str]) -> list[str]:
-    if node.merged:
-        return [f"{node.merged:,} more states"]
-    if not atoms:
-        return [NO_FACT]
-    lines = [_without_parentheses(atom) for atom in atoms if atom not in always]
-    return _shortened(lines, _ATOMS_SHOWN, "atoms")
-
-
-def edge_lines(dag: PlanDag, edge: DagEdge) -> list[str]:
-    """What is written at an edge: one line for each robot, for each of its first joint actions."""
-    lines: list[str] = []
-    for action in edge.actions[:_ACTIONS_SHOWN]:
-        if lines:
-            lines.append("or")
-        for robot, text in zip(dag.robots, action, strict=True):
-            lines.append(_clipped(f"{robot} {own_text(text or '(idles)', robot)}"))
-    rest = len(edge.actions) - _ACTIONS_SHOWN
-    return [*lines, f"or {rest:,} more"] if rest > 0 else lines
 
 
 def cut_note(dag: PlanDag) -> str | None:
@@ -82,63 +81,96 @@ def cut_note(dag: PlanDag) -> str | None:
     )
 
 
+def _node(node: DagNode, always: Collection[str], ink: dict[str, Ink]) -> str:
+    """A node's attributes: its word, its atoms without those of all nodes, its plans."""
+    plans = _plans_text(node.plans)
+    if node.merged:
+        text = f"{node.merged:,} more states\n{plans}"
+        return f'label={_quoted(text)}, style="dashed,rounded"'
+    atoms = split_atoms(node.key)
+    lines = [_clipped(atom[1:-1]) for atom in atoms if atom not in always]
+    if len(lines) > _ATOMS_SHOWN:
+        rest = len(lines) - _ATOMS_SHOWN + 1
+        lines = [*lines[: _ATOMS_SHOWN - 1], f"and {rest} more atoms"]
+    text = "\n".join([node.word, *(lines if atoms else [NO_FACT]), plans])
+    own = ink[node.word]
+    again = ", peripheries=2" if own.again else ""
+    colours = f'fillcolor="{own.fill}", fontcolor="{own.text}"{again}'
+    return f"label={_quoted(text)}, tooltip={_quoted(node.key)}, {colours}"
+
+
+def _edge_text(dag: PlanDag, edge: DagEdge) -> str:
+    """One line for each robot, for each of the first joint actions."""
+    actions = [
+        [
+            _clipped(f"{robot} {own_text(text or '(idles)', robot)}")
+            for robot, text in zip(dag.robots, action, strict=True)
+        ]
+        for action in edge.actions[:_ACTIONS_SHOWN]
+    ]
+    rest = len(edge.actions) - _ACTIONS_SHOWN
+    more = f"\nor {rest:,} more" if rest > 0 else ""
+    return "\nor\n".join("\n".join(lines) for lines in actions) + more
+
+
+def choices_dot(choices: Choices, robots: Sequence[int] | None = None) -> str:
+    """All robots' automata, or of those with these numbers: a cluster each, a rank for each step.
+
+    In a state stand its number, how many own subplans are left, and the atoms known to be true that
+    tell it from the other states of its step.
+    """
+    lines = [
+        "digraph choices {",
+        "  rankdir=LR; node [shape=box, style=rounded, fontsize=10]; edge [fontsize=10];",
+    ]
+    for own in choices.of(robots):
+        lines += _cluster(choices, own)
+    return "\n".join([*lines, "}"]) + "\n"
+
+
+def distinguishing(choices: Choices, own: RobotChoices, states: range) -> list[list[str]]:
+    """For each state of one step the atoms known to be true there.
+
+    Without those known to be true in all of them.
+    """
+    known = own.automaton.known[states.start : states.stop]
+    everywhere = reduce(and_, (knowledge.true for knowledge in known))
+    facts = choices.task_language.model.codec.facts.texts
+    return [
+        [text for bit, text in enumerate(facts) if (knowledge.true & ~everywhere) >> bit & 1]
+        for knowledge in known
+    ]
+
+
+def _cluster(choices: Choices, own: RobotChoices) -> list[str]:
+    model, automaton = choices.task_language.model, own.automaton
+    title = f"{model.robots[own.robot]}: {automaton.count:,} subplan{'s' * (automaton.count != 1)}"
+    lines = [f"  subgraph cluster_{own.robot} {{", f"    label={_quoted(title)};"]
+    for step, states in enumerate(automaton.layers):
+        names = [f"r{own.robot}s{state}" for state in states]
+        final = ", peripheries=2" if step == automaton.steps else ""
+        known = distinguishing(choices, own, states)
+        for state, name, atoms in zip(states, names, known, strict=True):
+            text = "\n".join([f"{state}: {automaton.left[state]:,} left", *atoms])
+            lines.append(f"    {name} [label={_quoted(text)}{final}];")
+        lines.append("    {rank=same; " + " ".join(f"{name};" for name in names) + "}")
+    for state in range(len(automaton)):
+        for label, to in automaton.moves(state):
+            text = model.label_text(own.robot, label) or IDLE
+            lines.append(f"    r{own.robot}s{state} -> r{own.robot}s{to} [label={_quoted(text)}];")
+    return [*lines, "  }"]
+
+
 def _plans_text(number: int) -> str:
     """``12 plans``."""
     return f"{number:,} plan{'s' * (number != 1)}" if number < 10**12 else f"{number:.2e} plans"
 
 
-def to_dot(dag: PlanDag) -> str:
-    """Graphviz text, layers from left to right.  The same DAG gives the same text."""
-    ink, lines = inks(dag), node_lines(dag)
-    note = cut_note(dag)
-    headline = f'"{" ".join(dag.sentence)}" leaves {_plans_text(dag.count)} open'
-    title = "\n".join([headline, dag.task, *([note] if note else [])])
-    out = [
-        "digraph plans {",
-        "  rankdir=LR;",
-        '  node [shape=box, style="filled,rounded", fontname="monospace", fontsize=10];',
-        '  edge [fontname="monospace", fontsize=9];',
-        f"  labelloc=t; label={quoted(title)};",
-    ]
-    for layer in dag.layers:
-        out.append(f"  subgraph step{dag.nodes[layer.start].step} {{ rank=same;")
-        out += [f"    n{n} [{_dot_node(dag.nodes[n], lines[n], ink)}];" for n in layer]
-        out.append("  }")
-    for edge in dag.edges:
-        merged = dag.nodes[edge.source].merged or dag.nodes[edge.target].merged
-        look = "style=dashed" if merged else f"label={quoted(chr(10).join(edge_lines(dag, edge)))}"
-        out.append(f"  n{edge.source} -> n{edge.target} [{look}];")
-    return "\n".join([*out, "}"]) + "\n"
-
-
-def _dot_node(node: DagNode, lines: list[str], ink: dict[str, Ink]) -> str:
-    text = "\n".join([*([] if node.merged else [node.word]), *lines, _plans_text(node.plans)])
-    if node.merged:
-        return f'label={quoted(text)}, style="dashed,rounded"'
-    own = ink[node.word]
-    look = f'fillcolor="{own.fill}", fontcolor="{own.text}"' + (
-        ", peripheries=2" if own.again else ""
-    )
-    return f"label={quoted(text)}, tooltip={quoted(node.key)}, {look}"
-
-
-def quoted(text: str) -> str:
+def _quoted(text: str) -> str:
     """A string of Graphviz' language, in which ``&`` begins a character reference."""
     for character, written in (("&", "&amp;"), ("\\", "\\\\"), ('"', '\\"'), ("\n", "\\n")):
         text = text.replace(character, written)
     return f'"{text}"'
-
-
-def _without_parentheses(atom: str) -> str:
-    """An atom without its outer parentheses; a remembered action keeps its own ones."""
-    return atom[1:-1]
-
-
-def _shortened(lines: list[str], most: int, noun: str) -> list[str]:
-    lines = [_clipped(line) for line in lines]
-    if len(lines) <= most:
-        return lines
-    return [*lines[: most - 1], f"and {len(lines) - most + 1} more {noun}"]
 
 
 def _clipped(text: str) -> str:

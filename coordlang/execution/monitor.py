@@ -23,9 +23,9 @@ from array import array
 from bisect import bisect_left
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from decimal import Decimal
 from functools import cache, partial
 from io import BytesIO
-from math import log10
 from typing import Any, TypeVar
 
 FORMAT = "coordlang/choices"
@@ -140,28 +140,34 @@ class _Walk:
         return range(self.first[node], self.first[node + 1])
 
 
-@dataclass(frozen=True, slots=True)
-class _FactSets:
-    """A set of facts for each state; those of state s are ``facts[first[s]:first[s + 1]]``."""
+class _Facts:
+    """Sets of facts by state, as the sorted numbers ``state * facts + fact`` in one flat array."""
 
-    first: array[int]
-    facts: array[int]
-
-    @classmethod
-    def of(cls, sets: Iterable[Iterable[int]]) -> _FactSets:
-        first, facts = array("q", [0]), array("q")
-        for one in sets:
-            facts.extend(sorted(set(one)))
-            first.append(len(facts))
-        return cls(first, facts)
+    def __init__(self, states: Sequence[Any], key: str, facts: int) -> None:
+        self._facts, self._pairs = facts, array("q")
+        for number, state in enumerate(states):
+            numbers = _get(state, key, list, f"state {number}")
+            for fact in numbers:
+                if not _is_number(fact) or not 0 <= fact < facts:
+                    raise _broken(
+                        f"state {number}: '{key}' has {_shown(fact)}; "
+                        f"facts are numbers below {facts}"
+                    )
+            self._pairs.extend(number * facts + fact for fact in sorted(set(numbers)))
 
     def has(self, state: int, fact: int | None) -> bool:
         """Whether a fact is in the set of a state; None never is."""
         if fact is None:
             return False
-        end = self.first[state + 1]
-        at = bisect_left(self.facts, fact, self.first[state], end)
-        return at < end and self.facts[at] == fact
+        pair = state * self._facts + fact
+        at = bisect_left(self._pairs, pair)
+        return at < len(self._pairs) and self._pairs[at] == pair
+
+    def require_apart(self, other: _Facts) -> None:
+        """Raise `MonitorError` if a state has one fact in both."""
+        for pair in sorted({*self._pairs} & {*other._pairs})[:1]:
+            state, fact = divmod(pair, self._facts)
+            raise MonitorError(f"state {state} says that fact {fact} is true and unknown")
 
 
 class _History:
@@ -251,9 +257,10 @@ class Monitor:
         self._numbers = {text: number for number, text in enumerate(self._texts)}
         self._walk = _read_walk(states, labels)
         _check_ends(entry, states, self._walk)
-        self._true = _FactSets.of(_facts_of(states, "true", len(facts)))
-        self._unknown = _FactSets.of(_facts_of(states, "unknown", len(facts)))
-        _check_facts(self._true, self._unknown)
+        self._true = _Facts(states, "true", len(facts))
+        self._unknown = _Facts(states, "unknown", len(facts))
+        self._true.require_apart(self._unknown)
+        self._most = max(MAX_NODES, _NODES_OF_STATE * len(states))
         self._here = 0
         self._history = _History()
         self._promised = Detour()
@@ -424,7 +431,6 @@ class Monitor:
         made_in = cache(partial(self._made_in, detour))
         made = made_in(walk.state[self._here])
         nodes = [(self._here, made)] if made is not None else []
-        most = max(MAX_NODES, _NODES_OF_STATE * (len(self._true.first) - 1))
         numbers = {node: number for number, node in enumerate(nodes)}
         moves: list[list[tuple[int, int]]] = []
         for node, before in nodes:  # which grows meanwhile
@@ -436,11 +442,11 @@ class Monitor:
                     continue
                 after = (to, before | now | then)
                 if after not in numbers:
-                    if len(nodes) >= most:
+                    if len(nodes) >= self._most:
                         raise MonitorError(
                             f"{len(detour.visit) + len(detour.do)} visits and dos at once are too "
-                            f"many here: there are more than {most:,} ways to have made some of "
-                            "them; ask for fewer"
+                            f"many here: there are more than {self._most:,} ways to have made some "
+                            "of them; ask for fewer"
                         )
                     numbers[after] = len(nodes)
                     nodes.append(after)
@@ -553,6 +559,11 @@ def _get(record: Any, key: str, kind: type[_Kind], where: str) -> _Kind:
     return value
 
 
+def _is_number(value: object) -> bool:
+    """Whether a value is a whole number; to Python true and false are, too."""
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
 def _text(record: Any, key: str, where: str) -> str:
     text = _get(record, key, str, where)
     if not text.isprintable():
@@ -578,7 +589,7 @@ def _entry(data: Any, robot: str | None) -> Mapping[str, Any]:
     if not isinstance(data, Mapping) or data.get("format") != FORMAT:
         raise MonitorError(f'expected a choices file: {{"format": "{FORMAT}", ..}}')
     version = data.get("version")
-    if not isinstance(version, int) or isinstance(version, bool) or version != VERSION:
+    if not _is_number(version) or version != VERSION:
         raise MonitorError(
             f"choices file version {_shown(version)}; this program reads version {VERSION}"
         )
@@ -615,12 +626,8 @@ def _check_moves(states: Sequence[Any]) -> None:
         if not reached[number]:
             raise MonitorError(f"state {number} cannot be reached from state 0")
         for to in _get(state, "next", dict, f"state {number}").values():
-            if (
-                not isinstance(to, int)
-                or isinstance(to, bool)
-                or not number < to < len(states)
-                or steps[to] != steps[number] + 1
-            ):
+            is_state = _is_number(to) and number < to < len(states)
+            if not is_state or steps[to] != steps[number] + 1:
                 raise MonitorError(
                     f"state {number} does not lead to a state of step {steps[number] + 1}"
                 )
@@ -672,46 +679,12 @@ def _check_count(record: Mapping[str, Any], key: str, count: int, where: str) ->
     if key not in record:
         raise _broken(f"{where}: '{key}' is missing")
     said = record[key]
-    if isinstance(said, str):
-        same = _is_decimal(said, count)
-    else:
-        same = isinstance(said, int) and not isinstance(said, bool) and said == count
-    if not same:
+    if isinstance(said, str) and said.isascii() and said.isdigit() and said[0] != "0":
+        said = Decimal(said)  # exact, and unlike `int` not limited to some digits
+    if not (_is_number(said) or isinstance(said, Decimal)) or said != count:
         number = str(count) if count.bit_length() < 256 else f"about 2^{count.bit_length()}"
-        raise MonitorError(f"{where} says {_shown(said)} subplans are left, but there are {number}")
-
-
-def _is_decimal(text: str, count: int) -> bool:
-    """Whether a text has the digits of a positive number, which may have more than Python reads."""
-    if abs(len(text) - count.bit_length() * log10(2)) > 2 or text.startswith("0"):
-        return False
-    if not (text.isascii() and text.isdigit()):
-        return False
-    number = 0
-    for at in range(0, len(text), 512):
-        piece = text[at : at + 512]
-        number = number * 10 ** len(piece) + int(piece)
-    return number == count
-
-
-def _facts_of(states: Sequence[Any], key: str, facts: int) -> Iterable[Sequence[int]]:
-    """The numbers of facts in each state."""
-    for number, state in enumerate(states):
-        numbers = _get(state, key, list, f"state {number}")
-        for fact in numbers:
-            if not isinstance(fact, int) or isinstance(fact, bool) or not 0 <= fact < facts:
-                raise _broken(
-                    f"state {number}: '{key}' has {_shown(fact)}; facts are numbers below {facts}"
-                )
-        yield numbers
-
-
-def _check_facts(true: _FactSets, unknown: _FactSets) -> None:
-    """Raise if a state says of an atom that it is true and that it is unknown."""
-    for state in range(len(true.first) - 1):
-        for fact in unknown.facts[unknown.first[state] : unknown.first[state + 1]]:
-            if true.has(state, fact):
-                raise MonitorError(f"state {state} says that fact {fact} is true and unknown")
+        shown = _shown(record[key])
+        raise MonitorError(f"{where} says {shown} subplans are left, but there are {number}")
 
 
 def _texts(value: Texts) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from coordlang.language.partition import Partition
 from coordlang.language.recorded import check_source, options_of, recorded_list
 from coordlang.language.tolerance import Tolerance
 from coordlang.language.words import Language
-from coordlang.verification.by_definition import verify
+from coordlang.verification.by_definition import Verdict, verify
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask
 from planners.joint.tables import Ints
 from planners.pddl.formula_tree import conjuncts
@@ -62,6 +62,8 @@ class TaskLanguage:
         the language says.  For any other task nothing is guaranteed.
     holds
         Whether the plans of each sentence mix freely in the task: verified here.
+    verdict
+        What the verification said; None where there was none, or it did not fit into the memory.
     declared
         The names of domain and problem; None where there is only a model.
     """
@@ -74,6 +76,7 @@ class TaskLanguage:
     covered: bool
     declared: Declared | None = None
     holds: bool = True
+    verdict: Verdict | None = None
 
     @property
     def start(self) -> int:
@@ -164,23 +167,24 @@ def language_in_task(
     space = search(loaded.model, loaded.tasks[0])
     partition = language.partition(loaded.model)
     covered = _covers(language, space, recorded)
-    holds = covered and _holds(partition, space)
+    verdict = _verdict(partition, space) if covered else None
+    holds = verdict is not None and verdict.holds
     covered &= holds or language.may_fail
     word = partition.word_of(space.rows)[space.state]
     declared = Declared(domain.predicates, problem.objects)
-    return TaskLanguage(language, partition, space, 0, word, covered, declared, holds)
+    return TaskLanguage(language, partition, space, 0, word, covered, declared, holds, verdict)
 
 
-def _holds(partition: Partition, space: PlanSpace) -> bool:
+def _verdict(partition: Partition, space: PlanSpace) -> Verdict | None:
     """Whether words are a coordination language in a plan space, by definition.
 
-    False, with a note, where the verification does not fit into the memory.
+    None, with a note, where the verification does not fit into the memory.
     """
     try:
-        return verify(partition, [space]).holds
+        return verify(partition, [space])
     except OutOfMemory as error:
         note(f"what the language promises is not verified here: {error.what}")
-        return False
+        return None
 
 
 def languages_in_tasks(language: Language, candidates: Candidates) -> Iterator[TaskLanguage]:

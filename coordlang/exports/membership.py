@@ -15,6 +15,7 @@ from coordlang.explanation.words import word_formulas
 from planners.joint.model import JointModel
 from planners.joint.tables import Bools, Ints, Rows, unique_rows
 from planners.pddl.lifted import Atom
+from planners.system.errors import UsageError
 
 #: For more states than this no short formulas are looked for.
 _STATES = 20_000
@@ -153,3 +154,17 @@ def _best_test(values: Bools, word: Ints, words: int) -> int:
         left -= (side * np.log2(share)).sum(axis=1)
         left[total[:, 0] == 0] = np.inf
     return int(left.argmin())
+
+
+def refuse_seen_slack(model: JointModel, what: str) -> None:
+    """Raise `UsageError` if words depend on how much is left of the slack.
+
+    ``what`` is what cannot say so.
+    """
+    if model.slack_facts:
+        raise UsageError(
+            f"{what} speaks of the facts of the problem, and the words of this language see how "
+            "much is left of the slack",
+            remedy="`coordlang understand`, `plan` and `choices` give its plans, or build one "
+            "without --words-see-slack.",
+        )

@@ -34,9 +34,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from coordlang.execution.guided_search import plan_under_sentence
-from coordlang.execution.slack import refuse_seen_slack
 from coordlang.execution.task_language import TaskLanguage
-from coordlang.exports.membership import membership
+from coordlang.exports.membership import membership, refuse_seen_slack
 from coordlang.exports.naming import RobotLabel, named_by_words
 from planners.classical import (
     ClassicalAction,

@@ -72,6 +72,11 @@ def page_data(
         task.update(task_summary(part, world))
     return {
         "robots": list(model.robots),
+        "kept": {
+            "plan": model.kept_plan,
+            "plans": model.kept_plans,
+            "one": f"{'a' if model.slack else 'an'} {model.kept_plan}",
+        },
         **(_lifted_words(language, lifted) if lifted else _words(language, model)),
         "default": language.words.index(language.default),
         "things": list(world.things),

@@ -138,7 +138,8 @@ def _render(
         features=data.get("features", ()),
         all_listed=language.provenance.tasks.get("kind") == "all",
         terms_open=_TERMS_OPEN if len(words) <= _FEW_WORDS else 1,
-        figures=_figures(language),
+        figures=_figures(language, data["kept"]["plans"]),
+        kept=data["kept"],
         may_fail=language.may_fail,
         warning=language.tolerance.warning if language.tolerance else None,
         slack=language.tolerance.slack if language.tolerance else None,
@@ -186,7 +187,7 @@ def _json(data: Mapping[str, Any]) -> str:
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
-def _figures(language: Language) -> list[tuple[str, str, str]]:
+def _figures(language: Language, plans: str) -> list[tuple[str, str, str]]:
     g, tolerance = language.guarantee, language.tolerance
     kind = {"all": "all pairs of states", "problems": "of the problems", "file": "of a task file"}
     return [
@@ -196,7 +197,7 @@ def _figures(language: Language) -> list[tuple[str, str, str]]:
             _number(int(language.provenance.tasks.get("count", 0))),
             kind.get(str(language.provenance.tasks.get("kind")), ""),
         ),
-        ("States", _number(len(language.states)), "on optimal plans of these tasks"),
+        ("States", _number(len(language.states)), f"on {plans} of these tasks"),
         *(
             [
                 (

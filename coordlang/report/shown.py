@@ -161,7 +161,7 @@ def _candidates(
         except ProvedImpossible:
             continue  # of two states one need not be reachable from the other
         word = first.partition.word_of(space.rows)[space.state]
-        yield replace(first, space=space, task=0, word=word, covered=True, holds=True)
+        yield replace(first, space=space, task=0, word=word, covered=True, holds=True, verdict=None)
 
 
 def _recorded(

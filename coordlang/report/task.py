@@ -76,7 +76,7 @@ def _verified(language: TaskLanguage) -> tuple[bool | None, Miscoordination | No
     if len(language.space.target) > _VERIFIED:
         return None, None
     try:
-        verdict = verify(language.partition, [language.space])
+        verdict = language.verdict or verify(language.partition, [language.space])
     except OutOfMemory:
         return None, None
     return verdict.holds, verdict.witness

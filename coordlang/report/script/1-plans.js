@@ -1,7 +1,7 @@
 // The plans of a task that fit a sentence, as a graph; counts are exact (BigInt).
 
 class Fits {
-  // words: word numbers, or null for all optimal plans.  Nodes are pairs (task node, words said so far), numbered by step;
+  // words: word numbers, or null for all plans of the task.  Nodes are pairs (task node, words said so far), numbered by step;
   // only those on some fitting plan are kept.  out[k]: pairs [edge, node] in the order of labels.
   constructor(task, wordOf, words) {
     this.task = task;

@@ -30,10 +30,10 @@ class TaskView {
     const { task } = this, plans = BigInt(task.plans);
     const cost = task.second === null ? '' : ` (second cost ${task.second})`;
     this.byId('task-summary').replaceChildren(
-      make('strong', {}, counted(plans, 'optimal plan')), ` of `, make('strong', {}, counted(task.steps, 'step')), cost, ', ',
+      make('strong', {}, countedPlans(plans)), ` of `, make('strong', {}, counted(task.steps, 'step')), cost, ', ',
       ...(task.all_sentences === null ? ['too many sentences to count. '] : [make('strong', {}, counted(task.all_sentences, 'sentence')), '. ']),
       task.requires === null ? 'Whether coordination is required was not decided: too large.' : task.requires
-        ? `Coordination is required: some mixtures of these plans go wrong${task.silence === null ? '' : `, without a word ${percent(task.silence)} of all`}.` : 'No coordination is required: any mixture of these plans is optimal.');
+        ? `Coordination is required: some mixtures of these plans go wrong${task.silence === null ? '' : `, without a word ${percent(task.silence)} of all`}.` : 'No coordination is required: any mixture of these plans is one of them.');
     const warning = this.byId('task-warning');
     const text = task.violation ? 'In this task it is no coordination language: plans with one sentence miscoordinate, as shown below.'
         + (task.failure === null ? '' : ` Robots that choose by themselves fail in ${percent(task.failure)} of all runs.`)
@@ -42,8 +42,8 @@ class TaskView {
     warning.textContent = text; warning.hidden = !text;
     warning.classList.toggle('bad', Boolean(task.violation) || task.verified === null);
     this.byId('space-note').textContent = (task.complete
-      ? `All ${counted(task.nodes.state.length, 'node')} and ${counted(task.target.length, 'joint step')} on optimal plans; every way from left to right is one. `
-      : `Too large to show: of ${counted(task.all_nodes, 'node')} and ${counted(task.all_edges, 'joint step')} on optimal plans, these are on plans drawn at random. `)
+      ? `All ${counted(task.nodes.state.length, 'node')} and ${counted(task.target.length, 'joint step')} on ${DATA.kept.plans}; every way from left to right is one. `
+      : `Too large to show: of ${counted(task.all_nodes, 'node')} and ${counted(task.all_edges, 'joint step')} on ${DATA.kept.plans}, these are on plans drawn at random. `)
       + 'A node is a joint state, coloured by its word; choose one to see a plan through it.';
     this.byId('sentences-note').textContent = task.all_sentences === null
       ? `Sentences of plans drawn at random: ${task.sentences.length}.` : task.all_sentences > task.sentences.length
@@ -75,7 +75,7 @@ class TaskView {
     make('span', { class: 'said' }, ...said), make('span', { class: 'open', title: counted(open, 'plan') }, shortNumber(open)),
     make('span', { class: 'bar', style: `--share:${share(open, plans)}%` }), own ? make('span', { class: 'own' }, own) : null);
     this.byId('sentence-list').replaceChildren(
-      row(-1, [make('span', {}, 'All optimal plans')], plans, null),
+      row(-1, [make('span', {}, `All ${DATA.kept.plans}`)], plans, null),
       ...task.sentences.map((s, k) => row(k, s.words.map(chip), BigInt(s.plans), ownText(s, task))));
   }
 
@@ -183,10 +183,10 @@ class TaskView {
 
   ending(step) {
     if (this.broken && step === this.edges.length) {
-      return `Now ${this.broken.map((label, r) => `${DATA.robots[r]} chose ${DATA.labels[r][label].short}`).join(' and ')}: that is not part of any optimal plan.`;
+      return `Now ${this.broken.map((label, r) => `${DATA.robots[r]} chose ${DATA.labels[r][label].short}`).join(' and ')}: that is not part of any ${DATA.kept.plan}.`;
     }
     if (step < this.task.steps) return '';
-    return this.mode < 0 ? 'The goal is reached.' : 'The goal is reached on an optimal plan, and nobody had to ask.';
+    return this.mode < 0 ? 'The goal is reached.' : `The goal is reached on ${DATA.kept.one}, and nobody had to ask.`;
   }
 
   optionArrows(step) {

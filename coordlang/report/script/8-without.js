@@ -12,9 +12,9 @@ class WithoutView {
     this.task = task;
     this.byId('without-player').hidden = !witness;
     this.byId('without-note').textContent = !witness
-      ? (task.requires === null ? 'Not decided for this task: it is too large.' : 'In this task nothing can go wrong: any mixture of its optimal plans is an optimal plan.')
+      ? (task.requires === null ? 'Not decided for this task: it is too large.' : `In this task nothing can go wrong: any mixture of its ${DATA.kept.plans} is ${DATA.kept.one}.`)
       : task.violation ? 'These plans have one sentence, and yet they do not mix. Each robot follows its own part of another one.'
-        : 'Each robot knows the task and plans by itself, an optimal plan each time, and follows its own part of it. Nobody has said a word.';
+        : `Each robot knows the task and plans by itself, ${DATA.kept.one} each time, and follows its own part of it. Nobody has said a word.`;
     if (!witness) return;
     const impossible = witness.stops !== null;
     this.last = impossible ? witness.stops + 1 : witness.together.length - 1;
@@ -64,8 +64,8 @@ class WithoutView {
     line.classList.toggle('bad', breaks);
     line.textContent = broken ? `Step ${step} is not possible: ${witness.stops === witness.breaks ? witness.reason : witness.why}.`
       : late && !witness.reaches ? `After ${counted(step, 'step')} the goal is not reached. It went wrong in step ${witness.breaks + 1}: ${witness.reason}.`
-        : late ? `The goal is reached, but not on an optimal plan: ${witness.reason}.`
-          : breaks ? `Step ${witness.breaks + 1} is on no optimal plan: ${witness.reason}.` : step ? 'So far, so good.' : '';
+        : late ? `The goal is reached, but not on ${DATA.kept.one}: ${witness.reason}.`
+          : breaks ? `Step ${witness.breaks + 1} is on no ${DATA.kept.plan}: ${witness.reason}.` : step ? 'So far, so good.' : '';
   }
 }
 

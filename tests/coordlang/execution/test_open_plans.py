@@ -14,10 +14,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordlang.execution.drawing import COLOURS, cut_note, inks, to_dot
+from coordlang.execution.drawing import COLOURS, cut_note, inks, plans_dot
 from coordlang.execution.fitting_plans import NoPlanFits
-from coordlang.execution.open_plans import OpenPlans, open_plans_data
-from coordlang.execution.plan_dag import PlanDag, plan_dag
+from coordlang.execution.open_plans import OpenPlans, PlanDag, open_plans_data, plan_dag
 from coordlang.execution.task_language import TaskLanguage
 from planners.search.plan_file import texts
 from planners.search.plans import Plan
@@ -148,8 +147,8 @@ def test_a_cut_dag_says_what_is_missing(name: str, most: int) -> None:
         )
     assert (cut_note(small) is None) == (small.cut == 0)
     if small.cut:
-        assert f"cut: {small.cut} nodes" in to_dot(small)
-        assert "dashed" in to_dot(small)
+        assert f"cut: {small.cut} nodes" in plans_dot(small)
+        assert "dashed" in plans_dot(small)
     else:
         assert small == whole
 
@@ -167,7 +166,7 @@ DRAWN = [
 @pytest.mark.parametrize("name", DRAWN)
 def test_dot_has_every_node_and_edge(name: str) -> None:
     graph = largest(name)
-    text = to_dot(graph)
+    text = plans_dot(graph)
     assert len(re.findall(r"^    n\d+ \[", text, re.M)) == len(graph.nodes)
     assert len(re.findall(r"^  n\d+ -> n\d+ \[", text, re.M)) == len(graph.edges)
     assert text.count("{") == text.count("}")
